@@ -492,7 +492,8 @@ fn b2a_alone_finds_its_place_by_b_cnav2_and_its_pilot() {
 /// and both loops as theory has them. A deviation of N independent errors scatters by the root of 1/(2N),
 /// with the N that the judge states: three of these are the bar, and 5 % where they are more. In 42 s and
 /// four satellites they are 6 % of the carrier's, at ten a second, but 13 % of the code's, whose loop has 0.5
-/// Hz: of 24 seeds of B2I 4 are more than 5 % off there, with a mean of 0.994 ± 0.007, and none of 8 in 150 s.
+/// Hz: of 24 seeds of B2I 4 are more than 5 % off there, with a mean of 0.994 ± 0.007, and none of 8 in
+/// 150 s.
 fn in_phase_alone(signal: &str, front_end: &str, duration_s: u32) -> Value {
     let duration = format!("duration_s = {duration_s}\n");
     let scene = include_str!("../scenarios/beidou.toml")

@@ -120,6 +120,7 @@ pub const ORDER: Order<'static> = &[
             &["front_end", "multiple_access"],
             &["samples"],
             &["spectrum"],
+            &["stated"],
             &["due", "timeline"],
             &["loops"],
             &["multipath"],

@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use crate::analysis::read::Run;
 use crate::analysis::waveform::{Waveform, leading};
-use crate::gnss::signal::{Layers, Signal, Tone};
+use crate::gnss::signal::{Component, Layer, Layers, Signal, Tone};
 
 /// What `receiver.json` says of a signal.
 #[derive(Clone, Debug, Deserialize)]
@@ -25,6 +25,9 @@ struct Entry {
 /// What a receiver follows of a signal.
 #[derive(Clone, Debug)]
 pub(in crate::analysis) struct Followed {
+    /// The component, and the layer of it that the replica has; none where it has all.
+    pub component: &'static Component,
+    pub made: Option<&'static Layer>,
     /// Of what is sent with the replica.
     pub found: Waveform,
     /// Of the whole waveform with the replica: what the discriminator is made for.
@@ -77,6 +80,8 @@ impl Followed {
         };
         let of = |shape| Waveform::of_shape(shape, component.chip_rate_hz);
         Some(Self {
+            component,
+            made,
             found: of(found),
             assumed: of(assumed),
             own: of(own),

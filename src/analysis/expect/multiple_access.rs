@@ -6,10 +6,8 @@
 //! sampler that averages over its interval, and a replica that does too, narrow the spectra and raise κ.
 //! Every pair of signals counts whose carriers are within the sample rate, each component by its share of
 //! power. Interference adds its own power times its own separation ([`super::jamming`]). Limits: components
-//! of one signal do not disturb each other. Data beside a pilot in phase with it do, as their codes correlate
-//! at no delay by a share of their own for each satellite: 0.03 of the amplitude for E1 of E11 and E33, which
-//! takes 0.2 dB from the C/N0 that a receiver states, and 0.001 for E27. What folds back from beyond the band
-//! is left out.
+//! of one signal do not disturb each other ([`super::stated`] has what they do); what folds back from beyond
+//! the band is left out.
 
 use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap};

@@ -89,7 +89,7 @@ type Null = (f64, f64);
 
 /// Decibels of C/N0 that filter and converter of its front end cost each signal's replica, noise alone
 /// counted: a filter passes less of the code than of noise with the code's spectrum, and rounding adds noise.
-/// What edges between samples cost beside is [`edge_costs_db`].
+/// What edges between samples cost beside is [`edge_cost_db`].
 pub fn costs_db(run: &Run) -> BTreeMap<&'static Signal, f64> {
     let kept = |signal: &'static Signal| {
         let place = run.front_end(signal);
@@ -129,11 +129,6 @@ pub fn costs_db(run: &Run) -> BTreeMap<&'static Signal, f64> {
 /// then, which is all that the replica wants.
 pub fn edge_cost_db(run: &Run, signal: &'static Signal) -> f64 {
     -10.0 * libm::log10(found(run, signal, false).unwrap_or(1.0))
-}
-
-/// The same of every signal.
-pub fn edge_costs_db(run: &Run) -> BTreeMap<&'static Signal, f64> {
-    run.signals.iter().map(|&signal| (signal, edge_cost_db(run, signal))).collect()
 }
 
 /// Steps of those integrals over the samples' band.

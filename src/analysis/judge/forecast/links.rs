@@ -13,7 +13,8 @@ use crate::analysis::expect::loops::{Stresses, Theory, update_s};
 use crate::analysis::expect::multipath::Rays;
 use crate::analysis::expect::multiple_access::MultipleAccess;
 use crate::analysis::expect::quantile::{largest, mean_square};
-use crate::analysis::expect::spectrum::{costs_db, edge_costs_db};
+use crate::analysis::expect::spectrum::costs_db;
+use crate::analysis::expect::stated::Stated;
 use crate::analysis::expect::theory::edges;
 use crate::analysis::expect::timeline::Timeline;
 use crate::analysis::judge::forecast::settled::Settled;
@@ -111,15 +112,15 @@ impl Links {
             return Ok(links);
         }
         let access = MultipleAccess::new(run);
-        let (costs_db, edges_db) = (costs_db(run), edge_costs_db(run));
+        let (costs_db, stated) = (costs_db(run), Stated::of(run));
         for link in errors.signals.keys() {
             let Some(update_s) = update_s(run, link.signal) else { continue };
             let Some(theory) = Theory::new(run, settings, &link, update_s) else {
                 links.unheld.push(run.name(link));
                 continue;
             };
-            let [cost_db, edge_db] = [&costs_db, &edges_db].map(|all| all.get(link.signal).copied().unwrap_or(0.0));
-            let rows = Settled::of((run, &access), errors, link, &theory, [cost_db, edge_db])?;
+            let cost_db = costs_db.get(link.signal).copied().unwrap_or(0.0);
+            let rows = Settled::of((run, &access), errors, link, &theory, (cost_db, &stated))?;
             if rows.count < LEAST {
                 continue;
             }

@@ -17,6 +17,7 @@ use crate::analysis::expect::loops::{Theory, update_s};
 use crate::analysis::expect::message::Message;
 use crate::analysis::expect::multipath::{self, Rays};
 use crate::analysis::expect::smoothing::Smoothing;
+use crate::analysis::expect::stated::Stated;
 use crate::analysis::expect::theory::edges;
 use crate::analysis::judge::forecast::links::CN0_DB;
 use crate::analysis::measure::errors::{Errors, SignalError};
@@ -175,7 +176,7 @@ pub struct Scene<'r> {
     health: BTreeMap<Link, Vec<(u64, bool)>>,
     /// Decibels that filter and converter cost, by signal.
     costs_db: BTreeMap<&'static Signal, f64>,
-    edge_costs_db: BTreeMap<&'static Signal, f64>,
+    stated: Stated,
     /// Error of chip edges with a code at rest, root mean square.
     edges_m: BTreeMap<&'static Signal, f64>,
 }
@@ -213,7 +214,7 @@ impl<'r> Scene<'r> {
             whole,
             health,
             costs_db: crate::analysis::expect::spectrum::costs_db(run),
-            edge_costs_db: crate::analysis::expect::spectrum::edge_costs_db(run),
+            stated: Stated::of(run),
             edges_m: (run.signals.iter())
                 .filter(|_| run.scene.code_edge == Edge::Area)
                 .map(|&signal| (signal, edges::averaged_m(signal, run.scene.waveform, run.rate_hz(signal))))
@@ -289,7 +290,7 @@ impl<'r> Scene<'r> {
         // What the system's time is ahead of GPS time goes into its own clock.
         let ahead_m = SPEED_OF_LIGHT_MPS * self.run.scene.ahead_s(true_row.signal.time.name);
         let cost_db = self.costs_db.get(true_row.signal).copied().unwrap_or(0.0);
-        let edge_db = self.edge_costs_db.get(true_row.signal).copied().unwrap_or(0.0);
+        let lacks_db = self.stated.cost_db(true_row.link(), row.cn0_effective_dbhz - cost_db);
         let cn0_hz = libm::pow(10.0, (row.cn0_effective_dbhz - cost_db) / 10.0);
         let (_, code) = theory.noise(Loop::Dll, cn0_hz);
         let (_, rate_hz) = theory.noise(Loop::Fll, cn0_hz);
@@ -310,7 +311,7 @@ impl<'r> Scene<'r> {
             rate_sigma_mps: rate_hz * true_row.link().wavelength_m(),
             rate_bias_mps: 0.0,
             cn0_hz,
-            steady: (row.cn0_dbhz - row.cn0_effective_dbhz + cost_db + edge_db).abs() <= CN0_DB,
+            steady: (row.cn0_dbhz - row.cn0_effective_dbhz + cost_db + lacks_db).abs() <= CN0_DB,
             fading: false,
             slant: if in_space { 1.0 } else { 1.0 / sin.max(0.05) },
             near_mask: !in_space && elevation_rad < self.choices.mask_rad + MASK_SLACK_RAD,

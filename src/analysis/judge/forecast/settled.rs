@@ -8,6 +8,7 @@ use crate::analysis::expect::due::satellite::is_stepping;
 use crate::analysis::expect::loops::Theory;
 use crate::analysis::expect::multipath::{self, Rays};
 use crate::analysis::expect::multiple_access::MultipleAccess;
+use crate::analysis::expect::stated::Stated;
 use crate::analysis::measure::errors::{Errors, PULL_IN_S, SignalError};
 use crate::analysis::read::{Numbers, Run};
 use crate::gnss::signal::Link;
@@ -48,8 +49,8 @@ pub(super) struct Settled {
 }
 
 impl Settled {
-    /// Those of a satellite whose C/N0 the front end lowers by so much, and edges between samples by so much,
-    /// which theory has in its share of the power.
+    /// Those of a satellite whose C/N0 the front end lowers by so much; what else the stated one lacks is in
+    /// theory's share of the power or does not disturb loops.
     ///
     /// # Errors
     /// [`JudgeError`] where rows cannot be read or numbers cannot be put away.
@@ -58,7 +59,7 @@ impl Settled {
         errors: &Errors,
         link: Link,
         theory: &Theory,
-        [cost_db, edge_db]: [f64; 2],
+        (cost_db, stated): (f64, &Stated),
     ) -> Result<Self, JudgeError> {
         let jammed = |row: &SignalError| row.cn0_true_dbhz - row.cn0_effective_dbhz;
         let mut least = f64::INFINITY;
@@ -88,7 +89,8 @@ impl Settled {
             };
             let own_hz = libm::pow(10.0, row.cn0_true_dbhz / 10.0);
             let white_hz = access.white_hz(row.sample, link, own_hz) / libm::pow(10.0, cost_db / 10.0);
-            found.add(&row, (ray_m, white_hz), [cost_db, edge_db])?;
+            let lacks_db = stated.cost_db(link, row.cn0_effective_dbhz - cost_db);
+            found.add(&row, (ray_m, white_hz), [cost_db, lacks_db])?;
         }
         Ok(found)
     }
@@ -119,7 +121,7 @@ impl Settled {
         &mut self,
         row: &SignalError,
         (ray_m, white_hz): (f64, f64),
-        [cost_db, edge_db]: [f64; 2],
+        [cost_db, lacks_db]: [f64; 2],
     ) -> Result<(), JudgeError> {
         let goes_on = row.locked_s > self.locked_s && row.time_s - self.ends_s.1 < 1.0;
         match self.spans.last_mut() {
@@ -134,9 +136,9 @@ impl Settled {
         self.doppler.push(row.doppler_hz)?;
         self.inverse_hz += 1.0 / libm::pow(10.0, (row.cn0_effective_dbhz - cost_db) / 10.0);
         self.white_hz += white_hz;
-        self.dbhz += row.cn0_effective_dbhz - cost_db - edge_db;
+        self.dbhz += row.cn0_effective_dbhz - cost_db - lacks_db;
         self.others += libm::pow(10.0, (row.cn0_true_dbhz - row.cn0_effective_dbhz) / 10.0) - 1.0;
-        let off_db = row.cn0_dbhz - row.cn0_effective_dbhz + cost_db + edge_db;
+        let off_db = row.cn0_dbhz - row.cn0_effective_dbhz + cost_db + lacks_db;
         self.off_db += off_db;
         self.most_off_db = self.most_off_db.max(off_db.abs());
         Ok(())

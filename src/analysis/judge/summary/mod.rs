@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::expect::spectrum::{self, Spectrum};
+use crate::analysis::expect::stated::Stated;
 use crate::analysis::expect::theory::clock::white_phase;
 use crate::analysis::judge::verdict::Verdict;
 use crate::analysis::measure::allan::{Deviation, Point};
@@ -170,8 +171,8 @@ pub struct Observables {
     pub doppler_rms_hz: Option<f64>,
     /// Mean of measured minus expected: the scene's C/N0 with other satellites and interference counted as
     /// noise (see [`crate::analysis::expect::multiple_access`]), less what edges between samples and the
-    /// replica cost ([`crate::analysis::expect::spectrum::edge_costs_db`]). Losses of filter and quantiser
-    /// are not counted.
+    /// replica cost ([`crate::analysis::expect::spectrum::edge_cost_db`]) and what data in phase with a pilot
+    /// do. Losses of filter and quantiser are not counted.
     pub cn0_bias_db: Option<f64>,
 }
 
@@ -307,8 +308,8 @@ impl Summary {
         let satellites = satellites(run, &mut details);
         let position = position(run, errors, &mut details)?;
         let clock = clock_section(clock, &mut details)?;
-        let costs_db = spectrum::edge_costs_db(run);
-        let observables = observables(errors, (None, &costs_db), &mut details)?;
+        let stated = Stated::of(run);
+        let observables = observables(errors, (None, &stated), &mut details)?;
         let tracking = tracking(run, errors, &mut details)?;
         let navigation = navigation(run, &mut details);
         details.psd_theory_db = spectrum::theory_db(run)?;
@@ -326,7 +327,7 @@ impl Summary {
             clock,
             observables,
             tracking,
-            signals: by_signal(run, errors, &costs_db)?,
+            signals: by_signal(run, errors, &stated)?,
             navigation,
             psd,
             interference: Lines::of(run)?,
@@ -439,18 +440,14 @@ fn clock_section(clock: &clock::Clock, details: &mut Details) -> Result<Clock, J
     })
 }
 
-fn by_signal(
-    run: &Run,
-    errors: &Errors,
-    costs_db: &BTreeMap<&Signal, f64>,
-) -> Result<BTreeMap<&'static str, BySignal>, JudgeError> {
+fn by_signal(run: &Run, errors: &Errors, stated: &Stated) -> Result<BTreeMap<&'static str, BySignal>, JudgeError> {
     let signals: BTreeSet<&'static Signal> = errors.signals.keys().map(|link| link.signal).collect();
     let one = |signal: &'static Signal| {
         let sigma = |of: LoopError| errors.settled_std(Some(signal), of);
         let lost = run.events.iter().filter(|row| row.event == Event::LossOfLock && row.signal == signal);
         let figures = BySignal {
             satellites: errors.signals.keys().filter(|link| link.signal == signal).count(),
-            observables: observables(errors, (Some(signal), costs_db), &mut Details::default())?,
+            observables: observables(errors, (Some(signal), stated), &mut Details::default())?,
             tracking: SignalTracking {
                 losses_of_lock: lost.count(),
                 dll_sigma_chips: sigma(DLL_CHIPS)?,
@@ -466,7 +463,7 @@ fn by_signal(
 /// Of one signal, or of all.
 fn observables(
     errors: &Errors,
-    (signal, costs_db): (Option<&Signal>, &BTreeMap<&Signal, f64>),
+    (signal, stated): (Option<&Signal>, &Stated),
     details: &mut Details,
 ) -> Result<Observables, JudgeError> {
     let code = errors.code_without_clock_m(signal)?;
@@ -481,8 +478,8 @@ fn observables(
     let doppler_rms_hz = doppler.rms()?;
     details.doppler_hz = doppler.spread()?;
     drop(doppler);
-    let cost_db = |link: &Link| costs_db.get(link.signal).copied().unwrap_or(0.0);
-    let cn0 = errors.pooled_by(signal, |link, error| error.cn0_dbhz - error.cn0_effective_dbhz + cost_db(link))?;
+    let expected_dbhz = |link: &Link, dbhz: f64| dbhz - stated.cost_db(*link, dbhz);
+    let cn0 = errors.pooled_by(signal, |link, error| error.cn0_dbhz - expected_dbhz(link, error.cn0_effective_dbhz))?;
     details.cn0_db = cn0.spread()?;
     let (mut means, [mut truth, mut effective, mut measured]) = (Vec::new(), [Sum::default(); 3]);
     for link in errors.signals.keys().filter(|link| signal.is_none_or(|signal| link.signal == signal)) {
