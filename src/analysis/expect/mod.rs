@@ -1,7 +1,7 @@
 //! Expecting: what theory and the scene's truth let one expect, before any result of a receiver is looked at.
 //!
 //! [`theory`] has the closed forms with their sources. [`samples`] is the density that the samples should
-//! have as [`welch`] shows it, through a [`converter`] and the [`response`] of a filter, and [`spectrum`]
+//! have as [`welch`] shows it, through a [`converter`] and the response of a filter, and [`spectrum`]
 //! what follows from it; [`jamming`] and [`multiple_access`] say what interference and other satellites take
 //! from C/N0. [`timeline`] is the truth as a function of time. `loops` are the receiver's three loops as
 //! linear systems, [`multipath`] is the code error that reflected rays leave in them, [`smoothing`] what the
