@@ -1,8 +1,7 @@
-//! The carrier replica: one phasor for sixteen samples, from powers in `f64`.
+//! The carrier replica: one phasor for sixteen samples, or for sixteen pairs of them, from powers in `f64`.
 //!
-//! A vector of sixteen samples is turned by the phasor of its first sample only; what is left, the turn
-//! within a vector, is the same for every vector and is applied to the sums. Phasors carry an error of a few
-//! 1e-7.
+//! A vector is turned by the phasor of its first sample only; what is left, the turn within a vector, is the
+//! same for every vector and is applied to the sums. Phasors carry an error of a few 1e-7.
 
 use num_complex::Complex64;
 
@@ -14,9 +13,9 @@ pub(super) const LANES: usize = 16;
 pub(super) const BLOCK: usize = LANES * LANES;
 
 /// Sixteen complex numbers.
-struct Sixteen {
-    re: [f64; LANES],
-    im: [f64; LANES],
+pub(super) struct Sixteen {
+    pub re: [f64; LANES],
+    pub im: [f64; LANES],
 }
 
 impl Sixteen {
@@ -55,9 +54,29 @@ pub(super) struct Carrier {
 }
 
 impl Carrier {
+    /// Of vectors of sixteen samples.
     #[inline(always)]
     pub fn new(nco: &Nco) -> Self {
         let (within, vector_turn) = Sixteen::powers(phasor(nco.carrier_step));
+        Self::of(nco, within, vector_turn)
+    }
+
+    /// Of vectors of sixteen pairs of samples, over each of which it stands still in the middle.
+    #[inline(always)]
+    pub fn of_pairs(nco: &Nco) -> Self {
+        let one = phasor(nco.carrier_step);
+        let (mut within, vector_turn) = Sixteen::powers(one * one);
+        let middle = 0.5 * (Complex64::ONE + one);
+        for k in 0..LANES {
+            let (re, im) = (within.re[k], within.im[k]);
+            within.re[k] = re * middle.re - im * middle.im;
+            within.im[k] = re * middle.im + im * middle.re;
+        }
+        Self::of(nco, within, vector_turn)
+    }
+
+    #[inline(always)]
+    fn of(nco: &Nco, within: Sixteen, vector_turn: Complex64) -> Self {
         let (turns, block_turn) = Sixteen::powers(vector_turn);
         // Loops take on the instruction set of where they stand; a closure that `map` calls does not.
         let (mut turns_re, mut turns_im) = ([0.0; LANES], [0.0; LANES]);
@@ -81,43 +100,19 @@ impl Carrier {
         (cos, sin)
     }
 
-    /// Turns within a vector of pairs of lanes, each the mean of two.
+    /// Turns of the lanes, or of the pairs, against their vector's first sample.
     #[inline(always)]
-    pub fn pairs(&self) -> Pairs {
-        let mut pairs = Pairs { re: [0.0; LANES / 2], im: [0.0; LANES / 2] };
-        for k in 0..LANES / 2 {
-            pairs.re[k] = 0.5 * (self.within.re[2 * k] + self.within.re[2 * k + 1]);
-            pairs.im[k] = 0.5 * (self.within.im[2 * k] + self.within.im[2 * k + 1]);
-        }
-        pairs
+    pub fn within(&self) -> &Sixteen {
+        &self.within
     }
 
-    /// The sum of lanes, each turned back to the vectors' first samples.
+    /// The sum of lanes, or of pairs, each turned back to the vectors' first samples.
     #[inline(always)]
     pub fn fold(&self, re: &[f64; LANES], im: &[f64; LANES]) -> Complex64 {
         let (mut turned_re, mut turned_im) = ([0.0; LANES], [0.0; LANES]);
         for k in 0..LANES {
             turned_re[k] = re[k] * self.within.re[k] + im[k] * self.within.im[k];
             turned_im[k] = im[k] * self.within.re[k] - re[k] * self.within.im[k];
-        }
-        Complex64::new(sum(turned_re), sum(turned_im))
-    }
-}
-
-/// Turns within a vector, by pairs of lanes.
-pub(super) struct Pairs {
-    re: [f64; LANES / 2],
-    im: [f64; LANES / 2],
-}
-
-impl Pairs {
-    /// The sum of pairs of lanes, each turned back to the vectors' first samples.
-    #[inline(always)]
-    pub fn fold(&self, re: &[f64; LANES / 2], im: &[f64; LANES / 2]) -> Complex64 {
-        let (mut turned_re, mut turned_im) = ([0.0; LANES / 2], [0.0; LANES / 2]);
-        for k in 0..LANES / 2 {
-            turned_re[k] = re[k] * self.re[k] + im[k] * self.im[k];
-            turned_im[k] = im[k] * self.re[k] - re[k] * self.im[k];
         }
         Complex64::new(sum(turned_re), sum(turned_im))
     }
@@ -152,8 +147,9 @@ fn phasor(turns: u64) -> Complex64 {
     let z = x * x;
     let (mut sin, mut cos) = (1.0, 1.0);
     for n in [15.0, 13.0, 11.0, 9.0, 7.0, 5.0, 3.0] {
-        sin = 1.0 - z * sin * (1.0 / (n * (n - 1.0)));
-        cos = 1.0 - z * cos * (1.0 / (n * (n + 1.0)));
+        // Of z alone, so that only one product waits for the term before.
+        sin = 1.0 - sin * (z * (1.0 / (n * (n - 1.0))));
+        cos = 1.0 - cos * (z * (1.0 / (n * (n + 1.0))));
     }
     sin *= x;
     cos = 1.0 - 0.5 * z * cos;

@@ -3,46 +3,77 @@
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64 as x86;
+use std::ops::Range;
 
 use num_complex::Complex64;
 
-use super::super::carrier::LANES;
+use super::super::carrier::{Carrier, LANES};
 use super::super::kernel::Level;
-use super::{AMPLITUDE, Job, Places, ROWS, SEGMENT, body};
+use super::{AMPLITUDE, Job, Places, ROWS, SEGMENT, SEGMENTS, body};
 
-/// Pairs of samples in a vector.
-pub(super) const PAIRS: usize = LANES / 2;
-/// Samples that are taken together, two vectors.
-pub(super) const TOGETHER: usize = 2 * LANES;
-/// Vectors of a segment.
-pub(super) const VECTORS: usize = SEGMENT / LANES;
+/// Samples that share a phasor, and such vectors of a stretch.
+pub(super) const VECTOR: usize = 2 * LANES;
+pub(super) const VECTORS: usize = SEGMENTS * SEGMENT / VECTOR;
 /// Phasors of length one.
 pub(super) const UNIT: f32 = 32_767.0;
 /// Adding this to a float leaves its integer, rounded half to even, in the low bits.
 const ROUND: f32 = 12_582_912.0;
 
-/// Sums of the pairs of all vectors, in phase and in quadrature, a tap: whole numbers. Those of a segment, 32
+/// Sums of the pairs of all vectors, in phase and in quadrature, a tap: whole numbers. Those of a stretch, 32
 /// pairs of 127.5·2⁴·√2 · 127 · 64, stay below 2³¹.
-pub(super) type Sums<const T: usize> = [[[f64; PAIRS]; 2]; T];
+pub(super) type Sums<const T: usize> = [[[f64; LANES]; 2]; T];
 
-/// Samples and what they are multiplied by.
-pub(super) struct Segment<'a, const T: usize> {
-    pub i: &'a [[i16; TOGETHER]],
-    pub q: &'a [[i16; TOGETHER]],
-    /// A phasor for each vector, the same in both halves.
-    pub cos: &'a [[i32; 2]],
-    pub sin: &'a [[i32; 2]],
-    /// Values of two rows side by side; those of the first sample are entry `from`.
+/// Samples of some segments and what they are multiplied by.
+pub(super) struct Stretch<'a, const T: usize> {
+    pub i: &'a [[i16; VECTOR]],
+    pub q: &'a [[i16; VECTOR]],
+    /// Both components of the few samples after these, and zeros.
+    pub last: Option<&'a [[i16; VECTOR]; 2]>,
+    /// A phasor for each vector, the same in both halves of a number.
+    pub cos: &'a [i32; VECTORS],
+    pub sin: &'a [i32; VECTORS],
+    /// Values of two rows side by side; those of a segment's first sample are entry `from`.
     pub entries: &'a [[i8; 2]],
-    pub from: [usize; T],
-    pub weights: [[u8; 2]; T],
+    pub from: &'a [[usize; T]; SEGMENTS],
+    /// Two bytes, that of the row itself first.
+    pub weights: &'a [[i16; T]; SEGMENTS],
+}
+
+impl<const T: usize> Stretch<'_, T> {
+    /// Vectors of samples, with the last one.
+    #[inline(always)]
+    fn vectors(&self) -> usize {
+        (self.i.len().min(self.q.len()) + usize::from(self.last.is_some())).min(VECTORS)
+    }
+
+    /// Samples of a vector there is.
+    #[inline(always)]
+    fn samples(&self, vector: usize) -> [&[i16; VECTOR]; 2] {
+        match (self.i.get(vector), self.q.get(vector), self.last) {
+            (Some(i), Some(q), _) => [i, q],
+            (.., Some([i, q])) => [i, q],
+            _ => [&[0; VECTOR]; 2],
+        }
+    }
+
+    /// Numbers of a segment's vectors, and its entries for each tap, as many as they have samples.
+    #[inline(always)]
+    fn segment(&self, segment: usize) -> (Range<usize>, [&[[i8; 2]]; T]) {
+        const EACH: usize = SEGMENT / VECTOR;
+        let vectors = segment * EACH..self.vectors().min((segment + 1) * EACH);
+        let mut entries = [self.entries; T];
+        for (entries, from) in entries.iter_mut().zip(self.from[segment]) {
+            *entries = &self.entries[from..from + VECTOR * vectors.len()];
+        }
+        (vectors, entries)
+    }
 }
 
 /// Correlates with the code at the first sample at each of `codes`; `level` must be one that this processor
 /// has.
 pub(super) fn correlate<const T: usize>(level: Level, job: &Job, codes: [i64; T]) -> [Complex64; T] {
     match level {
-        Level::Baseline => body(job, codes, add_plain),
+        Level::Baseline => body(job, codes, add_plain, Carrier::fold),
         // SAFETY: `Level` values beyond the baseline come from `best` (and `all` in tests), which detected
         // AVX2.
         #[cfg(target_arch = "x86_64")]
@@ -56,13 +87,13 @@ pub(super) fn correlate<const T: usize>(level: Level, job: &Job, codes: [i64; T]
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq")]
 fn correlate_avx512<const T: usize>(job: &Job, codes: [i64; T]) -> [Complex64; T] {
-    body(job, codes, |segment, sums| add_avx512(segment, sums))
+    body(job, codes, |stretch, sums| add_avx512(stretch, sums), |carrier, re, im| fold_avx2(carrier, re, im))
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn correlate_avx2<const T: usize>(job: &Job, codes: [i64; T]) -> [Complex64; T] {
-    body(job, codes, |segment, sums| add_avx2(segment, sums))
+    body(job, codes, |stretch, sums| add_avx2(stretch, sums), |carrier, re, im| fold_avx2(carrier, re, im))
 }
 
 /// A float of this size has 2⁻⁴ in its last bit, and zeros in its last sixteen.
@@ -109,127 +140,148 @@ fn product(a: i16, b: i16) -> i32 {
 }
 
 /// [`add_avx2`] in plain Rust.
-fn add_plain<const T: usize>(segment: &Segment<T>, sums: &mut Sums<T>) {
-    for (v, (i, q)) in segment.i.iter().zip(segment.q).enumerate() {
-        for k in 0..TOGETHER {
-            let (cos, sin) = (segment.cos[v][k / LANES] as i16, segment.sin[v][k / LANES] as i16);
-            let re = product(i[k], cos) + product(q[k], sin);
-            let im = product(q[k], cos) - product(i[k], sin);
-            for (t, sums) in sums.iter_mut().enumerate() {
-                let [near, next] = segment.entries[segment.from[t] + TOGETHER * v + k].map(i32::from);
-                let [weight, next_weight] = segment.weights[t].map(i32::from);
-                let value = weight * near + next_weight * next;
-                sums[0][k % LANES / 2] += f64::from(re * value);
-                sums[1][k % LANES / 2] += f64::from(im * value);
-            }
-        }
-    }
-}
-
-/// How many of the vectors of two there are, and where the entries of each tap begin.
-#[inline(always)]
-fn checked<const T: usize>(segment: &Segment<T>) -> (usize, [*const [i8; 2]; T]) {
-    let pairs = segment.i.len().min(segment.q.len()).min(segment.cos.len()).min(segment.sin.len());
-    let mut entries = [segment.entries.as_ptr(); T];
-    for (entries, from) in entries.iter_mut().zip(segment.from) {
-        *entries = segment.entries[from..from + TOGETHER * pairs].as_ptr();
-    }
-    (pairs, entries)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-#[inline]
-fn add_avx2<const T: usize>(segment: &Segment<T>, sums: &mut Sums<T>) {
-    let (pairs, entries) = checked(segment);
-    let mut weights = [x86::_mm256_setzero_si256(); T];
-    for (weights, own) in weights.iter_mut().zip(segment.weights) {
-        *weights = x86::_mm256_set1_epi16(i16::from_le_bytes(own));
-    }
-    let mut re_sums = [x86::_mm256_setzero_si256(); T];
-    let mut im_sums = [x86::_mm256_setzero_si256(); T];
-    for v in 0..2 * pairs {
-        // SAFETY: sixteen values are at either, and any alignment will do.
-        let (i, q) = unsafe {
-            (
-                x86::_mm256_loadu_si256(segment.i.as_ptr().cast::<[i16; LANES]>().add(v).cast()),
-                x86::_mm256_loadu_si256(segment.q.as_ptr().cast::<[i16; LANES]>().add(v).cast()),
-            )
-        };
-        let (cos, sin) = (segment.cos[v / 2][v % 2], segment.sin[v / 2][v % 2]);
-        let (cos, sin) = (x86::_mm256_set1_epi32(cos), x86::_mm256_set1_epi32(sin));
-        let re = x86::_mm256_add_epi16(x86::_mm256_mulhrs_epi16(i, cos), x86::_mm256_mulhrs_epi16(q, sin));
-        let im = x86::_mm256_sub_epi16(x86::_mm256_mulhrs_epi16(q, cos), x86::_mm256_mulhrs_epi16(i, sin));
-        for t in 0..T {
-            // SAFETY: sixteen entries for each vector were found to be there.
-            let near = unsafe { x86::_mm256_loadu_si256(entries[t].add(LANES * v).cast()) };
-            let value = x86::_mm256_maddubs_epi16(weights[t], near);
-            re_sums[t] = x86::_mm256_add_epi32(re_sums[t], x86::_mm256_madd_epi16(re, value));
-            im_sums[t] = x86::_mm256_add_epi32(im_sums[t], x86::_mm256_madd_epi16(im, value));
-        }
-    }
-    for t in 0..T {
-        for (sum, own) in sums[t].iter_mut().zip([re_sums[t], im_sums[t]]) {
-            let halves = [x86::_mm256_castsi256_si128(own), x86::_mm256_extracti128_si256::<1>(own)];
-            for (sum, half) in sum.as_chunks_mut::<4>().0.iter_mut().zip(halves) {
-                // SAFETY: four values are there, and any alignment will do.
-                unsafe {
-                    let total = x86::_mm256_add_pd(x86::_mm256_loadu_pd(sum.as_ptr()), x86::_mm256_cvtepi32_pd(half));
-                    x86::_mm256_storeu_pd(sum.as_mut_ptr(), total);
+fn add_plain<const T: usize>(stretch: &Stretch<T>, sums: &mut Sums<T>) {
+    for segment in 0..SEGMENTS {
+        let (vectors, entries) = stretch.segment(segment);
+        for (number, v) in vectors.enumerate() {
+            let ([i, q], cos, sin) = (stretch.samples(v), stretch.cos[v] as i16, stretch.sin[v] as i16);
+            for k in 0..VECTOR {
+                let re = product(i[k], cos) + product(q[k], sin);
+                let im = product(q[k], cos) - product(i[k], sin);
+                for (t, sums) in sums.iter_mut().enumerate() {
+                    let [near, next] = entries[t][VECTOR * number + k].map(i32::from);
+                    let [weight, next_weight] = stretch.weights[segment][t].to_le_bytes().map(i32::from);
+                    let value = weight * near + next_weight * next;
+                    sums[0][k / 2] += f64::from(re * value);
+                    sums[1][k / 2] += f64::from(im * value);
                 }
             }
         }
     }
 }
 
-/// [`add_avx2`], two vectors at a time.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+#[inline]
+fn add_avx2<const T: usize>(stretch: &Stretch<T>, sums: &mut Sums<T>) {
+    // Sums of both halves of a vector would not stay in registers.
+    for half in 0..2 {
+        let mut re_sums = [x86::_mm256_setzero_si256(); T];
+        let mut im_sums = [x86::_mm256_setzero_si256(); T];
+        for segment in 0..SEGMENTS {
+            let (vectors, entries) = stretch.segment(segment);
+            let mut weights = [x86::_mm256_setzero_si256(); T];
+            for (weights, own) in weights.iter_mut().zip(stretch.weights[segment]) {
+                *weights = x86::_mm256_set1_epi16(own);
+            }
+            for (number, v) in vectors.enumerate() {
+                let samples = stretch.samples(v);
+                // SAFETY: there are 32 values, and any alignment will do.
+                let [i, q] =
+                    samples.map(|values| unsafe { x86::_mm256_loadu_si256(values.as_ptr().add(LANES * half).cast()) });
+                let (cos, sin) = (x86::_mm256_set1_epi32(stretch.cos[v]), x86::_mm256_set1_epi32(stretch.sin[v]));
+                let re = x86::_mm256_add_epi16(x86::_mm256_mulhrs_epi16(i, cos), x86::_mm256_mulhrs_epi16(q, sin));
+                let im = x86::_mm256_sub_epi16(x86::_mm256_mulhrs_epi16(q, cos), x86::_mm256_mulhrs_epi16(i, sin));
+                for t in 0..T {
+                    // SAFETY: 32 entries for each vector were found to be there.
+                    let near = unsafe {
+                        x86::_mm256_loadu_si256(entries[t].as_ptr().add(VECTOR * number + LANES * half).cast())
+                    };
+                    let value = x86::_mm256_maddubs_epi16(weights[t], near);
+                    re_sums[t] = x86::_mm256_add_epi32(re_sums[t], x86::_mm256_madd_epi16(re, value));
+                    im_sums[t] = x86::_mm256_add_epi32(im_sums[t], x86::_mm256_madd_epi16(im, value));
+                }
+            }
+        }
+        for t in 0..T {
+            for (sum, own) in sums[t].iter_mut().zip([re_sums[t], im_sums[t]]) {
+                let quarters = [x86::_mm256_castsi256_si128(own), x86::_mm256_extracti128_si256::<1>(own)];
+                for (sum, quarter) in sum.as_chunks_mut::<4>().0.iter_mut().skip(2 * half).zip(quarters) {
+                    // SAFETY: four values are there, and any alignment will do.
+                    unsafe {
+                        let own = x86::_mm256_cvtepi32_pd(quarter);
+                        x86::_mm256_storeu_pd(
+                            sum.as_mut_ptr(),
+                            x86::_mm256_add_pd(x86::_mm256_loadu_pd(sum.as_ptr()), own),
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// [`add_avx2`], whole vectors at a time.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq")]
 #[inline]
-fn add_avx512<const T: usize>(segment: &Segment<T>, sums: &mut Sums<T>) {
-    let (pairs, entries) = checked(segment);
-    let mut weights = [x86::_mm512_setzero_si512(); T];
-    for (weights, own) in weights.iter_mut().zip(segment.weights) {
-        *weights = x86::_mm512_set1_epi16(i16::from_le_bytes(own));
-    }
+fn add_avx512<const T: usize>(stretch: &Stretch<T>, sums: &mut Sums<T>) {
     let mut re_sums = [x86::_mm512_setzero_si512(); T];
     let mut im_sums = [x86::_mm512_setzero_si512(); T];
-    // Eight lanes of either vector's phasor.
-    let halves = |phasors: [i32; 2]| {
-        let (low, high) = (x86::_mm512_set1_epi32(phasors[0]), x86::_mm512_set1_epi32(phasors[1]));
-        x86::_mm512_mask_blend_epi32(0xff00, low, high)
-    };
-    for v in 0..pairs {
-        // SAFETY: 32 values are at either, and any alignment will do.
-        let (i, q) = unsafe {
-            (
-                x86::_mm512_loadu_si512(segment.i.as_ptr().add(v).cast()),
-                x86::_mm512_loadu_si512(segment.q.as_ptr().add(v).cast()),
-            )
-        };
-        let (cos, sin) = (halves(segment.cos[v]), halves(segment.sin[v]));
-        let re = x86::_mm512_add_epi16(x86::_mm512_mulhrs_epi16(i, cos), x86::_mm512_mulhrs_epi16(q, sin));
-        let im = x86::_mm512_sub_epi16(x86::_mm512_mulhrs_epi16(q, cos), x86::_mm512_mulhrs_epi16(i, sin));
-        for t in 0..T {
-            // SAFETY: 32 entries for each two vectors were found to be there.
-            let near = unsafe { x86::_mm512_loadu_si512(entries[t].add(TOGETHER * v).cast()) };
-            let value = x86::_mm512_maddubs_epi16(weights[t], near);
-            re_sums[t] = x86::_mm512_add_epi32(re_sums[t], x86::_mm512_madd_epi16(re, value));
-            im_sums[t] = x86::_mm512_add_epi32(im_sums[t], x86::_mm512_madd_epi16(im, value));
+    for segment in 0..SEGMENTS {
+        let (vectors, entries) = stretch.segment(segment);
+        let mut weights = [x86::_mm512_setzero_si512(); T];
+        for (weights, own) in weights.iter_mut().zip(stretch.weights[segment]) {
+            *weights = x86::_mm512_set1_epi16(own);
+        }
+        for (number, v) in vectors.enumerate() {
+            let [i, q] = stretch.samples(v);
+            // SAFETY: there are 32 values, and any alignment will do.
+            let (i, q) =
+                unsafe { (x86::_mm512_loadu_si512(i.as_ptr().cast()), x86::_mm512_loadu_si512(q.as_ptr().cast())) };
+            let (cos, sin) = (x86::_mm512_set1_epi32(stretch.cos[v]), x86::_mm512_set1_epi32(stretch.sin[v]));
+            let re = x86::_mm512_add_epi16(x86::_mm512_mulhrs_epi16(i, cos), x86::_mm512_mulhrs_epi16(q, sin));
+            let im = x86::_mm512_sub_epi16(x86::_mm512_mulhrs_epi16(q, cos), x86::_mm512_mulhrs_epi16(i, sin));
+            for t in 0..T {
+                // SAFETY: 32 entries for each vector were found to be there.
+                let near = unsafe { x86::_mm512_loadu_si512(entries[t].as_ptr().add(VECTOR * number).cast()) };
+                let value = x86::_mm512_maddubs_epi16(weights[t], near);
+                re_sums[t] = x86::_mm512_add_epi32(re_sums[t], x86::_mm512_madd_epi16(re, value));
+                im_sums[t] = x86::_mm512_add_epi32(im_sums[t], x86::_mm512_madd_epi16(im, value));
+            }
         }
     }
     for t in 0..T {
         for (sum, own) in sums[t].iter_mut().zip([re_sums[t], im_sums[t]]) {
-            // Both vectors together are still those of a segment.
-            let low = x86::_mm512_castsi512_si256(own);
-            let both = x86::_mm256_add_epi32(low, x86::_mm512_extracti64x4_epi64::<1>(own));
-            // SAFETY: eight values are there, and any alignment will do.
-            unsafe {
-                let total = x86::_mm512_add_pd(x86::_mm512_loadu_pd(sum.as_ptr()), x86::_mm512_cvtepi32_pd(both));
-                x86::_mm512_storeu_pd(sum.as_mut_ptr(), total);
+            let halves = [x86::_mm512_castsi512_si256(own), x86::_mm512_extracti64x4_epi64::<1>(own)];
+            for (sum, half) in sum.as_chunks_mut::<8>().0.iter_mut().zip(halves) {
+                // SAFETY: eight values are there, and any alignment will do.
+                unsafe {
+                    let total = x86::_mm512_add_pd(x86::_mm512_loadu_pd(sum.as_ptr()), x86::_mm512_cvtepi32_pd(half));
+                    x86::_mm512_storeu_pd(sum.as_mut_ptr(), total);
+                }
             }
         }
     }
+}
+
+/// [`Carrier::fold`]: a loop over taps around it would be made into one over lanes, with gathered numbers.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+#[inline]
+fn fold_avx2(carrier: &Carrier, re: &[f64; LANES], im: &[f64; LANES]) -> Complex64 {
+    let turns = carrier.within();
+    let mut re_sums = [x86::_mm256_setzero_pd(); 4];
+    let mut im_sums = [x86::_mm256_setzero_pd(); 4];
+    for k in 0..4 {
+        // SAFETY: four numbers are at each, and any alignment will do.
+        let [re, im, turn_re, turn_im] =
+            [re, im, &turns.re, &turns.im].map(|of| unsafe { x86::_mm256_loadu_pd(of.as_ptr().add(4 * k)) });
+        re_sums[k] = x86::_mm256_add_pd(x86::_mm256_mul_pd(re, turn_re), x86::_mm256_mul_pd(im, turn_im));
+        im_sums[k] = x86::_mm256_sub_pd(x86::_mm256_mul_pd(im, turn_re), x86::_mm256_mul_pd(re, turn_im));
+    }
+    Complex64::new(total_avx2(re_sums), total_avx2(im_sums))
+}
+
+/// Halves added to each other until one number is left.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+#[inline]
+fn total_avx2(fours: [x86::__m256d; 4]) -> f64 {
+    let eight = [x86::_mm256_add_pd(fours[0], fours[2]), x86::_mm256_add_pd(fours[1], fours[3])];
+    let four = x86::_mm256_add_pd(eight[0], eight[1]);
+    let two = x86::_mm_add_pd(x86::_mm256_castpd256_pd128(four), x86::_mm256_extractf128_pd::<1>(four));
+    x86::_mm_cvtsd_f64(x86::_mm_add_sd(two, x86::_mm_unpackhi_pd(two, two)))
 }
 
 /// Fills rows with the means of a period's steps over a sample of `step` steps from each of their places,

@@ -14,18 +14,19 @@
 
 use num_complex::Complex64;
 
-use super::carrier::{BLOCK, Carrier, LANES, filled};
+use super::carrier::{Carrier, LANES, filled};
 use super::fixed::{Fixed, POINT_BITS};
 use super::kernel::Level;
 use super::{CODE_BITS, MOST_STEPS, Nco, TURN, Wave};
-use kernel::{PAIRS, Sums};
+use kernel::{Stretch, Sums, VECTOR, VECTORS};
 
 pub(super) mod kernel;
 
 /// Rows a sample.
 const ROWS: usize = 16;
-/// Samples whose replica is taken from the same rows.
-const SEGMENT: usize = 2 * BLOCK;
+/// Samples whose replica is taken from the same rows, and such segments whose products are added in 32 bits.
+const SEGMENT: usize = 512;
+const SEGMENTS: usize = 2;
 /// Entries of a row before the period and after it: half a segment, a whole one, and a little more.
 const BEFORE: usize = SEGMENT / 2 + 2;
 const AFTER: usize = SEGMENT + LANES + 2;
@@ -55,6 +56,8 @@ pub(super) struct Rows {
     period: i64,
     /// Nominal samples in a phase unit of steps.
     samples_a_unit: f64,
+    /// Length of the period in 2⁻⁴⁰ samples.
+    places: i64,
     /// Entries of a row, each the value there and that of the next row.
     stride: usize,
     entries: Vec<[i8; 2]>,
@@ -85,6 +88,7 @@ impl Rows {
             steps_per_chip: wave.steps_per_chip as i64,
             period: (length as i64) << CODE_BITS,
             samples_a_unit: 1.0 / (step * unit),
+            places: (samples * (1_i64 << PLACE_BITS) as f64).round() as i64,
             stride,
             entries,
         })
@@ -164,69 +168,69 @@ struct Motion {
 
 impl Motion {
     fn new(rows: &Rows, step: i64) -> Self {
-        let samples = |units: i64| (units as f64 * rows.samples_a_unit * (1_i64 << PLACE_BITS) as f64).round() as i64;
-        Self { gain: samples(step) - (1 << PLACE_BITS), period: samples(rows.period), stride: rows.stride }
+        let samples = step as f64 * rows.samples_a_unit * (1_i64 << PLACE_BITS) as f64;
+        // As near one as rows suit.
+        Self { gain: (samples + 0.5) as i64 - (1 << PLACE_BITS), period: rows.places, stride: rows.stride }
     }
 
-    /// The entry of a segment's first sample, and the weights of it and of the next row's. Samples are
+    /// The entry of a segment's first sample, and the weights of it and of the next row's, a byte each. Samples are
     /// [`SEGMENT`] or, at the end, less.
     #[inline(always)]
-    fn next(&self, place: &mut Place, samples: usize) -> (usize, [u8; 2]) {
+    fn next(&self, place: &mut Place, samples: usize) -> (usize, i16) {
         let samples = samples as i64;
         // At least two samples, at most a period and half a segment more.
         let begin = place.at + place.owed + ((BEFORE as i64) << PLACE_BITS) + ((samples * self.gain) >> 1);
         let fine = (begin + (1 << (FINE_BITS - 1))) >> FINE_BITS;
         place.owed = begin - (fine << FINE_BITS);
-        let (row, weight) = ((fine / WEIGHTS) as usize, fine % WEIGHTS);
+        // Positive: a shift and a mask.
+        let (row, weight) = ((fine as u64 / WEIGHTS as u64) as usize, (fine as u64 % WEIGHTS as u64) as i64);
         let (entry, row) = (row / ROWS, row % ROWS);
         place.at += (samples << PLACE_BITS) + samples * self.gain;
         while place.at >= self.period {
             place.at -= self.period;
         }
-        (row * self.stride + entry, [(WEIGHTS - weight) as u8, weight as u8])
+        (row * self.stride + entry, (weight << 8 | (WEIGHTS - weight)) as i16)
     }
 }
 
 /// Everything but the products, for each instruction set.
 #[inline(always)]
-fn body<const T: usize>(job: &Job, codes: [i64; T], add: impl Fn(&kernel::Segment<T>, &mut Sums<T>)) -> [Complex64; T] {
-    let mut carrier = Carrier::new(job.nco);
+fn body<const T: usize>(
+    job: &Job,
+    codes: [i64; T],
+    add: impl Fn(&Stretch<T>, &mut Sums<T>),
+    fold: impl Fn(&Carrier, &[f64; LANES], &[f64; LANES]) -> Complex64,
+) -> [Complex64; T] {
+    let mut carrier = Carrier::of_pairs(job.nco);
     let motion = Motion::new(job.rows, job.step);
     let mut places = [Place { at: 0, owed: 0 }; T];
     for t in 0..T {
         let at = (codes[t] as f64 * job.rows.samples_a_unit * (1_i64 << PLACE_BITS) as f64) as i64;
         places[t].at = at + planted!("receiver.rows.place", 0, 1 << (PLACE_BITS - 1));
     }
-    let mut totals: Sums<T> = [[[0.0; PAIRS]; 2]; T];
-    for (i, q) in job.samples.i.chunks(SEGMENT).zip(job.samples.q.chunks(SEGMENT)) {
-        let samples = i.len();
-        let (mut from, mut weights) = ([0; T], [[0; 2]; T]);
-        for t in 0..T {
-            (from[t], weights[t]) = motion.next(&mut places[t], samples);
+    let mut totals: Sums<T> = [[[0.0; LANES]; 2]; T];
+    for (i, q) in job.samples.i.chunks(SEGMENTS * SEGMENT).zip(job.samples.q.chunks(SEGMENTS * SEGMENT)) {
+        let (mut from, mut weights) = ([[0; T]; SEGMENTS], [[0; T]; SEGMENTS]);
+        for (samples, (from, weights)) in i.chunks(SEGMENT).zip(from.iter_mut().zip(&mut weights)) {
+            for t in 0..T {
+                (from[t], weights[t]) = motion.next(&mut places[t], samples.len());
+            }
         }
-        let (mut cos, mut sin) = ([0; kernel::VECTORS], [0; kernel::VECTORS]);
+        let (mut cos, mut sin) = ([0; VECTORS], [0; VECTORS]);
         let blocks = cos.as_chunks_mut().0.iter_mut().zip(sin.as_chunks_mut().0);
-        for (cos, sin) in blocks.take(samples.div_ceil(BLOCK)) {
+        for (cos, sin) in blocks.take(i.len().div_ceil(LANES * VECTOR)) {
             let phasors = carrier.next_block();
             (*cos, *sin) = (kernel::twice(phasors.0), kernel::twice(phasors.1));
         }
         let (i, last_i) = i.as_chunks();
         let (q, last_q) = q.as_chunks();
-        let entries = &job.rows.entries;
-        let (cos, sin) = (cos.as_chunks().0, sin.as_chunks().0);
-        add(&kernel::Segment { i, q, cos, sin, entries, from, weights }, &mut totals);
-        if !last_i.is_empty() {
-            let whole = i.len();
-            let (i, q) = (&[filled(last_i)], &[filled(last_q)]);
-            from = from.map(|from| from + kernel::TOGETHER * whole);
-            let (cos, sin) = (&cos[whole..], &sin[whole..]);
-            add(&kernel::Segment { i, q, cos, sin, entries, from, weights }, &mut totals);
-        }
+        let last = (!last_i.is_empty()).then(|| [filled(last_i), filled(last_q)]);
+        let (cos, sin, from, weights) = (&cos, &sin, &from, &weights);
+        add(&Stretch { i, q, last: last.as_ref(), cos, sin, entries: &job.rows.entries, from, weights }, &mut totals);
     }
     let mut found = [Complex64::ZERO; T];
-    let pairs = carrier.pairs();
     for t in 0..T {
-        found[t] = pairs.fold(&totals[t][0], &totals[t][1]) * SCALE;
+        found[t] = fold(&carrier, &totals[t][0], &totals[t][1]) * SCALE;
     }
     found
 }
