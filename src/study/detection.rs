@@ -314,21 +314,15 @@ pub fn false_alarms(
     Ok(DetectionRow { low: interval(probability * share, made).0, ..row })
 }
 
-/// Cells of a search at a Doppler.
-fn lags(metadata: &IfMetadata, settings: &AcquisitionSettings) -> Result<f64, DetectionError> {
-    let chips = leading(&L1_CA).map_or(0.0, |code| f64::from(code.code_chips));
-    Ok(chips / acquire::cell_chips(metadata, &L1_CA, settings)?)
-}
-
-/// Cells of a whole search.
+/// Independent cells of a whole search.
 fn cells(metadata: &IfMetadata, settings: &AcquisitionSettings) -> Result<f64, DetectionError> {
     let side = (settings.doppler_max_hz / doppler_step_hz(settings)).ceil();
-    Ok((2.0 * side + 1.0) * lags(metadata, settings)?)
+    Ok((2.0 * side + 1.0) * acquire::independent_cells(metadata, &L1_CA, settings)? as f64)
 }
 
 fn leaving(metadata: &IfMetadata, settings: &AcquisitionSettings, seed: u64) -> Result<Leaving, DetectionError> {
     let bars = acquire::bars(metadata, &L1_CA, settings)?;
-    Ok(Leaving::new(bars, lags(metadata, settings)?.round() as usize, seed))
+    Ok(Leaving::new(bars, acquire::independent_cells(metadata, &L1_CA, settings)?, seed))
 }
 
 fn doppler_step_hz(settings: &AcquisitionSettings) -> f64 {

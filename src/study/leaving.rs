@@ -1,8 +1,8 @@
 //! Dopplers that a search leaves before all sums are made: what that takes from detections and false alarms.
 //!
 //! A Doppler stays while its largest cell exceeds a bar, whichever cell that is: the satellite's, or one of
-//! noise. So whole Dopplers of noise are drawn with every sum. Limits: the cells of a Doppler are independent
-//! here, where neighbours share a part of their power; they keep a few more Dopplers than there are.
+//! noise. So whole Dopplers of noise are drawn with every sum. Limits: the cells of a Doppler are as many
+//! independent ones as have the same law (`receiver::acquire::independent_cells`).
 
 use super::normal::{Normals, Purpose, uniform};
 use crate::analysis::expect::theory::detection::threshold;
@@ -22,7 +22,7 @@ pub struct Leaving {
 }
 
 impl Leaving {
-    /// Of a search with these bars and so many cells at a Doppler.
+    /// Of a search with these bars and so many independent cells at a Doppler.
     pub fn new(bars: Vec<f64>, lags: usize, seed: u64) -> Self {
         let columns = if bars.iter().any(|bar| *bar > 0.0) { COLUMNS } else { 1 };
         let mut normals = Normals::new(seed, Purpose::Columns);

@@ -23,6 +23,8 @@ const SIDE_BINS: i32 = 2;
 /// Lags and bins of the neighbourhood.
 const LAGS: usize = 2 * SIDE_LAGS as usize + 1;
 const BINS: usize = 2 * SIDE_BINS as usize + 1;
+/// Lags, and those between them.
+const CELLS: usize = 2 * LAGS - 1;
 /// Steps of an integral over a sum in which symbols turn.
 const STEPS: u32 = 40;
 
@@ -37,7 +39,7 @@ pub struct Model {
     pub coherent_s: f64,
     /// What the largest Σ|S|², in units of the noise of one component, has to exceed.
     pub threshold: f64,
-    /// Distance of lags, chips.
+    /// Distance of lags, chips. Between any two there is another cell, the sum of both.
     pub lag_chips: f64,
     /// Distance of frequencies, Hz.
     pub doppler_step_hz: f64,
@@ -132,6 +134,7 @@ impl Model {
         let Some(waveform) = Waveform::of(self.signal) else { return 0.0 };
         let chips = Folded::new(&waveform, self.sample_chips, lag);
         let across_code = covariance(&lags, &|d| chips.noise(d * lag));
+        let between_power = 2.0 * (1.0 + chips.noise(lag));
         let across_doppler = covariance(&bins, &|d| sinc(d * self.doppler_step_hz * self.coherent_s));
         // Neighbours this close are never dependent, so both are positive definite; if not, nothing is found.
         let (Some(code), Some(doppler)) = (across_code.cholesky(), across_doppler.cholesky()) else { return 0.0 };
@@ -151,7 +154,7 @@ impl Model {
             let doppler_hz = doppler_hz.get(draw as usize % doppler_hz.len().max(1)).copied().unwrap_or(0.0);
             let height = |number: &f64| chips.signal((offset - number) * lag, between + number * lag);
             let shape: Vec<f64> = lags.iter().map(height).collect();
-            let mut powers = [[0.0; LAGS]; BINS];
+            let mut powers = [[0.0; CELLS]; BINS];
             let mut largest = [const { Vec::new() }; BINS];
             for sum in 0..self.sums {
                 let begin_s = f64::from(sum) * self.coherent_s;
@@ -167,8 +170,12 @@ impl Model {
                     coloured.iter_mut().zip(across_bins).for_each(|(column, cell)| column[row] = cell);
                 }
                 for ((powers, coloured), mean) in powers.iter_mut().zip(&coloured).zip(&across) {
-                    for ((power, noise), height) in powers.iter_mut().zip(coloured).zip(&shape) {
-                        *power += (noise + mean * height * amplitude).norm_sqr();
+                    let sums: [Complex64; LAGS] =
+                        std::array::from_fn(|lag| coloured[lag] + mean * shape[lag] * amplitude);
+                    let (own, between) = powers.split_at_mut(LAGS);
+                    own.iter_mut().zip(&sums).for_each(|(power, sum)| *power += sum.norm_sqr());
+                    for (power, pair) in between.iter_mut().zip(sums.windows(2)) {
+                        *power += (pair[0] + pair[1]).norm_sqr() / between_power;
                     }
                 }
                 for (largest, powers) in largest.iter_mut().zip(&powers) {

@@ -53,7 +53,7 @@ fn searches() -> Vec<Kind> {
             "chips",
             Some(0.05),
             1.0,
-            &["code phase found over a cell of the search, largest"],
+            &["code phase found over two thirds of a cell of the search, largest"],
             AtRest,
             |rx, chips| {
                 rx.table("acquisition").map_where("code_phase_chips", found, |_, value| value + chips);
@@ -110,7 +110,7 @@ fn searches() -> Vec<Kind> {
             "",
             None,
             1.0,
-            &["code phase found over a cell of the search, largest"],
+            &["code phase found over two thirds of a cell of the search, largest"],
             AtRest,
             |rx, _| {
                 rx.table("acquisition").swap_satellites(ONE, "G23", 1);

@@ -5,14 +5,14 @@
 //! the largest cells of all codes ([`super::multiple_access`]). There the threshold to begin with is seven
 //! tenths of what the codes' first dwells let expect of it, and not below what nine of them in ten reach. A
 //! satellite that passes it by less than what makes it sure has its column filled, and all are chosen anew,
-//! until none is left that does. So no satellite is found by less than a search without leaving asks for.
+//! until none is left that does; but for columns whose first dwells show noise. So no satellite is found by less than a search without leaving asks for.
 
 use std::collections::BTreeSet;
 
 #[cfg(test)]
 use super::grid::Peaks;
 use super::grid::{Grid, Peak, Strip};
-use super::multiple_access::LEAST_CODES;
+use super::multiple_access::{LEAST_CODES, Raised};
 
 /// What is so many times its threshold, or where that is not known so many times what other codes reach
 /// there, needs no column: cross-correlations of a family differ by less.
@@ -27,21 +27,21 @@ fn place_of_largest(values: &[f64]) -> usize {
 }
 
 impl Grid {
-    /// The best Doppler of every satellite, its number first, and the crowded ones. `reached` has what nine
-    /// codes in ten reach in crowded columns, as far as their law is not known.
+    /// The best Doppler of every satellite, its number first, and the crowded ones. `raised` has what first
+    /// dwells showed of them.
     pub fn peaks(
         &self,
         strips: &[Vec<Strip>],
-        reached: &[Option<f64>],
+        raised: &[Raised],
         satellites: usize,
     ) -> (Vec<(usize, Peak)>, Vec<usize>) {
         let heights: Vec<Vec<f64>> = (0..satellites).map(|satellite| self.heights(strips, satellite)).collect();
         let image = |bin: usize| self.dopplers_hz.get(bin).is_some_and(|doppler_hz| self.meets_image(*doppler_hz));
         let mut bar = self.law.bar(&heights, image);
         let mut sure: Vec<f64> = bar.thresholds.iter().map(|threshold| SURE * threshold).collect();
-        for (bin, others) in reached.iter().enumerate() {
+        for (bin, raised) in raised.iter().enumerate() {
             let known = strips[bin].iter().all(|strip| strip.sums == self.sums);
-            if let Some(others) = others.filter(|_| !known) {
+            if let (Raised::Yes(others), false) = (*raised, known) {
                 sure[bin] = sure[bin].max(SURE * others);
                 let expected = DOUBTFUL * self.law.beyond(others);
                 bar.thresholds[bin] = bar.thresholds[bin].max(others).max(expected);
@@ -53,8 +53,8 @@ impl Grid {
             let highest = place_of_largest(heights);
             let bin = if heights[highest] >= sure[highest] { highest } else { place_of_largest(&shares) };
             let (statistic, threshold) = (heights[bin], bar.thresholds[bin]);
-            let (doppler_hz, lag) = (self.dopplers_hz[bin], strips[bin][satellite].lag);
-            (bin, Peak { statistic, threshold, is_sure: statistic >= sure[bin], doppler_hz, lag })
+            let (doppler_hz, half_lag) = (self.dopplers_hz[bin], strips[bin][satellite].half_lag);
+            (bin, Peak { statistic, threshold, is_sure: statistic >= sure[bin], doppler_hz, half_lag })
         };
         (heights.iter().enumerate().map(choice).collect(), bar.crowded)
     }
@@ -83,11 +83,12 @@ impl Grid {
                 whole * if self.meets_image(doppler_hz) { self.image_scale } else { 1.0 }
             })
             .collect();
-        let best_lag = column().nth(place_of_largest(&scaled)).map_or(0, |strip| strip.lag);
+        let best = column().nth(place_of_largest(&scaled)).map_or(0, |strip| strip.half_lag);
+        let halves = 2 * self.lags;
         let (mut total, mut powers) = (0.0, 0.0);
         for strip in column() {
-            let apart = strip.lag.abs_diff(best_lag);
-            let same = apart.min(self.lags - apart.min(self.lags)) <= self.near_cells();
+            let apart = strip.half_lag.abs_diff(best);
+            let same = apart.min(halves - apart.min(halves)) <= 2 * self.near_cells();
             let out = same && strip.sums == self.sums;
             total += strip.total - if out { strip.near } else { 0.0 };
             powers += f64::from(strip.sums) * (self.lags - if out { strip.near_cells } else { 0 }) as f64;
@@ -102,7 +103,8 @@ impl Grid {
         let bin = |peak: &Peak| self.dopplers_hz.iter().position(|doppler_hz| *doppler_hz == peak.doppler_hz);
         let numbered: Vec<(usize, Peak)> = peaks.of.iter().map(|peak| (bin(peak).unwrap(), *peak)).collect();
         let strips = &peaks.map.strips;
-        let is_open = |bin: usize, _| strips[bin].iter().any(|strip| strip.sums < self.sums);
+        let is_open =
+            |bin: usize, _| peaks.raised[bin] != Raised::No && strips[bin].iter().any(|strip| strip.sums < self.sums);
         self.doubtful(&numbered, is_open).len()
     }
 

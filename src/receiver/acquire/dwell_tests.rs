@@ -6,8 +6,8 @@ use super::dwells::Dwells;
 use super::tests::Noise;
 use crate::receiver::threshold::{of_one_cell, threshold};
 
-/// Cells of a code period at 2.6 Msps, and Dopplers.
-const LAGS: usize = 2560;
+/// Independent cells of a code period at 2.6 Msps, and Dopplers.
+const CELLS: usize = 3120;
 const DOPPLERS: f64 = 41.0;
 /// Seconds of a coherent sum and of a data bit.
 const SUM_S: f64 = 2e-3;
@@ -18,12 +18,13 @@ const BIT_S: f64 = 20e-3;
 fn shares_found(dwells: &Dwells, dbhz: [f64; 2]) -> [f64; 2] {
     const TRIALS: u32 = 20_000;
     let mut random = Noise(8);
-    let bar = threshold(of_one_cell(1e-6, DOPPLERS * LAGS as f64), 2 * dwells.sums());
+    let bar = threshold(of_one_cell(1e-6, DOPPLERS * CELLS as f64), 2 * dwells.sums());
     let mut found = [0; 2];
     for _ in 0..TRIALS {
         let (hz, first_bit_s) = (250.0 * random.uniform() - 125.0, BIT_S * random.uniform());
-        // Two and a half cells a chip, and what is left of a triangle's square on the way to the next cell.
-        let lag_loss = 1.0 - 0.4 * random.uniform();
+        // Two cells a chip, and what is left of a triangle's square on the way to the one between them, which has
+        // three quarters wherever the code lies.
+        let lag_loss = f64::max(libm::pow(1.0 - 0.25 * random.uniform(), 2.0), 0.75);
         let amplitudes = dbhz.map(|dbhz| (2.0 * libm::pow(10.0, dbhz / 10.0) * SUM_S * lag_loss).sqrt());
         let mut bit = (0.0, 1.0);
         let (mut powers, mut stays) = ([0.0; 2], true);
@@ -52,7 +53,7 @@ fn shares_found(dwells: &Dwells, dbhz: [f64; 2]) -> [f64; 2] {
 #[test]
 fn leaving_costs_a_tenth_of_a_decibel_however_many_sums_are_asked_for() {
     for (asked, weakest_dbhz) in [(5, 35.0), (10, 33.0), (20, 31.0), (100, 26.5)] {
-        let dwells = Dwells::alone(asked, 2, LAGS);
+        let dwells = Dwells::alone(asked, 2, CELLS);
         for step in 0..5 {
             let dbhz = weakest_dbhz + f64::from(step);
             // The same satellites and noise are counted, so the shares differ by what is left alone.
@@ -70,10 +71,10 @@ fn leaving_costs_a_tenth_of_a_decibel_however_many_sums_are_asked_for() {
 #[test]
 fn few_sums_are_all_made() {
     for asked in 1..=4 {
-        assert!(Dwells::alone(asked, 2, LAGS).stay().iter().all(|bar| *bar == 0.0), "{asked}");
+        assert!(Dwells::alone(asked, 2, CELLS).stay().iter().all(|bar| *bar == 0.0), "{asked}");
     }
-    let ten = Dwells::alone(10, 2, LAGS);
-    // Chi-square of 10 degrees exceeds 35.6 in one case in 10 000, and the largest of 2560 in one of four.
-    assert!((ten.stay()[4] - 35.3).abs() < 0.5 && ten.stay()[..4].iter().all(|bar| *bar == 0.0), "{:?}", ten.stay());
+    let ten = Dwells::alone(10, 2, CELLS);
+    // Chi-square of 10 degrees exceeds 35.6 in one case in 10 000, and the largest of 3120 in one of four.
+    assert!((ten.stay()[4] - 35.7).abs() < 0.5 && ten.stay()[..4].iter().all(|bar| *bar == 0.0), "{:?}", ten.stay());
     assert!(ten.stay()[5..9].windows(2).all(|bars| bars[0] < bars[1]) && ten.stay()[9] == 0.0, "{:?}", ten.stay());
 }

@@ -26,7 +26,8 @@ use num_complex::Complex;
 
 use super::grid::{Grid, Strip};
 use super::kernel::{self, Spectrum};
-use super::multiple_access::{LEAST_CODES, Law};
+use super::multiple_access::{LEAST_CODES, Law, Raised};
+use super::powers::Powers;
 use crate::receiver::threshold::{of_one_cell, threshold};
 
 /// A share of the dwells after which a Doppler may be left, and the probability that noise stays.
@@ -80,9 +81,9 @@ impl Rooms {
 pub(super) struct Room {
     fft: Vec<Complex<f32>>,
     short: Vec<Complex<f32>>,
-    powers: Vec<f32>,
+    powers: Powers,
     /// Those of satellites that stay after the first dwells.
-    kept: Vec<Vec<f32>>,
+    kept: Vec<Powers>,
     /// Of every dwell, and whether it has been made.
     spectra: Vec<(bool, Vec<Complex<f32>>)>,
 }
@@ -96,14 +97,14 @@ impl Room {
 
 impl Dwells {
     /// Sums of so many code periods one after the other, of maps with so many cells.
-    pub fn alone(sums: u32, periods: u32, lags: usize) -> Self {
+    pub fn alone(sums: u32, periods: u32, cells: usize) -> Self {
         let begins = (0..sums).map(|dwell| f64::from(dwell * periods)).collect();
         let leaves: &[Stay] = if sums < LEAST_SUMS { &[] } else { &ALONE };
-        Self::leaving(begins, 1, leaves, lags)
+        Self::leaving(begins, 1, leaves, cells)
     }
 
     /// Periods of data and pilot, among so many code periods, of maps with so many cells.
-    pub fn of_pair(periods: u32, lags: usize) -> Self {
+    pub fn of_pair(periods: u32, cells: usize) -> Self {
         let count = (DWELLS * f64::from(periods)).ceil().max(1.0) as u32;
         let apart = f64::from(periods - 1) / f64::from((count - 1).max(1));
         let mut begins: Vec<f64> = (0..count).map(|dwell| f64::from(dwell) * apart).collect();
@@ -111,17 +112,17 @@ impl Dwells {
         if begins.len() > 3 {
             begins.swap(1, 2);
         }
-        Self::leaving(begins, 2, &PAIR, lags)
+        Self::leaving(begins, 2, &PAIR, cells)
     }
 
     /// Dwells with the powers of so many codes each, which may be left at these shares of them.
-    fn leaving(begins: Vec<f64>, codes: usize, leaves: &[Stay], lags: usize) -> Self {
+    fn leaving(begins: Vec<f64>, codes: usize, leaves: &[Stay], cells: usize) -> Self {
         let mut stay = vec![0.0; begins.len()];
         for (share, probability) in leaves {
             let made = (share * begins.len() as f64 - 1e-9).ceil() as usize;
             // After the last there is nothing to leave.
             if let Some(bar) = made.checked_sub(1).filter(|_| made < begins.len()).and_then(|last| stay.get_mut(last)) {
-                *bar = threshold(of_one_cell(*probability, lags as f64), (2 * codes * made) as u32);
+                *bar = threshold(of_one_cell(*probability, cells as f64), (2 * codes * made) as u32);
             }
         }
         Self { begins, stay, codes }
@@ -152,15 +153,15 @@ impl Dwells {
 }
 
 impl Grid {
-    /// All satellites at one Doppler, and where that is crowded what nine codes in ten would at most reach
-    /// by all sums, as far as codes that were left show it; `make` gives the spectrum of a dwell there.
+    /// All satellites at one Doppler, and whether that is crowded, as far as codes that were left show it: then
+    /// with what nine codes in ten would at most reach by all sums; `make` gives the spectrum of a dwell there.
     pub fn column(
         &self,
         doppler_hz: f64,
         spectra: &[Spectra<'_>],
         make: &mut Make<'_>,
         room: &mut Room,
-    ) -> (Vec<Strip>, Option<f64>) {
+    ) -> (Vec<Strip>, Raised) {
         room.clear();
         let all = self.meets_image(doppler_hz);
         if let Some((first, law)) = self.early.as_ref().filter(|_| !all) {
@@ -172,7 +173,7 @@ impl Grid {
         if column.len() >= LEAST_CODES && stayed as f64 >= MANY * column.len() as f64 {
             self.fill_by(&mut column, spectra, make, room);
         }
-        (column, None)
+        (column, Raised::Perhaps)
     }
 
     /// The same of one code a satellite: `first` dwells of all codes show what cross-correlation adds.
@@ -182,27 +183,30 @@ impl Grid {
         make: &mut Make<'_>,
         room: &mut Room,
         (first, law): (usize, &Law),
-    ) -> (Vec<Strip>, Option<f64>) {
+    ) -> (Vec<Strip>, Raised) {
         let least = self.dwells.stay[first - 1];
         let (mut heights, mut stayed) = (Vec::new(), Vec::new());
         let mut column = Vec::with_capacity(spectra.len());
         for (number, codes) in spectra.iter().enumerate() {
-            room.powers.fill(0.0);
+            room.powers.clear();
             (0..first).for_each(|dwell| self.add(make, codes, dwell, room));
             let (height, total) = self.height(&room.powers, first);
             heights.push(height);
             column.push(self.left(height / least, total, first));
             if height > least {
                 match room.kept.get_mut(stayed.len()) {
-                    Some(place) => place.copy_from_slice(&room.powers),
+                    Some(place) => place.clone_from(&room.powers),
                     None => room.kept.push(room.powers.clone()),
                 }
                 stayed.push(number);
             }
         }
-        let reached = law.reached(heights.clone());
+        let raised = law.raised(heights.clone());
         // Cross-correlation is the same in every dwell.
-        let rise = reached.map_or(0.0, |reached| f64::max(reached - least, 0.0) / first as f64);
+        let rise = match raised {
+            Raised::Yes(reached) => f64::max(reached - least, 0.0) / first as f64,
+            Raised::No | Raised::Perhaps => 0.0,
+        };
         let bar = |made: usize| match self.dwells.stay[made - 1] {
             0.0 => 0.0,
             noise => noise + rise * made as f64,
@@ -217,7 +221,8 @@ impl Grid {
                 })
                 .unwrap_or_else(|| self.strip(&room.powers));
         }
-        (column, reached.map(|reached| reached * self.dwells.stay.len() as f64 / first as f64))
+        let all = self.dwells.stay.len() as f64 / first as f64;
+        (column, if let Raised::Yes(reached) = raised { Raised::Yes(reached * all) } else { raised })
     }
 
     /// Gives the satellites of a column the dwells that they were left without.
@@ -243,7 +248,7 @@ impl Grid {
         Room {
             fft: vec![Complex::default(); self.inverse.get_inplace_scratch_len()],
             short: vec![Complex::default(); self.inverse.len()],
-            powers: vec![0.0; self.lags],
+            powers: Powers::new(self.lags),
             kept: Vec::new(),
             spectra: self.dwells.begins.iter().map(|_| (false, Vec::new())).collect(),
         }
@@ -251,7 +256,7 @@ impl Grid {
 
     /// One satellite at one Doppler, dwell by dwell until it is left.
     fn map(&self, make: &mut Make<'_>, codes: &Spectra<'_>, to_the_end: bool, room: &mut Room) -> Strip {
-        room.powers.fill(0.0);
+        room.powers.clear();
         for (dwell, &bar) in self.dwells.stay.iter().enumerate() {
             self.add(make, codes, dwell, room);
             if bar == 0.0 || to_the_end {
@@ -277,20 +282,25 @@ impl Grid {
         for code in codes.iter().take(self.dwells.codes) {
             kernel::multiply(&mut room.short, code, spectrum);
             self.inverse.process_with_scratch(&mut room.short, &mut room.fft);
-            kernel::add_powers(&mut room.powers, &room.short);
+            room.powers.add(&room.short);
         }
     }
 
     /// The largest of the powers after so many dwells in units of half a sum's noise, and the sum of all.
-    fn height(&self, powers: &[f32], dwells: usize) -> (f64, f64) {
-        let (peak, total) = kernel::peak_and_total(powers);
-        let floor = total / (2.0 * f64::from(self.dwells.sums_after(dwells)) * powers.len() as f64);
-        (if floor > 0.0 { f64::from(peak) / floor } else { 0.0 }, total)
+    fn height(&self, powers: &Powers, dwells: usize) -> (f64, f64) {
+        let (peak, total) = powers.peak_and_total();
+        let floor = total / (2.0 * f64::from(self.dwells.sums_after(dwells)) * self.lags as f64);
+        (if floor > 0.0 { peak / floor } else { 0.0 }, total)
+    }
+
+    /// With all dwells.
+    fn strip(&self, powers: &Powers) -> Strip {
+        powers.strip(self.near_cells(), self.sums)
     }
 
     /// Of a Doppler that was left after so many dwells: its peak is what it reached of the bar.
     fn left(&self, reached: f64, total: f64, dwells: usize) -> Strip {
         let sums = self.dwells.sums_after(dwells);
-        Strip { peak: reached as f32, lag: 0, total, near: 0.0, near_cells: 0, sums }
+        Strip { peak: reached as f32, half_lag: 0, total, near: 0.0, near_cells: 0, sums }
     }
 }

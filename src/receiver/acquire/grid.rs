@@ -19,8 +19,9 @@ use rustfft::{Fft, FftPlanner};
 use super::Acquired;
 use super::dwells::{Dwells, Room, Rooms, Spectra};
 use super::kernel::Spectrum;
-use super::multiple_access::Law;
-use super::refine::Refined;
+use super::multiple_access::{Law, Raised};
+use super::powers;
+use super::refine::{self, Refined};
 use super::replica::Replica;
 use super::settings::AcquisitionSettings;
 use super::sums::Sums;
@@ -57,9 +58,11 @@ pub(super) struct Grid {
     pub dopplers_hz: Vec<f64>,
     /// From one of them to the next.
     pub step_hz: f64,
-    /// Lags in one code period, and the samples between them.
+    /// Cells in one code period, and the samples from one to the next. There is another between any two.
     pub lags: usize,
     pub lag_samples: f64,
+    /// Independent cells that have the same law.
+    pub cells: usize,
     /// What a satellite's statistic has to exceed, by Doppler.
     pub(super) law: Law,
     /// Of one code: the dwells after which a Doppler may be left for the first time, and the law then.
@@ -81,7 +84,8 @@ pub(super) struct Peak {
     /// Whether no law of that Doppler would make it cross-correlation.
     pub is_sure: bool,
     pub doppler_hz: f64,
-    pub lag: usize,
+    /// In halves of a cell.
+    pub half_lag: usize,
 }
 
 /// The outcome for all satellites.
@@ -89,6 +93,9 @@ pub(super) struct Peaks {
     pub of: Vec<Peak>,
     /// Numbers of the Dopplers at which cross-correlation raises the cells of all codes.
     pub crowded: Vec<usize>,
+    /// By Doppler, as far as first dwells showed it.
+    #[cfg(test)]
+    pub raised: Vec<Raised>,
     pub map: Map,
 }
 
@@ -124,11 +131,13 @@ impl Map {
     }
 }
 
-/// One satellite at one Doppler: the largest cell, and sums over all cells and over those near it.
+/// One satellite at one Doppler: the largest cell, and sums over all cells and over those near it, without
+/// those between.
 #[derive(Clone, Copy)]
 pub(super) struct Strip {
     pub peak: f32,
-    pub lag: usize,
+    /// In halves of a cell.
+    pub half_lag: usize,
     pub total: f64,
     pub near: f64,
     pub near_cells: usize,
@@ -170,16 +179,18 @@ impl Grid {
         let side = (settings.doppler_max_hz / step_hz).ceil() as i64;
         let centre = (centre_hz / step_hz).round() as i64;
         let dopplers_hz: Vec<f64> = (centre - side..=centre + side).map(|bin| bin as f64 * step_hz).collect();
-        let lags = (period_samples / lag_samples).ceil() as usize;
-        let per_cell = of_one_cell(settings.false_alarm_probability, (lags * dopplers_hz.len()) as f64);
+        let cell_s = lag_samples / rate_hz;
+        let shape = refine::searched_shape(component);
+        let cells = powers::independent(band, shape.correlation(cell_s) / shape.correlation(0.0));
+        let per_cell = of_one_cell(settings.false_alarm_probability, (cells * dopplers_hz.len()) as f64);
         let looked = settings.sums(component);
         let dwells =
-            if is_pair { Dwells::of_pair(looked, lags) } else { Dwells::alone(looked, coherent_periods, lags) };
+            if is_pair { Dwells::of_pair(looked, cells) } else { Dwells::alone(looked, coherent_periods, cells) };
         let sums = dwells.sums();
         // One degree of freedom a sum, with the same mean.
         let image_scale = threshold(per_cell, 2 * sums) / (2.0 * threshold(per_cell, sums));
         let bins = dopplers_hz.len();
-        let of_sums = |sums| Law::new(settings.false_alarm_probability, lags, bins, sums, image_scale);
+        let of_sums = |sums| Law::new(settings.false_alarm_probability, cells, bins, sums, image_scale);
         let early = dwells.first_bar().filter(|_| !is_pair).map(|made| (made, of_sums(dwells.sums_after(made))));
         let side_hz = component.side_hz();
         let share = 1.0 + side_hz / carrier_hz;
@@ -197,8 +208,9 @@ impl Grid {
             is_pair,
             dopplers_hz,
             step_hz,
-            lags,
+            lags: band,
             lag_samples,
+            cells,
             law: of_sums(sums),
             early,
             image_scale,
@@ -260,8 +272,15 @@ impl Grid {
         let power: f64 = block.i.iter().chain(block.q).map(|x| f64::from(x * x)).sum();
         let rms = (power / block.i.len().max(1) as f64).sqrt();
         if rms == 0.0 {
-            let none = Peak { statistic: 0.0, threshold: self.law.threshold, is_sure: false, doppler_hz: 0.0, lag: 0 };
-            return Peaks { of: vec![none; spectra.len()], crowded: Vec::new(), map: Map::default() };
+            let none =
+                Peak { statistic: 0.0, threshold: self.law.threshold, is_sure: false, doppler_hz: 0.0, half_lag: 0 };
+            return Peaks {
+                of: vec![none; spectra.len()],
+                crowded: Vec::new(),
+                #[cfg(test)]
+                raised: Vec::new(),
+                map: Map::default(),
+            };
         }
         // What is compared with strips of before has their scale.
         let again = again.filter(|_| !self.is_pair);
@@ -275,17 +294,18 @@ impl Grid {
             Some(again) if !again.dopplers.contains(&bin) => {
                 let wanted = |number: usize| again.satellites.get(number).is_some_and(|(_, everywhere)| *everywhere);
                 let some: Vec<Spectra<'_>> = (0..).zip(spectra).filter(|(n, _)| wanted(*n)).map(|(_, s)| *s).collect();
-                let (seen, reached) = if some.is_empty() { (Vec::new(), None) } else { column(bin, &some, room) };
+                let (seen, raised) =
+                    if some.is_empty() { (Vec::new(), Raised::Perhaps) } else { column(bin, &some, room) };
                 let mut seen = seen.into_iter();
                 let before = |satellite: usize| again.before.strips.get(bin)?.get(satellite).copied();
                 let strips = (again.satellites.iter())
                     .filter_map(|(satellite, everywhere)| if *everywhere { seen.next() } else { before(*satellite) })
                     .collect();
-                (strips, reached)
+                (strips, raised)
             }
             _ => column(bin, spectra, room),
         };
-        let (mut strips, reached): (Vec<Vec<Strip>>, Vec<Option<f64>>) =
+        let (mut strips, raised): (Vec<Vec<Strip>>, Vec<Raised>) =
             (0..self.dopplers_hz.len()).into_par_iter().map(|bin| rooms.with(self, |room| one(room, bin))).unzip();
         self.complete(&mut strips, spectra, &sums, rooms);
         // Satellites that are not looked at again were seen beside what has been subtracted since.
@@ -295,11 +315,12 @@ impl Grid {
         };
         let mut filled = BTreeSet::new();
         let (of, mut crowded) = loop {
-            let (of, crowded) = self.peaks(&strips, &reached, spectra.len());
+            let (of, crowded) = self.peaks(&strips, &raised, spectra.len());
             // Of others all sums are enough: what was subtracted since made them larger, if anything.
             let is_open = |bin: usize, satellite: usize| {
                 let open = |strip: &Strip| strip.sums < self.sums;
-                !filled.contains(&bin) && (old(bin, satellite) || strips[bin].iter().any(open))
+                let unknown = raised[bin] != Raised::No && strips[bin].iter().any(open);
+                !filled.contains(&bin) && (old(bin, satellite) || unknown)
             };
             let doubtful = self.doubtful(&of, is_open);
             if doubtful.is_empty() {
@@ -312,11 +333,17 @@ impl Grid {
             });
             filled.extend(doubtful);
         };
-        crowded.extend((0..).zip(&reached).filter_map(|(bin, reached)| reached.map(|_| bin)));
+        crowded.extend((0..).zip(&raised).filter_map(|(bin, raised)| matches!(raised, Raised::Yes(_)).then_some(bin)));
         crowded.sort_unstable();
         crowded.dedup();
         let of = of.into_iter().map(|(_, peak)| peak).collect();
-        Peaks { of, crowded, map: Map { strips, scale } }
+        Peaks {
+            of,
+            crowded,
+            #[cfg(test)]
+            raised,
+            map: Map { strips, scale },
+        }
     }
 
     /// What a statistic has to exceed in noise.
@@ -342,22 +369,6 @@ impl Grid {
         for ((bin, satellite), strip) in missing.into_iter().zip(found) {
             strips[bin][satellite] = strip;
         }
-    }
-
-    pub(super) fn strip(&self, powers: &[f32]) -> Strip {
-        let (mut lag, mut peak, mut total) = (0, 0.0_f32, 0.0_f64);
-        for (n, &power) in powers.iter().enumerate() {
-            total += f64::from(power);
-            if power > peak {
-                (lag, peak) = (n, power);
-            }
-        }
-        let side = self.near_cells();
-        let near_cells = (2 * side + 1).min(powers.len());
-        let near = (0..near_cells)
-            .map(|n| f64::from(powers[(lag + powers.len() + n - side.min(powers.len())) % powers.len()]))
-            .sum();
-        Strip { peak, lag, total, near, near_cells, sums: self.sums }
     }
 
     pub(super) fn near_cells(&self) -> usize {
@@ -399,10 +410,12 @@ impl Grid {
         self.chips_per_sample * (1.0 + doppler_hz / self.carrier_hz)
     }
 
-    /// Code phase at the first sample of the block, in chips (not reduced), if the largest cell is at `lag`.
-    pub fn code_phase_chips(&self, lag: usize, doppler_hz: f64) -> f64 {
+    /// Code phase at the first sample of the block, in chips (not reduced), if the largest cell is at
+    /// `half_lag` halves of one.
+    pub fn code_phase_chips(&self, half_lag: usize, doppler_hz: f64) -> f64 {
+        let lag_samples = 0.5 * half_lag as f64 * self.lag_samples;
         // The replica's first sample represents the middle of its interval.
-        0.5 * self.chips_per_sample - lag as f64 * self.lag_samples * self.received_chips_per_sample(doppler_hz)
+        0.5 * self.chips_per_sample - lag_samples * self.received_chips_per_sample(doppler_hz)
     }
 }
 

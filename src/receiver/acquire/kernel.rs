@@ -236,15 +236,20 @@ pub(super) fn multiply(out: &mut [Complex<f32>], a: &Spectrum, b: &[Complex<f32>
     multiply_plain(out, a, b);
 }
 
-/// powers += |x|².
-pub(super) fn add_powers(powers: &mut [f32], x: &[Complex<f32>]) {
+/// cells += |x|², and between += |x + x'|², x' the number after x, of the last one the first; all have as many.
+pub(super) fn add_powers(cells: &mut [f32], between: &mut [f32], x: &[Complex<f32>]) {
+    let length = cells.len().min(between.len()).min(x.len());
+    let (cells, between, x) = (&mut cells[..length], &mut between[..length], &x[..length]);
+    let (Some(first), Some(last)) = (x.first(), x.last()) else { return };
+    cells[length - 1] += last.norm_sqr();
+    between[length - 1] += (last + first).norm_sqr();
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") {
         // SAFETY: the processor has AVX2.
-        unsafe { add_powers_avx2(powers, x) };
+        unsafe { add_powers_avx2(cells, between, x) };
         return;
     }
-    add_powers_plain(powers, x);
+    add_powers_plain(cells, between, x);
 }
 
 /// The largest of these powers and their sum.
@@ -318,10 +323,44 @@ fn multiply_parts(out: &mut [f32], (a, step): (&[i16], f32), b: &[f32]) {
     }
 }
 
+/// Numbers whose powers are added side by side.
+#[cfg(target_arch = "x86_64")]
+const CELLS: usize = 8;
+
+/// All but the last of as many numbers, so that each has one after it.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn add_powers_avx2(powers: &mut [f32], x: &[Complex<f32>]) {
-    add_powers_plain(powers, x);
+fn add_powers_avx2(cells: &mut [f32], between: &mut [f32], x: &[Complex<f32>]) {
+    let whole = x.len().saturating_sub(1) / CELLS * CELLS;
+    let x_parts = parts(x);
+    let planes = cells[..whole].as_chunks_mut::<CELLS>().0.iter_mut().zip(between.as_chunks_mut::<CELLS>().0);
+    for (n, (cells, between)) in planes.enumerate() {
+        let from = x_parts[2 * CELLS * n..].as_ptr();
+        // SAFETY: there are eight numbers from there on and one more, and any alignment will do.
+        unsafe {
+            let [low, high] = [0, 8].map(|part| x86::_mm256_loadu_ps(from.add(part)));
+            let [low_after, high_after] = [2, 10].map(|part| x86::_mm256_loadu_ps(from.add(part)));
+            let own = powers_avx2(low, high);
+            let sums = powers_avx2(x86::_mm256_add_ps(low, low_after), x86::_mm256_add_ps(high, high_after));
+            let add = |place: &mut [f32; CELLS], powers| {
+                let sum = x86::_mm256_add_ps(x86::_mm256_loadu_ps(place.as_ptr()), powers);
+                x86::_mm256_storeu_ps(place.as_mut_ptr(), sum);
+            };
+            add(cells, own);
+            add(between, sums);
+        }
+    }
+    add_powers_plain(&mut cells[whole..], &mut between[whole..], &x[whole..]);
+}
+
+/// Squares of eight numbers whose parts are in turn.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn powers_avx2(low: x86::__m256, high: x86::__m256) -> x86::__m256 {
+    let re = x86::_mm256_shuffle_ps::<0b10_00_10_00>(low, high);
+    let im = x86::_mm256_shuffle_ps::<0b11_01_11_01>(low, high);
+    let squares = x86::_mm256_add_ps(x86::_mm256_mul_ps(re, re), x86::_mm256_mul_ps(im, im));
+    x86::_mm256_castpd_ps(x86::_mm256_permute4x64_pd::<0b11_01_10_00>(x86::_mm256_castps_pd(squares)))
 }
 
 /// Real and imaginary parts in turn.
@@ -338,10 +377,10 @@ fn parts_mut(numbers: &mut [Complex<f32>]) -> &mut [f32] {
     unsafe { std::slice::from_raw_parts_mut(numbers.as_mut_ptr().cast(), 2 * numbers.len()) }
 }
 
-#[inline(always)]
-fn add_powers_plain(powers: &mut [f32], x: &[Complex<f32>]) {
-    for (power, x) in powers.iter_mut().zip(x) {
-        *power += x.re * x.re + x.im * x.im;
+fn add_powers_plain(cells: &mut [f32], between: &mut [f32], x: &[Complex<f32>]) {
+    for ((cell, between), pair) in cells.iter_mut().zip(between).zip(x.windows(2)) {
+        *cell += pair[0].norm_sqr();
+        *between += (pair[0] + pair[1]).norm_sqr();
     }
 }
 
@@ -454,21 +493,23 @@ mod tests {
                 let (spectrum, b) = (Spectrum::of(&a[offset..offset + length]), &b[31 - offset..31 - offset + length]);
                 let a = spectrum.bins();
                 let mut products = vec![Complex::new(77.0, 77.0); 200];
-                let mut powers = vec![2.5; 200];
+                let [mut cells, mut between] = [(); 2].map(|()| vec![2.5; 200]);
                 let mut plain = products.clone();
                 multiply(&mut products[offset..offset + length], &spectrum, b);
                 multiply_plain(&mut plain[offset..offset + length], &spectrum, b);
                 assert_eq!(plain, products);
-                add_powers(&mut powers[offset..offset + length], &a);
-                for (n, (product, power)) in products.iter().zip(&powers).enumerate() {
-                    let (expected, sum) = match n.checked_sub(offset).filter(|n| *n < length) {
+                let place = offset..offset + length;
+                add_powers(&mut cells[place.clone()], &mut between[place], &a);
+                let power = |x: Complex<f32>| 2.5 + (x.re * x.re + x.im * x.im);
+                for (n, product) in products.iter().enumerate() {
+                    let expected = match n.checked_sub(offset).filter(|n| *n < length) {
                         Some(k) => (
                             Complex::new(a[k].re * b[k].re - a[k].im * b[k].im, a[k].re * b[k].im + a[k].im * b[k].re),
-                            2.5 + (a[k].re * a[k].re + a[k].im * a[k].im),
+                            [power(a[k]), power(a[k] + a[(k + 1) % length])],
                         ),
-                        None => (Complex::new(77.0, 77.0), 2.5),
+                        None => (Complex::new(77.0, 77.0), [2.5; 2]),
                     };
-                    assert_eq!((*product, *power), (expected, sum), "{length} {offset} {n}");
+                    assert_eq!((*product, [cells[n], between[n]]), expected, "{length} {offset} {n}");
                 }
             }
         }

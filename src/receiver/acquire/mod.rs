@@ -16,9 +16,10 @@
 //!
 //! **Threshold.** A cell's statistic is Σ|S|² in units of half its noise power: chi-square with 2K degrees of
 //! freedom for K sums. With N cells (lags in one code period times Dopplers), a cell is given 1 − (1 −
-//! P)^(1/N) of the probability P. Neighbouring cells are correlated, so this errs to the safe side, but
-//! little: at three cells a chip and half-cycle Doppler steps neighbours share 40 % of their power, and where
-//! one exceeds a high threshold the next does so in few of a hundred cases (measured in this module's tests).
+//! P)^(1/N) of the probability P. Between any two lags there is another cell, the sum of both (`powers`), and
+//! N counts independent ones of the same law. Neighbours in Doppler are correlated, so this errs to the safe
+//! side, but little: at half-cycle steps they share 40 % of their power, and where one exceeds a high
+//! threshold the next does so in few of a hundred cases (measured in this module's tests).
 //! Near a multiple of half the rate of a real recording a carrier meets its own image and a sum has one
 //! degree of freedom only; there the statistic is scaled by the ratio of both thresholds.
 //!
@@ -26,8 +27,8 @@
 //! dwells where a single code has ten sums, and a Doppler is left early where nothing is (`dwells`).
 //!
 //! **Sensitivity.** By default 10 sums of 2 ms with half-cycle steps. At 38 dB-Hz and 2.6 Msps, with the
-//! worst losses of code (2.0 dB) and Doppler (0.9 dB) and one sum in ten lost to a data bit, 20 + λ = 138 ±
-//! 23 exceeds a threshold of 95. A bit that turns within a sum leaves a third of its power on average.
+//! worst losses of code (1.5 dB) and Doppler (0.9 dB) and one sum in ten lost to a data bit, 20 + λ = 151 ±
+//! 24 exceeds a threshold of 95. A bit that turns within a sum leaves a third of its power on average.
 
 mod across;
 mod choice;
@@ -39,6 +40,7 @@ mod kernel;
 mod multiple_access;
 mod near;
 mod pair;
+mod powers;
 mod refine;
 mod replica;
 mod room;
@@ -127,7 +129,7 @@ fn far_hz(metadata: &IfMetadata, signal: &Signal, carrier_hz: f64) -> f64 {
     if_hz + libm::copysign(signal.sides_hz(), if_hz)
 }
 
-/// Chips between neighbouring cells of a search for `signal`.
+/// Chips from one cell of a search for `signal` to the next; there is another between them.
 ///
 /// # Errors
 /// As [`Searcher::search`] for a signal that has no code.
@@ -150,6 +152,18 @@ pub fn bars(
     settings: &AcquisitionSettings,
 ) -> Result<Vec<f64>, AcquireError> {
     grid(metadata, signal, settings).map(|grid| grid.dwells.stay().to_vec())
+}
+
+/// Independent cells at a Doppler whose largest has the law of all of them in a search for `signal`.
+///
+/// # Errors
+/// As [`cell_chips`].
+pub fn independent_cells(
+    metadata: &IfMetadata,
+    signal: &'static Signal,
+    settings: &AcquisitionSettings,
+) -> Result<usize, AcquireError> {
+    grid(metadata, signal, settings).map(|grid| grid.cells)
 }
 
 fn grid(metadata: &IfMetadata, signal: &'static Signal, settings: &AcquisitionSettings) -> Result<Grid, AcquireError> {
@@ -467,7 +481,7 @@ impl Searcher {
             .map(|(peak, (_, code))| {
                 let excess = peak.statistic / (2.0 * f64::from(sums)) - 1.0;
                 let coarse = Refined {
-                    code_phase_chips: grid.code_phase_chips(peak.lag, peak.doppler_hz),
+                    code_phase_chips: grid.code_phase_chips(peak.half_lag, peak.doppler_hz),
                     doppler_hz: peak.doppler_hz,
                     cn0_hz: excess.max(f64::MIN_POSITIVE) / coherent_s,
                     power: 0.0,

@@ -22,6 +22,9 @@ use crate::receiver::threshold::{of_one_cell, threshold};
 pub(super) const LEAST_CODES: usize = 12;
 /// A bin is crowded when its median is so many standard deviations above that of noise.
 const CROWDED: f64 = 5.0;
+/// After the first half of its sums a bin that shows no more than this of them is none: of one that is to be
+/// crowded by all sums the median is raised by half of [`CROWDED`] then, and shows so little in one case of 40.
+const QUIET: f64 = 0.5;
 /// Standard deviation of a Gumbel sample's median over scale, times √n: 1 / (2 × density there, ½ ln 2) =
 /// 1/ln 2.
 const MEDIAN_SPREAD: f64 = std::f64::consts::LOG2_E;
@@ -48,6 +51,16 @@ pub(super) struct Law {
     image: (f64, f64),
     /// Deviation of a cell's root where a carrier meets its image; one elsewhere.
     image_deviation: f64,
+}
+
+/// Whether cross-correlation raises the cells of all codes in a bin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Raised {
+    No,
+    /// By too little to tell from noise, or too few codes were seen.
+    Perhaps,
+    /// What nine codes in ten stay below.
+    Yes(f64),
 }
 
 /// What every bin's peak has to exceed.
@@ -110,11 +123,21 @@ impl Law {
         bar
     }
 
-    /// What nine codes in ten stay below in a bin that is crowded; `None` where it is not. Noise is circular.
-    pub fn reached(&self, column: Vec<f64>) -> Option<f64> {
-        let (median_root, mut beyond) = self.crowded(column, false)?;
-        let root = median_root + quantile(&mut beyond, REACHED);
-        Some(root * root)
+    /// What the largest cells of all codes in a bin say after a part of the sums. Noise is circular.
+    pub fn raised(&self, column: Vec<f64>) -> Raised {
+        if column.len() < LEAST_CODES {
+            return Raised::Perhaps;
+        }
+        let (median, mut beyond) = median_and_excesses(column);
+        let deviations = self.deviations(median, beyond.len(), false);
+        if deviations > CROWDED {
+            let root = median.sqrt() + quantile(&mut beyond, REACHED);
+            Raised::Yes(root * root)
+        } else if deviations > QUIET {
+            Raised::Perhaps
+        } else {
+            Raised::No
+        }
     }
 
     /// What a peak has to exceed in a crowded bin where nine codes in ten stay below `reached`.
@@ -123,22 +146,32 @@ impl Law {
         root * root
     }
 
-    /// The median of the largest cells of a crowded bin and by how much each exceeds that, in amplitude.
-    fn crowded(&self, mut column: Vec<f64>, image: bool) -> Option<(f64, Vec<f64>)> {
+    /// The root of the median of the largest cells of a crowded bin and by how much each exceeds that, in
+    /// amplitude.
+    fn crowded(&self, column: Vec<f64>, image: bool) -> Option<(f64, Vec<f64>)> {
         if column.len() < LEAST_CODES {
             return None;
         }
-        let (place, scale) = if image { self.image } else { self.circular };
-        let deviation = MEDIAN_SPREAD * scale / (column.len() as f64).sqrt();
-        let mut median = quantile(&mut column, 0.5);
-        if stands_out(&column, median) {
-            column.retain(|height| !is_beyond_cross_correlation(*height, median));
-            median = quantile(&mut column, 0.5);
-        }
-        let excess = |height: f64| height.sqrt() - median.sqrt();
-        (median > place + CROWDED * deviation)
-            .then(|| (median.sqrt(), column.iter().map(|height| excess(*height)).collect()))
+        let (median, beyond) = median_and_excesses(column);
+        (self.deviations(median, beyond.len(), image) > CROWDED).then(|| (median.sqrt(), beyond))
     }
+
+    /// How far the median of so many codes is above that of noise, in its standard deviations.
+    fn deviations(&self, median: f64, codes: usize, image: bool) -> f64 {
+        let (place, scale) = if image { self.image } else { self.circular };
+        (median - place) / (MEDIAN_SPREAD * scale / (codes as f64).sqrt())
+    }
+}
+
+/// The median of a bin's largest cells without those of satellites that are there, as far as these stand out, and
+/// by how much each of the others exceeds it, in amplitude.
+fn median_and_excesses(mut column: Vec<f64>) -> (f64, Vec<f64>) {
+    let mut median = quantile(&mut column, 0.5);
+    if stands_out(&column, median) {
+        column.retain(|height| !is_beyond_cross_correlation(*height, median));
+        median = quantile(&mut column, 0.5);
+    }
+    (median, column.iter().map(|height| height.sqrt() - median.sqrt()).collect())
 }
 
 /// Whether more codes than the quantile leaves room for are higher than cross-correlation explains.

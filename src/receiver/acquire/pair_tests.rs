@@ -111,15 +111,15 @@ fn leaving_dopplers_brings_no_more_false_alarms_than_designed() {
 /// `asked` by the pilot alone that begin at one place of the code.
 fn share_found(cn0_dbhz: f64, asked: u32, dwells: Option<&Dwells>, random: &mut Noise) -> f64 {
     const TRIALS: u32 = 4000;
-    const CELLS: f64 = 24_552.0;
+    const CELLS: f64 = 29_600.0;
     let sums = dwells.map_or(asked, Dwells::sums);
     let bar = threshold(of_one_cell(1e-6, 81.0 * CELLS), 2 * sums);
     let begins = dwells.map_or(vec![0.0; asked as usize], |dwells| dwells.begins().to_vec());
     let mut found = 0;
     for _ in 0..TRIALS {
         let (turn_at, cycles) = (random.uniform(), 0.5 * random.uniform() - 0.25);
-        // Six cells a chip, power around 1 MHz, and what CBOC and the band leave.
-        let lag_loss = libm::cos(TAU * (random.uniform() - 0.5) / 6.0 / 1.023);
+        // Eight cells a chip with those between, power around 1 MHz, and what CBOC and the band leave.
+        let lag_loss = libm::cos(TAU * (random.uniform() - 0.5) / 8.0 / 1.023);
         let amplitude = (2.0 * libm::pow(10.0, (cn0_dbhz - 0.85) / 10.0) * 0.5 * 4e-3).sqrt() * lag_loss;
         let part = |from: f64, to: f64| {
             let turns = |x: f64| Complex::new(0.0, TAU * cycles * x).exp() / Complex::new(0.0, TAU * cycles);
@@ -145,7 +145,7 @@ fn share_found(cn0_dbhz: f64, asked: u32, dwells: Option<&Dwells>, random: &mut 
 fn eight_dwells_by_both_find_as_many_as_ten_by_the_pilot_alone() {
     // Weak signals ask for many and show late.
     for (asked, weakest_dbhz) in [(10, 34), (20, 32), (50, 29)] {
-        let dwells = Dwells::of_pair(asked, 24_552);
+        let dwells = Dwells::of_pair(asked, 29_600);
         let mut random = Noise(12);
         for cn0_dbhz in weakest_dbhz..=weakest_dbhz + 8 {
             let [alone, both] =
@@ -166,7 +166,7 @@ fn satellites_are_found_where_they_are_no_less_often_than_the_model_says() {
     let samples = samples_needed(&metadata, &settings).unwrap() as usize;
     let mut searcher = Searcher::new(&metadata, &settings).unwrap();
     let mut random = Noise(31);
-    let expected = share_found(38.0, 10, Some(&Dwells::of_pair(10, 24_552)), &mut random);
+    let expected = share_found(38.0, 10, Some(&Dwells::of_pair(10, 29_600)), &mut random);
     let (mut found, trials) = (0, 60);
     for trial in 0..trials {
         let (doppler_hz, phase) = (900.0 * random.uniform() - 450.0, 4092.0 * random.uniform());

@@ -62,14 +62,7 @@ pub(super) fn refine(
     };
     let doppler_hz = correlators.fine_doppler_hz(phase, doppler_hz);
 
-    let made = component.tone().map_or(component.strongest(), |_| Some(&Layer::BPSK));
-    let shape = made.map_or_else(
-        || component.shape(),
-        |layer| {
-            let layers = [*layer];
-            Shape::between(&layers, &layers, component.chip_rate_hz)
-        },
-    );
+    let shape = searched_shape(component);
     let quiet_chips: Vec<f64> = replica.quiet_taps(NOISE_TAPS).into_iter().map(units_to_chips).collect();
     // Taps of one pass share the carrier.
     let (fours, rest) = quiet_chips.as_chunks::<4>();
@@ -100,6 +93,18 @@ pub(super) fn refine(
         cn0_hz: if measured > 0.0 { measured } else { coarse.cn0_hz },
         power: (power - noise).max(0.0),
     }
+}
+
+/// Correlation of the layer that a search looks for: of one side of a sub-carrier that of chips.
+pub(super) fn searched_shape(component: &Component) -> Shape {
+    let made = component.tone().map_or(component.strongest(), |_| Some(&Layer::BPSK));
+    made.map_or_else(
+        || component.shape(),
+        |layer| {
+            let layers = [*layer];
+            Shape::between(&layers, &layers, component.chip_rate_hz)
+        },
+    )
 }
 
 fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {

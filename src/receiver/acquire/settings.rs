@@ -27,8 +27,8 @@ pub struct AcquisitionSettings {
     /// Doppler step times coherent time: 0.5 loses 0.91 dB at worst and 0.29 dB on average, 2/3 1.65 and 0.51
     /// dB.
     pub doppler_step_cycles: f64,
-    /// Cells a chip at most: faster recordings are band-limited to this many times the chip rate for the
-    /// search.
+    /// Cells a chip at most, with one more between any two: faster recordings are band-limited to this many
+    /// times the chip rate for the search.
     pub cells_per_chip: f64,
     /// Probability that the search for one absent satellite, over all its cells, finds it in noise alone;
     /// where the others' cross-correlation is seen to make the tail heavier, in that too. The default costs
@@ -53,7 +53,7 @@ impl Default for AcquisitionSettings {
             coherent_periods: 2,
             noncoherent_sums: 10,
             doppler_step_cycles: 0.5,
-            cells_per_chip: 3.0,
+            cells_per_chip: 2.0,
             false_alarm_probability: 1e-6,
             reserved_codes: false,
         }

@@ -17,9 +17,11 @@ use crate::gnss::signal::{SIGNALS, Signal};
 const HOLDING_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
 /// Least C/N0 at which the message can be read: at 27 dB-Hz one bit in 4e6 is wrong (Eb/N0 of 10 dB).
 const MESSAGE_DBHZ: f64 = 27.0;
-/// Share of the power that the worst place between cells leaves: 2.0 dB of code at three cells a chip and few
-/// samples, and one sum in ten half lost to a data bit.
+/// Share of the power that the worst place between cells leaves: 2.0 dB of code at few samples a chip, and one
+/// sum in ten half lost to a data bit.
 const CODE_LOSS: f64 = 0.6 * 0.95;
+/// With one cell between any two there are so many more of the same law.
+const CELLS_BETWEEN: f64 = 1.5;
 /// Detection so sure that one search counts no more.
 const SUREST: f64 = 1.0 - 1e-7;
 
@@ -78,7 +80,7 @@ impl Receiver {
         let step_cycles = number("acquisition", "doppler_step_cycles", 0.5);
         let doppler_max_hz = number("acquisition", "doppler_max_hz", 5000.0);
         let dopplers = 2.0 * doppler_max_hz * coherent_s / step_cycles + 1.0;
-        let cells = chips * number("acquisition", "cells_per_chip", 3.0) * dopplers;
+        let cells = CELLS_BETWEEN * chips * number("acquisition", "cells_per_chip", 2.0) * dopplers;
         let false_alarm = number("acquisition", "false_alarm_probability", 1e-6);
         let later = number("operation", "repeated_false_alarm_share", 0.01);
         let threshold = |search: f64| {
