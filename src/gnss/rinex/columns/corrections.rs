@@ -132,8 +132,8 @@ impl Form {
     }
 }
 
-/// Whether coefficients of BDGIM are within what the messages' fields carry, the fifth below zero and the first
-/// above (BDS-SIS-ICD-B1C 1.0, 7.8).
+/// Whether coefficients of BDGIM are within what the messages' fields carry, the fifth below zero and the
+/// first above (BDS-SIS-ICD-B1C 1.0, 7.8).
 fn possible(alpha_tecu: &[f64]) -> Result<(), String> {
     match alpha_tecu.iter().find(|alpha| !(-31.875..=127.875).contains(*alpha)) {
         Some(alpha) => Err(format!("coefficient of BDGIM {alpha} TECU: expected -31.875 to 127.875")),
