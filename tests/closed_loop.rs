@@ -567,6 +567,27 @@ fn b2b_alone_finds_its_place_by_b_cnav3() {
     assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
 }
 
+/// The same under the ionosphere that satellites broadcast by BDGIM: the same bars, by its coefficients,
+/// which message 30 brings within the four seconds of a set.
+#[test]
+fn b2b_alone_finds_its_place_under_the_ionosphere_that_b_cnav3_brings() {
+    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+        return;
+    }
+    let scene = include_str!("../scenarios/beidou_b2b.toml");
+    let (scene, _) = scene.split_once("[receiver.position]").unwrap();
+    let electrons = "bdgim_tecu = [30.875, 0.25, 11.625, 10.375, -12.5, 0.75, 0, 3.125, 1.875]";
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("beidou_b2b_bdgim.toml");
+    std::fs::write(&path, format!("{scene}[ionosphere]\nmodel = \"bdgim\"\n{electrons}\n")).unwrap();
+    let summary = run_with(&path, &["--check".as_ref()]);
+    found_and_decoded_what_is_there(&summary);
+    assert_eq!(number(&summary, "/satellites/used"), 5.0);
+    at_most(&summary, "/position/horizontal_p95_m", 1.0);
+    at_most(&summary, "/position/first_fix_s", 8.0);
+    assert_eq!(number(&summary, "/navigation/parameters_wrong"), 0.0);
+}
+
 /// Bars of B1C and B2a together: 2 m, as the fixes of B2a's first nine seconds, until a frame of B1C is
 /// whole, are of one carrier and have the ionosphere, some 8 m of it, in height and clock above all; and
 /// 0.3 m for the ionosphere as two bands show it (`GNSS_TWIN_LONG=1`).

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use crate::gnss::bdgim::Bdgim;
 use crate::gnss::earth::{Geodetic, Look};
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::nequick::NequickG;
@@ -18,6 +19,8 @@ pub enum Model {
     KlobucharNavic,
     /// That of GPS as BeiDou has it, with geographic latitudes: the delay of B1I.
     KlobucharBeidou,
+    /// Of BeiDou's third generation.
+    Bdgim,
 }
 
 /// The coefficients of a model.
@@ -31,6 +34,8 @@ pub enum Coefficients {
     KlobucharNavic(Klobuchar),
     /// Of BeiDou's form of it.
     KlobucharBeidou(Klobuchar),
+    /// Of the model of BeiDou's third generation.
+    Bdgim(Bdgim),
 }
 
 /// Carrier on which NavIC's coefficients give the delay (IRNSS SIS ICD for SPS 1.1: they are for users of
@@ -50,6 +55,7 @@ impl Coefficients {
             Self::NequickG(_) => Model::NequickG,
             Self::KlobucharNavic(_) => Model::KlobucharNavic,
             Self::KlobucharBeidou(_) => Model::KlobucharBeidou,
+            Self::Bdgim(_) => Model::Bdgim,
         }
     }
 
@@ -67,6 +73,7 @@ impl Coefficients {
             Self::NequickG(model) => model.delay_s(user, satellite_m, at, carrier_hz),
             Self::KlobucharNavic(model) => model.delay_from_s(NAVIC_HZ, user, look, at, carrier_hz),
             Self::KlobucharBeidou(model) => model.beidou_delay_s(user, look, at, carrier_hz),
+            Self::Bdgim(model) => model.delay_s(user, look, at, carrier_hz),
         }
     }
 }

@@ -11,6 +11,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use crate::gnss::augmentation::{Content, Network};
+use crate::gnss::bdgim::Bdgim;
 use crate::gnss::bits::{Field, FieldError};
 use crate::gnss::broadcast::{Ephemeris, SetForm};
 use crate::gnss::gps::lnav::UtcData;
@@ -121,6 +122,8 @@ pub struct Common {
     pub klobuchar_navic: Option<Klobuchar>,
     /// Those of BeiDou's form of it; absent means none are sent.
     pub klobuchar_beidou: Option<Klobuchar>,
+    /// Those of the model of BeiDou's third generation; absent means that nine zeros are sent.
+    pub bdgim: Option<Bdgim>,
     /// Effective ionisation coefficients of NeQuick-G, in solar flux units, per degree and per degree
     /// squared.
     pub nequick: Option<[f64; 3]>,

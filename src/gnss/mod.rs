@@ -25,6 +25,7 @@
 #![warn(missing_docs)]
 
 pub mod augmentation;
+pub mod bdgim;
 pub mod beidou;
 pub mod bits;
 pub mod broadcast;

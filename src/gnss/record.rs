@@ -352,6 +352,8 @@ pub enum IonosphereModel {
     Broadcast,
     /// NeQuick-G with the parameters that the satellites send.
     NequickG,
+    /// BDGIM with the parameters that the satellites send.
+    Bdgim,
     /// Two carriers of every satellite, in the combination that has no ionosphere.
     Combined,
     /// The grid that an augmentation system sends; where it has no points what would correct without it.

@@ -1,7 +1,7 @@
 //! RINEX navigation files, versions 2 to 4: ephemerides of GPS LNAV, Galileo I/NAV (or F/NAV of
 //! satellites that have no I/NAV), NavIC, BeiDou D1 or D2, GLONASS, LNAV of QZSS and SBAS, the
-//! coefficients of these systems' ionosphere but of the last two, times of GPS and Galileo against each
-//! other and UTC, and the leap seconds.
+//! coefficients of these systems' ionosphere but of the last two (of BeiDou those of BDGIM too), times of GPS
+//! and Galileo against each other and UTC, and the leap seconds.
 //!
 //! Source: RINEX 2.11, tables A4 and A10; RINEX 3.05, tables A6, A8, A10, A12 and A18; RINEX 4.02. Lines and
 //! columns are read in `columns`; `elements` holds every element against the range of its field in the
@@ -18,6 +18,7 @@ use std::collections::BTreeSet;
 
 use thiserror::Error;
 
+use crate::gnss::bdgim::Bdgim;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::gps::lnav::LeapEvent;
 use crate::gnss::inflate::{InflateError, inflate};
@@ -40,6 +41,9 @@ pub struct Navigation {
     pub klobuchar_navic: Option<Klobuchar>,
     /// Those of BeiDou's form of it, likewise.
     pub klobuchar_beidou: Option<Klobuchar>,
+    /// Coefficients of BDGIM: of version 4's first record of them that are not all zero, of version 3 by the
+    /// header's lines BDS1 to BDS3, which some providers write.
+    pub bdgim: Option<Bdgim>,
     /// Effective ionisation coefficients of NeQuick-G: solar flux units, per degree, per degree squared.
     pub nequick: Option<[f64; 3]>,
     /// GPS time minus UTC, in whole seconds.
@@ -135,6 +139,7 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
         klobuchar,
         klobuchar_navic,
         klobuchar_beidou,
+        bdgim,
         nequick,
         leap_seconds,
         leap_event,
@@ -153,6 +158,7 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
         klobuchar,
         klobuchar_navic,
         klobuchar_beidou,
+        bdgim,
         nequick,
         leap_seconds,
         leap_event,
@@ -319,6 +325,65 @@ mod tests {
         assert_eq!(first.toe, Epoch::from_week(1590, 345_600.0));
         assert_eq!(first.transmitted, Epoch::from_week(1590, 341_670.0));
         assert_eq!(first.sqrt_a_sqrtm, 0.515480139732e4);
+    }
+
+    #[test]
+    fn coefficients_of_bdgim_are_the_first_that_are_not_all_zero_by_header_or_record() {
+        let whole = unpack(include_bytes!("../../data/brdc1820-2010.n.gz"), "test").unwrap();
+        let text = String::from_utf8(whole[..3000].to_vec()).unwrap();
+        let records = text.split_once("END OF HEADER").unwrap().1.split_once('\n').unwrap().1;
+        let record: Vec<&str> = records.lines().take(8).collect();
+        let first = record[0].replacen(" 1 10  7  1  0  0  0.0", "G01 2010 07 01 00 00 00", 1);
+        let rest: Vec<String> = record[1..].iter().map(|line| format!(" {line}")).collect();
+        let set = format!("{first}\n{}\n", rest.join("\n"));
+        let line = |text: &str, label: &str| format!("{text:<60}{label}\n");
+        let head = |version: &str| line(&format!("{version:>9}{:11}N{:19}M", "", ""), "RINEX VERSION / TYPE");
+        let end = line("", "END OF HEADER");
+        let read = |text: String| read(text.as_bytes(), "bdgim").unwrap();
+
+        // Three numbers a line, and a mark of time behind the fourth field.
+        let third = |name: &str, values: [f64; 3], mark: &str| {
+            let values = values.map(|value| format!("{value:>12.4e}")).concat();
+            line(&format!("{name} {values}{:12} {mark}", ""), "IONOSPHERIC CORR")
+        };
+        let lines = |first: f64, mark: &str| {
+            third("BDS1", [first, -1.78, 5.172], mark)
+                + &third("BDS2", [3.13, -4.59, 0.325], mark)
+                + &third("BDS3", [-0.078, 1.243, 0.378], mark)
+        };
+        let three = |header: &str| read(head("3.04") + header + &end + &set);
+        let expected = |first: f64| Bdgim::given([first, -1.78, 5.172, 3.13, -4.59, 0.325, -0.078, 1.243, 0.378]);
+        let found = three(&(lines(14.0, "B") + &lines(13.0, "A")));
+        assert_eq!((found.bdgim, &found.skipped), (expected(13.0), &Vec::new()));
+        assert_eq!(three(&(third("BDS1", [9.0; 3], "A") + &lines(14.0, "B"))).bdgim, expected(14.0));
+        assert_eq!(three(&third("BDS1", [9.0; 3], "A")).bdgim, None);
+        let damaged = three(&lines(14.0, "A").replace("BDS2", "BDS2 x"));
+        assert!(damaged.bdgim.is_none() && damaged.skipped[0].contains("line 3 (IONOSPHERIC CORR)"), "{damaged:?}");
+
+        let ion = |sv: &str, hour: u8, values: [f64; 9]| {
+            let field = |value: &f64| format!("{value:>19.12e}");
+            let text = |values: &[f64]| values.iter().map(field).collect::<String>();
+            let [one, two, three] = [&values[..3], &values[3..7], &values[7..]].map(text);
+            format!("> ION {sv} CNVX\n    2010 07 01 {hour:02} 00 00{one}\n    {two}\n    {three}\n")
+        };
+        let sent = [30.875, 0.25, 11.625, 10.375, -12.5, 0.75, 0.0, 3.125, 1.875];
+        let four = |body: String| read(head("4.01") + &end + "> EPH G01 LNAV\n" + &set + &body);
+        let found = four(ion("C30", 4, [9.0; 9]) + &ion("C25", 2, sent) + &ion("C20", 0, [0.0; 9]));
+        assert_eq!((found.bdgim, &found.skipped), (Bdgim::given(sent), &Vec::new()));
+        // Records of that name of another system are of another model.
+        let other = ion("J02", 0, sent);
+        assert_eq!(four(other).bdgim, None);
+        for (wrong, expected) in [
+            (ion("C30", 4, sent).replace("2010 07 01 04 00 00", "2010 07 01 04 00 xx"), "expected an epoch"),
+            (ion("C30", 4, sent).lines().take(3).map(|line| format!("{line}\n")).collect(), "a record of 3 lines"),
+            (ion("C30", 4, [128.0; 9]), "coefficient of BDGIM 128 TECU: expected -31.875 to 127.875"),
+            (ion("C30", 4, sent).replace("1.0375", "1.03x5"), "column"),
+            (ion("C30", 4, sent).replace("1.875000000000e0", "                "), "expected nine coefficients"),
+        ] {
+            let found = four(wrong.clone());
+            let named = found.skipped.iter().any(|reason| reason.contains(expected) && reason.contains("ION C30 CNVX"));
+            assert!(found.bdgim.is_none() && named, "{wrong}\n{:?}", found.skipped);
+        }
     }
 
     #[test]

@@ -51,6 +51,7 @@ impl Base {
 const TABLES: &[(&str, Option<&str>)] = &[
     ("[ionosphere]\nmodel = \"klobuchar\"", None),
     ("[ionosphere]\nmodel = \"nequick_g\"\nai = [120, 0.3, 0.01]", None),
+    ("[ionosphere]\nmodel = \"bdgim\"\nbdgim_tecu = [31, 0.25, 11, 10, -12, 0.75, 0, 3, 2]", None),
     ("[troposphere]\nmodel = \"saastamoinen\"", None),
     ("[troposphere]\nmodel = \"saastamoinen\"\nmapping = \"vmf3\"\nvmf_file = \"tests/effects/coarse.vmf3\"", None),
     ("[receiver_clock]\nbias_s = 1e-4\ndrift_sps = 1e-7", Some("[receiver_clock]\nbias_s = 0\ndrift_sps = 0")),

@@ -12,7 +12,7 @@ pub const ORDER: Order<'static> = &[
         "gnss",
         &[
             &["time", "earth", "satellite", "crc", "fec", "inflate", "place", "weil"],
-            &["bits", "klobuchar", "nequick", "ionex", "samples", "vienna"],
+            &["bits", "bdgim", "klobuchar", "nequick", "ionex", "samples", "vienna"],
             &["ionosphere"],
             &["packed", "signal", "vmf3"],
             &["recording"],

@@ -55,6 +55,8 @@ const QZSS_CNAV: &str =
     "witness::qzss::every_real_message_of_l5_and_l2c_is_read_and_sent_again_and_its_sets_are_the_records_of_the_hour";
 const B1C_CODES: &str = "witness::bcnav1::all_chips_of_all_codes_and_overlays_of_b1c_are_those_of_another_program";
 const FRAMES_B1C: &str = "witness::bcnav1::frames_are_read_from_any_symbol_and_either_way_up_to_what_was_sent";
+const BDGIM: &str = "witness::bdgim::places_and_contents_are_those_of_the_authors_program";
+const BDGIM_FIELDS: &str = "witness::bdgim::coefficients_have_their_places_signs_and_steps_in_all_three_messages";
 const FIELD_64: &str = "witness::bcnav1::elements_of_six_bits_are_those_of_the_printed_field";
 const B2_CODES: &str =
     "witness::bcnav2::all_chips_of_all_codes_and_overlays_of_b2a_and_b2b_are_those_of_another_program";
@@ -289,6 +291,12 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.bcnav.preamble", "a symbol of the preambles of B2a and B2b is wrong", PRINTED_B2),
     fault("gnss.bcnav.issue", "message 11 of B2a is of the set of any message", MIXED_B2),
     fault("gnss.bcnav.delays", "B2a has the group delay of B1C", CARRIED_B2),
+    fault("gnss.bdgim.obliquity", "slant contents are a hundredth greater", BDGIM),
+    fault("gnss.bdgim.pole", "the geomagnetic pole is as far east as it is west", BDGIM),
+    fault("gnss.bdgim.norm", "harmonics that have an order are normalised as those that have none", BDGIM),
+    fault("gnss.bdgim.hour", "the forecast is that of an interval's beginning", BDGIM),
+    fault("gnss.bdgim.least", "the least vertical content is half as much", BDGIM),
+    fault("gnss.bdgim.fifth", "the fifth coefficient is above zero, sent and read", BDGIM_FIELDS),
     fault("gnss.bcnav.leap", "BDT's leap seconds are those of GPS time", UTC_B2),
     fault("gnss.fec.field64", "elements of six bits are of another field", FIELD_64),
     fault("gnss.l1c.insertion", "the seven chips are put into the code of L1C a chip late", L1C_CODES),

@@ -13,6 +13,8 @@ mod atmosphere;
 mod bcnav1;
 #[path = "../witness/bcnav2.rs"]
 mod bcnav2;
+#[path = "../witness/bdgim.rs"]
+mod bdgim;
 #[path = "../witness/beidou.rs"]
 mod beidou;
 #[path = "../witness/cnav.rs"]

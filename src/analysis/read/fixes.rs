@@ -50,13 +50,14 @@ struct Row {
     time_scale: u64,
 }
 
-const MODELS: [IonosphereModel; 6] = [
+const MODELS: [IonosphereModel; 7] = [
     IonosphereModel::None,
     IonosphereModel::Nominal,
     IonosphereModel::Broadcast,
     IonosphereModel::NequickG,
     IonosphereModel::Combined,
     IonosphereModel::Grid,
+    IonosphereModel::Bdgim,
 ];
 
 /// Place of a model among [`MODELS`]; another one does not compile without a place.
@@ -68,6 +69,7 @@ fn place(model: IonosphereModel) -> u64 {
         IonosphereModel::NequickG => 3,
         IonosphereModel::Combined => 4,
         IonosphereModel::Grid => 5,
+        IonosphereModel::Bdgim => 6,
     }
 }
 

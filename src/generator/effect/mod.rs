@@ -1,6 +1,7 @@
 //! What nature and hardware do to the rays of a satellite, one file a cause.
 
 pub mod antenna;
+pub mod bdgim;
 pub mod ionosphere;
 pub mod link;
 pub mod mapping;

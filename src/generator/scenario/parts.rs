@@ -10,6 +10,7 @@ use crate::generator::effect::wind_up::WindUp;
 use crate::generator::message::Senders;
 use crate::generator::ray::Effect;
 use crate::generator::vehicle::Trajectory;
+use crate::gnss::bdgim::Bdgim;
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::gps::lnav::UtcData;
 use crate::gnss::ionosphere::NAVIC_HZ;
@@ -48,6 +49,7 @@ pub(super) fn navigation(
             klobuchar,
             klobuchar_navic,
             klobuchar_beidou,
+            bdgim,
             nequick,
             leap_seconds,
             leap_event,
@@ -59,6 +61,7 @@ pub(super) fn navigation(
         navigation.klobuchar = navigation.klobuchar.or(klobuchar);
         navigation.klobuchar_navic = navigation.klobuchar_navic.or(klobuchar_navic);
         navigation.klobuchar_beidou = navigation.klobuchar_beidou.or(klobuchar_beidou);
+        navigation.bdgim = navigation.bdgim.or(bdgim);
         navigation.nequick = navigation.nequick.or(nequick);
         navigation.galileo = navigation.galileo.or(galileo);
         navigation.leap_seconds = navigation.leap_seconds.or(leap_seconds);
@@ -165,6 +168,7 @@ fn common(scenario: &Scenario, navigation: &Navigation, almanac: Vec<Ephemeris>)
         klobuchar: given.or(navigation.klobuchar),
         klobuchar_navic: klobuchar_navic(scenario, navigation),
         klobuchar_beidou: navigation.klobuchar_beidou,
+        bdgim: bdgim(scenario, navigation),
         nequick: scenario.ionosphere.as_ref().and_then(Ionosphere::sent_nequick).or(navigation.nequick),
         utc,
         galileo: galileo_ahead(scenario, navigation),
@@ -176,10 +180,18 @@ fn common(scenario: &Scenario, navigation: &Navigation, almanac: Vec<Ephemeris>)
 
 /// Those who encode what satellites say.
 pub(super) fn messages(scenario: &Scenario, common: &Common) -> Result<Senders, ScenarioError> {
-    let given = scenario.ionosphere.as_ref().and_then(Ionosphere::sent);
-    let key = if given.is_some() { "ionosphere" } else { "navigation.file" };
+    let scene = scenario.ionosphere.as_ref();
+    let is_given = scene.is_some_and(|own| own.sent().is_some() || own.sent_bdgim_tecu().is_some());
+    let key = if is_given { "ionosphere" } else { "navigation.file" };
     Senders::new(common, &scenario.signals)
         .map_err(|e| scenario.conflict(key, format!("the navigation message cannot carry it: {e}")))
+}
+
+/// What BeiDou's satellites of the third generation send of the ionosphere: as the scene has it, or else the
+/// file.
+fn bdgim(scenario: &Scenario, navigation: &Navigation) -> Option<Bdgim> {
+    let given = scenario.ionosphere.as_ref().and_then(Ionosphere::sent_bdgim_tecu);
+    given.map_or(navigation.bdgim, Bdgim::given)
 }
 
 /// What NavIC's satellites send of the ionosphere: as the file has it, or else the bulge of GPS's model,

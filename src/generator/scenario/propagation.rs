@@ -5,12 +5,14 @@ use std::path::{Path, PathBuf};
 use super::files::Files;
 use super::read::Table;
 use super::{Scenario, ScenarioError};
+use crate::generator::effect::bdgim::BdgimIonosphere;
 use crate::generator::effect::ionosphere::KlobucharIonosphere;
 use crate::generator::effect::mapping;
 use crate::generator::effect::nequick::NequickIonosphere;
 use crate::generator::effect::tec::{Content, EARTH_RADIUS_M, Mapping, Shell, ShellIonosphere};
 use crate::generator::effect::troposphere::{Air, Troposphere, Weather};
 use crate::generator::ray::Effect;
+use crate::gnss::bdgim::Bdgim;
 use crate::gnss::ionex::{Interpolation, Maps};
 use crate::gnss::ionosphere::NAVIC_HZ;
 use crate::gnss::klobuchar::{Klobuchar, L1_HZ};
@@ -29,6 +31,8 @@ pub struct Ionosphere {
     pub broadcast: Option<Klobuchar>,
     /// Coefficients of NeQuick-G that are sent in place of the true ones or the file's.
     pub broadcast_ai: Option<[f64; 3]>,
+    /// Coefficients of BDGIM that are sent in place of the true ones or the file's; nine zeros for none.
+    pub broadcast_bdgim_tecu: Option<[f64; 9]>,
 }
 
 /// Where the electrons are.
@@ -38,6 +42,8 @@ pub enum Electrons {
     Klobuchar(Option<Klobuchar>),
     /// NeQuick-G with the given coefficients, or those of the navigation file.
     NequickG(Option<[f64; 3]>),
+    /// BDGIM with the given coefficients, or those of the navigation file.
+    Bdgim(Option<Bdgim>),
     /// The same vertical content everywhere.
     Constant {
         /// Vertical content, in TECU.
@@ -59,7 +65,7 @@ pub enum Electrons {
 }
 
 pub(super) fn ionosphere(table: &Table<'_>) -> Result<Ionosphere, ScenarioError> {
-    let models = [("klobuchar", 0), ("constant_tec", 1), ("ionex", 2), ("nequick_g", 3)];
+    let models = [("klobuchar", 0), ("constant_tec", 1), ("ionex", 2), ("nequick_g", 3), ("bdgim", 4)];
     let model = table.need_choice("model", &models)?;
     let broadcast = coefficients(table, "broadcast_alpha", "broadcast_beta")?;
     let mappings = [("single_layer", Mapping::SingleLayer), ("modified_single_layer", Mapping::ModifiedSingleLayer)];
@@ -72,6 +78,12 @@ pub(super) fn ionosphere(table: &Table<'_>) -> Result<Ionosphere, ScenarioError>
             Electrons::Constant { vtec_tecu: table.need("vtec_tecu")?, shell }
         }
         3 => Electrons::NequickG(table.numbers("ai")?),
+        4 => {
+            let given = table.numbers("bdgim_tecu")?.map(|alpha_tecu| {
+                Bdgim::given(alpha_tecu).ok_or_else(|| table.bad("bdgim_tecu", "nine numbers that are not all zero"))
+            });
+            Electrons::Bdgim(given.transpose()?)
+        }
         _ => {
             let file = table.need_text("file")?;
             let start = table.instant("map_start")?;
@@ -84,7 +96,8 @@ pub(super) fn ionosphere(table: &Table<'_>) -> Result<Ionosphere, ScenarioError>
             }
         }
     };
-    Ok(Ionosphere { truth, broadcast, broadcast_ai: table.numbers("broadcast_ai")? })
+    let broadcast_ai = table.numbers("broadcast_ai")?;
+    Ok(Ionosphere { truth, broadcast, broadcast_ai, broadcast_bdgim_tecu: table.numbers("broadcast_bdgim_tecu")? })
 }
 
 /// Klobuchar's coefficients, both lists or none.
@@ -119,6 +132,14 @@ impl Ionosphere {
         })
     }
 
+    /// Coefficients of BDGIM that the satellites send, if the scenario says them; nine zeros for none.
+    pub(super) fn sent_bdgim_tecu(&self) -> Option<[f64; 9]> {
+        self.broadcast_bdgim_tecu.or(match self.truth {
+            Electrons::Bdgim(given) => given.map(|model| model.alpha_tecu),
+            _ => None,
+        })
+    }
+
     /// The effect, with its file read; `navigation` says what the scenario does not, `end_s` is the scene's
     /// end.
     pub(super) fn effect(
@@ -146,6 +167,14 @@ impl Ionosphere {
                     scenario.conflict("ionosphere", reason.to_owned())
                 })?;
                 Ok(Box::new(NequickIonosphere { model: NequickG { coefficients } }))
+            }
+            Electrons::Bdgim(given) => {
+                let model = given.or(navigation.bdgim).ok_or_else(|| {
+                    let reason = "the navigation file has no coefficients of BDGIM (ION records CNVX of BeiDou): write \
+                                  bdgim_tecu here, name a file that has them, or choose another model";
+                    scenario.conflict("ionosphere", reason.to_owned())
+                })?;
+                Ok(Box::new(BdgimIonosphere { model }))
             }
             Electrons::Constant { vtec_tecu, shell } => {
                 Ok(Box::new(ShellIonosphere { content: Content::Constant(*vtec_tecu), shell: *shell }))

@@ -8,7 +8,7 @@ mod spoofing_and_jamming;
 use std::path::Path;
 
 use declared::{replaced, with};
-use propagation::{IONEX, NEQUICK, TEC, VIENNA};
+use propagation::{BDGIM, IONEX, NEQUICK, TEC, VIENNA};
 use satellite::FAULTS;
 
 use super::schema::{Absent, Value, tables_of};

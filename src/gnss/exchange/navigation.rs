@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use super::offset::offsets;
 use super::{Version, calendar, header_line, opening};
 use crate::gnss::broadcast::{Ephemeris, StateVector, status_of_record};
-use crate::gnss::ionosphere::Coefficients;
+use crate::gnss::ionosphere::{Coefficients, Model};
 use crate::gnss::message::{Message, Raw, RecordLine, Records};
 use crate::gnss::record::NavigationRow;
 use crate::gnss::satellite::{Sv, System};
@@ -72,6 +72,8 @@ impl NavigationSets {
                 let raw = |name: &str| raws.get(name).copied();
                 Some(((message.ionosphere.coefficients)(&raw)?, region(&raw)))
             });
+            // A header of version 3 has no lines for BDGIM, but for BeiDou's older model.
+            let sent = sent.filter(|(sent, _)| version == Version::Four || sent.model() != Model::Bdgim);
             let raw = |name: &str| common.and_then(|raws| raws.get(name)).copied();
             if let Some(sent) = sent.filter(|_| once("")) {
                 match version {
@@ -131,6 +133,7 @@ fn ionosphere(sent: Coefficients, system: System) -> String {
             let [a, b, c] = model.coefficients;
             line("GAL", [a, b, c, 0.0])
         }
+        Coefficients::Bdgim(_) => String::new(),
     }
 }
 
@@ -170,6 +173,7 @@ fn ionosphere_record(
         }
         // The last one are the flags of storms, of which nothing is said.
         Coefficients::NequickG(model) => [&model.coefficients[..], &[0.0]].concat(),
+        Coefficients::Bdgim(model) => model.alpha_tecu.to_vec(),
     };
     let epoch = format!("{year:04} {month:02} {day:02} {hour:02} {minute:02} {second:02}");
     // Three beside the time, then four a line; of those with a region the issue alone beside the time.
@@ -336,6 +340,7 @@ fn sisa_m(index: u8) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gnss::bdgim::Bdgim;
     use crate::gnss::beidou::b1c::B1C;
     use crate::gnss::beidou::b2a::B2A;
     use crate::gnss::beidou::b2b::B2B;
@@ -632,6 +637,45 @@ mod tests {
         }
         assert_eq!("4".parse(), Ok(Version::Four));
         assert!("2.11".parse::<Version>().unwrap_err().to_string().contains("3.05 or 4.02"));
+    }
+
+    #[test]
+    fn coefficients_of_bdgim_have_one_record_of_version_4_whichever_message_sent_them_and_no_line_of_version_3() {
+        let both = rinex::embedded_two_systems().unwrap().ephemerides;
+        let mut own = both.iter().filter(|set| set.sv.system == System::BeiDou && set.sv.number >= 19);
+        let set = own.find(|set| set.is_healthy()).unwrap().clone();
+        let alpha_tecu = [30.875, 0.25, 11.625, 10.375, -12.5, 0.75, -0.125, 3.125, 1.875];
+        let klobuchar = Klobuchar { alpha: [libm::exp2(-27.0); 4], beta: [libm::exp2(16.0); 4] };
+        let bdgim = Bdgim::given(alpha_tecu);
+        let common = Common { bdgim, klobuchar_beidou: Some(klobuchar), ..Common::default() };
+        let all: [(&Message, &'static Signal); 4] =
+            [(&B_CNAV1, &B1C), (&B_CNAV2, &B2A), (&B_CNAV3, &B2B), (&D1_D2, &B1I)];
+        for sent in [&all[..1], &all[1..2], &all[2..3], &all[..]] {
+            let mut sets = NavigationSets::default();
+            sent.iter().for_each(|(message, signal)| send(&mut sets, &(*message, *signal, set.clone()), &common));
+            let signals: Vec<&'static Signal> = sent.iter().map(|(_, signal)| *signal).collect();
+            let text = |version| {
+                let mut bytes = Vec::new();
+                sets.write(&mut bytes, version, &signals, set.toe).unwrap();
+                String::from_utf8(bytes).unwrap()
+            };
+            let four = text(Version::Four);
+            assert_eq!(four.matches(&format!("> ION {} CNVX\n", set.sv)).count(), 1, "{four}");
+            let file = foreign(&four);
+            let models: Vec<_> = file.nav_ionosphere_models_iter().filter_map(|(_, model)| model.as_bdgim()).collect();
+            let [model] = models.as_slice() else { panic!("{} models\n{four}", models.len()) };
+            let [a, b, c, d, e, f, g, h, i] = alpha_tecu;
+            assert_eq!(model.alpha, (a, b, c, d, e, f, g, h, i), "{four}");
+            // Ours wants sets of messages that it reads.
+            let is_all = sent.len() == all.len();
+            if is_all {
+                let read = rinex::read(four.as_bytes(), "own").unwrap();
+                assert_eq!((read.bdgim, read.klobuchar_beidou.is_some()), (bdgim, true), "{four}");
+            }
+            // Version 3 has a line of each list of the older model.
+            let lines = text(Version::Three).matches("IONOSPHERIC CORR").count();
+            assert_eq!(lines, if is_all { 2 } else { 0 });
+        }
     }
 
     #[test]

@@ -12,10 +12,11 @@ mod corrections;
 mod numbers;
 mod record;
 
+use crate::gnss::bdgim::Bdgim;
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::satellite::{Sv, System};
 use crate::gnss::time::Epoch;
-use corrections::{delta_utc, leap_event, system_time};
+use corrections::{Thirds, delta_utc, leap_event, system_time};
 use numbers::{digits, fields, numbers};
 pub(super) use record::Record;
 use record::{CLOCK_FNAV, FIELDS, MESSAGES, READ, is_spare};
@@ -71,6 +72,8 @@ pub(super) struct Contents {
     pub klobuchar_navic: Option<Klobuchar>,
     /// As BeiDou sends them.
     pub klobuchar_beidou: Option<Klobuchar>,
+    /// As BeiDou's third generation sends them.
+    pub bdgim: Option<Bdgim>,
     /// Effective ionisation coefficients of Galileo.
     pub nequick: Option<[f64; 3]>,
     pub leap_seconds: Option<i64>,
@@ -125,6 +128,7 @@ pub(super) fn read(text: &[u8]) -> Result<Contents, String> {
     let mut ionosphere: Option<(String, Klobuchar)> = None;
     let mut navic: Option<(String, Klobuchar)> = None;
     let mut beidou: Option<(String, Klobuchar)> = None;
+    let mut bdgim: Option<(String, Bdgim)> = None;
     let mut nequick: Option<(String, [f64; 3])> = None;
     let mut utc: Option<(String, Polynomial)> = None;
     let mut galileo: Option<(String, Polynomial)> = None;
@@ -135,6 +139,7 @@ pub(super) fn read(text: &[u8]) -> Result<Contents, String> {
             Ok(Group::Ionosphere(System::Navic, age, found)) => keep_first(&mut navic, age, found),
             Ok(Group::Ionosphere(System::BeiDou, age, found)) => keep_first(&mut beidou, age, found),
             Ok(Group::Ionosphere(_, age, found)) => keep_first(&mut ionosphere, age, found),
+            Ok(Group::Bdgim(age, found)) => keep_first(&mut bdgim, age, found),
             Ok(Group::Ionisation(age, found)) => keep_first(&mut nequick, age, found),
             Ok(Group::Utc(age, found)) => keep_first(&mut utc, age, found),
             Ok(Group::Galileo(age, found)) => keep_first(&mut galileo, age, found),
@@ -145,6 +150,7 @@ pub(super) fn read(text: &[u8]) -> Result<Contents, String> {
     contents.klobuchar = contents.klobuchar.or(ionosphere.map(|(_, found)| found));
     contents.klobuchar_navic = contents.klobuchar_navic.or(navic.map(|(_, found)| found));
     contents.klobuchar_beidou = contents.klobuchar_beidou.or(beidou.map(|(_, found)| found));
+    contents.bdgim = contents.bdgim.or(bdgim.map(|(_, found)| found));
     contents.nequick = contents.nequick.or(nequick.map(|(_, found)| found));
     contents.utc = contents.utc.or(utc.map(|(_, found)| found));
     contents.galileo = contents.galileo.or(galileo.map(|(_, found)| found));
@@ -169,6 +175,8 @@ enum Group {
     Record(Box<Record>),
     /// Of which system, when and by which satellite, in an order that sorts, and what it said.
     Ionosphere(System, String, Klobuchar),
+    /// The same of BDGIM's coefficients.
+    Bdgim(String, Bdgim),
     /// The same of Galileo's effective ionisation.
     Ionisation(String, [f64; 3]),
     /// The same of GPS time against UTC.
@@ -204,6 +212,7 @@ impl Form {
         let (mut alpha, mut beta) = (None, None);
         let (mut navic_alpha, mut navic_beta) = (None, None);
         let (mut beidou_alpha, mut beidou_beta) = (None, None);
+        let mut thirds = Thirds::default();
         for (number, line) in lines {
             let mut four = |start: usize, into: &mut Option<[f64; 4]>| match numbers::<4>(line, start, HEADER_FIELD) {
                 Ok(found) => *into = Some(found),
@@ -222,8 +231,13 @@ impl Form {
                     Ok(found) => contents.nequick = Some(found),
                     Err(reason) => contents.reasons.push(format!("line {number} (IONOSPHERIC CORR): {reason}")),
                 },
+                "IONOSPHERIC CORR" if Thirds::has(line) => {
+                    if let Err(reason) = thirds.take(line) {
+                        contents.reasons.push(format!("line {number} (IONOSPHERIC CORR): {reason}"));
+                    }
+                }
                 "IONOSPHERIC CORR" => {
-                    let known = ["QZSA", "QZSB", "BDS1", "BDS2", "BDS3", "BDS "];
+                    let known = ["QZSA", "QZSB", "BDS "];
                     let name: String = line.chars().take(4).collect();
                     if !known.contains(&name.as_str()) {
                         contents
@@ -269,6 +283,7 @@ impl Form {
         };
         let found = [both(alpha, beta), both(navic_alpha, navic_beta), both(beidou_alpha, beidou_beta)];
         [contents.klobuchar, contents.klobuchar_navic, contents.klobuchar_beidou] = found;
+        contents.bdgim = thirds.first();
     }
 
     fn group(&self, group: &[Line<'_>]) -> Result<Group, String> {
@@ -325,6 +340,7 @@ impl Form {
             }
             ("ION", "LNAV") if ['G', 'I'].contains(&letter) => self.ionosphere(group, satellite),
             ("ION", "D1D2") => self.ionosphere(group, satellite),
+            ("ION", "CNVX") if letter == 'C' => self.bdgim(group, satellite),
             ("ION", "IFNV") => self.ionisation(group, satellite),
             ("STO", "LNAV") if letter == 'G' => self.system_time(group, satellite),
             // Merged files name the system alone.

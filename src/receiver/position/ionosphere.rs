@@ -13,6 +13,7 @@ use std::f64::consts::PI;
 use nalgebra::Vector3;
 
 use super::least_squares::{IONOSPHERE_TOP_M, Range};
+use crate::gnss::bdgim::Bdgim;
 use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::nequick;
@@ -47,6 +48,8 @@ pub enum Delays {
     Klobuchar(Klobuchar, f64),
     /// The same by BeiDou's form of the formula.
     Beidou(Klobuchar),
+    /// By the model of BeiDou's third generation.
+    Bdgim(Bdgim),
     /// By the electrons on the way to each satellite, in TECU, from near where the receiver is.
     Electrons(Vec<(Sv, f64)>),
 }
@@ -55,8 +58,9 @@ impl Delays {
     /// Delay of a range that is received at a place from a direction, in seconds.
     pub fn delay_s(&self, range: &Range, user: Geodetic, look: Look, received: Epoch) -> f64 {
         match self {
-            Self::Klobuchar(..) | Self::Beidou(_) if user.height_m > IONOSPHERE_TOP_M => 0.0,
+            Self::Klobuchar(..) | Self::Beidou(_) | Self::Bdgim(_) if user.height_m > IONOSPHERE_TOP_M => 0.0,
             Self::Beidou(model) => model.beidou_delay_s(user, look, received, range.carrier_hz),
+            Self::Bdgim(model) => model.delay_s(user, look, received, range.carrier_hz),
             Self::Klobuchar(model, defined_hz) => {
                 model.delay_from_s(*defined_hz, user, look, received, range.carrier_hz)
             }

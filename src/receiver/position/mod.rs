@@ -59,12 +59,14 @@ pub enum IonosphereChoice {
     /// `Broadcast`.
     Combined,
     /// By the model that satellites send: Klobuchar's where signals are received that bring it, else
-    /// NeQuick-G. Until its coefficients are decoded, by a nominal ionosphere and its error.
+    /// NeQuick-G, else BDGIM. Until its coefficients are decoded, by a nominal ionosphere and its error.
     Broadcast,
     /// The same by Klobuchar's model and no other.
     Klobuchar,
     /// The same by NeQuick-G and no other.
     NequickG,
+    /// The same by BDGIM and no other.
+    Bdgim,
     /// Not at all: recordings made without an ionosphere.
     None,
 }
@@ -81,7 +83,10 @@ impl IonosphereChoice {
             Self::None => None,
             Self::Klobuchar => Some(klobuchar.unwrap_or(Model::Klobuchar)),
             Self::NequickG => Some(Model::NequickG),
-            Self::Combined | Self::Broadcast => klobuchar.or_else(|| brought(Model::NequickG)),
+            Self::Bdgim => Some(Model::Bdgim),
+            Self::Combined | Self::Broadcast => {
+                klobuchar.or_else(|| brought(Model::NequickG)).or_else(|| brought(Model::Bdgim))
+            }
         }
     }
 }
@@ -133,8 +138,8 @@ pub struct PositionSettings {
     /// sine.
     pub model_sigma_m: f64,
     /// How the ionosphere is corrected: combined for two carriers of a satellite where there are two, and
-    /// else the model; broadcast for the model alone, Klobuchar's if received signals bring it and else
-    /// NeQuick-G; klobuchar or nequick_g for that one; none.
+    /// else the model; broadcast for the model alone, Klobuchar's if received signals bring it, else
+    /// NeQuick-G, else BDGIM; klobuchar, nequick_g or bdgim for that one; none.
     pub ionosphere: IonosphereChoice,
     /// Standard deviation of the broadcast ionosphere's error as a share of its delay, common to all
     /// satellites: about 0.5 under a real sky, of whose ionosphere the model removes half; 0 where satellites
@@ -469,6 +474,7 @@ impl Solver {
                 (Delays::Klobuchar(model, NAVIC_HZ), IonosphereModel::Broadcast)
             }
             Some(Coefficients::KlobucharBeidou(model)) => (Delays::Beidou(model), IonosphereModel::Broadcast),
+            Some(Coefficients::Bdgim(model)) => (Delays::Bdgim(model), IonosphereModel::Bdgim),
             Some(Coefficients::NequickG(model)) => {
                 (Delays::Electrons(self.electrons.of(model, ranges, place_m)), IonosphereModel::NequickG)
             }

@@ -85,7 +85,10 @@ impl<'r> Fixes<'r> {
 
     fn with(&self, model: IonosphereModel) -> impl DoubleEndedIterator<Item = &Judged> {
         // What is broadcast, of whichever model.
-        let of = |used| if used == IonosphereModel::NequickG { IonosphereModel::Broadcast } else { used };
+        let of = |used| match used {
+            IonosphereModel::NequickG | IonosphereModel::Bdgim => IonosphereModel::Broadcast,
+            other => other,
+        };
         self.rows.iter().filter(move |row| of(row.fix.ionosphere) == model)
     }
 

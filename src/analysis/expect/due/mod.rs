@@ -22,6 +22,7 @@ use crate::analysis::read::Run;
 use crate::analysis::statistics::median;
 use crate::gnss::earth::Geodetic;
 use crate::gnss::facts::{Expect, FaultKind, Fixes};
+use crate::gnss::ionosphere::Model;
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Link;
 use crate::gnss::signal::Signal;
@@ -244,7 +245,15 @@ impl Expectations {
         let signals: BTreeSet<&'static Signal> = self.satellites.keys().map(|link| link.signal).collect();
         let table = |signal: &&'static Signal| Timetable::beside(signal, &signals, start);
         let page_s = |signal: &&'static Signal| table(signal).ionosphere_by_s(acquired_s + satellite::LOCK_S);
-        let page_s = signals.iter().map(page_s).fold(f64::INFINITY, f64::min);
+        // Nine zeros are no coefficients of BDGIM.
+        let told = |signal: &&&'static Signal| {
+            let mut messages = signal.components.iter().filter_map(|component| component.message);
+            messages.all(|message| {
+                let model = message.ionosphere.model;
+                model != Model::Bdgim || self.message.ionosphere(model).is_some()
+            })
+        };
+        let page_s = signals.iter().filter(told).map(page_s).fold(f64::INFINITY, f64::min);
         let waited_s = four_s + receiver.ionosphere_wait_s;
         let due_s = if receiver.requires_ionosphere { four_s.max(page_s) } else { waited_s } + SOLVE_S;
         // Where the scene excuses a time, the clock begins anew after it.

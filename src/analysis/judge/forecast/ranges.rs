@@ -64,8 +64,10 @@ impl Choices {
         let ionosphere = match word("ionosphere")? {
             "none" => None,
             "nequick_g" => Some(Model::NequickG),
+            "bdgim" => Some(Model::Bdgim),
             "klobuchar" => Some(klobuchar(run)),
             _ if run.fixes.uses(IonosphereModel::NequickG) => Some(Model::NequickG),
+            _ if run.fixes.uses(IonosphereModel::Bdgim) => Some(Model::Bdgim),
             _ => Some(klobuchar(run)),
         };
         Some(Self {
@@ -98,7 +100,7 @@ fn updates_s(run: &Run) -> Option<BTreeMap<&'static Signal, f64>> {
 
 /// Space: no horizon, and models that are as good in every direction.
 const SPACE_M: f64 = 1e5;
-/// Klobuchar's ionosphere ends here.
+/// The ionosphere of Klobuchar's model and of BDGIM ends here.
 const IONOSPHERE_TOP_M: f64 = 1e6;
 /// Error of a range by elements in short, whose steps are 4.5 m of clock and 22 m across the line of sight,
 /// of which a fifth shows at the most; and by a group delay that they lack.
@@ -275,7 +277,7 @@ impl<'r> Scene<'r> {
         let (satellite_m, computed_m) = computed_m(ephemeris, true_row, place)?;
         let carrier_hz = true_row.link().carrier_hz();
         let sent = self.choices.ionosphere.and_then(|model| self.message.ionosphere(model));
-        let is_formula = |own: &Coefficients| Model::KLOBUCHAR.contains(&own.model());
+        let is_formula = |own: &Coefficients| own.model() != Model::NequickG;
         let reached = |own: &&Coefficients| !is_formula(own) || user.height_m <= IONOSPHERE_TOP_M;
         let ionosphere_m = match sent.filter(reached) {
             // A correction of what the scene does not have is an error, not an expectation.

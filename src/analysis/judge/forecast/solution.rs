@@ -213,7 +213,8 @@ pub fn expected(
             ranges.of_fix(&fix, place.as_ref(), |range| sums.take(range, choice))?;
         }
         sums.finish(choice);
-        let sent = matches!(fix.ionosphere, IonosphereModel::Broadcast | IonosphereModel::NequickG);
+        let models = [IonosphereModel::Broadcast, IonosphereModel::NequickG, IonosphereModel::Bdgim];
+        let sent = models.contains(&fix.ionosphere);
         let exact = scene.choices.ionosphere_error_share == 0.0 && sent;
         let combined = fix.ionosphere == IonosphereModel::Combined;
         let corrected = exact || combined || scene.choices.ionosphere.is_none();

@@ -49,7 +49,12 @@ fn missing(run: &Run) -> Found {
     // Whoever says that the ionosphere is known has all of its parameters.
     let klobuchar = ["alpha_0", "alpha_1", "alpha_2", "alpha_3", "beta_0", "beta_1", "beta_2", "beta_3"];
     let nequick = ["ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"];
-    let models = [(IonosphereModel::Broadcast, &klobuchar[..]), (IonosphereModel::NequickG, &nequick[..])];
+    let bdgim = [1, 2, 3, 4, 5, 6, 7, 8, 9].map(|place| format!("alpha_{place}_tecu"));
+    let models = [
+        (IonosphereModel::Broadcast, &klobuchar[..]),
+        (IonosphereModel::NequickG, &nequick[..]),
+        (IonosphereModel::Bdgim, &bdgim.each_ref().map(String::as_str)[..]),
+    ];
     for (model, names) in models {
         if run.fixes.uses(model) {
             let lacks = |name: &&&str| !run.navigation.iter().any(|row| row.parameter == **name);

@@ -54,6 +54,7 @@ fn mismatches(run: &Run) -> Vec<String> {
         if ionosphere == "none"
             || used(IonosphereModel::Broadcast)
             || used(IonosphereModel::NequickG)
+            || used(IonosphereModel::Bdgim)
             || used(IonosphereModel::Combined)
             || used(IonosphereModel::Grid)
             || run.ionosphere_m < NOTHING_M

@@ -34,8 +34,9 @@ impl Verdict {
         let wrong = |fix: &Fix| match fix.ionosphere {
             IonosphereModel::None => true,
             IonosphereModel::Nominal => required || known(fix),
-            IonosphereModel::Broadcast => !known(fix) || corrected == Some("nequick_g"),
-            IonosphereModel::NequickG => !known(fix) || corrected == Some("klobuchar"),
+            IonosphereModel::Broadcast => !known(fix) || matches!(corrected, Some("nequick_g" | "bdgim")),
+            IonosphereModel::NequickG => !known(fix) || matches!(corrected, Some("klobuchar" | "bdgim")),
+            IonosphereModel::Bdgim => !known(fix) || matches!(corrected, Some("klobuchar" | "nequick_g")),
             IonosphereModel::Combined => corrected != Some("combined"),
             IonosphereModel::Grid => setting("sbas").and_then(serde_json::Value::as_str) == Some("none"),
         };

@@ -13,8 +13,13 @@ const BETA: (f64, f64) = (-1e7, 1e7);
 /// What word 5 of I/NAV carries at most (Galileo OS SIS ICD, table 65).
 const AI: (f64, f64) = (-4.0, 511.75);
 
+/// What the fields of B-CNAV1, B-CNAV2 and B-CNAV3 carry at most, α₅ below zero and α₁ above
+/// (BDS-SIS-ICD-B1C 1.0, 7.8).
+const BDGIM: (f64, f64) = (-31.875, 127.875);
+
 pub(crate) const IONOSPHERE: &[Key] = &[
-    word("model", || vec!["klobuchar", "constant_tec", "ionex", "nequick_g"], "where the electrons are").required(),
+    word("model", || vec!["klobuchar", "constant_tec", "ionex", "nequick_g", "bdgim"], "where the electrons are")
+        .required(),
     numbers("alpha", 4, ALPHA, "s, by powers of semicircles", "amplitude of the true delay; with beta")
         .or_else("the navigation file's")
         .of(KLOBUCHAR),
@@ -24,6 +29,9 @@ pub(crate) const IONOSPHERE: &[Key] = &[
     numbers("ai", 3, AI, "sfu, sfu/deg, sfu/deg^2", "effective ionisation by modified dip")
         .or_else("the navigation file's (GAL)")
         .of(&["nequick_g"]),
+    numbers("bdgim_tecu", 9, BDGIM, "TECU", "coefficients of BeiDou's global model, not all zero")
+        .or_else("the navigation file's (CNVX)")
+        .of(&["bdgim"]),
     number("vtec_tecu", 0.0, 1000.0, "TECU", "vertical content everywhere").required().of(&["constant_tec"]),
     number("shell_km", 100.0, 1000.0, "km", "height of the shell; the default is that of the IGS's maps")
         .or(450.0)
@@ -40,6 +48,15 @@ pub(crate) const IONOSPHERE: &[Key] = &[
         .or_else("beta, or the navigation file's"),
     numbers("broadcast_ai", 3, AI, "as ai", "what Galileo's satellites broadcast")
         .or_else("ai, or the navigation file's"),
+    numbers(
+        "broadcast_bdgim_tecu",
+        9,
+        BDGIM,
+        "as bdgim_tecu",
+        "what BeiDou's satellites of the third generation \
+             broadcast; nine zeros: nothing",
+    )
+    .or_else("bdgim_tecu, or the navigation file's"),
 ];
 
 pub(crate) const TROPOSPHERE: &[Key] = &[

@@ -167,7 +167,7 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
                     cases.push((with("spoofer", &format!("power_db = 6\n{key} = 1")), table, key));
                 }
                 ("ionosphere" | "troposphere", key) if line_of(&full, table, key).is_none() => {
-                    let others = [IONEX, TEC, NEQUICK, VIENNA].map(|other| format!("{MINIMAL}{STATIC}{other}"));
+                    let others = [IONEX, TEC, NEQUICK, BDGIM, VIENNA].map(|other| format!("{MINIMAL}{STATIC}{other}"));
                     let with_it = others.iter().find(|text| line_of(text, table, key).is_some()).unwrap();
                     cases.push((with_it.clone(), table, key));
                 }

@@ -10,6 +10,8 @@ pub(super) const TEC: &str =
     "[ionosphere]\nmodel = \"constant_tec\"\nvtec_tecu = 20\nshell_km = 400\nmapping = \"single_layer\"\n";
 pub(super) const NEQUICK: &str =
     "[ionosphere]\nmodel = \"nequick_g\"\nai = [120, 0.25, 0.0125]\nbroadcast_ai = [100, 0.125, 0]\n";
+pub(super) const BDGIM: &str = "[ionosphere]\nmodel = \"bdgim\"\nbdgim_tecu = [30.875, 0.25, 11.625, 10.375, -12.5, \
+                                0.75, 0, 3.125, 1.875]\nbroadcast_bdgim_tecu = [20, 0, 8, 4, -8, 0, 0, 1, 0.5]\n";
 pub(super) const VIENNA: &str = "[troposphere]\nmodel = \"saastamoinen\"\nmapping = \"vmf1\"\ngpt3_file \
                                  = \"gpt3_5.grd\"\nvmf_file = \"VMF3_20181125.H00\"\n";
 
@@ -73,6 +75,29 @@ fn nequick_wants_coefficients_and_sends_what_the_scene_says() {
     assert!(error.contains("unknown key 'ionosphere.alpha'"), "{error}");
     let parsed = parse(&format!("{MINIMAL}{STATIC}{NEQUICK}")).unwrap();
     assert_eq!(parsed.ionosphere.unwrap().sent_nequick(), Some([100.0, 0.125, 0.0]));
+}
+
+#[test]
+fn bdgim_wants_coefficients_that_messages_carry_and_sends_what_the_scene_says() {
+    let compose = |signal: &str, lines: &str| {
+        let text = format!("{MINIMAL}{STATIC}{lines}").replace("GPS L1 C/A", signal);
+        parse(&text).and_then(|scenario| scenario.compose(Path::new("."), &Overrides::default()))
+    };
+    let (scene, _) = compose("GPS L1 C/A", BDGIM).unwrap();
+    assert!(scene.effects[0].describe().contains("BDGIM"));
+    let parsed = parse(&format!("{MINIMAL}{STATIC}{BDGIM}")).unwrap().ionosphere.unwrap();
+    assert_eq!(parsed.sent_bdgim_tecu(), Some([20.0, 0.0, 8.0, 4.0, -8.0, 0.0, 0.0, 1.0, 0.5]));
+    let own = BDGIM.split_once("broadcast").unwrap().0;
+    let parsed = parse(&format!("{MINIMAL}{STATIC}{own}")).unwrap().ionosphere.unwrap();
+    assert_eq!(parsed.sent_bdgim_tecu().unwrap()[4], -12.5);
+    // The file of 2010 has none of BeiDou's.
+    let error = compose("GPS L1 C/A", "[ionosphere]\nmodel = \"bdgim\"\n").err().unwrap().to_string();
+    assert!(error.contains("write bdgim_tecu here"), "{error}");
+    let zeros = "[ionosphere]\nmodel = \"bdgim\"\nbdgim_tecu = [0, 0, 0, 0, 0, 0, 0, 0, 0]\n";
+    let error = compose("GPS L1 C/A", zeros).err().unwrap().to_string();
+    assert!(error.contains("ionosphere.bdgim_tecu") && error.contains("not all zero"), "{error}");
+    let error = compose("GPS L1 C/A", &BDGIM.replace("-12.5", "-40")).err().unwrap().to_string();
+    assert!(error.contains("ionosphere.bdgim_tecu") && error.contains("127.875"), "{error}");
 }
 
 #[test]

@@ -22,6 +22,7 @@ const TIME: &str = "7.3";
 const ORBIT: &str = "7.4, table 7-5";
 const CLOCK: &str = "7.5, table 7-6";
 const UTC: &str = "7.12, table 7-16";
+const ELECTRONS: &str = "7.8";
 const HEALTH: &str = "7.14 to 7.17";
 
 /// What messages say.
@@ -36,6 +37,8 @@ pub(in crate::gnss::beidou) struct Content {
     pub flags: f64,
     pub flags_b1c: f64,
     pub utc: UtcNumbers,
+    /// Coefficients of BDGIM; nine zeros say nothing.
+    pub alpha_tecu: [f64; 9],
     pub reserved: f64,
 }
 
@@ -130,6 +133,31 @@ pub(in crate::gnss::beidou) const fn clock<const AT: u16>() -> [Of; 4] {
         plain!("af0_s", const { [(AT + 11, 25)] }, Signed, -34, CLOCK, set.af0_s),
         plain!("af1_sps", const { [(AT + 36, 22)] }, Signed, -50, CLOCK, set.af1_sps),
         plain!("af2_sps2", const { [(AT + 58, 11)] }, Signed, -66, CLOCK, set.af2_sps2),
+    ]
+}
+
+/// Place of the coefficient whose field has no sign and means a number below zero (7.8).
+const BELOW_ZERO: usize = 4;
+
+/// A coefficient of BDGIM by the number of its field, and that by the coefficient.
+pub(super) fn signed(place: usize, value: f64) -> f64 {
+    if place == BELOW_ZERO { planted!("gnss.bdgim.fifth", 0.0 - value, value.abs()) } else { value }
+}
+
+/// BDGIM's coefficients, 74 bits.
+#[rustfmt::skip]
+pub(in crate::gnss::beidou) const fn electrons<const AT: u16>() -> [Of; 9] {
+    [
+        plain!("alpha_1_tecu", const { [(AT, 10)] }, Unsigned, -3, ELECTRONS, alpha_tecu[0]),
+        plain!("alpha_2_tecu", const { [(AT + 10, 8)] }, Signed, -3, ELECTRONS, alpha_tecu[1]),
+        plain!("alpha_3_tecu", const { [(AT + 18, 8)] }, Unsigned, -3, ELECTRONS, alpha_tecu[2]),
+        plain!("alpha_4_tecu", const { [(AT + 26, 8)] }, Unsigned, -3, ELECTRONS, alpha_tecu[3]),
+        element(Field::new("alpha_5_tecu", const { &[(AT + 34, 8)] }, Unsigned, -3, ELECTRONS),
+            |c| signed(BELOW_ZERO, c.alpha_tecu[BELOW_ZERO]), |c, v| c.alpha_tecu[BELOW_ZERO] = signed(BELOW_ZERO, v)),
+        plain!("alpha_6_tecu", const { [(AT + 42, 8)] }, Signed, -3, ELECTRONS, alpha_tecu[5]),
+        plain!("alpha_7_tecu", const { [(AT + 50, 8)] }, Signed, -3, ELECTRONS, alpha_tecu[6]),
+        plain!("alpha_8_tecu", const { [(AT + 58, 8)] }, Signed, -3, ELECTRONS, alpha_tecu[7]),
+        plain!("alpha_9_tecu", const { [(AT + 66, 8)] }, Signed, -3, ELECTRONS, alpha_tecu[8]),
     ]
 }
 

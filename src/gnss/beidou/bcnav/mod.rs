@@ -5,26 +5,56 @@
 //! carried to the nearest reference time that the messages can express, and to their steps; its two group
 //! delays are against B3I, and those of the three signals follow as delays that are as 1/f².
 //!
-//! Limits: nothing of the ionosphere (the documents' own model, BDGIM, is left out), of other systems, of the
-//! Earth's orientation and no almanacs; nothing of UTC is read.
+//! Nine coefficients of BDGIM that are all zero are none: they are sent where the scene has none, and are not
+//! reported.
+//!
+//! Limits: nothing of other systems, of the Earth's orientation and no almanacs; nothing of UTC is read.
 
 pub(super) mod blocks;
 pub(super) mod typed;
 
+use crate::gnss::bdgim::Bdgim;
 use crate::gnss::beidou::d1d2::issue;
 use crate::gnss::bits::{Field, FieldError, Store, add_to, integers, quantise_all, read_all};
 use crate::gnss::broadcast::{Ephemeris, PLAIN, SetForm};
 use crate::gnss::exchange::modern;
-use crate::gnss::ionosphere::Model;
-use crate::gnss::message::{IonosphereForm, Parameters, Raw, RecordLine, UtcNumbers};
+use crate::gnss::ionosphere::{Coefficients, Model};
+use crate::gnss::message::{Common, IonosphereForm, Parameters, Raw, RecordLine, UtcNumbers};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
-use blocks::{Content, Of, STEP_S, kind};
+use blocks::{Content, Of, STEP_S, electrons, kind, signed};
 
-/// Never sent and never read.
-pub(super) const NO_IONOSPHERE: IonosphereForm =
-    IonosphereForm { model: Model::KlobucharBeidou, unit: |_| false, coefficients: |_| None };
+/// Fields of BDGIM's coefficients, their places counted from the first of them.
+static ELECTRONS: [Of; 9] = electrons::<0>();
+
+/// How the messages describe the ionosphere; `unit` says which of their units do.
+pub(super) const fn ionosphere(unit: fn(Epoch) -> bool) -> IonosphereForm {
+    IonosphereForm { model: Model::Bdgim, unit, coefficients }
+}
+
+/// The coefficients that raw integers give; `None` where one is missing or all are zero.
+pub(super) fn coefficients(raw: Raw<'_>) -> Option<Coefficients> {
+    let mut alpha_tecu = [0.0; 9];
+    for (place, (alpha, element)) in alpha_tecu.iter_mut().zip(&ELECTRONS).enumerate() {
+        *alpha = signed(place, element.field.value(raw(element.field.name)?));
+    }
+    Bdgim::given(alpha_tecu).map(Coefficients::Bdgim)
+}
+
+/// The coefficients of BDGIM among the parameters of a unit, with their raw integers.
+pub(super) fn electrons_in(all: &Parameters) -> Option<(Coefficients, Parameters)> {
+    let raw = |name: &str| all.iter().find(|(other, _)| *other == name).map(|(_, raw)| *raw);
+    let own = all.iter().filter(|(name, _)| ELECTRONS.iter().any(|element| element.field.name == *name));
+    Some((coefficients(&raw)?, own.copied().collect()))
+}
+
+/// Refuses coefficients of BDGIM that the fields cannot carry.
+pub(super) fn check(common: &Common) -> Result<(), FieldError> {
+    let alpha_tecu = common.bdgim.map_or([0.0; 9], |model| model.alpha_tecu);
+    let mut all = ELECTRONS.iter().zip(alpha_tecu).enumerate();
+    all.try_for_each(|(place, (element, alpha))| element.field.raw(signed(place, alpha)).map(|_| ()))
+}
 
 /// Tables with the parameters of a set.
 pub(super) type Tables = [&'static [Of]];
@@ -73,7 +103,17 @@ fn status(raw: Raw<'_>) -> [Option<f64>; 3] {
 pub(super) fn blank(set: Ephemeris) -> Content {
     let kind = kind(set.sv);
     let sent = set.toe;
-    Content { set, sent, kind, page: 0.0, flags: 0.0, flags_b1c: 0.0, utc: UtcNumbers::default(), reserved: 0.0 }
+    Content {
+        set,
+        sent,
+        kind,
+        page: 0.0,
+        flags: 0.0,
+        flags_b1c: 0.0,
+        utc: UtcNumbers::default(),
+        alpha_tecu: [0.0; 9],
+        reserved: 0.0,
+    }
 }
 
 /// A set in one of the messages: carried to the nearest multiple of 300 s of BDT, with the delays of the

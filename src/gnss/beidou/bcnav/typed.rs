@@ -9,7 +9,7 @@ use std::fmt;
 use std::sync::LazyLock;
 
 use super::blocks::Content;
-use super::{Tables, blank, integers_in, of_integers, sent_at};
+use super::{Tables, blank, electrons_in, integers_in, of_integers, sent_at};
 use crate::gnss::bits::{Field, FieldError, bits_of, read_all, write_all};
 use crate::gnss::broadcast::Ephemeris;
 use crate::gnss::crc::crc24q;
@@ -174,7 +174,8 @@ impl Sender for Messages {
         }
         let kind = layout.type_at(start);
         let utc = UtcNumbers::of(&self.common, start, &BDT, (BDT_WEEK, 0));
-        let content = Content { sent: start, utc, ..blank(set.clone()) };
+        let alpha_tecu = self.common.bdgim.map_or([0.0; 9], |model| model.alpha_tecu);
+        let content = Content { sent: start, utc, alpha_tecu, ..blank(set.clone()) };
         let mut bits = vec![false; layout.bits - CHECK_BITS];
         if let Some(field) = &layout.number {
             field.write(&mut bits, i64::from(set.sv.number));
@@ -222,6 +223,8 @@ impl TypedReader {
         let of_week_s = layout.begun_s(&bits);
         let mut news = vec![Read::Unit { symbols: layout.symbols() as u64, of_week_s, inverted }];
         news.extend(layout.sent_at(&bits, near).map(Read::Time));
+        let all = integers_in(layout.of_type(layout.type_of(&bits)), &bits);
+        news.extend(electrons_in(&all).map(|(sent, _)| Read::Ionosphere(sent)));
         self.keep(bits, of_week_s);
         self.look_for_set(near, &mut news);
         news
@@ -274,7 +277,10 @@ impl TypedReader {
         for Part { kind, bits, .. } in parts {
             let tables = layout.of_type(*kind);
             tables.iter().for_each(|table| read_all(table, bits, &mut content));
-            for (name, raw) in integers_in(tables, bits).into_iter().filter(|(name, _)| own.contains(name)) {
+            let found = integers_in(tables, bits);
+            // Coefficients of the ionosphere bear the issue of their message.
+            let beside = electrons_in(&found).map(|(_, electrons)| electrons).unwrap_or_default();
+            for (name, raw) in found.into_iter().filter(|(name, _)| own.contains(name)).chain(beside) {
                 all.retain(|(other, _)| *other != name);
                 all.push((name, raw));
             }

@@ -34,12 +34,19 @@ static HEADER: [Of; 4] = [
     blocks::sismai::<11>(),
 ];
 
-/// Of subframe 2, of subframe 3, and of both, all of which are a set's.
+/// What page 1 has beside it.
+static ELECTRONS: [Of; 9] = blocks::electrons::<42>();
+static UTC: [Of; 9] = blocks::utc::<116>();
+
+/// Of subframe 2, of every page of subframe 3, and of both, all of which are a set's.
 pub(super) static TWO: &Tables = &[&BEGIN, &FIRST_HALF, &SECOND_HALF, &CLOCK, &DELAY];
 pub(super) static THREE: &Tables = &[&HEADER];
 pub(super) static SET: &Tables = &[&BEGIN, &FIRST_HALF, &SECOND_HALF, &CLOCK, &DELAY, &HEADER];
 
+/// Of page 1 of subframe 3 beside what is of a set.
+pub(super) static BESIDE: &Tables = &[&ELECTRONS, &UTC];
+
 /// Every field by the subframe that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
-    bcnav::fields(&[("subframe 2", TWO), ("subframe 3", THREE)])
+    bcnav::fields(&[("subframe 2", TWO), ("subframe 3", THREE), ("subframe 3, page 1", BESIDE)])
 }

@@ -6,8 +6,11 @@
 //! interleaved together. The matrices of the codes are those of the document's section 6.2.2, packed in
 //! `ldpc_2.bin` and `ldpc_3.bin`.
 //!
-//! Limits: those of [`super::bcnav`]; subframe 3 is always page 2, whose almanacs are empty (number 0). Of
-//! other pages health alone is read.
+//! Subframe 3 is page 1 (ionosphere, UTC) where BDGIM's coefficients are known, and else page 2, whose
+//! almanacs are empty (number 0); the document leaves the order open.
+//!
+//! Limits: those of [`super::bcnav`]; page 1 has zeros for predicted accuracies. Of other pages than 1 health
+//! alone is read.
 
 mod fields;
 mod reader;
@@ -17,7 +20,7 @@ use std::sync::LazyLock;
 use crate::gnss::beidou::b1c::{B1C, CARRIER_HZ as B1C_HZ};
 use crate::gnss::beidou::b2a::B2A;
 use crate::gnss::beidou::bcnav::blocks::Content;
-use crate::gnss::beidou::bcnav::{self, NO_IONOSPHERE, blank, integers_in, record_lines, sent_at};
+use crate::gnss::beidou::bcnav::{self, blank, integers_in, record_lines, sent_at};
 use crate::gnss::beidou::bcnav2::B_CNAV2;
 use crate::gnss::bits::{FieldError, bits_of, number, read_all, write_all};
 use crate::gnss::broadcast::{Ephemeris, SetForm};
@@ -25,12 +28,12 @@ use crate::gnss::crc::crc24q;
 use crate::gnss::fec::interleaver::Interleaver;
 use crate::gnss::fec::ldpc64::Ldpc64;
 use crate::gnss::fec::register::RegisterCode;
-use crate::gnss::message::{Message, Parameters, Records, Sender};
+use crate::gnss::message::{Common, Message, Parameters, Records, Sender, UtcNumbers};
 use crate::gnss::satellite::Sv;
 use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, WEEK_S};
+use crate::gnss::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
 pub use fields::tables;
-use fields::{SET, THREE, TWO};
+use fields::{BESIDE, SET, THREE, TWO};
 pub use reader::BCnav1Reader;
 
 /// B-CNAV1 as B1C names it.
@@ -40,13 +43,13 @@ pub static B_CNAV1: Message = Message {
     unit_s: FRAME_S,
     set_s: FRAME_S,
     first_s: 0,
-    sender: |_| Ok(Box::new(Frames)),
+    sender: |common| bcnav::check(common).map(|()| Box::new(Frames { common: common.clone() }) as _),
     number: |_| 1,
     timed: &[1],
     dated: &[],
     set: &[1],
     reduced: &[],
-    ionosphere: NO_IONOSPHERE,
+    ionosphere: bcnav::ionosphere(|_| true),
     set_parameters: || bcnav::set_parameters(SET),
     elements: |sv, raw, near| bcnav::of_integers((SET, &B_CNAV1_SETS), sv, raw, near),
     parameters: opened,
@@ -107,8 +110,9 @@ const CHECK_BITS: usize = 24;
 const NUMBER_SYMBOLS: usize = 21;
 const SYMBOLS_1: usize = 72;
 const SYMBOLS: usize = SYMBOLS_1 + 2 * BITS_2 + 2 * BITS_3;
-/// The page that is sent: almanacs, of no satellite.
-const PAGE: f64 = 2.0;
+/// Pages of subframe 3: of the ionosphere and UTC, and of almanacs.
+const WITH_ELECTRONS: u8 = 1;
+const WITH_ALMANACS: u8 = 2;
 
 /// The codes of subframe 1 (6.2.1).
 const NUMBER_CODE: RegisterCode = RegisterCode { stages: 6, feedback: 0b11_1010, symbols: NUMBER_SYMBOLS };
@@ -209,7 +213,9 @@ pub fn decode(number: u8, soft: &[f32]) -> Option<Frame> {
 }
 
 /// Makes the frames of satellites.
-struct Frames;
+struct Frames {
+    common: Common,
+}
 
 impl Sender for Frames {
     fn unit(&self, set: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
@@ -217,18 +223,22 @@ impl Sender for Frames {
             let expected = "a multiple of 18 s of BDT";
             return Err(FieldError::Start { message: B_CNAV1.name, start_s: start.tow_s(), expected });
         }
-        let [two, three] = subframes(set, start)?.map(checked);
+        let [two, three] = subframes(set, &self.common, start)?.map(checked);
         let time = start.tow_whole_s() % HOUR_S / FRAME_S;
         Ok(encoded(set.sv.number, time as u32, &two, &three))
     }
 }
 
 /// The bits of subframes 2 and 3 of a set without their checks.
-fn subframes(set: &Ephemeris, start: Epoch) -> Result<[Vec<bool>; 2], FieldError> {
-    let content = Content { sent: start, page: PAGE, ..blank(set.clone()) };
+fn subframes(set: &Ephemeris, common: &Common, start: Epoch) -> Result<[Vec<bool>; 2], FieldError> {
+    let page = if common.bdgim.is_some() { WITH_ELECTRONS } else { WITH_ALMANACS };
+    let utc = UtcNumbers::of(common, start, &BDT, (BDT_WEEK, 0));
+    let alpha_tecu = common.bdgim.map_or([0.0; 9], |model| model.alpha_tecu);
+    let content = Content { sent: start, page: f64::from(page), utc, alpha_tecu, ..blank(set.clone()) };
     let [mut two, mut three] = [BITS_2, BITS_3].map(|bits| vec![false; bits - CHECK_BITS]);
     TWO.iter().try_for_each(|table| write_all(table, &content, &mut two))?;
-    THREE.iter().try_for_each(|table| write_all(table, &content, &mut three))?;
+    let beside = if page == WITH_ELECTRONS { BESIDE } else { &[] };
+    THREE.iter().chain(beside).try_for_each(|table| write_all(table, &content, &mut three))?;
     Ok([two, three])
 }
 
@@ -244,7 +254,10 @@ fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
     let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
     let number = number(symbols.get(..6)?) as u8;
     let frame = decode(number, &soft)?;
-    Some((true, of_set_in(&frame.two, &frame.three?)))
+    let three = frame.three?;
+    let mut found = of_set_in(&frame.two, &three);
+    found.extend(beside_in(&three));
+    Some((true, found))
 }
 
 /// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
@@ -260,6 +273,12 @@ fn of_set_in(two: &Vec<bool>, three: &Vec<bool>) -> Parameters {
     let mut found = integers_in(TWO, two);
     found.extend(integers_in(THREE, three));
     found
+}
+
+/// The raw integers of page 1 that are of no set; none of another page.
+fn beside_in(three: &Vec<bool>) -> Parameters {
+    let page = number(three.get(..6).unwrap_or_default());
+    if page == u128::from(WITH_ELECTRONS) { integers_in(BESIDE, three) } else { Parameters::new() }
 }
 
 /// The set in subframes 2 and 3, sent at `sent`.

@@ -3,7 +3,8 @@
 //! Where a frame begins shows in the code words of number and time, which is right by chance at times: the
 //! check of subframe 2 decides.
 
-use super::{B_CNAV1, Frame, SYMBOLS, SYMBOLS_1, decode, elements, likely_time, of_set_in};
+use super::{B_CNAV1, Frame, SYMBOLS, SYMBOLS_1, beside_in, decode, elements, likely_time, of_set_in};
+use crate::gnss::beidou::bcnav::electrons_in;
 use crate::gnss::fec::frames::Frames;
 use crate::gnss::message::{Parameters, Read, Reader};
 use crate::gnss::record::NavigationRow;
@@ -22,12 +23,14 @@ pub struct BCnav1Reader {
     frames: Frames,
     /// What the set that was reported last said.
     complete: Option<Parameters>,
+    /// The coefficients of the ionosphere that were reported last, and of which issue.
+    electrons: Option<(u32, Parameters)>,
 }
 
 impl BCnav1Reader {
     /// A reader that has read nothing.
     pub fn new(sv: Sv) -> Self {
-        Self { sv, frames: Frames::new(SYMBOLS), complete: None }
+        Self { sv, frames: Frames::new(SYMBOLS), complete: None, electrons: None }
     }
 
     /// Takes a frame that ends with the newest symbol.
@@ -37,14 +40,28 @@ impl BCnav1Reader {
         let mut news = vec![unit, Read::Time(sent)];
         let Some(beside) = &frame.three else { return news };
         let all = of_set_in(&frame.two, beside);
+        let set = elements(self.sv, &frame.two, beside, sent);
+        // A frame is of one set, and what it says besides bears its issue.
+        let issue = u32::from(set.iode);
+        if let Some((coefficients, raws)) = electrons_in(&beside_in(beside)) {
+            news.push(Read::Ionosphere(coefficients));
+            let own = Some((issue, raws));
+            if self.electrons != own {
+                news.extend(own.iter().map(|(issue, raws)| Read::Parameters(self.rows(*issue, raws.clone()))));
+                self.electrons = own;
+            }
+        }
         if self.complete.as_ref() != Some(&all) {
-            let set = elements(self.sv, &frame.two, beside, sent);
-            let rows = NavigationRow::each(self.sv, B_CNAV1.name, u32::from(set.iode), all.clone()).collect();
+            let rows = self.rows(issue, all.clone());
             self.complete = Some(all);
             news.push(Read::Ephemeris(Box::new(set)));
             news.push(Read::Parameters(rows));
         }
         news
+    }
+
+    fn rows(&self, issue: u32, parameters: Parameters) -> Vec<NavigationRow> {
+        NavigationRow::each(self.sv, B_CNAV1.name, issue, parameters).collect()
     }
 }
 

@@ -2,13 +2,13 @@
 //!
 //! Source: BDS-SIS-ICD-B2a 1.0, 6.2 (structure, code) and 7. A message is 600 symbols: 24 of a preamble, then
 //! 288 bits with their check, coded over GF(64) by the matrix of 6.2.2, packed in `ldpc.bin`. Sent are
-//! messages 10 and 11 (orbit), 30 (clock, group delays) and 34 (clock, UTC) in turn; the document leaves the
-//! order open. A set begins with message 10. Message 11 has no mark of its set: it is of that of
+//! messages 10 and 11 (orbit), 30 (clock, group delays, ionosphere) and 34 (clock, UTC) in turn; the document
+//! leaves the order open. A set begins with message 10. Message 11 has no mark of its set: it is of that of
 //! the message 10 right before it, or of another message right after it.
 //!
-//! Limits: those of [`super::bcnav`]; message 30 has zeros for BDGIM's coefficients, and for what B2a's data
-//! are apart from its pilot. Messages 31, 32, 33 and 40 (almanacs, the Earth's orientation, other systems'
-//! times) are neither sent nor read.
+//! Limits: those of [`super::bcnav`]; message 30 has zeros for what B2a's data are apart from its pilot.
+//! Messages 31, 32, 33 and 40 (almanacs, the Earth's orientation, other systems' times) are neither sent nor
+//! read.
 
 use std::sync::LazyLock;
 
@@ -16,7 +16,7 @@ use crate::gnss::beidou::b1c::B1C;
 use crate::gnss::beidou::b2a::B2A;
 use crate::gnss::beidou::bcnav::blocks::{self, Of};
 use crate::gnss::beidou::bcnav::typed::{Layout, Messages, TypedReader};
-use crate::gnss::beidou::bcnav::{self, NO_IONOSPHERE, Tables, record_lines};
+use crate::gnss::beidou::bcnav::{self, Tables, record_lines};
 use crate::gnss::beidou::bcnav1::B_CNAV1_SETS;
 use crate::gnss::bits::Kind::{Signed, Whole};
 use crate::gnss::bits::{Field, FieldError, plain};
@@ -31,13 +31,13 @@ pub static B_CNAV2: Message = Message {
     unit_s: MESSAGE_S,
     set_s: MESSAGE_S * ORDER.len() as i64,
     first_s: 0,
-    sender: |common| Ok(Box::new(Messages { layout: &LAYOUT, common: common.clone() })),
+    sender: |common| bcnav::check(common).map(|()| Box::new(Messages { layout: &LAYOUT, common: common.clone() }) as _),
     number: |start| LAYOUT.type_at(start),
     timed: &ORDER,
     dated: &[],
     set: &OF_SET,
     reduced: &[],
-    ionosphere: NO_IONOSPHERE,
+    ionosphere: bcnav::ionosphere(|start| LAYOUT.type_at(start) == 30),
     set_parameters: || bcnav::set_parameters(SET),
     elements: |sv, raw, near| LAYOUT.elements(SET, sv, raw, near),
     parameters: |symbols| LAYOUT.opened(symbols),
@@ -102,6 +102,7 @@ static FIRST_HALF: [Of; 9] = blocks::first_half::<61>();
 static HEADER: [Of; 4] =
     [blocks::health::<30>(), blocks::flags::<32>(), blocks::sismai::<35>(), blocks::flags_b1c::<39>()];
 static SECOND_HALF: [Of; 10] = blocks::second_half::<42>();
+static ELECTRONS: [Of; 9] = blocks::electrons::<145>();
 static CLOCK: [Of; 4] = blocks::clock::<42>();
 static DELAY: [Of; 4] = [
     blocks::iodc::<111>(),
@@ -115,7 +116,7 @@ static UTC: [Of; 9] = blocks::utc::<143>();
 
 static TEN: &Tables = &[&BEGIN, &FIRST_HALF];
 static ELEVEN: &Tables = &[&HEADER, &SECOND_HALF];
-static THIRTY: &Tables = &[&HEADER, &CLOCK, &DELAY];
+static THIRTY: &Tables = &[&HEADER, &CLOCK, &DELAY, &ELECTRONS];
 static THIRTY_FOUR: &Tables = &[&HEADER, &CLOCK_34, &ISSUE_34, &UTC];
 /// Those with parameters of a set.
 static SET: &Tables = &[&BEGIN, &FIRST_HALF, &HEADER, &SECOND_HALF, &CLOCK, &DELAY];

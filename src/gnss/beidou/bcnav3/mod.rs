@@ -2,20 +2,20 @@
 //!
 //! Source: BDS-SIS-ICD-B2b 1.0, 6.2 (structure, code) and 7. A message is 1000 symbols: 16 of a preamble, six
 //! of the satellite's number and six reserved ones, then 486 bits with their check, coded over GF(64) by the
-//! matrix of 6.2.2, packed in `ldpc.bin`. Sent are messages 10 (orbit) and 30 (clock, group delay, UTC) in
-//! turn; the document leaves the order open. Sets have no issue but their reference times, which are those of
-//! orbit and clock alike.
+//! matrix of 6.2.2, packed in `ldpc.bin`. Sent are messages 10 (orbit) and 30 (clock, group delay,
+//! ionosphere, UTC) in turn; the document leaves the order open. Sets have no issue but their reference
+//! times, which are those of orbit and clock alike.
 //!
-//! Limits: those of [`super::bcnav`]; message 30 has zeros for BDGIM's coefficients, the Earth's orientation
-//! and predicted accuracies. Message 40 (almanacs, other systems' times) is neither sent nor read, nor are
-//! those of PPP-B2b.
+//! Limits: those of [`super::bcnav`]; message 30 has zeros for the Earth's orientation and predicted
+//! accuracies. Message 40 (almanacs, other systems' times) is neither sent nor read, nor are those of
+//! PPP-B2b.
 
 use std::sync::LazyLock;
 
 use crate::gnss::beidou::b2b::{B2B, CARRIER_HZ};
 use crate::gnss::beidou::bcnav::blocks::{self, Of};
 use crate::gnss::beidou::bcnav::typed::{Layout, Messages, TypedReader};
-use crate::gnss::beidou::bcnav::{self, NO_IONOSPHERE, Tables, record_lines_of_b2b};
+use crate::gnss::beidou::bcnav::{self, Tables, record_lines_of_b2b};
 use crate::gnss::beidou::d1d2::issue;
 use crate::gnss::bits::Kind::{Signed, Whole};
 use crate::gnss::bits::{Field, FieldError, plain};
@@ -30,13 +30,13 @@ pub static B_CNAV3: Message = Message {
     unit_s: MESSAGE_S,
     set_s: MESSAGE_S * ORDER.len() as i64,
     first_s: 0,
-    sender: |common| Ok(Box::new(Messages { layout: &LAYOUT, common: common.clone() })),
+    sender: |common| bcnav::check(common).map(|()| Box::new(Messages { layout: &LAYOUT, common: common.clone() }) as _),
     number: |start| LAYOUT.type_at(start),
     timed: &ORDER,
     dated: &[],
     set: &ORDER,
     reduced: &[],
-    ionosphere: NO_IONOSPHERE,
+    ionosphere: bcnav::ionosphere(|start| LAYOUT.type_at(start) == 30),
     set_parameters: || bcnav::set_parameters(SET),
     elements: |sv, raw, near| LAYOUT.elements(SET, sv, raw, near),
     parameters: |symbols| LAYOUT.opened(symbols),
@@ -94,13 +94,14 @@ static FIRST_HALF: [Of; 9] = blocks::first_half::<30>();
 static SECOND_HALF: [Of; 10] = blocks::second_half::<233>();
 static STATUS: [Of; 2] = [blocks::flags::<455>(), blocks::sismai::<458>()];
 static TIME: [Of; 1] = [blocks::week::<26>()];
+static ELECTRONS: [Of; 9] = blocks::electrons::<124>();
 static CLOCK: [Of; 4] = blocks::clock::<43>();
 static DELAY: [Of; 1] = [plain!("tgd_b2bi_s", [(112, 12)], Signed, -34, DELAYS, set.tgd_s)];
 static UTC: [Of; 9] = blocks::utc::<198>();
 static HEALTH: [Of; 1] = [blocks::health::<460>()];
 
 static TEN: &Tables = &[&FIRST_HALF, &SECOND_HALF, &STATUS];
-static THIRTY: &Tables = &[&TIME, &CLOCK, &DELAY, &UTC, &HEALTH];
+static THIRTY: &Tables = &[&TIME, &CLOCK, &DELAY, &ELECTRONS, &UTC, &HEALTH];
 /// Those with parameters of a set.
 static SET: &Tables = &[&FIRST_HALF, &SECOND_HALF, &STATUS, &TIME, &CLOCK, &DELAY, &HEALTH];
 

@@ -1,7 +1,10 @@
 //! Lines and records about the ionosphere and about one time against another.
 
+use std::collections::BTreeMap;
+
 use super::numbers::{fields, number_of, numbers};
-use super::{FIELD, Form, GALILEO, GALILEO_OLD, Group, Line, Polynomial, UTC};
+use super::{FIELD, Form, GALILEO, GALILEO_OLD, Group, HEADER_FIELD, Line, Polynomial, UTC};
+use crate::gnss::bdgim::Bdgim;
 use crate::gnss::klobuchar::Klobuchar;
 use crate::gnss::satellite::System;
 
@@ -42,6 +45,38 @@ impl Form {
             }
             _ => refuse(one.0, "expected eight coefficients".to_owned()),
         }
+    }
+
+    /// BDGIM's coefficients in a record of version 4; where all are zero the record says nothing.
+    pub(super) fn bdgim(&self, group: &[Line<'_>], satellite: &str) -> Result<Group, String> {
+        let (first, title) = group.first().copied().unwrap_or_default();
+        let refuse = |line: usize, what: String| Err(format!("line {line} ({}): {what}", title.trim_end()));
+        let [_, one, two, three] = group else {
+            return refuse(first, format!("a record of {} lines: expected 4", group.len()));
+        };
+        let margin = self.margin();
+        let mut alpha_tecu = Vec::with_capacity(9);
+        for (&(number, line), start, count) in [(one, margin + FIELD, 3), (two, margin, 4), (three, margin, 2)] {
+            if self.cut == Some(number) && !line.trim_end().len().saturating_sub(start).is_multiple_of(FIELD) {
+                return refuse(number, "the file ends within a number".to_owned());
+            }
+            match fields(line, start, FIELD, count) {
+                Ok(found) => alpha_tecu.extend(found),
+                Err(reason) => return refuse(number, reason),
+            }
+        }
+        let Some(epoch) = self.epoch(one.1.get(margin..margin + FIELD).unwrap_or("")) else {
+            return refuse(one.0, "column 5: expected an epoch".to_owned());
+        };
+        let alpha_tecu: Option<Vec<f64>> = alpha_tecu.into_iter().collect();
+        let Some(alpha_tecu) = alpha_tecu.and_then(|all| <[f64; 9]>::try_from(all).ok()) else {
+            return refuse(one.0, "expected nine coefficients".to_owned());
+        };
+        if let Err(reason) = possible(&alpha_tecu) {
+            return refuse(one.0, reason);
+        }
+        let given = Bdgim::given(alpha_tecu);
+        Ok(given.map_or(Group::Other, |found| Group::Bdgim(format!("{epoch} {satellite}"), found)))
     }
 
     /// Galileo's effective ionisation in a record of version 4; the flags after it are not read.
@@ -94,6 +129,51 @@ impl Form {
             },
             Err(reason) => refuse(what.0, reason),
         }
+    }
+}
+
+/// Whether coefficients of BDGIM are within what the messages' fields carry, the fifth below zero and the
+/// first above (BDS-SIS-ICD-B1C 1.0, 7.8).
+fn possible(alpha_tecu: &[f64]) -> Result<(), String> {
+    match alpha_tecu.iter().find(|alpha| !(-31.875..=127.875).contains(*alpha)) {
+        Some(alpha) => Err(format!("coefficient of BDGIM {alpha} TECU: expected -31.875 to 127.875")),
+        None => Ok(()),
+    }
+}
+
+/// BDGIM's coefficients in lines BDS1, BDS2 and BDS3 of a header, three in each, by their mark of time.
+#[derive(Default)]
+pub(super) struct Thirds(BTreeMap<String, [Option<[f64; 3]>; 3]>);
+
+impl Thirds {
+    /// Which of the lines this is, if one of them.
+    fn place(line: &str) -> Option<usize> {
+        ["BDS1", "BDS2", "BDS3"].iter().position(|name| line.starts_with(name))
+    }
+
+    /// Whether this is one of the lines.
+    pub(super) fn has(line: &str) -> bool {
+        Self::place(line).is_some()
+    }
+
+    /// Takes a line: `A4, 1X, 3D12.4`, and a mark of time behind the fourth field.
+    pub(super) fn take(&mut self, line: &str) -> Result<(), String> {
+        let found = numbers::<3>(line, 5, HEADER_FIELD)?;
+        possible(&found)?;
+        let mark = line.get(5 + 4 * HEADER_FIELD..5 + 4 * HEADER_FIELD + 2).unwrap_or("").trim().to_owned();
+        let own = self.0.entry(mark).or_default();
+        if let Some(third) = Self::place(line).and_then(|place| own.get_mut(place)) {
+            *third = Some(found);
+        }
+        Ok(())
+    }
+
+    /// The coefficients of the first time of which all three lines are there and not all numbers are zero.
+    pub(super) fn first(&self) -> Option<Bdgim> {
+        self.0.values().find_map(|own| {
+            let [one, two, three] = *own;
+            Bdgim::given([one?, two?, three?].concat().try_into().ok()?)
+        })
     }
 }
 
