@@ -5,7 +5,8 @@
 //! the largest cells of all codes ([`super::multiple_access`]). There the threshold to begin with is seven
 //! tenths of what the codes' first dwells let expect of it, and not below what nine of them in ten reach. A
 //! satellite that passes it by less than what makes it sure has its column filled, and all are chosen anew,
-//! until none is left that does; but for columns whose first dwells show noise. So no satellite is found by less than a search without leaving asks for.
+//! until none is left that does; but for columns whose first dwells show noise. So no satellite is found by
+//! less than a search without leaving asks for.
 
 use std::collections::BTreeSet;
 

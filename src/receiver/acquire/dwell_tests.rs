@@ -22,8 +22,8 @@ fn shares_found(dwells: &Dwells, dbhz: [f64; 2]) -> [f64; 2] {
     let mut found = [0; 2];
     for _ in 0..TRIALS {
         let (hz, first_bit_s) = (250.0 * random.uniform() - 125.0, BIT_S * random.uniform());
-        // Two cells a chip, and what is left of a triangle's square on the way to the one between them, which has
-        // three quarters wherever the code lies.
+        // Two cells a chip, and what is left of a triangle's square on the way to the one between them,
+        // which has three quarters wherever the code lies.
         let lag_loss = f64::max(libm::pow(1.0 - 0.25 * random.uniform(), 2.0), 0.75);
         let amplitudes = dbhz.map(|dbhz| (2.0 * libm::pow(10.0, dbhz / 10.0) * SUM_S * lag_loss).sqrt());
         let mut bit = (0.0, 1.0);

@@ -153,8 +153,9 @@ impl Dwells {
 }
 
 impl Grid {
-    /// All satellites at one Doppler, and whether that is crowded, as far as codes that were left show it: then
-    /// with what nine codes in ten would at most reach by all sums; `make` gives the spectrum of a dwell there.
+    /// All satellites at one Doppler, and whether that is crowded, as far as codes that were left show it:
+    /// then with what nine codes in ten would at most reach by all sums; `make` gives the spectrum of a
+    /// dwell there.
     pub fn column(
         &self,
         doppler_hz: f64,
@@ -195,7 +196,7 @@ impl Grid {
             column.push(self.left(height / least, total, first));
             if height > least {
                 match room.kept.get_mut(stayed.len()) {
-                    Some(place) => place.clone_from(&room.powers),
+                    Some(place) => place.copy(&room.powers),
                     None => room.kept.push(room.powers.clone()),
                 }
                 stayed.push(number);

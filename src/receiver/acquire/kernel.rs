@@ -236,7 +236,8 @@ pub(super) fn multiply(out: &mut [Complex<f32>], a: &Spectrum, b: &[Complex<f32>
     multiply_plain(out, a, b);
 }
 
-/// cells += |x|², and between += |x + x'|², x' the number after x, of the last one the first; all have as many.
+/// cells += |x|², and between += |x + x'|², x' the number after x, of the last one the first; all have as
+/// many.
 pub(super) fn add_powers(cells: &mut [f32], between: &mut [f32], x: &[Complex<f32>]) {
     let length = cells.len().min(between.len()).min(x.len());
     let (cells, between, x) = (&mut cells[..length], &mut between[..length], &x[..length]);

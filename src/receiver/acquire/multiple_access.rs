@@ -23,7 +23,8 @@ pub(super) const LEAST_CODES: usize = 12;
 /// A bin is crowded when its median is so many standard deviations above that of noise.
 const CROWDED: f64 = 5.0;
 /// After the first half of its sums a bin that shows no more than this of them is none: of one that is to be
-/// crowded by all sums the median is raised by half of [`CROWDED`] then, and shows so little in one case of 40.
+/// crowded by all sums the median is raised by half of [`CROWDED`] then, and shows so little in one case of
+/// 40.
 const QUIET: f64 = 0.5;
 /// Standard deviation of a Gumbel sample's median over scale, times √n: 1 / (2 × density there, ½ ln 2) =
 /// 1/ln 2.
@@ -163,8 +164,8 @@ impl Law {
     }
 }
 
-/// The median of a bin's largest cells without those of satellites that are there, as far as these stand out, and
-/// by how much each of the others exceeds it, in amplitude.
+/// The median of a bin's largest cells without those of satellites that are there, as far as these stand
+/// out, and by how much each of the others exceeds it, in amplitude.
 fn median_and_excesses(mut column: Vec<f64>) -> (f64, Vec<f64>) {
     let mut median = quantile(&mut column, 0.5);
     if stands_out(&column, median) {

@@ -1,15 +1,16 @@
 //! Powers in the cells of one code period, and in those between them.
 //!
-//! Cells half a chip apart lose up to 2.5 dB of a code that lies between two. There both hold it alike, so their sum
-//! is the cell between them: it costs an addition where a transform of as many cells would cost another
-//! transform. Its noise has 2(1 + ρ) times the power of theirs, ρ the correlation of neighbours, which the
-//! totals of both tell whatever the samples' spectrum is. Of band-limited rectangular chips half a chip apart
-//! cells and those between them lose 1.07 dB at worst and 0.83 on average, 0.64 of that wherever the code
-//! lies; cells 0.4 chip apart without others between lose 1.57 and 0.92.
+//! Cells half a chip apart lose up to 2.5 dB of a code that lies between two. There both hold it alike, so
+//! their sum is the cell between them: it costs an addition where a transform of as many cells would cost
+//! another transform. Its noise has 2(1 + ρ) times the power of theirs, ρ the correlation of neighbours,
+//! which the totals of both tell whatever the samples' spectrum is. Of band-limited rectangular chips half a
+//! chip apart cells and those between them lose 1.07 dB at worst and 0.83 on average, 0.64 of that wherever
+//! the code lies; cells 0.4 chip apart without others between lose 1.57 and 0.92.
+
+use num_complex::Complex;
 
 use super::grid::Strip;
 use super::kernel;
-use num_complex::Complex;
 
 /// A code period's powers: cell n, and the one between it and the next.
 #[derive(Clone)]
@@ -18,11 +19,12 @@ pub(super) struct Powers {
     between: Vec<f32>,
 }
 
-/// Independent cells whose largest has the law of so many, with one between any two whose correlation with its
-/// neighbours follows from `correlation`, that of two cells.
+/// Independent cells whose largest has the law of so many, with one between any two whose correlation with
+/// its neighbours follows from `correlation`, that of two cells.
 ///
-/// From draws of the largest of 2048 to 4096 cells, quantiles 0.5 to 0.9 of 8 and 16 sums: 1.8 to 2.1 times as
-/// many at a correlation of zero and below, 1.8 at 0.3, 1.4 to 1.6 at 0.5, 1.3 to 1.5 at 0.6, 1.0 to 1.2 at 0.75.
+/// From draws of the largest of 2048 to 4096 cells, quantiles 0.5 to 0.9 of 8 and 16 sums: 1.8 to 2.1 times
+/// as many at a correlation of zero and below, 1.8 at 0.3, 1.4 to 1.6 at 0.5, 1.3 to 1.5 at 0.6, 1.0 to 1.2
+/// at 0.75.
 pub(super) fn independent(cells: usize, correlation: f64) -> usize {
     let near = correlation.max(0.0);
     (cells as f64 * f64::max(1.9 - 1.5 * near * near, 1.0)).round() as usize
@@ -38,12 +40,19 @@ impl Powers {
         self.between.fill(0.0);
     }
 
+    /// Takes over those of as many cells.
+    pub fn copy(&mut self, other: &Self) {
+        self.cells.copy_from_slice(&other.cells);
+        self.between.copy_from_slice(&other.between);
+    }
+
     /// Adds those of a coherent sum.
     pub fn add(&mut self, sum: &[Complex<f32>]) {
         kernel::add_powers(&mut self.cells, &mut self.between, sum);
     }
 
-    /// The largest, and the total of the cells without those between, whose powers are taken in units of theirs.
+    /// The largest, and the total of the cells without those between, whose powers are taken in units of
+    /// theirs.
     pub fn peak_and_total(&self) -> (f64, f64) {
         let ([own, other], scale, total) = self.largest();
         (f64::max(f64::from(own), scale * f64::from(other)), total)
@@ -114,7 +123,8 @@ mod tests {
             let share = if half % 2 == 0 { 1.0 } else { 0.75 };
             let expected = share * 4.0 * 900.0;
             assert!(strip.half_lag.abs_diff(half as usize) <= usize::from(half < 2), "{half}: {}", strip.half_lag);
-            // Four sums of noise: a deviation of 30·√(2·4)·√share, and of the totals, which the code is part of.
+            // Four sums of noise: a deviation of 30·√(2·4)·√share, and of the totals, which the code is part
+            // of.
             assert!((f64::from(strip.peak) / expected - 1.0).abs() < 0.1, "{half}: {} for {expected}", strip.peak);
             assert_eq!(powers.peak_and_total().0 as f32, strip.peak);
             assert!(half < 2 || strip.near > 0.8 * (strip.total - 4.0 * 2.0 * 300.0), "{half}");
@@ -137,7 +147,8 @@ mod tests {
                     peak / (total / (16.0 * count as f64)) > bar
                 })
                 .count();
-            // Half of 400, three deviations of 10, and a tenth of the cells, which is 0.035 of the probability.
+            // Half of 400, three deviations of 10, and a tenth of the cells, which is 0.035 of the
+            // probability.
             assert!(above.abs_diff(trials / 2) < 30 + 14, "{correlation}: {above} of {trials}");
         }
     }

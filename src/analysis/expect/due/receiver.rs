@@ -17,8 +17,8 @@ use crate::gnss::signal::{SIGNALS, Signal};
 const HOLDING_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
 /// Least C/N0 at which the message can be read: at 27 dB-Hz one bit in 4e6 is wrong (Eb/N0 of 10 dB).
 const MESSAGE_DBHZ: f64 = 27.0;
-/// Share of the power that the worst place between cells leaves: 2.0 dB of code at few samples a chip, and one
-/// sum in ten half lost to a data bit.
+/// Share of the power that the worst place between cells leaves: 2.0 dB of code at few samples a chip, and
+/// one sum in ten half lost to a data bit.
 const CODE_LOSS: f64 = 0.6 * 0.95;
 /// With one cell between any two there are so many more of the same law.
 const CELLS_BETWEEN: f64 = 1.5;

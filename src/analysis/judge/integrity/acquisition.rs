@@ -18,8 +18,8 @@ use crate::gnss::signal::Link;
 
 /// A refined Doppler is right within half a bin of the search: 1/(2·2T) of a coherent time of a few periods.
 const DOPPLER_BINS: f64 = 0.5;
-/// A refined code phase is right within two thirds of a cell of the search: a third of a chip, where there are two
-/// cells a chip and the deviation at 34 dB-Hz is 0.07.
+/// A refined code phase is right within two thirds of a cell of the search: a third of a chip, where there
+/// are two cells a chip and the deviation at 34 dB-Hz is 0.07.
 const CELLS: f64 = 2.0 / 3.0;
 /// C/N0 of a few milliseconds: cell offsets cost up to 1.5 dB, its own noise is a decibel.
 const CN0_DB: f64 = 5.0;

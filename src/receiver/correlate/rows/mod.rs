@@ -173,8 +173,8 @@ impl Motion {
         Self { gain: (samples + 0.5) as i64 - (1 << PLACE_BITS), period: rows.places, stride: rows.stride }
     }
 
-    /// The entry of a segment's first sample, and the weights of it and of the next row's, a byte each. Samples are
-    /// [`SEGMENT`] or, at the end, less.
+    /// The entry of a segment's first sample, and the weights of it and of the next row's, a byte each.
+    /// Samples are [`SEGMENT`] or, at the end, less.
     #[inline(always)]
     fn next(&self, place: &mut Place, samples: usize) -> (usize, i16) {
         let samples = samples as i64;
