@@ -76,14 +76,14 @@ use window::Window;
 /// One C/A code appears in the correlator of another at most 21 dB down, several together seldom above 14 dB
 /// down.
 pub(in crate::receiver) const WEAK_SHARE: f64 = 0.1;
-/// A hit this much weaker than the strongest (33 dB) is not believed even then: subtraction leaves something
-/// over, and without noise to cover it that something has the cross-correlation's peaks. Of ten satellites
-/// 35 dB below another half would be found, and in one sky of 18 one that is not there.
-const LEAST_SHARE: f64 = 5e-4;
+/// A hit this much weaker than the strongest (40 dB) is not believed even then: subtraction leaves something
+/// over, and without noise to cover it that something has the cross-correlation's peaks.
+const LEAST_SHARE: f64 = 1e-4;
 /// A hit this much weaker (30 dB) has to pass its threshold by a fifth. What a subtraction leaves is at the
 /// edges of chips, and its cross-correlations reach further than those of whole codes: of 90 skies with a
 /// satellite 30 dB above ten others six passed the threshold of one that is not there, by 2 to 15 %, and by
-/// less than a fifth one in a hundred of those that are.
+/// less than a fifth one in a hundred of those that are. At 35 dB half of them are found, and in one sky of
+/// 18 one that is not there.
 const DISTANT_SHARE: f64 = 1e-3;
 const DISTANT_EXCESS: f64 = 1.2;
 /// Satellites with this share of the samples' power take 1.2 dB from those that were not found.
