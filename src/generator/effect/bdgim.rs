@@ -4,7 +4,7 @@
 //! not: here one interval passes into the next over [`MIDNIGHT_S`]. Limits: where the model's least content
 //! begins its delay has a bend; above the shell the delay fades as in [`super::ionosphere`].
 
-use crate::generator::effect::ionosphere::{MIDNIGHT_S, share_above, smooth};
+use crate::generator::effect::ionosphere::{MIDNIGHT_S, delay_groups, share_above, smooth};
 use crate::generator::ray::{Effect, Ray, Sight};
 use crate::gnss::bdgim::{Bdgim, INTERVAL_S, Pierce, delay_s, forecast_tecu, interval};
 use crate::gnss::earth::{Geodetic, Look};
@@ -53,11 +53,7 @@ impl Effect for BdgimIonosphere {
 
     fn act(&self, sight: &Sight, signal: &Signal, rays: &mut Vec<Ray>) {
         let tecu = self.stec_tecu(sight.user, sight.look, sight.received);
-        let delay_s = delay_s(tecu, signal.carrier_hz(sight.sv));
-        for ray in rays {
-            ray.code_delay_s += delay_s;
-            ray.carrier_delay_s -= delay_s;
-        }
+        delay_groups(rays, delay_s(tecu, signal.carrier_hz(sight.sv)));
     }
 }
 

@@ -49,6 +49,14 @@ impl KlobucharIonosphere {
     }
 }
 
+/// What electrons do to every ray: the code comes later by a group delay, the carrier as much earlier.
+pub(super) fn delay_groups(rays: &mut [Ray], delay_s: f64) {
+    for ray in rays {
+        ray.code_delay_s += planted!("generator.ionosphere.code", delay_s, 0.9 * delay_s);
+        ray.carrier_delay_s -= planted!("generator.ionosphere.carrier_sign", delay_s, -delay_s);
+    }
+}
+
 impl Effect for KlobucharIonosphere {
     fn name(&self) -> &'static str {
         "ionosphere"
@@ -59,11 +67,7 @@ impl Effect for KlobucharIonosphere {
     }
 
     fn act(&self, sight: &Sight, signal: &Signal, rays: &mut Vec<Ray>) {
-        let delay_s = self.delay_s(sight.user, sight.look, sight.received, signal.carrier_hz(sight.sv));
-        for ray in rays {
-            ray.code_delay_s += planted!("generator.ionosphere.code", delay_s, 0.9 * delay_s);
-            ray.carrier_delay_s -= planted!("generator.ionosphere.carrier_sign", delay_s, -delay_s);
-        }
+        delay_groups(rays, self.delay_s(sight.user, sight.look, sight.received, signal.carrier_hz(sight.sv)));
     }
 }
 

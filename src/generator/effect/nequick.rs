@@ -8,7 +8,7 @@
 
 use nalgebra::Vector3;
 
-use crate::generator::effect::ionosphere::{MIDNIGHT_S, smooth};
+use crate::generator::effect::ionosphere::{MIDNIGHT_S, delay_groups, smooth};
 use crate::generator::ray::{Effect, Ray, Sight};
 use crate::gnss::earth::Geodetic;
 use crate::gnss::nequick::{NequickG, delay_s};
@@ -53,11 +53,7 @@ impl Effect for NequickIonosphere {
 
     fn act(&self, sight: &Sight, signal: &Signal, rays: &mut Vec<Ray>) {
         let tecu = self.stec_tecu(sight.user, &sight.satellite.position_m, sight.received);
-        let delay_s = delay_s(tecu, signal.carrier_hz(sight.sv));
-        for ray in rays {
-            ray.code_delay_s += delay_s;
-            ray.carrier_delay_s -= delay_s;
-        }
+        delay_groups(rays, delay_s(tecu, signal.carrier_hz(sight.sv)));
     }
 }
 

@@ -8,7 +8,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use crate::generator::effect::ionosphere::share_above;
+use crate::generator::effect::ionosphere::{delay_groups, share_above};
 use crate::generator::ray::{Effect, Ray, Sight};
 use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
 use crate::gnss::ionex::{Interpolation, Maps};
@@ -147,11 +147,7 @@ impl Effect for ShellIonosphere {
     fn act(&self, sight: &Sight, signal: &Signal, rays: &mut Vec<Ray>) {
         let slant_tecu = self.slant_tecu(sight.user, sight.look, sight.received) * share_above(sight.user.height_m);
         let carrier_hz = signal.carrier_hz(sight.sv);
-        let delay_s = METRES_PER_TECU_HZ2 * slant_tecu / (carrier_hz * carrier_hz) / SPEED_OF_LIGHT_MPS;
-        for ray in rays {
-            ray.code_delay_s += delay_s;
-            ray.carrier_delay_s -= delay_s;
-        }
+        delay_groups(rays, METRES_PER_TECU_HZ2 * slant_tecu / (carrier_hz * carrier_hz) / SPEED_OF_LIGHT_MPS);
     }
 }
 
