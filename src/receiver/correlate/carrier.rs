@@ -5,7 +5,7 @@
 
 use num_complex::Complex64;
 
-use super::{Nco, TURN};
+use super::{Nco, TURN, kernel};
 
 /// Samples in a vector, and vectors whose phasors are made together.
 pub(super) const LANES: usize = 16;
@@ -13,9 +13,9 @@ pub(super) const LANES: usize = 16;
 pub(super) const BLOCK: usize = LANES * LANES;
 
 /// Sixteen complex numbers.
-pub(super) struct Sixteen {
-    pub re: [f64; LANES],
-    pub im: [f64; LANES],
+struct Sixteen {
+    re: [f64; LANES],
+    im: [f64; LANES],
 }
 
 impl Sixteen {
@@ -100,21 +100,10 @@ impl Carrier {
         (cos, sin)
     }
 
-    /// Turns of the lanes, or of the pairs, against their vector's first sample.
-    #[inline(always)]
-    pub fn within(&self) -> &Sixteen {
-        &self.within
-    }
-
     /// The sum of lanes, or of pairs, each turned back to the vectors' first samples.
     #[inline(always)]
     pub fn fold(&self, re: &[f64; LANES], im: &[f64; LANES]) -> Complex64 {
-        let (mut turned_re, mut turned_im) = ([0.0; LANES], [0.0; LANES]);
-        for k in 0..LANES {
-            turned_re[k] = re[k] * self.within.re[k] + im[k] * self.within.im[k];
-            turned_im[k] = im[k] * self.within.re[k] - re[k] * self.within.im[k];
-        }
-        Complex64::new(sum(turned_re), sum(turned_im))
+        kernel::fold([re, im], [&self.within.re, &self.within.im])
     }
 }
 
@@ -124,19 +113,6 @@ pub(super) fn filled<T: Copy + Default, const N: usize>(rest: &[T]) -> [T; N] {
     let mut all = [T::default(); N];
     all[..rest.len()].copy_from_slice(rest);
     all
-}
-
-/// Halves added to each other until one is left; of as many as a power of two.
-#[inline(always)]
-fn sum<const N: usize>(mut x: [f64; N]) -> f64 {
-    let mut half = N / 2;
-    while half > 0 {
-        for k in 0..half {
-            x[k] += x[k + half];
-        }
-        half /= 2;
-    }
-    x[0]
 }
 
 /// e^{jθ} of a phase in 2⁻⁶⁴ turns, to 2e-16: Taylor's polynomials on either side of the nearest quarter.
@@ -164,6 +140,26 @@ fn phasor(turns: u64) -> Complex64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lanes_and_pairs_are_turned_back_to_the_first_sample_of_their_vector() {
+        let step = 0x0123_4567_89ab_cdef;
+        let nco = Nco { carrier: 0, carrier_step: step, code: 0, code_step: 0 };
+        let at = |sample: u64| phasor(step.wrapping_mul(sample));
+        let number = |k: u64| Complex64::new(libm::sin(k as f64), libm::cos(3.0 * k as f64));
+        let pair = |k: u64| 0.5 * (at(2 * k) + at(2 * k + 1));
+        for (carrier, turn) in
+            [(Carrier::new(&nco), &at as &dyn Fn(u64) -> Complex64), (Carrier::of_pairs(&nco), &pair)]
+        {
+            let re = std::array::from_fn(|k| number(k as u64).re);
+            let im = std::array::from_fn(|k| number(k as u64).im);
+            let expected: Complex64 = (0..LANES as u64).map(|k| number(k) * turn(k).conj()).sum();
+            // Sixteen products of about one.
+            assert!((carrier.fold(&re, &im) - expected).norm() < 1e-14);
+            let turns = [&carrier.within.re, &carrier.within.im];
+            assert_eq!(carrier.fold(&re, &im), kernel::fold_plain([&re, &im], turns));
+        }
+    }
 
     #[test]
     fn phasors_are_those_of_the_library() {

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use num_complex::Complex64;
 
-use super::super::carrier::{Carrier, LANES};
+use super::super::carrier::LANES;
 use super::super::kernel::Level;
 use super::{AMPLITUDE, Job, Places, ROWS, SEGMENT, SEGMENTS, body};
 
@@ -73,7 +73,7 @@ impl<const T: usize> Stretch<'_, T> {
 /// has.
 pub(super) fn correlate<const T: usize>(level: Level, job: &Job, codes: [i64; T]) -> [Complex64; T] {
     match level {
-        Level::Baseline => body(job, codes, add_plain, Carrier::fold),
+        Level::Baseline => body(job, codes, add_plain),
         // SAFETY: `Level` values beyond the baseline come from `best` (and `all` in tests), which detected
         // AVX2.
         #[cfg(target_arch = "x86_64")]
@@ -87,13 +87,13 @@ pub(super) fn correlate<const T: usize>(level: Level, job: &Job, codes: [i64; T]
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq")]
 fn correlate_avx512<const T: usize>(job: &Job, codes: [i64; T]) -> [Complex64; T] {
-    body(job, codes, |stretch, sums| add_avx512(stretch, sums), |carrier, re, im| fold_avx2(carrier, re, im))
+    body(job, codes, |stretch, sums| add_avx512(stretch, sums))
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn correlate_avx2<const T: usize>(job: &Job, codes: [i64; T]) -> [Complex64; T] {
-    body(job, codes, |stretch, sums| add_avx2(stretch, sums), |carrier, re, im| fold_avx2(carrier, re, im))
+    body(job, codes, |stretch, sums| add_avx2(stretch, sums))
 }
 
 /// A float of this size has 2⁻⁴ in its last bit, and zeros in its last sixteen.
@@ -253,35 +253,6 @@ fn add_avx512<const T: usize>(stretch: &Stretch<T>, sums: &mut Sums<T>) {
             }
         }
     }
-}
-
-/// [`Carrier::fold`]: a loop over taps around it would be made into one over lanes, with gathered numbers.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-#[inline]
-fn fold_avx2(carrier: &Carrier, re: &[f64; LANES], im: &[f64; LANES]) -> Complex64 {
-    let turns = carrier.within();
-    let mut re_sums = [x86::_mm256_setzero_pd(); 4];
-    let mut im_sums = [x86::_mm256_setzero_pd(); 4];
-    for k in 0..4 {
-        // SAFETY: four numbers are at each, and any alignment will do.
-        let [re, im, turn_re, turn_im] =
-            [re, im, &turns.re, &turns.im].map(|of| unsafe { x86::_mm256_loadu_pd(of.as_ptr().add(4 * k)) });
-        re_sums[k] = x86::_mm256_add_pd(x86::_mm256_mul_pd(re, turn_re), x86::_mm256_mul_pd(im, turn_im));
-        im_sums[k] = x86::_mm256_sub_pd(x86::_mm256_mul_pd(im, turn_re), x86::_mm256_mul_pd(re, turn_im));
-    }
-    Complex64::new(total_avx2(re_sums), total_avx2(im_sums))
-}
-
-/// Halves added to each other until one number is left.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-#[inline]
-fn total_avx2(fours: [x86::__m256d; 4]) -> f64 {
-    let eight = [x86::_mm256_add_pd(fours[0], fours[2]), x86::_mm256_add_pd(fours[1], fours[3])];
-    let four = x86::_mm256_add_pd(eight[0], eight[1]);
-    let two = x86::_mm_add_pd(x86::_mm256_castpd256_pd128(four), x86::_mm256_extractf128_pd::<1>(four));
-    x86::_mm_cvtsd_f64(x86::_mm_add_sd(two, x86::_mm_unpackhi_pd(two, two)))
 }
 
 /// Fills rows with the means of a period's steps over a sample of `step` steps from each of their places,

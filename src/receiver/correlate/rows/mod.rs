@@ -195,12 +195,7 @@ impl Motion {
 
 /// Everything but the products, for each instruction set.
 #[inline(always)]
-fn body<const T: usize>(
-    job: &Job,
-    codes: [i64; T],
-    add: impl Fn(&Stretch<T>, &mut Sums<T>),
-    fold: impl Fn(&Carrier, &[f64; LANES], &[f64; LANES]) -> Complex64,
-) -> [Complex64; T] {
+fn body<const T: usize>(job: &Job, codes: [i64; T], add: impl Fn(&Stretch<T>, &mut Sums<T>)) -> [Complex64; T] {
     let mut carrier = Carrier::of_pairs(job.nco);
     let motion = Motion::new(job.rows, job.step);
     let mut places = [Place { at: 0, owed: 0 }; T];
@@ -230,7 +225,7 @@ fn body<const T: usize>(
     }
     let mut found = [Complex64::ZERO; T];
     for t in 0..T {
-        found[t] = fold(&carrier, &totals[t][0], &totals[t][1]) * SCALE;
+        found[t] = carrier.fold(&totals[t][0], &totals[t][1]) * SCALE;
     }
     found
 }
