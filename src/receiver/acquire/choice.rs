@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 
 #[cfg(test)]
 use super::grid::Peaks;
-use super::grid::{Grid, Peak, Strip};
+use super::grid::{Grid, Map, Peak, Strip};
 use super::multiple_access::{LEAST_CODES, Raised};
 
 /// What is so many times its threshold, or where that is not known so many times what other codes reach
@@ -28,19 +28,14 @@ fn place_of_largest(values: &[f64]) -> usize {
 }
 
 impl Grid {
-    /// The best Doppler of every satellite, its number first, and the crowded ones. `raised` has what first
-    /// dwells showed of them.
-    pub fn peaks(
-        &self,
-        strips: &[Vec<Strip>],
-        raised: &[Raised],
-        satellites: usize,
-    ) -> (Vec<(usize, Peak)>, Vec<usize>) {
+    /// The best Doppler of every satellite, its number first, and the crowded ones.
+    pub fn peaks(&self, map: &Map, satellites: usize) -> (Vec<(usize, Peak)>, Vec<usize>) {
+        let strips = &map.strips;
         let heights: Vec<Vec<f64>> = (0..satellites).map(|satellite| self.heights(strips, satellite)).collect();
         let image = |bin: usize| self.dopplers_hz.get(bin).is_some_and(|doppler_hz| self.meets_image(*doppler_hz));
         let mut bar = self.law.bar(&heights, image);
         let mut sure: Vec<f64> = bar.thresholds.iter().map(|threshold| SURE * threshold).collect();
-        for (bin, raised) in raised.iter().enumerate() {
+        for (bin, raised) in map.raised.iter().enumerate() {
             let known = strips[bin].iter().all(|strip| strip.sums == self.sums);
             if let (Raised::Yes(others), false) = (*raised, known) {
                 sure[bin] = sure[bin].max(SURE * others);
@@ -58,6 +53,11 @@ impl Grid {
             (bin, Peak { statistic, threshold, is_sure: statistic >= sure[bin], doppler_hz, half_lag })
         };
         (heights.iter().enumerate().map(choice).collect(), bar.crowded)
+    }
+
+    /// Whether a Doppler may be crowded that lacks sums of some codes.
+    pub fn is_unknown(&self, map: &Map, bin: usize) -> bool {
+        map.raised[bin] != Raised::No && map.strips[bin].iter().any(|strip| strip.sums < self.sums)
     }
 
     /// Numbers of the Dopplers at which a satellite seems to be that may be cross-correlation, and that are
@@ -103,10 +103,7 @@ impl Grid {
     pub fn unjudged(&self, peaks: &Peaks) -> usize {
         let bin = |peak: &Peak| self.dopplers_hz.iter().position(|doppler_hz| *doppler_hz == peak.doppler_hz);
         let numbered: Vec<(usize, Peak)> = peaks.of.iter().map(|peak| (bin(peak).unwrap(), *peak)).collect();
-        let strips = &peaks.map.strips;
-        let is_open =
-            |bin: usize, _| peaks.raised[bin] != Raised::No && strips[bin].iter().any(|strip| strip.sums < self.sums);
-        self.doubtful(&numbered, is_open).len()
+        self.doubtful(&numbered, |bin, _| self.is_unknown(&peaks.map, bin)).len()
     }
 
     /// Sums that were made, of all that a search without leaving makes.

@@ -96,14 +96,14 @@ impl Room {
 }
 
 impl Dwells {
-    /// Sums of so many code periods one after the other, of maps with so many cells.
+    /// Sums of so many code periods one after the other, of maps with so many independent cells.
     pub fn alone(sums: u32, periods: u32, cells: usize) -> Self {
         let begins = (0..sums).map(|dwell| f64::from(dwell * periods)).collect();
         let leaves: &[Stay] = if sums < LEAST_SUMS { &[] } else { &ALONE };
         Self::leaving(begins, 1, leaves, cells)
     }
 
-    /// Periods of data and pilot, among so many code periods, of maps with so many cells.
+    /// Periods of data and pilot, among so many code periods, of maps with so many independent cells.
     pub fn of_pair(periods: u32, cells: usize) -> Self {
         let count = (DWELLS * f64::from(periods)).ceil().max(1.0) as u32;
         let apart = f64::from(periods - 1) / f64::from((count - 1).max(1));

@@ -93,9 +93,6 @@ pub(super) struct Peaks {
     pub of: Vec<Peak>,
     /// Numbers of the Dopplers at which cross-correlation raises the cells of all codes.
     pub crowded: Vec<usize>,
-    /// By Doppler, as far as first dwells showed it.
-    #[cfg(test)]
-    pub raised: Vec<Raised>,
     pub map: Map,
 }
 
@@ -104,6 +101,8 @@ pub(super) struct Peaks {
 pub(super) struct Map {
     /// By Doppler, then by satellite.
     pub(super) strips: Vec<Vec<Strip>>,
+    /// By Doppler, as far as first dwells showed it.
+    pub(super) raised: Vec<Raised>,
     /// What samples were multiplied by.
     scale: f64,
 }
@@ -274,13 +273,7 @@ impl Grid {
         if rms == 0.0 {
             let none =
                 Peak { statistic: 0.0, threshold: self.law.threshold, is_sure: false, doppler_hz: 0.0, half_lag: 0 };
-            return Peaks {
-                of: vec![none; spectra.len()],
-                crowded: Vec::new(),
-                #[cfg(test)]
-                raised: Vec::new(),
-                map: Map::default(),
-            };
+            return Peaks { of: vec![none; spectra.len()], crowded: Vec::new(), map: Map::default() };
         }
         // What is compared with strips of before has their scale.
         let again = again.filter(|_| !self.is_pair);
@@ -305,9 +298,10 @@ impl Grid {
             }
             _ => column(bin, spectra, room),
         };
-        let (mut strips, raised): (Vec<Vec<Strip>>, Vec<Raised>) =
+        let (strips, raised) =
             (0..self.dopplers_hz.len()).into_par_iter().map(|bin| rooms.with(self, |room| one(room, bin))).unzip();
-        self.complete(&mut strips, spectra, &sums, rooms);
+        let mut map = Map { strips, raised, scale };
+        self.complete(&mut map.strips, spectra, &sums, rooms);
         // Satellites that are not looked at again were seen beside what has been subtracted since.
         let old = |bin: usize, satellite: usize| {
             let again = again.filter(|again| !again.dopplers.contains(&bin));
@@ -315,35 +309,28 @@ impl Grid {
         };
         let mut filled = BTreeSet::new();
         let (of, mut crowded) = loop {
-            let (of, crowded) = self.peaks(&strips, &raised, spectra.len());
+            let (of, crowded) = self.peaks(&map, spectra.len());
             // Of others all sums are enough: what was subtracted since made them larger, if anything.
             let is_open = |bin: usize, satellite: usize| {
-                let open = |strip: &Strip| strip.sums < self.sums;
-                let unknown = raised[bin] != Raised::No && strips[bin].iter().any(open);
-                !filled.contains(&bin) && (old(bin, satellite) || unknown)
+                !filled.contains(&bin) && (old(bin, satellite) || self.is_unknown(&map, bin))
             };
             let doubtful = self.doubtful(&of, is_open);
             if doubtful.is_empty() {
                 break (of, crowded);
             }
-            let columns = strips.par_iter_mut().enumerate().filter(|(bin, _)| doubtful.contains(bin));
+            let columns = map.strips.par_iter_mut().enumerate().filter(|(bin, _)| doubtful.contains(bin));
             columns.for_each(|(bin, column)| {
                 column.iter_mut().enumerate().filter(|(n, _)| old(bin, *n)).for_each(|(_, strip)| strip.sums = 0);
                 rooms.with(self, |room| self.fill(column, spectra, &mut sums.at(self, bin), room));
             });
             filled.extend(doubtful);
         };
-        crowded.extend((0..).zip(&raised).filter_map(|(bin, raised)| matches!(raised, Raised::Yes(_)).then_some(bin)));
+        crowded
+            .extend((0..).zip(&map.raised).filter_map(|(bin, raised)| matches!(raised, Raised::Yes(_)).then_some(bin)));
         crowded.sort_unstable();
         crowded.dedup();
         let of = of.into_iter().map(|(_, peak)| peak).collect();
-        Peaks {
-            of,
-            crowded,
-            #[cfg(test)]
-            raised,
-            map: Map { strips, scale },
-        }
+        Peaks { of, crowded, map }
     }
 
     /// What a statistic has to exceed in noise.
