@@ -1,23 +1,24 @@
-//! What the C/N0 that a receiver states lacks of the true one, beside noise, other satellites and front end.
+//! What the C/N0 that a receiver states lacks of the true one, beside noise and other satellites.
 //!
-//! Edges between samples ([`edge_cost_db`]), and data that are in phase with the pilot beside them. Codes of
-//! the pair correlate at no delay by a number ρ of the satellite's own, 0.03 for E1 of E11 and 0.001 for that
-//! of E27, with the sign of the data's symbol: prompts of a period T scatter by ρ²·2T·C/N0 of the data in
-//! units of their noise, along the carrier alone. A receiver that takes its noise along the mean prompt, as
-//! phase jitter lies across it, takes that for noise; its loops do not see it, as nothing lies across and
-//! early and late have the same. Limits: ρ is that of the codes as sent, without what edges leave of it;
-//! symbols are a period long, so that they are noise from prompt to prompt.
+//! Filter and converter ([`costs_db`]). Edges between samples ([`edge_cost_db`]), and data that are in phase
+//! with the pilot beside them. Codes of the pair correlate at no delay by a number ρ of the satellite's own,
+//! 0.03 for E1 of E11 and 0.001 for that of E27, with the sign of the data's symbol: prompts of a period T
+//! scatter by ρ²·2T·C/N0 of the data in units of their noise, along the carrier alone. A receiver that takes
+//! its noise along the mean prompt, as phase jitter lies across it, takes that for noise; its loops do not
+//! see it, as nothing lies across and early and late have the same. Limits: ρ is that of the codes as sent,
+//! without what edges leave of it; symbols are a period long, so that they are noise from prompt to prompt.
 
 use std::collections::BTreeMap;
 
 use crate::analysis::expect::followed::Followed;
-use crate::analysis::expect::spectrum::edge_cost_db;
+use crate::analysis::expect::spectrum::{costs_db, edge_cost_db};
 use crate::analysis::read::Run;
 use crate::gnss::signal::{Component, Layer, Link, Signal};
 
 /// Those losses.
 #[derive(Clone, Debug, Default)]
 pub struct Stated {
+    front_ends_db: BTreeMap<&'static Signal, f64>,
     edges_db: BTreeMap<&'static Signal, f64>,
     /// Of each satellite's signal the noise density of its own data over its C/N0, seconds.
     data_s: BTreeMap<Link, f64>,
@@ -31,11 +32,16 @@ impl Stated {
             let followed = Followed::of(run, link.signal).filter(|followed| followed.sides.is_none())?;
             Some((link, data_s(link, followed.component, followed.made)))
         };
-        Self { edges_db, data_s: run.truth.keys().filter_map(data_s).collect() }
+        Self { front_ends_db: costs_db(run), edges_db, data_s: run.truth.keys().filter_map(data_s).collect() }
     }
 
-    /// Decibels that a satellite's C/N0 lacks which is `effective_dbhz` with all other noise; negative where
-    /// it gains.
+    /// Decibels that filter and converter cost a signal.
+    pub fn front_end_db(&self, signal: &'static Signal) -> f64 {
+        self.front_ends_db.get(signal).copied().unwrap_or(0.0)
+    }
+
+    /// Decibels that a satellite's C/N0 lacks beside that, which is `effective_dbhz` with all other noise;
+    /// negative where it gains.
     pub fn cost_db(&self, link: Link, effective_dbhz: f64) -> f64 {
         let edges_db = self.edges_db.get(link.signal).copied().unwrap_or(0.0);
         let data_s = self.data_s.get(&link).copied().unwrap_or(0.0);

@@ -13,7 +13,6 @@ use crate::analysis::expect::loops::{Stresses, Theory, update_s};
 use crate::analysis::expect::multipath::Rays;
 use crate::analysis::expect::multiple_access::MultipleAccess;
 use crate::analysis::expect::quantile::{largest, mean_square};
-use crate::analysis::expect::spectrum::costs_db;
 use crate::analysis::expect::stated::Stated;
 use crate::analysis::expect::theory::edges;
 use crate::analysis::expect::timeline::Timeline;
@@ -104,7 +103,7 @@ impl Links {
     ///
     /// # Errors
     /// [`JudgeError::Read`] where spilled rows cannot be read.
-    pub fn measure(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
+    pub(in crate::analysis) fn measure(run: &Run, errors: &Errors, stated: &Stated) -> Result<Self, JudgeError> {
         let mut links = Self::default();
         let Some(settings) = Settings::of(run) else { return Ok(links) };
         // Without noise other codes alone disturb a loop, and they are no noise.
@@ -112,15 +111,13 @@ impl Links {
             return Ok(links);
         }
         let access = MultipleAccess::new(run);
-        let (costs_db, stated) = (costs_db(run), Stated::of(run));
         for link in errors.signals.keys() {
             let Some(update_s) = update_s(run, link.signal) else { continue };
             let Some(theory) = Theory::new(run, settings, &link, update_s) else {
                 links.unheld.push(run.name(link));
                 continue;
             };
-            let cost_db = costs_db.get(link.signal).copied().unwrap_or(0.0);
-            let rows = Settled::of((run, &access), errors, link, &theory, (cost_db, &stated))?;
+            let rows = Settled::of((run, &access), errors, link, &theory, stated)?;
             if rows.count < LEAST {
                 continue;
             }

@@ -176,16 +176,14 @@ pub struct Scene<'r> {
     known: BTreeMap<(Sv, &'static str), (u64, &'static Form)>,
     whole: BTreeMap<Sv, u64>,
     health: BTreeMap<Link, Vec<(u64, bool)>>,
-    /// Decibels that filter and converter cost, by signal.
-    costs_db: BTreeMap<&'static Signal, f64>,
-    stated: Stated,
+    stated: &'r Stated,
     /// Error of chip edges with a code at rest, root mean square.
     edges_m: BTreeMap<&'static Signal, f64>,
 }
 
 impl<'r> Scene<'r> {
     /// `None` without the receiver's settings.
-    pub fn new(run: &'r Run) -> Option<Self> {
+    pub(in crate::analysis) fn new(run: &'r Run, stated: &'r Stated) -> Option<Self> {
         let (mut known, mut whole, mut health) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::<_, Vec<_>>::new());
         for row in &run.events {
             let message = row.signal.components.iter().find_map(|component| component.message);
@@ -215,8 +213,7 @@ impl<'r> Scene<'r> {
             known,
             whole,
             health,
-            costs_db: crate::analysis::expect::spectrum::costs_db(run),
-            stated: Stated::of(run),
+            stated,
             edges_m: (run.signals.iter())
                 .filter(|_| run.scene.code_edge == Edge::Area)
                 .map(|&signal| (signal, edges::averaged_m(signal, run.scene.waveform, run.rate_hz(signal))))
@@ -291,7 +288,7 @@ impl<'r> Scene<'r> {
         let phase_m = true_row.link().wavelength_m() * true_row.carrier_cycles - clock_m - computed_m;
         // What the system's time is ahead of GPS time goes into its own clock.
         let ahead_m = SPEED_OF_LIGHT_MPS * self.run.scene.ahead_s(true_row.signal.time.name);
-        let cost_db = self.costs_db.get(true_row.signal).copied().unwrap_or(0.0);
+        let cost_db = self.stated.front_end_db(true_row.signal);
         let lacks_db = self.stated.cost_db(true_row.link(), row.cn0_effective_dbhz - cost_db);
         let cn0_hz = libm::pow(10.0, (row.cn0_effective_dbhz - cost_db) / 10.0);
         let (_, code) = theory.noise(Loop::Dll, cn0_hz);

@@ -49,8 +49,8 @@ pub(super) struct Settled {
 }
 
 impl Settled {
-    /// Those of a satellite whose C/N0 the front end lowers by so much; what else the stated one lacks is in
-    /// theory's share of the power or does not disturb loops.
+    /// Those of a satellite. The front end lowers its C/N0; what else the stated one lacks is in theory's
+    /// share of the power or does not disturb loops.
     ///
     /// # Errors
     /// [`JudgeError`] where rows cannot be read or numbers cannot be put away.
@@ -59,8 +59,9 @@ impl Settled {
         errors: &Errors,
         link: Link,
         theory: &Theory,
-        (cost_db, stated): (f64, &Stated),
+        stated: &Stated,
     ) -> Result<Self, JudgeError> {
+        let cost_db = stated.front_end_db(link.signal);
         let jammed = |row: &SignalError| row.cn0_true_dbhz - row.cn0_effective_dbhz;
         let mut least = f64::INFINITY;
         errors.signals.each(link, |row| least = least.min(jammed(&row)))?;

@@ -3,6 +3,7 @@
 use crate::analysis::error::JudgeError;
 use crate::analysis::judge::forecast::links::{Figure, Links};
 use crate::analysis::judge::judgement::Bound;
+use crate::analysis::judge::summary::Summary;
 use crate::analysis::judge::verdict::Verdict;
 use crate::analysis::measure::errors::Errors;
 use crate::analysis::measure::jitter::Loop;
@@ -44,11 +45,11 @@ impl Figure {
 
 impl Verdict {
     /// A row for each figure.
-    pub(super) fn links(&mut self, run: &Run, errors: &Errors) -> Result<(), JudgeError> {
+    pub(super) fn links(&mut self, run: &Run, errors: &Errors, summary: &Summary) -> Result<(), JudgeError> {
         if !run.scene.expect.bounded(0.0) {
             return Ok(());
         }
-        let links = Links::measure(run, errors)?;
+        let links = Links::measure(run, errors, &summary.details.stated)?;
         if !links.unheld.is_empty() {
             let names = links.unheld.join(", ");
             self.not_judged.push(format!("loops of {names}: the settings make no loop that holds the signal"));

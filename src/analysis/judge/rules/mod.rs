@@ -50,7 +50,7 @@ impl Verdict {
         let places = errors.positions.map(|error| (error.time_s, error.enu_m.norm()))?;
         verdict.within(&run.scene.expect, places.into_iter());
         verdict.tracking(run, summary);
-        verdict.links(run, errors)?;
+        verdict.links(run, errors, summary)?;
         verdict.losses(run, &receiver, slips)?;
         verdict.reception(summary);
         verdict.cn0(run, summary);

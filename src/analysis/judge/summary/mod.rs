@@ -279,6 +279,8 @@ pub struct Details {
     pub false_satellites: Vec<String>,
     /// Every figure against its limit.
     pub verdict: Verdict,
+    /// What the stated C/N0 lacks.
+    pub(in crate::analysis) stated: Stated,
 }
 
 /// Bounds for loop jitter.
@@ -310,6 +312,8 @@ impl Summary {
         let clock = clock_section(clock, &mut details)?;
         let stated = Stated::of(run);
         let observables = observables(errors, (None, &stated), &mut details)?;
+        let signals = by_signal(run, errors, &stated)?;
+        details.stated = stated;
         let tracking = tracking(run, errors, &mut details)?;
         let navigation = navigation(run, &mut details);
         details.psd_theory_db = spectrum::theory_db(run)?;
@@ -327,7 +331,7 @@ impl Summary {
             clock,
             observables,
             tracking,
-            signals: by_signal(run, errors, &stated)?,
+            signals,
             navigation,
             psd,
             interference: Lines::of(run)?,
