@@ -509,7 +509,7 @@ impl Stresses {
 }
 
 /// Errors in degrees that the true motion leaves in the phase loop of a satellite, with their times since
-/// sample 0: those of them at times that `wanted` tells.
+/// sample 0: those of them at times that `wanted` selects.
 ///
 /// # Errors
 /// [`JudgeError::Read`] where spilled rows cannot be read.

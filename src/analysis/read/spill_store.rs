@@ -280,7 +280,7 @@ pub struct Finder<'s, K, T> {
 }
 
 impl<K: Copy + Ord, T: SpillRow<K>> Finder<'_, K, T> {
-    /// The row of a sample; none where it cannot be read either, of which [`SpillStore::sound`] tells.
+    /// The row of a sample; none where it cannot be read either, which [`SpillStore::sound`] reports.
     pub fn get(&mut self, sample: u64) -> Option<T> {
         let key = self.key;
         let take = |words: &[u64]| T::take(key, &mut Words(words.iter()));

@@ -3,7 +3,7 @@
 //! Cells half a chip apart lose up to 2.5 dB of a code that lies between two. There both hold it alike, so
 //! their sum is the cell between them: it costs an addition where a transform of as many cells would cost
 //! another transform. Its noise has 2(1 + ρ) times the power of theirs, ρ the correlation of neighbours,
-//! which the totals of both tell whatever the samples' spectrum is. Of band-limited rectangular chips half a
+//! which the totals of both show whatever the samples' spectrum is. Of band-limited rectangular chips half a
 //! chip apart cells and those between them lose 1.07 dB at worst and 0.83 on average, 0.64 of that wherever
 //! the code lies; cells 0.4 chip apart without others between lose 1.57 and 0.92.
 

@@ -246,14 +246,14 @@ impl Expectations {
         let table = |signal: &&'static Signal| Timetable::beside(signal, &signals, start);
         let page_s = |signal: &&'static Signal| table(signal).ionosphere_by_s(acquired_s + satellite::LOCK_S);
         // Nine zeros are no coefficients of BDGIM.
-        let told = |signal: &&&'static Signal| {
+        let has_coefficients = |signal: &&&'static Signal| {
             let mut messages = signal.components.iter().filter_map(|component| component.message);
             messages.all(|message| {
                 let model = message.ionosphere.model;
                 model != Model::Bdgim || self.message.ionosphere(model).is_some()
             })
         };
-        let page_s = signals.iter().filter(told).map(page_s).fold(f64::INFINITY, f64::min);
+        let page_s = signals.iter().filter(has_coefficients).map(page_s).fold(f64::INFINITY, f64::min);
         let waited_s = four_s + receiver.ionosphere_wait_s;
         let due_s = if receiver.requires_ionosphere { four_s.max(page_s) } else { waited_s } + SOLVE_S;
         // Where the scene excuses a time, the clock begins anew after it.
