@@ -22,7 +22,7 @@ pub mod quantile;
 pub mod samples;
 pub mod smoothing;
 pub mod spectrum;
-pub(in crate::analysis) mod stated;
+pub mod stated;
 pub mod theory;
 pub mod timeline;
 pub mod welch;

@@ -103,7 +103,7 @@ impl Links {
     ///
     /// # Errors
     /// [`JudgeError::Read`] where spilled rows cannot be read.
-    pub(in crate::analysis) fn measure(run: &Run, errors: &Errors, stated: &Stated) -> Result<Self, JudgeError> {
+    pub fn measure(run: &Run, errors: &Errors, stated: &Stated) -> Result<Self, JudgeError> {
         let mut links = Self::default();
         let Some(settings) = Settings::of(run) else { return Ok(links) };
         // Without noise other codes alone disturb a loop, and they are no noise.

@@ -183,7 +183,7 @@ pub struct Scene<'r> {
 
 impl<'r> Scene<'r> {
     /// `None` without the receiver's settings.
-    pub(in crate::analysis) fn new(run: &'r Run, stated: &'r Stated) -> Option<Self> {
+    pub fn new(run: &'r Run, stated: &'r Stated) -> Option<Self> {
         let (mut known, mut whole, mut health) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::<_, Vec<_>>::new());
         for row in &run.events {
             let message = row.signal.components.iter().find_map(|component| component.message);

@@ -280,7 +280,7 @@ pub struct Details {
     /// Every figure against its limit.
     pub verdict: Verdict,
     /// What the stated C/N0 lacks.
-    pub(in crate::analysis) stated: Stated,
+    pub stated: Stated,
 }
 
 /// Bounds for loop jitter.
