@@ -6,8 +6,8 @@
 //! sampler that averages over its interval, and a replica that does too, narrow the spectra and raise κ.
 //! Every pair of signals counts whose carriers are within the sample rate, each component by its share of
 //! power. Interference adds its own power times its own separation ([`super::jamming`]). Limits: components
-//! of one signal do not disturb each other (what data make of the C/N0 beside a pilot is in [`super::stated`]); what
-//! folds back from beyond the band is left out.
+//! of one signal do not disturb each other (what data make of the C/N0 beside a pilot is in
+//! [`super::stated`]); what folds back from beyond the band is left out.
 
 use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap};
