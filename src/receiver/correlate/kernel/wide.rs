@@ -102,8 +102,8 @@ fn fixed(x: &[f32; GROUP]) -> x86::__m512i {
     x86::_mm512_mask_blend_epi16(0xaaaa_aaaa, first, x86::_mm512_slli_epi32::<16>(second))
 }
 
-/// [`single::lanes`] with chips looked up in tables. The one fused operation has an exact product, so it
-/// rounds as [`single::lanes`] does.
+/// [`lanes`](super::single::lanes) with chips looked up in tables. The one fused operation has an exact
+/// product, so it rounds as that one does.
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
 #[inline]
 pub(super) fn lanes<const T: usize, const AREA: bool>(chunk: &Chunk, code: &mut [u64; T]) -> Lanes<T> {
