@@ -281,6 +281,20 @@ impl Message {
     pub fn unit_start(&self, unit: i64) -> Epoch {
         Epoch::new(unit * self.unit_s + self.first_s, 0.0)
     }
+
+    /// Seconds in which each unit of a set comes whole, whatever the moment from which it is waited for;
+    /// `None` where the message carries no set.
+    pub fn set_within_s(&self) -> Option<i64> {
+        // Two rounds of LNAV's pages; no message repeats its set more seldom.
+        const UNITS: i64 = 250;
+        let longest_s = |wanted: &u8| {
+            let starts = (0..UNITS).map(|unit| self.unit_start(unit)).filter(|start| (self.number)(*start) == *wanted);
+            let seconds: Vec<i64> = starts.map(Epoch::seconds).collect();
+            let between_s = seconds.windows(2).map(|pair| pair[1] - pair[0]).max()?;
+            Some(between_s + self.unit_s)
+        };
+        self.set.iter().filter_map(longest_s).max()
+    }
 }
 
 impl fmt::Debug for Message {
@@ -292,5 +306,29 @@ impl fmt::Debug for Message {
 impl PartialEq for Message {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::gnss::signal::Signal;
+    use crate::gnss::{beidou, galileo, glonass, gps};
+
+    #[test]
+    fn sets_come_whole_within_a_repetition_and_a_unit() {
+        let within_s = |signal: &Signal| {
+            signal.components.iter().find_map(|component| component.message).and_then(super::Message::set_within_s)
+        };
+        // Frames of 30 s in subframes of 6 s (IS-GPS-200N, 20.3.3; BDS-SIS-ICD-B1I 3.0, 5), of 18 s in one
+        // piece (IS-GPS-800J, 3.2.3), of 30 s in strings of 2 s (GLONASS ICD L1, L2 5.1, 4.3); subframes of
+        // 30 s in pages of 2 s and of 50 s in pages of 10 s (Galileo OS SIS ICD 2.1, 4.3 and 4.2).
+        assert_eq!(within_s(&gps::l1ca::L1_CA), Some(30 + 6));
+        assert_eq!(within_s(&gps::l1c::L1C), Some(18 + 18));
+        assert_eq!(within_s(&galileo::e1::E1), Some(30 + 2));
+        assert_eq!(within_s(&galileo::e5::E5A), Some(50 + 10));
+        assert_eq!(within_s(&beidou::in_phase::B1I), Some(30 + 6));
+        assert_eq!(within_s(&glonass::fdma::G1), Some(30 + 2));
+        // Pages of high accuracy carry no set.
+        assert_eq!(within_s(&galileo::e6::E6), None);
     }
 }

@@ -7,8 +7,6 @@ use crate::gnss::signal::Signal;
 use crate::receiver::position::NoFix;
 use crate::receiver::position::least_squares::UNKNOWNS;
 
-/// A cold start needs this much signal: one whole frame of 30 s and up to one subframe before it.
-pub const SHORTEST_S: f64 = 36.0;
 /// Symbols come a second or two after the start: of a strong signal, whose edges or overlay are found then.
 const SYMBOLS_S: f64 = 2.0;
 /// What to check where symbols make no frame.
@@ -113,25 +111,22 @@ impl Diagnosis {
                 say(format!("the sample rate: {rate_hz} Hz was taken; a small error shows here first"));
                 say("the signal's strength: below 25 dB-Hz symbols cannot be distinguished".into());
             }
-            Stage::NoFrame { .. } => say(TOO_WEAK.into()),
-            Stage::NoEphemeris { .. } => {
-                if seconds < SHORTEST_S {
-                    say(format!("the length: a cold start needs {SHORTEST_S} s, there are {length}"));
-                }
-                say(TOO_WEAK.into());
-            }
+            Stage::NoFrame { .. } | Stage::NoEphemeris { .. } => say(TOO_WEAK.into()),
             Stage::NoPosition { reason, .. } => advice.extend(without_position(reason.as_ref(), &length)),
         }
         Self { stage, seconds, advice }
     }
 
-    /// Puts first what the messages of these signals take, where no frame was found and the recording may
-    /// have been too short for one.
+    /// Puts first what the messages of these signals take, where no frame or no whole set was found and the
+    /// recording may have been too short for one.
     pub(super) fn with_messages(mut self, signals: &[&'static Signal]) -> Self {
-        if matches!(self.stage, Stage::NoFrame { .. }) {
-            let lengths = signals.iter().filter_map(|signal| too_short(signal, self.seconds));
-            self.advice.splice(0..0, lengths);
-        }
+        let too_short = match self.stage {
+            Stage::NoFrame { .. } => too_short_for_a_frame,
+            Stage::NoEphemeris { .. } => too_short_for_a_set,
+            _ => return self,
+        };
+        let lengths = signals.iter().filter_map(|signal| too_short(signal, self.seconds));
+        self.advice.splice(0..0, lengths);
         self
     }
 }
@@ -139,7 +134,7 @@ impl Diagnosis {
 /// How long a signal's time and orbit take to be read, where a recording of `seconds` may be too short for
 /// it. Nothing is read before a unit of its message is whole: the first one that begins in the recording may
 /// begin a unit's length after symbols do.
-fn too_short(signal: &Signal, seconds: f64) -> Option<String> {
+fn too_short_for_a_frame(signal: &Signal, seconds: f64) -> Option<String> {
     let message = signal.components.iter().find_map(|component| component.message)?;
     let (unit_s, whole_s) = (message.unit_s, SYMBOLS_S + 2.0 * message.unit_s as f64);
     let length = duration(seconds);
@@ -147,6 +142,20 @@ fn too_short(signal: &Signal, seconds: f64) -> Option<String> {
         format!(
             "the length: a unit of {name} on {signal} lasts {unit_s} s and is read when it is whole, up to {whole_s} s \
              after the start; there are {length}",
+            name = message.name,
+        )
+    })
+}
+
+/// How long a signal's sets of orbit and clock take, where a recording of `seconds` may be too short for one.
+fn too_short_for_a_set(signal: &Signal, seconds: f64) -> Option<String> {
+    let message = signal.components.iter().find_map(|component| component.message)?;
+    let whole_s = SYMBOLS_S + message.set_within_s()? as f64;
+    let length = duration(seconds);
+    (seconds < whole_s).then(|| {
+        format!(
+            "the length: orbit and clock take {name} on {signal} up to {whole_s} s from a cold start; there are \
+             {length}",
             name = message.name,
         )
     })
@@ -257,8 +266,8 @@ mod tests {
             assert!(text.contains(part), "{part}: {text}");
         }
         let stage = Stage::NoEphemeris { complete: vec![Sv::gps(1)], missing: vec![(Sv::gps(9), vec![2, 3])] };
-        let text = Diagnosis::new(stage, 20.0, 2.6e6, "ci8", 0.0, 0, 7).to_string();
-        assert!(text.contains("G09 lacks subframe 2, 3") && text.contains("36"), "{text}");
+        let text = Diagnosis::new(stage, 20.0, 2.6e6, "ci8", 0.0, 0, 7).with_messages(&[&L1_CA]).to_string();
+        assert!(text.contains("G09 lacks subframe 2, 3") && text.contains("LNAV on GPS L1 C/A up to 38 s"), "{text}");
         assert!(!text.contains("may be false"), "{text}");
     }
 
