@@ -47,7 +47,8 @@ impl Response {
             }
             FilterShape::Butterworth { order } => {
                 let omega = std::f64::consts::PI * filter.bandwidth_hz;
-                let angle = |k: u32| std::f64::consts::PI * f64::from(2 * k + order + 1) / f64::from(2 * order);
+                let place = |k: u32| planted!("analysis.response.poles", 2 * k + order + 1, 2 * k + order);
+                let angle = |k: u32| std::f64::consts::PI * f64::from(place(k)) / f64::from(2 * order);
                 let pole = |k: u32| Complex::new(omega * libm::cos(angle(k)), omega * libm::sin(angle(k)));
                 let mut made = Self::Poles { poles: (0..order).map(pole).collect(), omega, rate_hz, scale: 1.0 };
                 // Real, as every alias meets its mirror image there.

@@ -260,7 +260,8 @@ impl Waveform {
     pub fn in_samples(signal: &Signal, layers: Layers, sampler: &Sampler) -> Option<Self> {
         let mut waveform = Self::sent(signal, layers)?;
         for ((share, _), component) in waveform.parts.iter_mut().zip(signal.components) {
-            *share /= Self::of_shape(component.shape(), component.chip_rate_hz).power(sampler);
+            let kept = Self::of_shape(component.shape(), component.chip_rate_hz).power(sampler);
+            *share /= planted!("analysis.waveform.share", kept, 1.0);
         }
         Some(waveform)
     }

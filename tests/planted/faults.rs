@@ -115,6 +115,9 @@ const JIT: &str = "laws::jitter_is_kaplan_and_hegarty_s";
 const JPOS: &str = "judge::figures_of_the_position_are_those_of_its_rows";
 const JOBS: &str = "judge::figures_of_the_observations_are_those_of_their_rows";
 const JDAM: &str = "judge::damaged_tables_fail_by_the_row_that_names_the_damage";
+const JSPEC: &str = "judge::the_spectrum_of_faultless_samples_keeps_its_limits";
+const SHARES: &str = "laws::components_of_a_signal_share_the_power_of_its_samples_as_they_are_sent";
+const POLES: &str = "laws::a_butterworth_filter_passes_half_of_the_power_at_the_edges_of_its_band";
 const JALL: &str = "judge::deviations_of_a_clock_are_those_that_sp_1065_prints";
 
 const fn fault(name: &'static str, what: &'static str, check: &'static str) -> Fault {
@@ -338,6 +341,10 @@ pub const FAULTS: &[Fault] = &[
     fault("analysis.summary.false_satellites", "no satellite is ever false", JDAM),
     fault("analysis.verdict.limit", "limits are a hundred times as wide", JDAM),
     fault("analysis.multiple_access.others", "other satellites count ten times", JOBS),
+    fault("analysis.samples.floor", "the noise under a spectrum is 0.13 dB too high", JSPEC),
+    fault("analysis.samples.codes", "satellites count half in a spectrum", JSPEC),
+    fault("analysis.waveform.share", "components lose to edges what they do not in the samples", SHARES),
+    fault("analysis.response.poles", "the poles of a Butterworth filter are turned", POLES),
     fault("analysis.theory.pll", "theory of the phase loop has the wrong constant", JIT),
     fault("analysis.theory.dll", "theory of the code loop has the wrong constant", JIT),
     fault("analysis.allan.half", "the Allan variance is not halved", JALL),

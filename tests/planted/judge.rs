@@ -172,6 +172,17 @@ fn figures_of_the_observations_are_those_of_their_rows() {
 }
 
 #[test]
+fn the_spectrum_of_faultless_samples_keeps_its_limits() {
+    let summary = judged(made(), NONE);
+    let of_spectrum = |figure: &str| figure.contains("of the samples");
+    let rows: Vec<_> = summary.details.verdict.rows.iter().filter(|row| of_spectrum(&row.figure)).collect();
+    // Level, thirty-seconds of the band, bins.
+    assert_eq!(rows.len(), 3, "{rows:?}");
+    let failures = failures(&summary).into_iter().filter(|failure| of_spectrum(failure)).collect::<Vec<_>>();
+    assert!(failures.is_empty(), "{}", failures.join("; "));
+}
+
+#[test]
 fn damaged_tables_fail_by_the_row_that_names_the_damage() {
     let undamaged = failures(&judged(copy(|_, text| text).path(), NONE));
     let damaged = |name: &'static str, change: &dyn Fn(usize, &str) -> String, row: &str| {

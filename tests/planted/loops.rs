@@ -9,10 +9,13 @@ use gnss_twin::analysis::assess;
 use gnss_twin::analysis::judge::judgement::{Judgement, Status};
 use gnss_twin::analysis::judge::limits::Limits;
 use gnss_twin::analysis::judge::summary::Summary;
+use gnss_twin::analysis::measure::psd::Psd;
+use gnss_twin::analysis::show::tables;
 use gnss_twin::generator::scenario::{Overrides, Scenario};
 use gnss_twin::generator::stream::{Options, Stream};
 use gnss_twin::generator::truth;
 use gnss_twin::gnss::record::Observation;
+use gnss_twin::gnss::samples::IfMetadata;
 use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::receiver::Reception;
 use gnss_twin::receiver::output::Output;
@@ -73,15 +76,38 @@ fn make(scene: &str, directory: &Path, mut keep: impl FnMut(&[u8])) {
     let mut output = Output::create(&below("rx")).unwrap();
     let mut stream = Stream::new(&scene, &mut truth, &Options::default()).unwrap();
     let mut reception = Reception::new(&scene.metadata, &settings).unwrap();
+    let mut spectrum = Spectrum::new(&scene.metadata);
     let mut bytes = Vec::new();
     while stream.next(&mut truth, &mut bytes).unwrap() {
         keep(&bytes);
+        spectrum.add(&bytes);
         reception.take(&bytes, &mut output).unwrap();
     }
     keep(&bytes);
     reception.take(&bytes, &mut output).unwrap();
     stream.finish(&mut truth).unwrap();
     reception.finish(&mut output).unwrap();
+    tables::write_psd(&directory.join("psd.csv"), &spectrum.psd).unwrap();
+}
+
+/// The spectrum of the samples of 8 bits at the start, as long as `run` looks at it.
+struct Spectrum {
+    psd: Psd,
+    left: usize,
+}
+
+impl Spectrum {
+    fn new(metadata: &IfMetadata) -> Self {
+        let rate_hz = metadata.rate.hz();
+        Self { psd: Psd::new(rate_hz, false, 2048), left: (0.2 * rate_hz) as usize }
+    }
+
+    fn add(&mut self, bytes: &[u8]) {
+        let part = |at: usize| bytes.iter().skip(at).step_by(2).take(self.left).map(|byte| f32::from(*byte as i8));
+        let (i, q): (Vec<f32>, Vec<f32>) = (part(0).collect(), part(1).collect());
+        self.psd.add(&i, &q);
+        self.left -= i.len();
+    }
 }
 
 /// A run judged by the verdict and by limits of one's own.

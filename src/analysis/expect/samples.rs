@@ -161,7 +161,7 @@ impl Expected {
         let bin_hz = front_end.rate_hz / bins as f64;
         let absolute = front_end.noise_lsb.is_some();
         let sigma_lsb = front_end.noise_lsb.unwrap_or(1.0);
-        let n0 = 2.0 * sigma_lsb * sigma_lsb / front_end.rate_hz;
+        let n0 = planted!("analysis.samples.floor", 2.0, 2.06) * sigma_lsb * sigma_lsb / front_end.rate_hz;
         let (smooth, codes_hz) = smooth(run, front_end, sent, 2 * bins, n0)?;
         let sources = jamming::sources(run);
         let jammers = jammers(run, front_end, &sources, rows, bin_hz);
@@ -274,7 +274,8 @@ fn smooth(run: &Run, front_end: &FrontEnd<'_>, sent: &[Sent], points: usize, n0:
         for (index, (density, codes_hz)) in density.iter_mut().zip(&mut codes_hz).enumerate() {
             let of = |f_hz: f64| {
                 let from_hz = f_hz - carrier_hz;
-                one.cn0_hz * between(table, from_hz / rate_hz) * one.ripple(sign * from_hz)
+                let cn0_hz = planted!("analysis.samples.codes", 1.0, 0.5) * one.cn0_hz;
+                cn0_hz * between(table, from_hz / rate_hz) * one.ripple(sign * from_hz)
             };
             let own = of(at(index)) + if real { of(-at(index)) } else { 0.0 };
             *density += own;
