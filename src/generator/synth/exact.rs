@@ -9,7 +9,7 @@
 
 use super::chips::{sign, window};
 use super::responses::{self, Responses, TILE};
-use super::{CODE_ONE, Edge, RUN_SAMPLES, Run, reference};
+use super::{CODE_ONE, Edge, RUN_SAMPLES, Run, dense};
 
 /// Phasors side by side: of tiles, of groups, and of the samples on each side of a group's middle.
 const LANES: usize = 16;
@@ -180,11 +180,7 @@ fn waveform(edge: Edge<'_>, run: &Run<'_>, wave: &mut [f64; TILE], responses: &m
                 *block = area(run, first);
             }
         }
-        Edge::Area => {
-            for (first, block) in blocks {
-                *block = each_mean(edge, run, first);
-            }
-        }
+        Edge::Area => dense::means(run, run.position, wave, |mean| mean),
         Edge::BandLimited(filter) => responses::waveform(filter, run, wave, responses),
     }
 }
@@ -228,12 +224,6 @@ fn area(run: &Run<'_>, first: u64) -> [f64; BLOCK] {
         *value = signed(mean, signs << (from / CODE_ONE));
     }
     block
-}
-
-/// The same of any steps.
-fn each_mean(edge: Edge<'_>, run: &Run<'_>, first: u64) -> [f64; BLOCK] {
-    let at = |k: usize| run.position + run.step * (first + k as u64);
-    std::array::from_fn(|k| reference::waveform(edge, run, at(k)))
 }
 
 /// A value with its sign turned by the first of `signs`.
@@ -295,8 +285,8 @@ mod tests {
     use super::*;
     use crate::generator::synth::band::Filter;
     use crate::generator::synth::chips::CodeTime;
-    use crate::generator::synth::radians;
     use crate::generator::synth::waveform::plain;
+    use crate::generator::synth::{radians, reference};
     use crate::gnss::gps::l1ca::L1_CA;
 
     #[test]

@@ -12,7 +12,7 @@ use super::angle::{cos_sin, ramp};
 use super::band::{Filter, HALF_WIDTH};
 use super::chips::{Changes, sign, window};
 use super::chorus::{self, Chord};
-use super::{CODE_BITS, CODE_ONE, Edge, RUN_SAMPLES, Run, reference, to_step};
+use super::{CODE_BITS, CODE_ONE, Edge, RUN_SAMPLES, Run, dense, to_step};
 
 /// Samples on each side of a group's middle. The same on every instruction set, because rounding depends on
 /// it.
@@ -192,9 +192,14 @@ pub fn accumulate(edge: Edge<'_>, runs: &[Run<'_>], i: &mut [f32], q: &mut [f32]
             Edge::Nearest | Edge::Area => {
                 for run in runs {
                     wave.clear();
-                    wave.extend(
-                        (0..i.len()).map(|n| reference::waveform(edge, run, run.position + run.step * n as u64) as f32),
-                    );
+                    wave.resize(i.len(), 0.0);
+                    if let Edge::Area = edge {
+                        dense::means(run, run.position, wave, |mean| mean as f32);
+                    } else {
+                        for (value, n) in wave.iter_mut().zip(0..) {
+                            *value = sign(run.bits, ((run.position + run.step * n) / CODE_ONE) as usize) as f32;
+                        }
+                    }
                     rotate(run, wave, voices, i, q);
                 }
             }

@@ -14,6 +14,7 @@ pub mod band;
 pub mod bank;
 pub mod chips;
 mod chorus;
+mod dense;
 pub mod exact;
 pub mod isa;
 pub mod lanes;
