@@ -12,7 +12,8 @@ use rayon::prelude::*;
 use super::dwells::Spectra;
 use super::grid::Grid;
 use super::kernel::Spectrum;
-use super::refine::{self, Refined};
+use super::refine::Refined;
+use super::removal;
 use super::replica::Replica;
 use super::window::Window;
 use super::{AcquireError, Band, companion};
@@ -80,7 +81,7 @@ impl Code {
         let mut one = |sent: &Sent| {
             let replica = sent.replica()?;
             let samples = (&mut window.i[..], &mut window.q[..]);
-            Some(refine::subtract(grid, chips, &replica, place, complex, samples))
+            Some(removal::subtract(grid, chips, &replica, place, complex, samples))
         };
         let power = one(&self.leading);
         self.companion.as_ref().and_then(&mut one);

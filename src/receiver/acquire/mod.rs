@@ -42,6 +42,7 @@ mod near;
 mod pair;
 mod powers;
 mod refine;
+mod removal;
 mod replica;
 mod room;
 mod settings;
@@ -79,11 +80,11 @@ pub(in crate::receiver) const WEAK_SHARE: f64 = 0.1;
 /// A hit this much weaker than the strongest (40 dB) is not believed even then: subtraction leaves something
 /// over, and without noise to cover it that something has the cross-correlation's peaks.
 const LEAST_SHARE: f64 = 1e-4;
-/// A hit this much weaker (30 dB) has to pass its threshold by a fifth. What a subtraction leaves is at the
-/// edges of chips, and its cross-correlations reach further than those of whole codes: of 90 skies with a
-/// satellite 30 dB above ten others six passed the threshold of one that is not there, by 2 to 15 %, and by
-/// less than a fifth one in a hundred of those that are. At 35 dB half of them are found, and in one sky of
-/// 18 one that is not there.
+/// A hit this much weaker (30 dB) has to pass its threshold by a fifth: what a subtraction leaves is at the
+/// edges of chips, and its cross-correlations reach further than those of whole codes. Where a filter follows
+/// the sampling, which the shape that is subtracted does not know, three of 30 skies with a satellite 30 dB
+/// above ten others passed the threshold of one that is not there, by 1 to 5 %, and by less than a fifth one
+/// in a hundred of those that are.
 const DISTANT_SHARE: f64 = 1e-3;
 const DISTANT_EXCESS: f64 = 1.2;
 /// Satellites with this share of the samples' power take 1.2 dB from those that were not found.

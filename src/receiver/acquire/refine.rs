@@ -10,8 +10,6 @@ use num_complex::Complex;
 use rustfft::FftPlanner;
 
 use super::grid::Grid;
-use super::kernel;
-use super::replica::Replica;
 use crate::gnss::signal::{Component, Layer, Shape};
 use crate::receiver::correlate::{self, Nco, TURN, chips_to_units, steps_of_chip, units_to_chips};
 use crate::receiver::source::Block;
@@ -208,47 +206,4 @@ fn square_frequency_cycles(prompts: &[Complex<f64>], reach: f64) -> f64 {
     let vertex = if curvature < 0.0 { 0.5 * (before - after) / curvature } else { 0.0 };
     let cycles = (best as f64 + vertex) / length as f64;
     if cycles >= 0.5 { cycles - 1.0 } else { cycles }
-}
-
-/// Takes a found satellite out of the samples, one code period at a time with the amplitude and phase
-/// that it shows there. A real recording holds the carrier's cosine only. Returns the mean power of a code
-/// period's sum.
-pub(super) fn subtract(
-    grid: &Grid,
-    code_chips: f64,
-    replica: &Replica,
-    hit: &Refined,
-    complex: bool,
-    (i, q): (&mut [f32], &mut [f32]),
-) -> f64 {
-    let step = grid.received_chips_per_sample(hit.doppler_hz);
-    let frequency_hz = grid.frequency_hz(hit.doppler_hz);
-    let turn = grid.phasor(frequency_hz, 1);
-    let (mut means, mut waveform): (Vec<f32>, Vec<Complex<f32>>) = (Vec::new(), Vec::new());
-    let (mut from, length) = (0, i.len());
-    let (mut power, mut periods) = (0.0, 0_u32);
-    for period in 1_u64.. {
-        let boundary = ((period as f64 * code_chips - hit.code_phase_chips) / step).ceil().max(0.0) as usize;
-        let to = boundary.min(length);
-        let start = hit.code_phase_chips + from as f64 * step - (period - 1) as f64 * code_chips;
-        let (Some(i), Some(q)) = (i.get_mut(from..to), q.get_mut(from..to)) else { break };
-        means.resize(i.len(), 0.0);
-        replica.means(start - 0.5 * step, step, &mut means);
-        waveform.resize(i.len(), Complex::default());
-        kernel::turn(&mut waveform, &means, grid.phasor(frequency_hz, from as u64), turn);
-        let (sum, energy) = kernel::project((i, q), &waveform);
-        let amplitude = if energy > 0.0 { sum / energy } else { Complex::default() };
-        power += sum.norm_sqr();
-        periods += 1;
-        if complex {
-            kernel::subtract((i, q), &waveform, amplitude);
-        } else {
-            kernel::subtract((i, &mut []), &waveform, 2.0 * amplitude);
-        }
-        if boundary >= length {
-            break;
-        }
-        from = to;
-    }
-    power / f64::from(periods.max(1))
 }

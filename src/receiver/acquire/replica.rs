@@ -56,6 +56,22 @@ impl Replica {
             previous = next;
         }
     }
+
+    /// The code at instants `step_chips` apart, less than a period, the first at `start_chips`.
+    pub fn instants(&self, start_chips: f64, step_chips: f64, out: &mut [f32]) {
+        let period = self.levels.len() as f64;
+        let (start, step) = (start_chips * self.steps_per_chip, step_chips * self.steps_per_chip);
+        let mut passed = period * (start / period).floor();
+        for (n, out) in out.iter_mut().enumerate() {
+            let mut steps = start + n as f64 * step - passed;
+            if steps >= period {
+                passed += period;
+                steps -= period;
+            }
+            // Not below zero: a negative number of small size, as rounding may leave it, is cast to zero.
+            *out = self.levels.get(steps as usize).map_or(0.0, |level| *level as f32);
+        }
+    }
 }
 
 #[cfg(test)]
@@ -77,6 +93,10 @@ mod tests {
         let mut mean = [0.0];
         replica.means(1022.25, 1.5, &mut mean);
         assert!((mean[0] - 0.5 * (level(1022) + level(0))).abs() < 1e-7);
+        // At the middles of chips each has its own, over the end of the period, too.
+        let mut instants = [0.0; 1500];
+        replica.instants(600.5, 1.0, &mut instants);
+        assert!((0..1500).all(|n| instants[n] == level(600 + n)));
         assert!(Replica::new(component, 0).is_none());
     }
 }

@@ -54,13 +54,22 @@ fn count(searcher: &mut Searcher, recording: &Recording, sent: &[Sent], counted:
             hit.sv.number == sent.prn && difference_chips(hit.code_phase_chips, sent.phase_chips).abs() < 1.0
         })
     };
-    let hits: Vec<Acquired> = searcher.search(&block, &all()).unwrap().into_iter().filter_map(|(_, hit)| hit).collect();
     total.skies += 1;
     total.there += counted.len() as u32;
-    total.found += hits.iter().filter(|hit| right(hit, counted)).count() as u32;
-    total.false_ones += hits.iter().filter(|hit| !right(hit, sent)).count() as u32;
-    for hit in hits.iter().filter(|hit| !right(hit, sent)) {
-        println!("nobody sends {} at {:.1} chips and {:.0} Hz", hit.sv, hit.code_phase_chips, hit.doppler_hz);
+    for (row, hit) in searcher.search(&block, &all()).unwrap() {
+        let Some(hit) = hit else { continue };
+        total.found += u32::from(right(&hit, counted));
+        if !right(&hit, sent) {
+            total.false_ones += 1;
+            println!(
+                "nobody sends {} at {:.1} chips and {:.0} Hz: {:.1} dB-Hz, {:.2} of its threshold",
+                hit.sv,
+                hit.code_phase_chips,
+                hit.doppler_hz,
+                hit.cn0_dbhz,
+                row.statistic / row.threshold
+            );
+        }
     }
 }
 
@@ -151,11 +160,51 @@ fn strong_signals_that_are_no_candidates_bring_no_false_satellites() {
     assert!(f64::from(total.found) >= 0.9 * f64::from(total.there), "{total:?}");
 }
 
+/// What is sent at four times the rate behind two poles at 1.7 MHz, little more than the main lobe and not
+/// evenly, and every fourth sample of it.
+fn filtered(samples: usize, sent: &[Sent], seed: u64) -> Recording {
+    let fine = record(metadata(Format::Ci8, 4.0 * 2.6e6, 0.0, false), 4 * samples, sent, seed);
+    let behind = |x: &[f32]| {
+        let (mut one, mut two) = (0.0, 0.0);
+        let pass = |x: &f32| {
+            one += 0.65 * (x - one);
+            two += 0.65 * (one - two);
+            2.0 * two
+        };
+        x.iter().map(pass).skip(3).step_by(4).collect()
+    };
+    Recording { metadata: metadata(Format::Ci8, 2.6e6, 0.0, false), i: behind(&fine.i), q: behind(&fine.q) }
+}
+
 #[test]
-fn satellites_twenty_five_decibels_below_another_are_found() {
+fn satellites_far_below_another_are_found_behind_a_filter() {
+    let (_, samples, mut searcher) = searcher(&AcquisitionSettings::default());
+    let short: &[(f64, &[u64])] = &[(25.0, &[0]), (35.0, &[1])];
+    let every: Vec<u64> = skies(1).collect();
+    let long = [20.0, 25.0, 30.0, 35.0, 40.0].map(|ratio_db| (ratio_db, &every[..]));
+    for &(ratio_db, seeds) in if is_long() { &long[..] } else { short } {
+        let mut total = Count::default();
+        for &seed in seeds {
+            let mut random = Noise(300 + seed);
+            let cn0_dbhz = [&[43.0 + ratio_db][..], &[43.0; 10]].concat();
+            let sent = satellites(&mut random, &cn0_dbhz);
+            let recording = quantised(filtered(samples, &sent, seed));
+            count(&mut searcher, &recording, &sent, &sent[1..], &mut total);
+        }
+        println!("{ratio_db} dB: {total:?}");
+        if ratio_db <= 35.0 {
+            assert!(f64::from(total.found) >= 0.95 * f64::from(total.there), "{ratio_db} dB: {total:?}");
+        }
+        assert!(total.false_ones <= total.skies / 50, "{ratio_db} dB: {total:?}");
+    }
+}
+
+#[test]
+fn satellites_far_below_another_are_found() {
     let (metadata, samples, mut searcher) = searcher(&AcquisitionSettings::default());
     // With skies in which a Doppler's side lobe was chosen by thresholds that cannot be compared.
-    let short: &[(f64, &[u64])] = &[(10.0, &[56]), (15.0, &[18, 22, 65]), (20.0, &[0, 1, 2]), (25.0, &[0, 1, 2])];
+    let short: &[(f64, &[u64])] =
+        &[(10.0, &[56]), (15.0, &[18, 22, 65]), (20.0, &[0, 1, 2]), (25.0, &[0, 1, 2]), (35.0, &[0])];
     let every: Vec<u64> = skies(3).collect();
     let long = [10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0].map(|ratio_db| (ratio_db, &every[..]));
     for &(ratio_db, seeds) in if is_long() { &long[..] } else { short } {
@@ -168,7 +217,7 @@ fn satellites_twenty_five_decibels_below_another_are_found() {
             count(&mut searcher, &recording, &sent, &sent[1..], &mut total);
         }
         println!("{ratio_db} dB: {total:?}");
-        if ratio_db <= 25.0 {
+        if ratio_db <= 35.0 {
             assert!(f64::from(total.found) >= 0.95 * f64::from(total.there), "{ratio_db} dB: {total:?}");
         }
         // Seldom enough at any ratio: of 21 satellites that are not there.
