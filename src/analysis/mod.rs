@@ -146,7 +146,7 @@ fn measure(read: Run, run: &Path, limits: Option<&Limits>) -> Result<Measured, J
     let mut summary = Summary::new(&read, &errors, &clock)?;
     clock.forget_phases();
     let slips = Slips::find(&read, &errors)?;
-    let jitter = Jitter::measure(&read, &errors)?;
+    let jitter = Jitter::measure(&read, &errors, &summary.details.stated)?;
     summary.add(&consistency, &slips, &jitter);
     let not_json = |source| JudgeError::Json { path: run.join("summary.json"), source };
     let verdict = Verdict::of(&read, &errors, &slips, &summary)?;

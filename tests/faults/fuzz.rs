@@ -10,6 +10,7 @@ use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
+use gnss_twin::analysis::expect::stated::Stated;
 use gnss_twin::analysis::judge::limits::Limits;
 use gnss_twin::analysis::measure::clock::Clock;
 use gnss_twin::analysis::measure::consistency::Consistency;
@@ -469,7 +470,7 @@ fn judge(run: &Path) -> Result<u64, String> {
     let clock = Clock::measure(&read, &errors).map_err(refused)?;
     let consistency = Consistency::measure(&read, &errors);
     let slips = Slips::find(&read, &errors).map_err(refused)?;
-    let jitter = Jitter::measure(&read, &errors).map_err(refused)?;
+    let jitter = Jitter::measure(&read, &errors, &Stated::of(&read)).map_err(refused)?;
     let _ = (clock, consistency, jitter, Elevations::measure(&read, &errors).map_err(refused)?);
     Ok(hashed(slips.causes()))
 }

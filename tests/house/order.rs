@@ -121,7 +121,7 @@ pub const ORDER: Order<'static> = &[
             &["samples"],
             &["spectrum"],
             &["stated"],
-            &["due", "timeline"],
+            &["due", "peak", "timeline"],
             &["loops"],
             &["multipath"],
         ],

@@ -8,9 +8,9 @@ use serde::Serialize;
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::expect::followed::Followed;
+use crate::analysis::expect::peak::{Code, Peak, raw_chips};
 use crate::analysis::expect::spectrum::edge_cost_db;
 use crate::analysis::expect::theory::clock::PowerLaw;
-use crate::analysis::expect::theory::dll::{Discriminator, Taps};
 use crate::analysis::expect::theory::linear::{Feedback, PhaseLoop, controlled_root, controlled_root_gains};
 use crate::analysis::expect::theory::{dll, fll, oscillator, pll};
 use crate::analysis::expect::timeline::Timeline;
@@ -18,7 +18,7 @@ use crate::analysis::read::Run;
 use crate::analysis::statistics::Sum;
 use crate::analysis::waveform::{Edge, Waveform, leading};
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::signal::{Link, Signal, Tone, sinc_squared};
+use crate::gnss::signal::{Link, Signal, sinc_squared};
 
 /// Which loop a row is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -107,6 +107,8 @@ struct Response {
     put_out: f64,
     difference: f64,
     rate: f64,
+    /// Covariance of that phase and that rate.
+    cross: f64,
     /// Variance of the same rate for steps of the phase in place of noise.
     rate_after_steps: f64,
 }
@@ -127,7 +129,8 @@ const LONGEST: usize = 200_000;
 impl Response {
     fn of(closed: &PhaseLoop) -> Self {
         let mut state = [0.0; 3];
-        let mut found = Self { phase: 0.0, put_out: 0.0, difference: 0.0, rate: 0.0, rate_after_steps: 0.0 };
+        let mut found =
+            Self { phase: 0.0, put_out: 0.0, difference: 0.0, rate: 0.0, cross: 0.0, rate_after_steps: 0.0 };
         let (mut before, mut summed) = (0.0, 0.0);
         for k in 0..LONGEST {
             let noise = if k == 0 { 1.0 } else { 0.0 };
@@ -135,6 +138,7 @@ impl Response {
             // What the oscillator runs at in this interval, the mean of its rate.
             let ran = state[1] + 0.5 * state[2];
             found.rate += ran * ran;
+            found.cross += state[0] * ran;
             summed += ran;
             found.rate_after_steps += summed * summed;
             let put_out = noise - state[0];
@@ -192,110 +196,33 @@ impl<'a> Follower<'a> {
     }
 }
 
-/// Correlation of a signal with a replica, either or both of them averaged over the sampler's interval, for
-/// early minus late.
+/// Where in the loops' intervals a satellite's observations fall, counted in intervals from the middle.
 ///
-/// A polygon is a sum of |x|/2 about its corners, each times the bend there; an average over w adds an
-/// integral and a difference of 1/w.
-#[derive(Clone, Debug, PartialEq)]
-struct Peak {
-    /// Places in chips, and by how much the slope grows there.
-    corners: Vec<(f64, f64)>,
-    width_chips: f64,
-    averages: u32,
-    /// Of both sides of a sub-carrier together, whose chips those are. Averages leave the sub-carrier as it
-    /// is.
-    sides: Option<Tone>,
+/// An interval is of whole code periods, so a place stays while the range does: in 10 ms it is not anywhere.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::analysis) struct Places {
+    count: usize,
+    sum: f64,
+    squares: f64,
 }
 
-impl Peak {
-    /// Of a signal's waveform, averaged so many times over `width_chips`.
-    fn new(waveform: &Waveform, width_chips: f64, averages: u32) -> Self {
-        let chip_s = 1.0 / waveform.chip_rate_hz();
-        let corners = waveform.corners().into_iter().map(|(at_s, bend)| (at_s / chip_s, bend * chip_s)).collect();
-        Self { corners, width_chips, averages, sides: None }
+impl Places {
+    /// Adds one by when, after a whole second, it was sent.
+    pub fn add(&mut self, sent_fraction_s: f64, update_s: f64) {
+        let intervals = sent_fraction_s / update_s;
+        let place = intervals - intervals.floor() - 0.5;
+        self.count += 1;
+        self.sum += place;
+        self.squares += place * place;
     }
 
-    /// The same of chips that a sub-carrier turns, where its sides are followed together.
-    fn between(self, sides: Option<Tone>) -> Self {
-        Self { sides, ..self }
-    }
-
-    /// The same `gain` times as high.
-    fn times(mut self, gain: f64) -> Self {
-        self.corners.iter_mut().for_each(|(_, bend)| *bend *= gain);
-        self
-    }
-
-    /// Value at a delay in chips.
-    fn value(&self, x: f64) -> f64 {
-        let w = self.width_chips;
-        let sum = |of: &dyn Fn(f64) -> f64| self.corners.iter().map(|(at, bend)| bend * of(x - at)).sum::<f64>();
-        let both = self.sides.map_or(1.0, |tone| tone.both_sides(x));
-        both * match self.averages {
-            0 => sum(&|y| 0.5 * y.abs()),
-            // Integrals of |x|/2: x|x|/4 and |x|³/12.
-            1 => sum(&|y| (y + 0.5 * w) * (y + 0.5 * w).abs() / 4.0 - (y - 0.5 * w) * (y - 0.5 * w).abs() / 4.0) / w,
-            _ => {
-                let cube = |y: f64| y.abs() * y * y / 12.0;
-                sum(&|y| cube(y + w) - 2.0 * cube(y) + cube(y - w)) / (w * w)
-            }
+    /// Mean and mean square; of none those of any place.
+    fn means(&self) -> [f64; 2] {
+        match self.count {
+            0 => [0.0, 1.0 / 12.0],
+            count => [self.sum, self.squares].map(|sum| sum / count as f64),
         }
     }
-
-    /// What early less late changes by over their sum, for a distance of `spacing_chips`.
-    fn steepness(&self, spacing_chips: f64) -> f64 {
-        let half = 0.5 * spacing_chips;
-        self.slope(half) / self.value(half)
-    }
-
-    /// Minus its slope at a delay, by a difference that errs by 1e-9.
-    fn slope(&self, x: f64) -> f64 {
-        let h = 1e-4;
-        (self.value(x - h) - self.value(x + h)) / (2.0 * h)
-    }
-}
-
-/// A code's correlation in chips, as sent.
-#[derive(Clone, Debug, PartialEq)]
-pub(in crate::analysis) struct Code {
-    peak: Peak,
-    /// Up to where it falls without rising again.
-    pub reach_chips: f64,
-}
-
-impl Code {
-    /// That of a signal's waveform.
-    pub fn of(waveform: &Waveform) -> Self {
-        Self { peak: Peak::new(waveform, 0.0, 0), reach_chips: waveform.reach_s() * waveform.chip_rate_hz() }
-    }
-
-    /// That of what is followed of a signal.
-    fn found(followed: &Followed) -> Self {
-        let code = Self::of(&followed.found);
-        let Some(tone) = followed.sides else { return code };
-        // The triangle of the chips bends the first minimum, half a cycle away, by a fiftieth of a chip
-        // inwards.
-        let half_chips = 1.0 / f64::from(tone.half_cycles.abs().max(1));
-        let peak = code.peak.between(Some(tone));
-        let fine = |k: u32| half_chips * f64::from(k) / 1000.0;
-        let rises = |k: &u32| peak.value(fine(k + 1)) > peak.value(fine(*k));
-        let reach_chips = (0..1000).find(rises).map_or(half_chips, fine);
-        Self { peak, reach_chips }
-    }
-
-    /// Correlation at a delay.
-    pub fn value(&self, chips: f64) -> f64 {
-        self.peak.value(chips)
-    }
-}
-
-/// Standard deviation of one early-minus-late value, in chips, for the shapes of signal and noise.
-fn raw_chips(signal: &Peak, noise: &Peak, d: f64, snr: f64) -> f64 {
-    let height = signal.value(0.5 * d) / signal.value(0.0);
-    let slope = signal.slope(0.5 * d) / signal.value(0.0);
-    let rho = noise.value(d) / noise.value(0.0);
-    dll::raw_on_chips(Discriminator::EarlyMinusLate, Taps { height, slope, common: rho }, snr)
 }
 
 /// The three loops of a receiver as theory sees them at one integration time.
@@ -378,8 +305,9 @@ impl Theory {
         self.update_s * cn0_hz * self.share
     }
 
-    /// Raw and thermal sigma, in the loop's unit, at the whole signal's C/N0.
-    pub fn noise(&self, which: Loop, cn0_hz: f64) -> (f64, f64) {
+    /// Raw and thermal sigma, in the loop's unit, at the whole signal's C/N0, of observations at some places
+    /// in the intervals.
+    pub fn noise(&self, which: Loop, cn0_hz: f64, places: &Places) -> (f64, f64) {
         let (update_s, snr) = (self.update_s, self.snr(cn0_hz));
         let phase_rad = pll::raw_rad(update_s, cn0_hz * self.share);
         let (loop_, code) = (&self.pll.1, &self.dll.1);
@@ -388,12 +316,12 @@ impl Theory {
                 let raw = raw_chips(&self.peaks.0, &self.peaks.1, self.settings.spacing_chips, snr);
                 (self.dll_gain * raw * code.put_out.sqrt(), raw * code.phase.sqrt())
             }
-            // Observations fall anywhere in an interval, in which the phase runs at the loop's rate: x²·rate²
-            // more, 1/12 in the mean.
-            Loop::Pll => (
-                (phase_rad * loop_.put_out.sqrt()).to_degrees(),
-                (phase_rad * (loop_.phase + loop_.rate / 12.0).sqrt()).to_degrees(),
-            ),
+            // In an interval the phase runs at the loop's rate.
+            Loop::Pll => {
+                let [mean, square] = places.means();
+                let variance = loop_.phase + 2.0 * mean * loop_.cross + square * loop_.rate;
+                ((phase_rad * loop_.put_out.sqrt()).to_degrees(), (phase_rad * variance.max(0.0).sqrt()).to_degrees())
+            }
             Loop::Fll => {
                 let hertz = phase_rad / (TAU * update_s);
                 (hertz * loop_.difference.sqrt(), hertz * loop_.rate.sqrt())
@@ -544,9 +472,31 @@ pub fn motion_error_deg(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::signal::Signal;
-    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, QUADRATURE};
+
+    #[test]
+    fn the_phase_at_a_place_of_an_interval_varies_as_the_loop_runs_there() {
+        let mut places = Places::default();
+        assert_eq!(places.means(), [0.0, 1.0 / 12.0]);
+        places.add(0.0275, 0.01);
+        assert!((places.means()[0] - 0.25).abs() < 1e-9 && (places.means()[1] - 0.0625).abs() < 1e-9);
+        // Bandwidth times time of 18 Hz and 10 ms: one value of noise, and what it moves until it is
+        // forgotten.
+        let closed = exact_loop(3, 0.18).unwrap();
+        let (mut state, mut ends) = (step(&closed.gains, [0.0; 3], 1.0), [0.0; 2]);
+        for _ in 0..1000 {
+            let ran = state[1] + 0.5 * state[2];
+            for (end, place) in ends.iter_mut().zip([-0.5, 0.5]) {
+                *end += (state[0] + place * ran) * (state[0] + place * ran);
+            }
+            state = step(&closed.gains, state, -state[0]);
+        }
+        let Response { phase, rate, cross, .. } = Response::of(&closed);
+        for (end, place) in ends.into_iter().zip([-0.5, 0.5]) {
+            let expected = phase + 2.0 * place * cross + place * place * rate;
+            assert!((end / expected - 1.0).abs() < 1e-9, "{place}: {end}, {expected}");
+        }
+        assert!(ends[1] > 1.1 * ends[0], "{ends:?}");
+    }
 
     #[test]
     fn a_loop_has_the_bandwidth_that_it_is_given() {
@@ -586,41 +536,5 @@ mod tests {
         let expected = 3.0 * jerk / (natural * natural);
         // ωT is 0.019: three halves of it is what the difference of two methods comes to.
         assert!((found / expected - 1.0).abs() < 0.04, "{found} {expected}");
-    }
-
-    #[test]
-    fn peaks_are_the_triangle_without_averages_and_rounded_with_them() {
-        let chips = Waveform::of(&L1_CA).unwrap();
-        let plain = Peak::new(&chips, 0.4, 0);
-        for cn0_hz in [1e3, 1e4, 1e5] {
-            let known = dll::raw_chips(Discriminator::EarlyMinusLate, 0.5, 4e-3, cn0_hz);
-            assert!((raw_chips(&plain, &plain, 0.5, 4e-3 * cn0_hz) / known - 1.0).abs() < 1e-9);
-        }
-        // The mean of a triangle over ±w/2 is 1 − w/4, over a triangle of ±w it is 1 − w/3; far from corners
-        // nothing changes.
-        for (averages, peak) in [(1, 1.0 - 0.1), (2, 1.0 - 0.4 / 3.0)] {
-            let round = Peak::new(&chips, 0.4, averages);
-            assert!((round.value(0.0) - peak).abs() < 1e-12, "{}", round.value(0.0));
-            assert!((round.value(0.5) - 0.5).abs() < 1e-12 && (round.slope(0.5) - 1.0).abs() < 1e-9);
-        }
-    }
-
-    #[test]
-    fn a_steeper_peak_has_less_jitter() {
-        let raw = |signal: &Signal, d: f64| {
-            let peak = Peak::new(&Waveform::of(signal).unwrap(), 0.0, 0);
-            raw_chips(&peak, &peak, d, 1e6)
-        };
-        // With slope s and 1 − ρ = s·d the variance is d/(4·s·snr): s is 1 of BPSK and 3 of BOC(1,1). Of MBOC
-        // it is 10/11 · 3 + 1/11 · 23, BOC(6,1) falling by 2·12 − 1 a chip.
-        for (signal, slope) in [(&QUADRATURE, 1.0), (&LONG_BOC, 3.0), (&MIXED, 53.0 / 11.0)] {
-            let ratio = raw(signal, 0.05) / raw(&L1_CA, 0.05);
-            // Squaring at 60 dB, 1e-6; slopes by differences, 1e-9.
-            assert!((ratio * ratio * slope - 1.0).abs() < 1e-5, "{signal}: {ratio}");
-        }
-        // At wide spacings the side peaks cost height: a = 1/4, a' = 3, ρ = −1/2 at half a chip.
-        let found = raw(&LONG_BOC, 0.5);
-        let expected = 1.5_f64 / (4.0 * 9.0 * 1e6) * (1.0 + 0.5 / (2.0 * 1e6 / 16.0));
-        assert!((found / expected.sqrt() - 1.0).abs() < 1e-9, "{found}");
     }
 }

@@ -18,6 +18,7 @@ pub(in crate::analysis) mod loops;
 pub mod message;
 pub mod multipath;
 pub mod multiple_access;
+pub(in crate::analysis) mod peak;
 pub mod quantile;
 pub mod samples;
 pub mod smoothing;

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use std::iter::Peekable;
 
 use crate::analysis::error::JudgeError;
-use crate::analysis::expect::loops::Code;
+use crate::analysis::expect::peak::Code;
 use crate::analysis::read::Run;
 use crate::analysis::read::spill_store::Cursor;
 use crate::gnss::record::RayRow;

@@ -311,6 +311,7 @@ mod tests {
             cn0_true_dbhz: 45.0,
             cn0_effective_dbhz: 44.5,
             locked_s: sample as f64,
+            sent_fraction_s: 0.0,
         };
         let link = L1_CA.link(Sv::gps(3));
         let rows = [row(1, 101.0, 0.0), row(2, 103.0, 0.0)];

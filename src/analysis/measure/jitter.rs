@@ -4,16 +4,19 @@
 //! Raw and closed-loop figures are never mixed: a discriminator's value is noise of one integration,
 //! √(1/(2B·T)) times what the loop lets through. The theory takes the loops as the settings file describes
 //! them, controlled roots of exact bandwidth, with phase and rate fed back
-//! ([`crate::analysis::expect::theory::linear`]), and adds the scene's oscillator and the stress that the
-//! true motion puts on that same linear loop. In the tracking stage the frequency is that of the phase loop;
-//! its row judges the rate. Limits: discriminators as of early minus late power and two-quadrant arctangent;
-//! a front-end filter's rounding of the correlation is left out.
+//! ([`crate::analysis::expect::theory::linear`]), at the C/N0 of which the measured one is stated
+//! ([`Stated::effective_dbhz`]) and at the places in the loops' intervals where observations fall, and adds
+//! the scene's oscillator and the stress that the true motion puts on that same linear loop. In the tracking
+//! stage the frequency is that of the phase loop; its row judges the rate. Limits: discriminators as of
+//! early minus late power and two-quadrant arctangent; a front-end filter's rounding of the correlation is
+//! left out.
 
 use serde::Serialize;
 
 use crate::analysis::error::JudgeError;
 pub use crate::analysis::expect::loops::{Loop, Settings, motion_error_deg};
-use crate::analysis::expect::loops::{Stresses, Theory};
+use crate::analysis::expect::loops::{Places, Stresses, Theory};
+use crate::analysis::expect::stated::Stated;
 use crate::analysis::expect::timeline::Timeline;
 use crate::analysis::measure::errors::{Errors, Link, PULL_IN_S, SignalError};
 use crate::analysis::measure::independent::Correlated;
@@ -112,7 +115,7 @@ impl Jitter {
     ///
     /// # Errors
     /// [`JudgeError::Read`] where spilled rows cannot be read.
-    pub fn measure(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
+    pub fn measure(run: &Run, errors: &Errors, stated: &Stated) -> Result<Self, JudgeError> {
         let Some(settings) = Settings::of(run) else { return Ok(Self::default()) };
         let mut rows = Vec::new();
         for link in &errors.signals.keys().collect::<Vec<_>>() {
@@ -140,7 +143,7 @@ impl Jitter {
                     whole.then(|| put_out(which, row))
                 })?;
                 let raw_sigma = put_out.std()?.map(|(sigma, _)| sigma);
-                rows.extend(row(link, which, &stretches, raw_sigma, &theory, &stresses));
+                rows.extend(row((link, stated), which, &stretches, raw_sigma, &theory, &stresses));
             }
         }
         Ok(Self { rows })
@@ -174,6 +177,7 @@ struct Past {
     code_m: f64,
     carrier_cycles: f64,
     doppler_hz: f64,
+    sent_fraction_s: f64,
 }
 
 /// Observations past their pull-in where the scene does not expect any errors, and the times of the first and
@@ -191,9 +195,18 @@ fn settled(
     })?;
     let mut past = Vec::new();
     errors.signals.each(link, |row| {
-        let SignalError { sample, time_s, locked_s, cn0_dbhz, code_m, carrier_cycles, doppler_hz, .. } = row;
-        let is_past = locked_s >= PULL_IN_S && (bounded(&row) || !any);
-        past.extend(is_past.then_some(Past { sample, time_s, locked_s, cn0_dbhz, code_m, carrier_cycles, doppler_hz }));
+        if row.locked_s >= PULL_IN_S && (bounded(&row) || !any) {
+            past.push(Past {
+                sample: row.sample,
+                time_s: row.time_s,
+                locked_s: row.locked_s,
+                cn0_dbhz: row.cn0_dbhz,
+                code_m: row.code_m,
+                carrier_cycles: row.carrier_cycles,
+                doppler_hz: row.doppler_hz,
+                sent_fraction_s: row.sent_fraction_s,
+            });
+        }
     })?;
     Ok((past, span.unwrap_or_default()))
 }
@@ -225,7 +238,7 @@ fn of_updates(
 }
 
 fn row(
-    link: &Link,
+    (link, stated): (&Link, &Stated),
     which: Loop,
     stretches: &[&[Past]],
     raw_sigma: Option<f64>,
@@ -245,7 +258,11 @@ fn row(
     let found = Correlated::about_zero(&centred)?;
     let sigma = found.variance().sqrt();
     let cn0_dbhz = mean(&stretches.iter().copied().flatten().map(|row| row.cn0_dbhz).collect::<Vec<_>>())?;
-    let (raw_theory, thermal) = theory.noise(which, libm::pow(10.0, cn0_dbhz / 10.0));
+    // What a receiver states has gains and losses that are in the theory's share of the power.
+    let cn0_hz = libm::pow(10.0, 0.1 * stated.effective_dbhz(*link, cn0_dbhz));
+    let mut places = Places::default();
+    stretches.iter().copied().flatten().for_each(|row| places.add(row.sent_fraction_s, theory.update_s));
+    let (raw_theory, thermal) = theory.noise(which, cn0_hz, &places);
     let oscillator_theory = theory.oscillator(which);
     let (stress_rms, stress_max) = (stresses.of(which).rms(), stresses.of(which).max);
     let theory_sigma = (thermal * thermal + oscillator_theory * oscillator_theory + stress_rms * stress_rms).sqrt();

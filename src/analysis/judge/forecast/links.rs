@@ -230,7 +230,7 @@ impl<'a> One<'a> {
         let pair = ((1.0 + WORST_PAIR * others) / (1.0 + others)).max(1.0).sqrt();
         let (mut sigma, mut raw) = (BTreeMap::new(), BTreeMap::new());
         for which in [Loop::Dll, Loop::Pll, Loop::Fll] {
-            let (put_out, thermal) = theory.noise(which, cn0_hz);
+            let (put_out, thermal) = theory.noise(which, cn0_hz, &rows.places);
             let (oscillator, stress) = (theory.oscillator(which), stresses.of(which));
             let noise = libm::hypot(thermal, oscillator);
             sigma.insert(which, [libm::hypot(noise, stress.rms()), noise, stress.max]);

@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::expect::due::satellite::{FADE_DB, is_stepping};
-use crate::analysis::expect::loops::{Theory, update_s};
+use crate::analysis::expect::loops::{Places, Theory, update_s};
 use crate::analysis::expect::message::Message;
 use crate::analysis::expect::multipath::{self, Rays};
 use crate::analysis::expect::smoothing::Smoothing;
@@ -291,8 +291,8 @@ impl<'r> Scene<'r> {
         let cost_db = self.stated.front_end_db(true_row.signal);
         let lacks_db = self.stated.cost_db(true_row.link(), row.cn0_effective_dbhz - cost_db);
         let cn0_hz = libm::pow(10.0, (row.cn0_effective_dbhz - cost_db) / 10.0);
-        let (_, code) = theory.noise(Loop::Dll, cn0_hz);
-        let (_, rate_hz) = theory.noise(Loop::Fll, cn0_hz);
+        let (_, code) = theory.noise(Loop::Dll, cn0_hz, &Places::default());
+        let (_, rate_hz) = theory.noise(Loop::Fll, cn0_hz, &Places::default());
         let (sin, cos) = libm::sincos(elevation_rad);
         let (east, north) = libm::sincos(look.azimuth_rad);
         let forecast = Forecast {

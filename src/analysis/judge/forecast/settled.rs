@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 use crate::analysis::error::JudgeError;
 use crate::analysis::expect::due::satellite::is_stepping;
-use crate::analysis::expect::loops::Theory;
+use crate::analysis::expect::loops::{Places, Theory};
 use crate::analysis::expect::multipath::{self, Rays};
 use crate::analysis::expect::multiple_access::MultipleAccess;
 use crate::analysis::expect::stated::Stated;
@@ -31,6 +31,8 @@ pub(super) struct Settled {
     locked_s: f64,
     /// Errors without what rays make of them, metres.
     pub code: Numbers,
+    /// Where in the loops' intervals they fall.
+    pub places: Places,
     /// Largest part that rays have in one.
     pub ray_m: f64,
     /// Errors, cycles.
@@ -91,6 +93,7 @@ impl Settled {
             let own_hz = libm::pow(10.0, row.cn0_true_dbhz / 10.0);
             let white_hz = access.white_hz(row.sample, link, own_hz) / libm::pow(10.0, cost_db / 10.0);
             let lacks_db = stated.cost_db(link, row.cn0_effective_dbhz - cost_db);
+            found.places.add(row.sent_fraction_s, theory.update_s);
             found.add(&row, (ray_m, white_hz), [cost_db, lacks_db])?;
         }
         Ok(found)
@@ -105,6 +108,7 @@ impl Settled {
             spans: Vec::new(),
             locked_s: 0.0,
             code,
+            places: Places::default(),
             ray_m: 0.0,
             carrier,
             doppler,

@@ -45,6 +45,8 @@ pub struct SignalError {
     pub cn0_effective_dbhz: f64,
     /// Since the carrier locked, as the receiver says.
     pub locked_s: f64,
+    /// The time sent in truth, after a whole second.
+    pub sent_fraction_s: f64,
 }
 
 /// Errors of one fix.
@@ -65,13 +67,14 @@ pub struct PositionError {
 }
 
 impl SpillRow<Link> for SignalError {
-    const WORDS: usize = 10;
+    const WORDS: usize = 11;
 
     fn put(&self, words: &mut Vec<u64>) {
         words.push(self.sample);
         let errors = [self.time_s, self.code_m, self.carrier_cycles, self.raw_cycles, self.doppler_hz];
         words.extend(errors.map(f64::to_bits));
-        words.extend([self.cn0_dbhz, self.cn0_true_dbhz, self.cn0_effective_dbhz, self.locked_s].map(f64::to_bits));
+        words.extend([self.cn0_dbhz, self.cn0_true_dbhz, self.cn0_effective_dbhz].map(f64::to_bits));
+        words.extend([self.locked_s, self.sent_fraction_s].map(f64::to_bits));
     }
 
     fn take(_: Link, words: &mut Words<'_>) -> Self {
@@ -86,6 +89,7 @@ impl SpillRow<Link> for SignalError {
             cn0_true_dbhz: words.number(),
             cn0_effective_dbhz: words.number(),
             locked_s: words.number(),
+            sent_fraction_s: words.number(),
         }
     }
 }
@@ -234,6 +238,7 @@ impl Errors {
                 cn0_true_dbhz: true_row.cn0_dbhz,
                 cn0_effective_dbhz: access.effective_dbhz(&true_row),
                 locked_s: estimate.locked_s,
+                sent_fraction_s: true_row.sent_fraction_s,
             });
         }
         rows.sort_by_key(|row| row.sample);

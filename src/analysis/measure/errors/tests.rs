@@ -23,6 +23,7 @@ pub fn arc(carrier: &[f64]) -> Vec<SignalError> {
         cn0_true_dbhz: 45.0,
         cn0_effective_dbhz: 45.0,
         locked_s: 5.0 + index as f64 * 0.1,
+        sent_fraction_s: 0.0,
     };
     carrier.iter().enumerate().map(row).collect()
 }

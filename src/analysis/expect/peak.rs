@@ -1,0 +1,156 @@
+//! Correlation of a signal with a replica about its peak, and the noise of early minus late there.
+
+use crate::analysis::expect::followed::Followed;
+use crate::analysis::expect::theory::dll::{self, Discriminator, Taps};
+use crate::analysis::waveform::Waveform;
+use crate::gnss::signal::Tone;
+
+/// Correlation of a signal with a replica, either or both of them averaged over the sampler's interval, for
+/// early minus late.
+///
+/// A polygon is a sum of |x|/2 about its corners, each times the bend there; an average over w adds an
+/// integral and a difference of 1/w.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Peak {
+    /// Places in chips, and by how much the slope grows there.
+    corners: Vec<(f64, f64)>,
+    width_chips: f64,
+    averages: u32,
+    /// Of both sides of a sub-carrier together, whose chips those are. Averages leave the sub-carrier as it
+    /// is.
+    sides: Option<Tone>,
+}
+
+impl Peak {
+    /// Of a signal's waveform, averaged so many times over `width_chips`.
+    pub fn new(waveform: &Waveform, width_chips: f64, averages: u32) -> Self {
+        let chip_s = 1.0 / waveform.chip_rate_hz();
+        let corners = waveform.corners().into_iter().map(|(at_s, bend)| (at_s / chip_s, bend * chip_s)).collect();
+        Self { corners, width_chips, averages, sides: None }
+    }
+
+    /// The same of chips that a sub-carrier turns, where its sides are followed together.
+    pub fn between(self, sides: Option<Tone>) -> Self {
+        Self { sides, ..self }
+    }
+
+    /// The same `gain` times as high.
+    pub fn times(mut self, gain: f64) -> Self {
+        self.corners.iter_mut().for_each(|(_, bend)| *bend *= gain);
+        self
+    }
+
+    /// Value at a delay in chips.
+    pub fn value(&self, x: f64) -> f64 {
+        let w = self.width_chips;
+        let sum = |of: &dyn Fn(f64) -> f64| self.corners.iter().map(|(at, bend)| bend * of(x - at)).sum::<f64>();
+        let both = self.sides.map_or(1.0, |tone| tone.both_sides(x));
+        both * match self.averages {
+            0 => sum(&|y| 0.5 * y.abs()),
+            // Integrals of |x|/2: x|x|/4 and |x|³/12.
+            1 => sum(&|y| (y + 0.5 * w) * (y + 0.5 * w).abs() / 4.0 - (y - 0.5 * w) * (y - 0.5 * w).abs() / 4.0) / w,
+            _ => {
+                let cube = |y: f64| y.abs() * y * y / 12.0;
+                sum(&|y| cube(y + w) - 2.0 * cube(y) + cube(y - w)) / (w * w)
+            }
+        }
+    }
+
+    /// What early less late changes by over their sum, for a distance of `spacing_chips`.
+    pub fn steepness(&self, spacing_chips: f64) -> f64 {
+        let half = 0.5 * spacing_chips;
+        self.slope(half) / self.value(half)
+    }
+
+    /// Minus its slope at a delay, by a difference that errs by 1e-9.
+    fn slope(&self, x: f64) -> f64 {
+        let h = 1e-4;
+        (self.value(x - h) - self.value(x + h)) / (2.0 * h)
+    }
+}
+
+/// A code's correlation in chips, as sent.
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::analysis) struct Code {
+    peak: Peak,
+    /// Up to where it falls without rising again.
+    pub reach_chips: f64,
+}
+
+impl Code {
+    /// That of a signal's waveform.
+    pub fn of(waveform: &Waveform) -> Self {
+        Self { peak: Peak::new(waveform, 0.0, 0), reach_chips: waveform.reach_s() * waveform.chip_rate_hz() }
+    }
+
+    /// That of what is followed of a signal.
+    pub(super) fn found(followed: &Followed) -> Self {
+        let code = Self::of(&followed.found);
+        let Some(tone) = followed.sides else { return code };
+        // The triangle of the chips bends the first minimum, half a cycle away, by a fiftieth of a chip
+        // inwards.
+        let half_chips = 1.0 / f64::from(tone.half_cycles.abs().max(1));
+        let peak = code.peak.between(Some(tone));
+        let fine = |k: u32| half_chips * f64::from(k) / 1000.0;
+        let rises = |k: &u32| peak.value(fine(k + 1)) > peak.value(fine(*k));
+        let reach_chips = (0..1000).find(rises).map_or(half_chips, fine);
+        Self { peak, reach_chips }
+    }
+
+    /// Correlation at a delay.
+    pub fn value(&self, chips: f64) -> f64 {
+        self.peak.value(chips)
+    }
+}
+
+/// Standard deviation of one early-minus-late value, in chips, for the shapes of signal and noise.
+pub(super) fn raw_chips(signal: &Peak, noise: &Peak, d: f64, snr: f64) -> f64 {
+    let height = signal.value(0.5 * d) / signal.value(0.0);
+    let slope = signal.slope(0.5 * d) / signal.value(0.0);
+    let rho = noise.value(d) / noise.value(0.0);
+    dll::raw_on_chips(Discriminator::EarlyMinusLate, Taps { height, slope, common: rho }, snr)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gnss::signal::Signal;
+    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, QUADRATURE};
+
+    #[test]
+    fn peaks_are_the_triangle_without_averages_and_rounded_with_them() {
+        let chips = Waveform::of(&L1_CA).unwrap();
+        let plain = Peak::new(&chips, 0.4, 0);
+        for cn0_hz in [1e3, 1e4, 1e5] {
+            let known = dll::raw_chips(Discriminator::EarlyMinusLate, 0.5, 4e-3, cn0_hz);
+            assert!((raw_chips(&plain, &plain, 0.5, 4e-3 * cn0_hz) / known - 1.0).abs() < 1e-9);
+        }
+        // The mean of a triangle over ±w/2 is 1 − w/4, over a triangle of ±w it is 1 − w/3; far from corners
+        // nothing changes.
+        for (averages, peak) in [(1, 1.0 - 0.1), (2, 1.0 - 0.4 / 3.0)] {
+            let round = Peak::new(&chips, 0.4, averages);
+            assert!((round.value(0.0) - peak).abs() < 1e-12, "{}", round.value(0.0));
+            assert!((round.value(0.5) - 0.5).abs() < 1e-12 && (round.slope(0.5) - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_steeper_peak_has_less_jitter() {
+        let raw = |signal: &Signal, d: f64| {
+            let peak = Peak::new(&Waveform::of(signal).unwrap(), 0.0, 0);
+            raw_chips(&peak, &peak, d, 1e6)
+        };
+        // With slope s and 1 − ρ = s·d the variance is d/(4·s·snr): s is 1 of BPSK and 3 of BOC(1,1). Of MBOC
+        // it is 10/11 · 3 + 1/11 · 23, BOC(6,1) falling by 2·12 − 1 a chip.
+        for (signal, slope) in [(&QUADRATURE, 1.0), (&LONG_BOC, 3.0), (&MIXED, 53.0 / 11.0)] {
+            let ratio = raw(signal, 0.05) / raw(&L1_CA, 0.05);
+            // Squaring at 60 dB, 1e-6; slopes by differences, 1e-9.
+            assert!((ratio * ratio * slope - 1.0).abs() < 1e-5, "{signal}: {ratio}");
+        }
+        // At wide spacings the side peaks cost height: a = 1/4, a' = 3, ρ = −1/2 at half a chip.
+        let found = raw(&LONG_BOC, 0.5);
+        let expected = 1.5_f64 / (4.0 * 9.0 * 1e6) * (1.0 + 0.5 / (2.0 * 1e6 / 16.0));
+        assert!((found / expected.sqrt() - 1.0).abs() < 1e-9, "{found}");
+    }
+}
