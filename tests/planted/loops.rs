@@ -6,6 +6,7 @@ use std::io::{Read as _, Write as _};
 use std::path::Path;
 
 use gnss_twin::analysis::assess;
+use gnss_twin::analysis::expect::welch::{BINS, Looks};
 use gnss_twin::analysis::judge::judgement::{Judgement, Status};
 use gnss_twin::analysis::judge::limits::Limits;
 use gnss_twin::analysis::judge::summary::Summary;
@@ -99,7 +100,8 @@ struct Spectrum {
 impl Spectrum {
     fn new(metadata: &IfMetadata) -> Self {
         let rate_hz = metadata.rate.hz();
-        Self { psd: Psd::new(rate_hz, false, 2048), left: (0.2 * rate_hz) as usize }
+        let looks = Looks::at(u64::MAX, rate_hz, false);
+        Self { psd: Psd::new(rate_hz, false, BINS), left: looks.length as usize }
     }
 
     fn add(&mut self, bytes: &[u8]) {
