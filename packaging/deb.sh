@@ -3,8 +3,8 @@
 # Needs cargo-deb (`cargo install cargo-deb --locked`).
 set -euo pipefail
 cd "$(dirname "$0")/.."
-cargo build --locked --profile dist --bin gnss-twin
-out=target/dist
+cargo build --locked --release --bin gnss-twin
+out=target/release
 rm -rf "$out/man" "$out/completions"
 mkdir -p "$out/man" "$out/completions"
 "$out/gnss-twin" man --out "$out/man"
@@ -14,4 +14,4 @@ gzip -9nc CHANGELOG.md >"$out/changelog.gz"
 "$out/gnss-twin" completions bash >"$out/completions/gnss-twin"
 "$out/gnss-twin" completions zsh >"$out/completions/_gnss-twin"
 "$out/gnss-twin" completions fish >"$out/completions/gnss-twin.fish"
-cargo deb --locked --no-build --profile dist
+cargo deb --locked --no-build

@@ -51,30 +51,59 @@
 //! # }
 //! ```
 //!
-//! Each world is a cargo feature and compiles without the others; a program that needs generator and receiver
-//! takes the package with `default-features = false, features = ["generator", "receiver"]`. Units: SI and
-//! radians inside, cycles for carrier phase, GPS time; a name ends with its unit.
+//! What the two wrote into a directory, [`analysis::judge`](analysis::judge()) measures, judges and draws:
+//!
+//! ```
+//! use gnss_twin::generator::{scenario::Scenario, truth};
+//! use gnss_twin::receiver::{output::Output, settings::Settings};
+//! use gnss_twin::{analysis, twin};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let scenario = r#"
+//!     name = "judged"
+//!     start = 2010-07-01T08:06:00
+//!     duration_s = 4
+//!     motion = { kind = "static", latitude_deg = 48.1, longitude_deg = 11.6, height_m = 520 }
+//!     noise = {}
+//! "#;
+//! let scene = Scenario::from_toml(scenario)?.scene()?;
+//! let run = tempfile::tempdir()?;
+//! let [truth, rx] = ["truth", "rx"].map(|name| run.path().join(name));
+//! std::fs::create_dir(&truth)?;
+//! std::fs::create_dir(&rx)?;
+//! let (mut truth, mut rx) = (truth::Writer::create(&truth)?, Output::create(&rx)?);
+//! twin::run(std::slice::from_ref(&scene), &Settings::default(), &mut truth, &mut rx)?;
+//! let summary = analysis::assess(run.path(), None)?;
+//! assert_eq!(summary.satellites.false_acquired, 0);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Each part is a crate of its own, named as its module here, and this crate hands them on: no crate of the
+//! three worlds depends on another. A program that needs generator and receiver takes the package with
+//! `default-features = false, features = ["generator", "receiver"]`. Units: SI and radians inside, cycles for
+//! carrier phase, GPS time; a name ends with its unit.
 //!
 //! Versions follow cargo's rules: before 1.0 a new minor version may change what is public, a patch may
 //! not. `tests/api.txt` lists all of it, so that no change goes unseen, and the changelog says what each one
 //! asks of a program that uses the library.
 
-#[macro_use]
-pub mod plant;
+#![warn(missing_docs)]
 
-pub mod gnss;
+pub use ::gnss;
 
 #[cfg(feature = "analysis")]
-pub mod analysis;
+pub use ::analysis;
+#[cfg(feature = "generator")]
+pub use ::generator;
+#[cfg(all(feature = "generator", feature = "receiver"))]
+pub use ::live;
+#[cfg(feature = "receiver")]
+pub use ::receiver;
+#[cfg(feature = "study")]
+pub use ::study;
+#[cfg(all(feature = "generator", feature = "receiver"))]
+pub use ::twin;
+
 #[cfg(feature = "cli")]
 pub mod cli;
-#[cfg(feature = "generator")]
-pub mod generator;
-#[cfg(all(feature = "generator", feature = "receiver"))]
-pub mod live;
-#[cfg(feature = "receiver")]
-pub mod receiver;
-#[cfg(feature = "study")]
-pub mod study;
-#[cfg(all(feature = "generator", feature = "receiver"))]
-pub mod twin;

@@ -1,4 +1,4 @@
-"""Lists the library's public items from the pages of `cargo doc --no-deps`, one line each with its declaration.
+"""Lists the libraries' public items from the pages of `cargo doc --no-deps`, one line each with its declaration.
 
 usage: tests/api.py [--write]     compares with tests/api.txt, or writes it
 exit:  0 as listed; 1 not: a change of the interface is meant (write the list, say it in the changelog) or a slip.
@@ -11,9 +11,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 LIST = ROOT / "tests/api.txt"
-PAGES = ROOT / "target/doc/gnss_twin"
-# The command line is no library, and switches of planted faults are for tests.
-OUTSIDE = {"cli", "plant"}
+PAGES = ROOT / "target/doc"
+# Crates that `gnss_twin` hands on. Its own item, the command line, is no library.
+CRATES = ("analysis", "generator", "gnss", "live", "receiver", "study", "twin")
+# Switches of planted faults are for tests.
+OUTSIDE = {"plant"}
 # Headings under which a page has what traits bring.
 TRAITS = ("trait-implementations", "synthetic-implementations", "blanket-implementations")
 KINDS = ("struct", "enum", "trait", "fn", "constant", "type", "static", "macro")
@@ -48,13 +50,17 @@ class Declarations(HTMLParser):
             self.found[-1] += data
 
 
-def items():
+def pages(crate):
     # Pages of an earlier run, with private items, may lie there too; this one is of the last run.
-    linked = re.findall(r'<a href="([^"#]+\.html)"', (PAGES / "all.html").read_text())
-    for page in sorted({PAGES / link for link in linked if "://" not in link and not link.startswith("..")}):
+    links = re.findall(r'<a href="([^"#]+\.html)"', (PAGES / crate / "all.html").read_text())
+    return sorted({PAGES / crate / link for link in links if "://" not in link and not link.startswith("..")})
+
+
+def items():
+    for page in (page for crate in CRATES for page in pages(crate)):
         kind, _, name = page.stem.partition(".")
         modules = page.relative_to(PAGES).parts[:-1]
-        if kind not in KINDS or not modules or modules[0] in OUTSIDE:
+        if kind not in KINDS or OUTSIDE.intersection(modules):
             continue
         reader = Declarations()
         reader.feed(page.read_text())
@@ -67,8 +73,9 @@ def items():
 
 
 def main():
-    if not (PAGES / "all.html").is_file():
-        sys.exit(f"{PAGES}: expected pages: cargo doc --no-deps")
+    missing = [crate for crate in CRATES if not (PAGES / crate / "all.html").is_file()]
+    if missing:
+        sys.exit(f"{PAGES}: no pages of {', '.join(missing)}: expected those of cargo doc --no-deps")
     found = "".join(f"{line}\n" for line in items())
     if "--write" in sys.argv[1:]:
         LIST.write_text(found)

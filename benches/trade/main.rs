@@ -14,6 +14,7 @@ use std::f64::consts::TAU;
 use std::path::Path;
 use std::time::Instant;
 
+use fft::Planner;
 use gnss_twin::analysis;
 use gnss_twin::analysis::show::trade::{self, TradeRow};
 use gnss_twin::analysis::statistics::{mean, median};
@@ -29,7 +30,6 @@ use gnss_twin::receiver::output::Output;
 use gnss_twin::receiver::receive;
 use gnss_twin::receiver::settings::Settings;
 use num_complex::Complex;
-use rustfft::FftPlanner;
 
 const CHIP_S: f64 = 1.0 / 1.023e6;
 const CHIP_M: f64 = 299_792_458.0 * CHIP_S;
@@ -234,7 +234,7 @@ fn spur_dbc(tested: &[Complex<f32>], base: &[Complex<f32>]) -> f64 {
         })
         .collect();
     buffer.resize(LENGTH, Complex::new(0.0, 0.0));
-    FftPlanner::new().plan_fft_forward(LENGTH).process(&mut buffer);
+    Planner::<f64>::new().plan_fft_forward(LENGTH).process(&mut buffer);
     let carrier = buffer[0].norm();
     let spur = buffer[8..LENGTH - 8].iter().map(|x| x.norm()).fold(0.0, f64::max);
     20.0 * libm::log10((spur / carrier).max(1e-15))

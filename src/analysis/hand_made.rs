@@ -9,23 +9,23 @@ use std::path::Path;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::record::{
+use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::gps::l1ca::L1_CA;
+use gnss::record::{
     AcquisitionRow, Event, EventRow, Fix, IonosphereModel, IonosphereRow, LineRow, NavigationRow, Observation, SkyRow,
     TrackingRow, TrajectoryRow,
 };
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use gnss::satellite::Sv;
+use gnss::time::Epoch;
 
-pub(in crate::analysis) const RATE_HZ: u64 = 2_600_000;
-pub(in crate::analysis) const TICKS: u64 = 600;
-pub(in crate::analysis) const FIRST_TICK: u64 = 300;
-pub(in crate::analysis) const PRNS: [u8; 9] = [2, 5, 7, 12, 15, 18, 21, 26, 29];
-pub(in crate::analysis) const CHIP_M: f64 = SPEED_OF_LIGHT_MPS / 1.023e6;
+pub(crate) const RATE_HZ: u64 = 2_600_000;
+pub(crate) const TICKS: u64 = 600;
+pub(crate) const FIRST_TICK: u64 = 300;
+pub(crate) const PRNS: [u8; 9] = [2, 5, 7, 12, 15, 18, 21, 26, 29];
+pub(crate) const CHIP_M: f64 = SPEED_OF_LIGHT_MPS / 1.023e6;
 
 /// Near normal with unit variance: the sum of twelve uniforms minus six, from Knuth's congruential generator.
-pub(in crate::analysis) struct Draw(pub u64);
+pub(crate) struct Draw(pub u64);
 
 impl Draw {
     pub fn normal(&mut self) -> f64 {
@@ -38,7 +38,7 @@ impl Draw {
 }
 
 /// What is planted.
-pub(in crate::analysis) struct Planted {
+pub(crate) struct Planted {
     pub code_bias_m: f64,
     pub code_sigma_m: f64,
     pub carrier_sigma_cycles: f64,
@@ -49,7 +49,7 @@ pub(in crate::analysis) struct Planted {
     pub fixes: bool,
 }
 
-pub(in crate::analysis) const PLANTED: Planted = Planted {
+pub(crate) const PLANTED: Planted = Planted {
     code_bias_m: 0.25,
     code_sigma_m: 0.7,
     carrier_sigma_cycles: 0.008,
@@ -60,18 +60,18 @@ pub(in crate::analysis) const PLANTED: Planted = Planted {
     fixes: true,
 };
 
-pub(in crate::analysis) fn write<T: Serialize>(path: &Path, rows: &[T]) {
+pub(crate) fn write<T: Serialize>(path: &Path, rows: &[T]) {
     let mut writer = csv::Writer::from_path(path).unwrap();
     rows.iter().for_each(|row| writer.serialize(row).unwrap());
     writer.flush().unwrap();
 }
 
-pub(in crate::analysis) fn start() -> Epoch {
+pub(crate) fn start() -> Epoch {
     Epoch::parse("2010-07-01T08:12:30").unwrap()
 }
 
 /// The true observation of a satellite at a tick of 0.1 s.
-pub(in crate::analysis) fn true_observation(index: usize, tick: u64) -> Observation {
+pub(crate) fn true_observation(index: usize, tick: u64) -> Observation {
     let t_s = tick as f64 * 0.1;
     let doppler_hz = 3500.0 - 800.0 * index as f64 - 0.6 * t_s;
     let range_m = 21.0e6 + 4.0e5 * index as f64 - doppler_hz * L1_CA.wavelength_m(Sv::gps(1)) * t_s;
@@ -91,12 +91,12 @@ pub(in crate::analysis) fn true_observation(index: usize, tick: u64) -> Observat
     }
 }
 
-pub(in crate::analysis) fn parameter(prn: u8, name: &str, raw: i64) -> NavigationRow {
+pub(crate) fn parameter(prn: u8, name: &str, raw: i64) -> NavigationRow {
     NavigationRow { sv: Sv::gps(prn), issue: 17, parameter: name.to_owned(), raw, message: "LNAV".to_owned() }
 }
 
 /// Writes the truth's half of a run.
-pub(in crate::analysis) fn write_truth(run: &Path) {
+pub(crate) fn write_truth(run: &Path) {
     let truth = run.join("truth");
     fs::create_dir_all(&truth).unwrap();
     let all = || (0..TICKS).flat_map(|tick| (0..PRNS.len()).map(move |index| (tick, index)));
@@ -148,7 +148,7 @@ pub(in crate::analysis) fn write_truth(run: &Path) {
 }
 
 /// Writes the receiver's half: the truth with what is planted.
-pub(in crate::analysis) fn write_estimate(run: &Path, planted: &Planted) {
+pub(crate) fn write_estimate(run: &Path, planted: &Planted) {
     let rx = run.join("rx");
     fs::create_dir_all(&rx).unwrap();
     let mut draw = Draw(1);
@@ -216,7 +216,7 @@ pub(in crate::analysis) fn write_estimate(run: &Path, planted: &Planted) {
 }
 
 /// Acquisition with one false hit, tracking, navigation with one wrong parameter and one never sent, events.
-pub(in crate::analysis) fn write_channels(rx: &Path, draw: &mut Draw) {
+pub(crate) fn write_channels(rx: &Path, draw: &mut Draw) {
     let search = |prn: u8| {
         let real = PRNS.contains(&prn);
         AcquisitionRow {
@@ -262,11 +262,11 @@ pub(in crate::analysis) fn write_channels(rx: &Path, draw: &mut Draw) {
 }
 
 /// The run as it is planted.
-pub(in crate::analysis) fn planted() -> tempfile::TempDir {
+pub(crate) fn planted() -> tempfile::TempDir {
     planted_run(&PLANTED)
 }
 
-pub(in crate::analysis) fn planted_run(planted: &Planted) -> tempfile::TempDir {
+pub(crate) fn planted_run(planted: &Planted) -> tempfile::TempDir {
     let run = tempfile::tempdir().unwrap();
     write_truth(run.path());
     write_estimate(run.path(), planted);
@@ -274,7 +274,7 @@ pub(in crate::analysis) fn planted_run(planted: &Planted) -> tempfile::TempDir {
 }
 
 /// What a receiver reports of a continuous wave in a second.
-pub(in crate::analysis) fn reported(second: u64, frequency_hz: f64) -> LineRow {
+pub(crate) fn reported(second: u64, frequency_hz: f64) -> LineRow {
     LineRow {
         sample: second * RATE_HZ,
         frequency_hz,
@@ -288,7 +288,7 @@ pub(in crate::analysis) fn reported(second: u64, frequency_hz: f64) -> LineRow {
 }
 
 /// Writes 41 delays that two bands showed of the second satellite, each with an error of its own.
-pub(in crate::analysis) fn two_bands(run: &Path, error_m: impl Fn(u64) -> f64) {
+pub(crate) fn two_bands(run: &Path, error_m: impl Fn(u64) -> f64) {
     let row = |row: u64| IonosphereRow {
         sample: (FIRST_TICK + row) * RATE_HZ / 10,
         sv: Sv::gps(PRNS[1]),

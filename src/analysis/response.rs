@@ -6,10 +6,10 @@
 //! length 1 + (80 − 7.95)/(14.36·edge), β = 0.1102·(80 − 8.7)). Limits: lags below −100 dB of a Butterworth's
 //! response and roundings of taps are left out.
 
-use rustfft::num_complex::Complex;
+use num_complex::Complex;
 
-use crate::analysis::waveform::KaiserSinc;
-use crate::gnss::facts::{FilterShape, FilterSpec};
+use crate::waveform::KaiserSinc;
+use gnss::facts::{FilterShape, FilterSpec};
 
 /// Attenuation of a wall, dB, and its edge over the filter's width.
 const WALL_DB: f64 = 80.0;

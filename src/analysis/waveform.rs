@@ -1,15 +1,15 @@
 //! A signal's spectrum as a sampler meets it, and the correlation whose transform that is.
 //!
 //! Both are sums over the signal's components by their shares of power, each from its own pulses
-//! ([`crate::gnss::signal::Shape`]). Samples show a spectrum with its aliases, behind the response of what
+//! ([`gnss::signal::Shape`]). Samples show a spectrum with its aliases, behind the response of what
 //! samples it ([`Sampler`]). Limits: codes count as random, so that the lines of a short code, its overlay
 //! and the data are left out; a chip that is another component's turn counts as any other.
 
 use std::sync::Arc;
 
-pub use crate::gnss::facts::Edge;
-use crate::gnss::facts::SceneFacts;
-use crate::gnss::signal::{Component, Layers, Shape, Signal};
+pub use gnss::facts::Edge;
+use gnss::facts::SceneFacts;
+use gnss::signal::{Component, Layers, Shape, Signal};
 
 /// Cut-off of band-limited edges where a scene's facts do not state it, in cycles a sample.
 pub const CUTOFF_CPS: f64 = 0.45;
@@ -301,10 +301,10 @@ impl Waveform {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::galileo::e1::E1;
-    use crate::gnss::gps::l1c::L1C;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, QUADRATURE, SYNTHETIC};
+    use gnss::galileo::e1::E1;
+    use gnss::gps::l1c::L1C;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::signal::synthetic::{LONG_BOC, MIXED, QUADRATURE, SYNTHETIC};
 
     fn of(signal: &Signal) -> Waveform {
         Waveform::of(signal).unwrap()

@@ -3,8 +3,6 @@
 //! Everything printed goes through writers that return errors, so a full disk or a closed pipe
 //! ends in an exit code and never in a panic. Exit codes are listed in `error`.
 
-#![warn(missing_docs)]
-
 mod address;
 mod analyze;
 mod archive;

@@ -4,18 +4,18 @@
 //! the delay of the code is (T − t) + τ + (delays of the ray) − (satellite clock); that of the carrier takes
 //! the ray's carrier delay instead, and is counted in cycles at RF.
 
-use crate::generator::geometry::{Arriving, Geometry, Places};
-use crate::generator::knots::Arrival;
-use crate::generator::presence::{Presence, presence};
-use crate::generator::ray::Ray;
-use crate::generator::scene::Scene;
-use crate::generator::sky::{Arc, Emission, LIGHT_TIME_S, Place, emission_near};
-use crate::generator::spoof::Constellation;
-use crate::generator::vehicle::Motion;
-use crate::gnss::broadcast::OrbitError;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use crate::geometry::{Arriving, Geometry, Places};
+use crate::knots::Arrival;
+use crate::presence::{Presence, presence};
+use crate::ray::Ray;
+use crate::scene::Scene;
+use crate::sky::{Arc, Emission, LIGHT_TIME_S, Place, emission_near};
+use crate::spoof::Constellation;
+use crate::vehicle::Motion;
+use gnss::broadcast::OrbitError;
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
+use gnss::time::Epoch;
 
 /// A satellite's signal as it arrives at one reading of the receiver's clock.
 #[derive(Clone, Debug)]

@@ -13,19 +13,19 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use crate::generator::catalogue::Catalogue;
-use crate::generator::message::{MessageFault, spoiled};
-use crate::generator::ray::{Effect, Ray, Sight};
-use crate::generator::sky::emission;
-use crate::gnss::augmentation::accuracy::{DO_NOT_USE, NOT_MONITORED, udrei_of};
-use crate::gnss::augmentation::grid::{BANDS, EDGE_DEG, Point, points};
-use crate::gnss::augmentation::{Known, LongTerm, Network};
-use crate::gnss::broadcast::{Ephemeris, State};
-use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::gps::lnav::LNAV;
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::time::Epoch;
+use crate::catalogue::Catalogue;
+use crate::message::{MessageFault, spoiled};
+use crate::ray::{Effect, Ray, Sight};
+use crate::sky::emission;
+use gnss::augmentation::accuracy::{DO_NOT_USE, NOT_MONITORED, udrei_of};
+use gnss::augmentation::grid::{BANDS, EDGE_DEG, Point, points};
+use gnss::augmentation::{Known, LongTerm, Network};
+use gnss::broadcast::{Ephemeris, State};
+use gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
+use gnss::gps::l1ca::L1_CA;
+use gnss::gps::lnav::LNAV;
+use gnss::satellite::{Sv, System};
+use gnss::time::Epoch;
 
 /// Steps of fast corrections and of places (A.4.4.3, A.4.4.7).
 const STEP_M: f64 = 0.125;
@@ -107,7 +107,7 @@ impl fmt::Debug for GroundNetwork {
 
 impl GroundNetwork {
     /// The network around a place; it corrects the satellites that are above its horizon at one of the times.
-    pub fn around(ground: Ground, motion: &crate::generator::vehicle::Motion, times: &[Epoch]) -> Self {
+    pub fn around(ground: Ground, motion: &crate::vehicle::Motion, times: &[Epoch]) -> Self {
         let is_up = |sv: Sv, at: Epoch| {
             let found = emission(&ground.catalogue, sv, at, motion).ok().flatten();
             found.is_some_and(|found| found.sight.look.elevation_rad > 0.0)

@@ -13,12 +13,12 @@
 
 use std::collections::BTreeMap;
 
-use crate::generator::orbit_error::{Displacement, minimum_jerk};
-use crate::generator::precise::Orbits;
-use crate::gnss::broadcast::{ClockState, Ephemeris, OrbitError, State};
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use crate::orbit_error::{Displacement, minimum_jerk};
+use crate::precise::Orbits;
+use gnss::broadcast::{ClockState, Ephemeris, OrbitError, State};
+use gnss::satellite::{Sv, System};
+use gnss::signal::Signal;
+use gnss::time::Epoch;
 
 /// Duration of a hand-over, centred on the instant when the broadcast set changes. A step of Δ metres
 /// becomes a rate of at most 1.875 Δ / 720 s: 2.6 mm/s a metre.

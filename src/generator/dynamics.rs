@@ -3,7 +3,7 @@
 //! With u from the antenna to the satellite the range's second derivative is u·(a_s − a) + |Δv across u|²/ρ,
 //! all in the Earth's axes; the satellite's share and u are taken at 240 instants, the body's at ten places
 //! between its knots. A spin carries the antenna round a circle, which counts for itself
-//! ([`Trajectory::circle`](crate::generator::vehicle::Trajectory::circle)). Limits: of jerk only the body's
+//! ([`Trajectory::circle`](crate::vehicle::Trajectory::circle)). Limits: of jerk only the body's
 //! share counts, −u·da/dt: the turning of u adds below 0.02 m/s³ for a rocket at 20 g; what an oscillator
 //! makes of acceleration is left out.
 
@@ -11,13 +11,13 @@ use nalgebra::Vector3;
 
 use serde::Serialize;
 
-use crate::generator::plan::strength_dbhz;
-use crate::generator::presence::{Presence, presence};
-use crate::generator::ray::Sight;
-use crate::generator::scene::Scene;
-use crate::gnss::broadcast::OrbitError;
-use crate::gnss::earth::{EARTH_ROTATION_RADPS, GPS_MU_M3PS2};
-use crate::gnss::satellite::Sv;
+use crate::plan::strength_dbhz;
+use crate::presence::{Presence, presence};
+use crate::ray::Sight;
+use crate::scene::Scene;
+use gnss::broadcast::OrbitError;
+use gnss::earth::{EARTH_ROTATION_RADPS, GPS_MU_M3PS2};
+use gnss::satellite::Sv;
 
 /// Instants between start and end at which satellites are placed.
 const INSTANTS: u32 = 240;

@@ -2,10 +2,10 @@
 
 use thiserror::Error;
 
-use crate::generator::synth::waveform::WaveformError;
-use crate::generator::truth::TruthError;
-use crate::gnss::broadcast::OrbitError;
-use crate::gnss::gps::lnav::FieldError;
+use crate::synth::waveform::WaveformError;
+use crate::truth::TruthError;
+use gnss::broadcast::OrbitError;
+use gnss::gps::lnav::FieldError;
 
 /// Why a scene could not be generated.
 #[derive(Debug, Error)]

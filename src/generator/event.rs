@@ -10,10 +10,10 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use crate::generator::scene::Scene;
-use crate::generator::switches::{MOST, Source};
-use crate::generator::vehicle::file::{Fault, FileError};
-use crate::gnss::satellite::Sv;
+use crate::scene::Scene;
+use crate::switches::{MOST, Source};
+use crate::vehicle::file::{Fault, FileError};
+use gnss::satellite::Sv;
 
 /// Decibels that a power may be changed by.
 const MOST_DB: f64 = 100.0;

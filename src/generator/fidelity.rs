@@ -6,9 +6,9 @@
 
 use serde::Serialize;
 
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::facts::Edge;
-use crate::gnss::signal::{Component, Layers, Signal};
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::facts::Edge;
+use gnss::signal::{Component, Layers, Signal};
 
 /// Rate of the code that the figures were measured with.
 const CHIP_HZ: f64 = 1.023e6;

@@ -9,11 +9,11 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::generator::clock::ReceiverClock;
-use crate::generator::scene::Scene;
-use crate::generator::sky::{Emission, Place};
-use crate::gnss::broadcast::OrbitError;
-use crate::gnss::time::Epoch;
+use crate::clock::ReceiverClock;
+use crate::scene::Scene;
+use crate::sky::{Emission, Place};
+use gnss::broadcast::OrbitError;
+use gnss::time::Epoch;
 
 /// Instants that are kept of a satellite: some 300 KB.
 const KEPT: usize = 1024;
@@ -106,11 +106,11 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::generator::catalogue::Catalogue;
-    use crate::generator::sky::{LIGHT_TIME_S, emission_near};
-    use crate::generator::vehicle::Motion;
-    use crate::gnss::rinex;
-    use crate::gnss::satellite::Sv;
+    use crate::catalogue::Catalogue;
+    use crate::sky::{LIGHT_TIME_S, emission_near};
+    use crate::vehicle::Motion;
+    use gnss::rinex;
+    use gnss::satellite::Sv;
 
     #[test]
     fn an_instant_is_computed_once_and_memory_is_bounded() {

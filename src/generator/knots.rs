@@ -10,8 +10,8 @@
 //! of a scene of two signals in two front ends. Where the motion is pushed, a root is a tick. Limits: parts
 //! are not shorter than 1024 samples.
 
-use crate::generator::fast_phase::FastPhase;
-use crate::gnss::time::Rate;
+use crate::fast_phase::FastPhase;
+use gnss::time::Rate;
 
 /// Parts of the grid are not halved below this; what error remains is reported.
 const SHORTEST_SAMPLES: u64 = 1024;
@@ -330,7 +330,7 @@ mod tests {
         // A hundredth of a decibel a second, as satellites rise.
         let slow = |t_s: f64| 1e4 * libm::pow(10.0, 1e-3 * t_s);
         let rising = made(&slow);
-        assert_eq!((rising.len(), rising[0].paths[0].run_samples), (1, crate::generator::synth::RUN_SAMPLES as u64));
+        assert_eq!((rising.len(), rising[0].paths[0].run_samples), (1, crate::synth::RUN_SAMPLES as u64));
         assert_eq!(rising[0].paths[0].cn0_hz, Cubic::line(slow(0.0), slow(rate.elapsed_s(rising[0].end))));
         // 9.5 dB from side to side, a hundred times a second.
         let turning = |t_s: f64| {

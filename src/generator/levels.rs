@@ -12,14 +12,14 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-use crate::generator::arrival;
-use crate::generator::ray::Ray;
-use crate::generator::scene::Scene;
-use crate::generator::sky::emission;
-use crate::generator::spoof::Constellation;
-use crate::generator::stream::{self, GenerateError, Stretch};
-use crate::gnss::broadcast::OrbitError;
-use crate::gnss::satellite::Sv;
+use crate::arrival;
+use crate::ray::Ray;
+use crate::scene::Scene;
+use crate::sky::emission;
+use crate::spoof::Constellation;
+use crate::stream::{self, GenerateError, Stretch};
+use gnss::broadcast::OrbitError;
+use gnss::satellite::Sv;
 
 /// Stretches of samples that are made, spread evenly over the scene, and the samples of each: with 5e5
 /// components a share of 1e-4 that is clipped is known to a seventh.

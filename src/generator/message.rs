@@ -7,13 +7,13 @@
 
 use std::ops::Range;
 
-use crate::generator::random::Stream;
-use crate::gnss::bits::FieldError;
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::message::{Common, Message, Sender};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, TimeScale};
+use crate::random::Stream;
+use gnss::bits::FieldError;
+use gnss::broadcast::Ephemeris;
+use gnss::message::{Common, Message, Sender};
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
+use gnss::time::{Epoch, TimeScale};
 
 /// Bits of a word by which a fault gives a bit's place (IS-GPS-200N, 20.3.2).
 const WORD_BITS: u64 = 30;

@@ -7,10 +7,10 @@
 
 use nalgebra::Vector3;
 
-use crate::gnss::broadcast::State;
-use crate::gnss::earth::EARTH_ROTATION_RADPS;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use gnss::broadcast::State;
+use gnss::earth::EARTH_ROTATION_RADPS;
+use gnss::satellite::Sv;
+use gnss::time::Epoch;
 
 /// An offset of some satellites.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,7 +83,7 @@ impl Displacement {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::rinex;
+    use gnss::rinex;
 
     #[test]
     fn an_offset_lies_along_its_axes_and_its_velocity_is_its_derivative() {

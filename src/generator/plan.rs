@@ -2,7 +2,7 @@
 //!
 //! Satellites are placed at a few hundred instants, effects act on them there, and sizes and times follow
 //! from counts. What concerns the synthesiser (knots, speed, memory) is given to it, and so are the levels
-//! ([`crate::generator::levels`]), for which a few stretches of samples are made.
+//! ([`crate::levels`]), for which a few stretches of samples are made.
 
 mod machinery;
 mod models;
@@ -14,17 +14,17 @@ use models::models;
 
 use serde::Serialize;
 
-use crate::generator::catalogue::Silence;
-use crate::generator::fidelity::{self, Choice};
-use crate::generator::levels::{Levels, Span};
-use crate::generator::presence::{Presence, presence};
-use crate::generator::ray::{Ray, Sight};
-use crate::generator::scene::{SPACE_M, Scene};
-use crate::gnss::broadcast::OrbitError;
-use crate::gnss::earth::Geodetic;
-use crate::gnss::record::PassEnd;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::catalogue::Silence;
+use crate::fidelity::{self, Choice};
+use crate::levels::{Levels, Span};
+use crate::presence::{Presence, presence};
+use crate::ray::{Ray, Sight};
+use crate::scene::{SPACE_M, Scene};
+use gnss::broadcast::OrbitError;
+use gnss::earth::Geodetic;
+use gnss::record::PassEnd;
+use gnss::satellite::Sv;
+use gnss::time::Epoch;
 
 /// Instants between start and end at which the sky is looked at.
 const INSTANTS: u32 = 240;
@@ -121,8 +121,7 @@ impl Plan {
         let links: usize = satellites.iter().map(|satellite| scene.signals_of(satellite.sv).count()).sum();
         let up = links as f64 * sources + scene.interference.len() as f64;
         let bytes = scene.samples.saturating_mul(scene.metadata.format.bytes() as u64);
-        let knots =
-            scene.trajectory.knots().len() as u64 * std::mem::size_of::<crate::generator::vehicle::Knot>() as u64;
+        let knots = scene.trajectory.knots().len() as u64 * std::mem::size_of::<crate::vehicle::Knot>() as u64;
         Ok(Self {
             name: scene.name.clone(),
             front_end: scene.front_end_name.clone(),

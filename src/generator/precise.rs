@@ -19,11 +19,11 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use crate::gnss::broadcast::{ClockState, State};
-use crate::gnss::earth::{EARTH_ROTATION_RADPS, GPS_MU_M3PS2, SPEED_OF_LIGHT_MPS};
-use crate::gnss::satellite::Sv;
-use crate::gnss::sp3::{Precise, Sample};
-use crate::gnss::time::Epoch;
+use gnss::broadcast::{ClockState, State};
+use gnss::earth::{EARTH_ROTATION_RADPS, GPS_MU_M3PS2, SPEED_OF_LIGHT_MPS};
+use gnss::satellite::Sv;
+use gnss::sp3::{Precise, Sample};
+use gnss::time::Epoch;
 
 /// Epochs that a position is taken through; half of them lie before it.
 pub const NODES: usize = 12;

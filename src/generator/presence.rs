@@ -7,14 +7,14 @@
 
 use std::ops::Range;
 
-use crate::generator::catalogue::Silence;
-use crate::generator::scene::{SPACE_M, Scene};
-use crate::generator::sky::{Emission, emission, emission_of_set};
-use crate::generator::vehicle::Motion;
-use crate::gnss::broadcast::OrbitError;
-use crate::gnss::record::{PassEnd, PassRow};
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::catalogue::Silence;
+use crate::scene::{SPACE_M, Scene};
+use crate::sky::{Emission, emission, emission_of_set};
+use crate::vehicle::Motion;
+use gnss::broadcast::OrbitError;
+use gnss::record::{PassEnd, PassRow};
+use gnss::satellite::Sv;
+use gnss::time::Epoch;
 
 /// Farthest from its reference time that a set places a satellite above or below the mask. Half a day on,
 /// real sets of two days are some kilometres off: 1e-4 rad of elevation.

@@ -2,11 +2,11 @@
 
 use nalgebra::Vector3;
 
-use crate::gnss::broadcast::State;
-use crate::gnss::earth::{Geodetic, Look};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use gnss::broadcast::State;
+use gnss::earth::{Geodetic, Look};
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
+use gnss::time::Epoch;
 
 /// The geometry between one satellite and the antenna at one instant of reception.
 #[derive(Clone, Debug)]

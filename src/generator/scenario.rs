@@ -2,7 +2,7 @@
 //!
 //! [`Scenario::parse`] holds each key and each value against its declaration ([`keys::SCENARIO`]) and
 //! collects what is wrong; [`Scenario::compose`] checks what concerns several of them, loads files and makes
-//! a [`Scene`](crate::generator::scene::Scene). Units are in the names of the keys: degrees and dB here,
+//! a [`Scene`](crate::scene::Scene). Units are in the names of the keys: degrees and dB here,
 //! radians and ratios from here on. `[receiver]` is kept as written for the receiver's own settings.
 
 mod attitude;
@@ -22,7 +22,7 @@ mod obstruction;
 mod parts;
 mod propagation;
 mod pushed;
-pub(crate) mod read;
+pub mod read;
 mod satellite;
 pub mod schema;
 mod scintillation;
@@ -51,16 +51,16 @@ use read::{Refusals, Source, Table};
 pub use satellite::{MessageKind, MessageSpec, OrbitsSpec, SatelliteFault};
 use stages::PlaybackSpec;
 
-use crate::generator::effect::multipath::Echo;
-use crate::generator::effect::obstruction::Obstacle;
-use crate::generator::fast_phase::scintillation::Strength;
-use crate::generator::fidelity::allowed_m;
-use crate::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade};
-use crate::generator::vehicle::attitude::Attitude;
-use crate::gnss::facts::Expect;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Layers, Signal};
-use crate::gnss::time::{Epoch, Rate};
+use crate::effect::multipath::Echo;
+use crate::effect::obstruction::Obstacle;
+use crate::fast_phase::scintillation::Strength;
+use crate::fidelity::allowed_m;
+use crate::scene::{Arithmetic, CodeEdge, Fidelity, Grade};
+use crate::vehicle::attitude::Attitude;
+use gnss::facts::Expect;
+use gnss::satellite::Sv;
+use gnss::signal::{Layers, Signal};
+use gnss::time::{Epoch, Rate};
 
 /// What an absent table comes to; a test holds these against the declared defaults.
 const MASK_DEG: f64 = 5.0;
@@ -417,7 +417,7 @@ fn name(root: &Table<'_>) -> Result<String, ScenarioError> {
 }
 
 fn signals(root: &Table<'_>) -> Result<Vec<&'static Signal>, ScenarioError> {
-    let signals = signal_list(root, "signals")?.unwrap_or_else(|| vec![&crate::gnss::gps::l1ca::L1_CA]);
+    let signals = signal_list(root, "signals")?.unwrap_or_else(|| vec![&gnss::gps::l1ca::L1_CA]);
     let sides =
         |whole: &'static Signal| signals.iter().filter(|side| whole.has_side(side)).map(move |side| (whole, *side));
     match signals.iter().copied().find_map(|whole| sides(whole).next()) {

@@ -8,13 +8,13 @@
 
 use nalgebra::{Matrix3, SVector, Vector3};
 
-use crate::generator::catalogue::Catalogue;
-use crate::generator::ray::Sight;
-use crate::generator::vehicle::Motion;
-use crate::gnss::broadcast::{ClockState, Ephemeris, OrbitError, State};
-use crate::gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, SPEED_OF_LIGHT_MPS, look_in, rotate_earth};
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::catalogue::Catalogue;
+use crate::ray::Sight;
+use crate::vehicle::Motion;
+use gnss::broadcast::{ClockState, Ephemeris, OrbitError, State};
+use gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, SPEED_OF_LIGHT_MPS, look_in, rotate_earth};
+use gnss::satellite::Sv;
+use gnss::time::Epoch;
 
 /// A first guess of the light time, good for any place near the Earth.
 pub const LIGHT_TIME_S: f64 = 0.075;
@@ -242,7 +242,7 @@ impl Arc {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::rinex;
+    use gnss::rinex;
 
     #[test]
     fn the_light_time_equation_holds_in_inertial_axes() {
@@ -319,7 +319,7 @@ mod tests {
             let found = emission(&catalogue, sv, received, &motion).unwrap().unwrap();
             let (state, _) = catalogue.truth(sv, received.plus_s(-found.travel_s)).unwrap().unwrap();
             let (s, u) = (state.position_m, place);
-            let sagnac_m = crate::gnss::earth::EARTH_ROTATION_RADPS / SPEED_OF_LIGHT_MPS * (s.x * u.y - s.y * u.x);
+            let sagnac_m = gnss::earth::EARTH_ROTATION_RADPS / SPEED_OF_LIGHT_MPS * (s.x * u.y - s.y * u.x);
             let range_m = (s - u).norm();
             // The first-order formula is good to 0.14 mm (theory: second order (Ωτ)² r / 2).
             assert!((found.sight.range_m - range_m - sagnac_m).abs() < 5e-4, "{sv}");

@@ -11,10 +11,10 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use crate::generator::clock::ReceiverClock;
-use crate::generator::vehicle::{Motion, Trajectory};
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::SampleClock;
+use crate::clock::ReceiverClock;
+use crate::vehicle::{Motion, Trajectory};
+use gnss::satellite::Sv;
+use gnss::time::SampleClock;
 
 /// Pieces of a power ramp, each linear in power: of 60 dB, a piece is 0.9 dB and off by 0.02 dB at most.
 const RAMP_PIECES: u32 = 64;
@@ -197,7 +197,7 @@ impl Constellation {
         let place = match &self.place {
             Place::Antenna => "the antenna's true place".to_owned(),
             Place::Claimed(trajectory) => {
-                let here = crate::gnss::earth::Geodetic::from_ecef(&trajectory.at(self.on_s.start).position_m);
+                let here = gnss::earth::Geodetic::from_ecef(&trajectory.at(self.on_s.start).position_m);
                 let (latitude, longitude) = (here.latitude_rad.to_degrees(), here.longitude_rad.to_degrees());
                 format!("{latitude:.5} deg, {longitude:.5} deg, {:.0} m", here.height_m)
             }

@@ -29,12 +29,12 @@ use ticks::Ticks;
 
 use serde::Serialize;
 
-pub use crate::generator::error::GenerateError;
-use crate::generator::scene::Scene;
-use crate::generator::synth::isa::Level;
-use crate::generator::truth::{Record, Sink};
-use crate::gnss::record::{NavigationRow, PassRow};
-use crate::gnss::satellite::Sv;
+pub use crate::error::GenerateError;
+use crate::scene::Scene;
+use crate::synth::isa::Level;
+use crate::truth::{Record, Sink};
+use gnss::record::{NavigationRow, PassRow};
+use gnss::satellite::Sv;
 
 /// How the work is cut; no choice changes a byte.
 #[derive(Clone, Copy, Debug, PartialEq)]

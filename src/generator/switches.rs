@@ -8,10 +8,10 @@
 use std::collections::BTreeMap;
 use std::sync::{PoisonError, RwLock};
 
-use crate::generator::knots::Arrival;
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Rate;
+use crate::knots::Arrival;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::satellite::Sv;
+use gnss::time::Rate;
 
 /// Changes of a scene at most.
 pub const MOST: usize = 100_000;

@@ -6,7 +6,7 @@
 
 use thiserror::Error;
 
-use crate::gnss::earth::GPS_PI;
+use crate::earth::GPS_PI;
 
 /// Bits that hold fields.
 pub trait Store {
@@ -302,8 +302,8 @@ pub const fn element<T>(field: Field, get: fn(&T) -> f64, set: fn(&mut T, f64)) 
 /// places, kind, power of two, clause, path of the part)`.
 macro_rules! plain {
     ($name:literal, $places:expr, $kind:expr, $power:expr, $clause:expr, $($part:tt)+) => {
-        $crate::gnss::bits::element(
-            $crate::gnss::bits::Field::new($name, &$places, $kind, $power, $clause),
+        $crate::bits::element(
+            $crate::bits::Field::new($name, &$places, $kind, $power, $clause),
             |of| of.$($part)+,
             |of, value| of.$($part)+ = value,
         )

@@ -7,10 +7,10 @@
 
 use nalgebra::Vector3;
 
-use crate::gnss::earth::{EARTH_ROTATION_RADPS, GPS_MU_M3PS2};
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, WEEK_S};
+use crate::earth::{EARTH_ROTATION_RADPS, GPS_MU_M3PS2};
+use crate::satellite::{Sv, System};
+use crate::signal::Signal;
+use crate::time::{Epoch, WEEK_S};
 
 mod carried;
 mod error;
@@ -148,7 +148,7 @@ pub struct Mean {
 }
 
 /// What the users of a system's elements compute with.
-pub(in crate::gnss) struct Constants {
+pub(crate) struct Constants {
     /// Gravitational constant of the Earth.
     pub mu_m3ps2: f64,
     /// Rotation of the Earth.
@@ -412,7 +412,7 @@ impl Ephemeris {
 
     /// What a delay as 1/f² on another carrier of BeiDou makes of the one that the message gives on
     /// `given_hz`: zero on B3I, whose clock it is.
-    pub(in crate::gnss) fn group_delay_on_s(&self, given_hz: f64, carrier_hz: f64) -> f64 {
+    pub(crate) fn group_delay_on_s(&self, given_hz: f64, carrier_hz: f64) -> f64 {
         let against_b3i = |hz: f64| B3I_HZ * B3I_HZ / (hz * hz) - 1.0;
         if carrier_hz == given_hz {
             return self.given_delay_s();
@@ -580,8 +580,8 @@ fn tilted(state: State, rotation_radps: f64, since_toe_s: f64) -> State {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::signal::Carrier;
+    use crate::gps::l1ca::L1_CA;
+    use crate::signal::Carrier;
 
     fn example() -> Ephemeris {
         let toe = Epoch::from_week(1590, 345_600.0);

@@ -13,9 +13,9 @@ use std::collections::BTreeMap;
 use roxmltree::{Document, Node};
 use thiserror::Error;
 
-use crate::gnss::packed::{Components, Encoding, Group, Layout};
-use crate::gnss::recording::{Description, Samples};
-use crate::gnss::time::Rate;
+use crate::packed::{Components, Encoding, Group, Layout};
+use crate::recording::{Description, Samples};
+use crate::time::Rate;
 
 /// Why a text does not describe samples that can be read.
 #[derive(Debug, Error)]
@@ -291,7 +291,7 @@ impl<'a, 'i> Of<'a, 'i> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::samples::Format;
+    use crate::samples::Format;
 
     /// Two streams of 1-bit I and Q in the higher half of a little-endian word, and six samples of a third.
     const TRIPLE: &str = r#"<?xml version="1.0"?>

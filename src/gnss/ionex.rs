@@ -10,8 +10,8 @@ use std::f64::consts::TAU;
 
 use thiserror::Error;
 
-use crate::gnss::inflate::{InflateError, inflate};
-use crate::gnss::time::Epoch;
+use crate::inflate::{InflateError, inflate};
+use crate::time::Epoch;
 
 /// Largest file that is read, in bytes after decompression.
 pub const LARGEST_BYTES: u64 = 64 << 20;

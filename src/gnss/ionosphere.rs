@@ -2,11 +2,11 @@
 
 use nalgebra::Vector3;
 
-use crate::gnss::bdgim::Bdgim;
-use crate::gnss::earth::{Geodetic, Look};
-use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::nequick::NequickG;
-use crate::gnss::time::Epoch;
+use crate::bdgim::Bdgim;
+use crate::earth::{Geodetic, Look};
+use crate::klobuchar::Klobuchar;
+use crate::nequick::NequickG;
+use crate::time::Epoch;
 
 /// The models that there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

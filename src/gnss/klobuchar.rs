@@ -9,8 +9,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::gnss::earth::{Geodetic, Look};
-use crate::gnss::time::{BDT, Epoch};
+use crate::earth::{Geodetic, Look};
+use crate::time::{BDT, Epoch};
 
 /// Carrier on which the coefficients are defined (IS-GPS-200N, 3.3.1.1).
 pub const L1_HZ: f64 = 1_575.42e6;
@@ -135,7 +135,7 @@ fn cubic(coefficients: &[f64; 4], x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+    use crate::earth::SPEED_OF_LIGHT_MPS;
 
     const EXAMPLE: Klobuchar =
         Klobuchar { alpha: [1.118e-8, -7.451e-9, -5.961e-8, 1.192e-7], beta: [1.167e5, -2.294e5, -1.311e5, 1.049e6] };

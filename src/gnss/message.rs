@@ -5,21 +5,21 @@
 //! in the file that encodes and decodes it. All times here are those of the system that sends
 //! ([`TimeScale::label`]); who calls brings them to GPS time.
 //!
-//! [`TimeScale::label`]: crate::gnss::time::TimeScale::label
+//! [`TimeScale::label`]: crate::time::TimeScale::label
 
 use std::fmt;
 use std::sync::Arc;
 
-use crate::gnss::augmentation::{Content, Network};
-use crate::gnss::bdgim::Bdgim;
-use crate::gnss::bits::{Field, FieldError};
-use crate::gnss::broadcast::{Ephemeris, SetForm};
-use crate::gnss::gps::lnav::UtcData;
-use crate::gnss::ionosphere::{Coefficients, Model};
-use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::record::NavigationRow;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::{Epoch, TimePolynomial, TimeScale, WEEK_S};
+use crate::augmentation::{Content, Network};
+use crate::bdgim::Bdgim;
+use crate::bits::{Field, FieldError};
+use crate::broadcast::{Ephemeris, SetForm};
+use crate::gps::lnav::UtcData;
+use crate::ionosphere::{Coefficients, Model};
+use crate::klobuchar::Klobuchar;
+use crate::record::NavigationRow;
+use crate::satellite::Sv;
+use crate::time::{Epoch, TimePolynomial, TimeScale, WEEK_S};
 
 /// A form of message.
 pub struct Message {
@@ -142,7 +142,7 @@ pub struct Common {
 /// What messages newer than LNAV and D1 say of UTC: a polynomial and a change of leap seconds, in numbers of
 /// their system's own time (IS-GPS-705J, 20.3.3.6; BDS-SIS-ICD-B2a 1.0, 7.12).
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::gnss) struct UtcNumbers {
+pub(crate) struct UtcNumbers {
     pub a0_s: f64,
     pub a1_sps: f64,
     pub a2_sps2: f64,
@@ -311,8 +311,8 @@ impl PartialEq for Message {
 
 #[cfg(test)]
 mod tests {
-    use crate::gnss::signal::Signal;
-    use crate::gnss::{beidou, galileo, glonass, gps};
+    use crate::signal::Signal;
+    use crate::{beidou, galileo, glonass, gps};
 
     #[test]
     fn sets_come_whole_within_a_repetition_and_a_unit() {

@@ -9,10 +9,10 @@ use std::fmt::Write;
 
 use nalgebra::Vector3;
 
-use crate::gnss::earth::Geodetic;
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use crate::earth::Geodetic;
+use crate::satellite::{Sv, System};
+use crate::signal::Signal;
+use crate::time::Epoch;
 
 /// One knot.
 const KNOT_MPS: f64 = 1852.0 / 3600.0;
@@ -241,7 +241,7 @@ fn in_view(seen: &[Seen]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::gps::l1ca::L1_CA;
 
     fn place(latitude_deg: f64, longitude_deg: f64, height_m: f64) -> Place {
         Place {

@@ -17,7 +17,7 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use crate::gnss::samples::Format;
+use crate::samples::Format;
 
 /// Bytes that are read at once, about.
 const READ_BYTES: usize = 1 << 16;

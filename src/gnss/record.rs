@@ -6,10 +6,10 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::gnss::earth::Geodetic;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Link, Signal, by_name};
-use crate::gnss::time::{Epoch, GPST};
+use crate::earth::Geodetic;
+use crate::satellite::Sv;
+use crate::signal::{Link, Signal, by_name};
+use crate::time::{Epoch, GPST};
 
 /// Rows that belong to one signal of one satellite.
 macro_rules! linked {

@@ -1,10 +1,10 @@
 //! What metadata say of a recording before anything completes it: keys may be absent, samples packed, and a
 //! file may have more than samples.
 
-use crate::gnss::packed::{Components, Encoding, Interleaved, Layout, LayoutError};
-use crate::gnss::samples::Format;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, Rate};
+use crate::packed::{Components, Encoding, Interleaved, Layout, LayoutError};
+use crate::samples::Format;
+use crate::signal::Signal;
+use crate::time::{Epoch, Rate};
 
 /// How samples lie in a file.
 #[derive(Clone, Debug, PartialEq)]

@@ -18,13 +18,13 @@ use std::collections::BTreeSet;
 
 use thiserror::Error;
 
-use crate::gnss::bdgim::Bdgim;
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::gps::lnav::LeapEvent;
-use crate::gnss::inflate::{InflateError, inflate};
-use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::{Epoch, TimePolynomial, WEEK_S};
+use crate::bdgim::Bdgim;
+use crate::broadcast::Ephemeris;
+use crate::gps::lnav::LeapEvent;
+use crate::inflate::{InflateError, inflate};
+use crate::klobuchar::Klobuchar;
+use crate::satellite::Sv;
+use crate::time::{Epoch, TimePolynomial, WEEK_S};
 
 /// Largest file that is read, in bytes after decompression.
 pub const LARGEST_BYTES: u64 = 256 << 20;
@@ -114,7 +114,7 @@ pub enum NavigationError {
 /// # Errors
 /// As [`read`]; a test makes sure that there are none.
 pub fn embedded() -> Result<Navigation, NavigationError> {
-    read(include_bytes!("../../data/brdc1820-2010.n.gz"), "embedded brdc1820-2010.n.gz")
+    read(include_bytes!("data/brdc1820-2010.n.gz"), "embedded brdc1820-2010.n.gz")
 }
 
 /// The hours around 2020-11-29T12:40 as broadcast by GPS and Galileo: the same for scenes of that day.
@@ -123,7 +123,7 @@ pub fn embedded() -> Result<Navigation, NavigationError> {
 /// As [`read`]; a test makes sure that there are none.
 pub fn embedded_two_systems() -> Result<Navigation, NavigationError> {
     let name = "embedded CARD00ESP_R_20203340900_15H_MN.rnx.gz";
-    read(include_bytes!("../../data/CARD00ESP_R_20203340900_15H_MN.rnx.gz"), name)
+    read(include_bytes!("data/CARD00ESP_R_20203340900_15H_MN.rnx.gz"), name)
 }
 
 /// Reads a navigation file, plain or gzip, whose `name` goes into errors.
@@ -329,7 +329,7 @@ mod tests {
 
     #[test]
     fn coefficients_of_bdgim_are_the_first_that_are_not_all_zero_by_header_or_record() {
-        let whole = unpack(include_bytes!("../../data/brdc1820-2010.n.gz"), "test").unwrap();
+        let whole = unpack(include_bytes!("data/brdc1820-2010.n.gz"), "test").unwrap();
         let text = String::from_utf8(whole[..3000].to_vec()).unwrap();
         let records = text.split_once("END OF HEADER").unwrap().1.split_once('\n').unwrap().1;
         let record: Vec<&str> = records.lines().take(8).collect();
@@ -388,7 +388,7 @@ mod tests {
 
     #[test]
     fn utc_is_read_from_every_version_and_refused_off_its_step() {
-        let whole = unpack(include_bytes!("../../data/brdc1820-2010.n.gz"), "test").unwrap();
+        let whole = unpack(include_bytes!("data/brdc1820-2010.n.gz"), "test").unwrap();
         let text = String::from_utf8(whole[..3000].to_vec()).unwrap();
         let records = text.split_once("END OF HEADER").unwrap().1.split_once('\n').unwrap().1;
         let record: Vec<&str> = records.lines().take(8).collect();
@@ -443,7 +443,7 @@ mod tests {
 
     #[test]
     fn damaged_files_give_errors_and_never_half_an_ephemeris() {
-        let whole = unpack(include_bytes!("../../data/brdc1820-2010.n.gz"), "test").unwrap();
+        let whole = unpack(include_bytes!("data/brdc1820-2010.n.gz"), "test").unwrap();
         let head = &whole[..whole.len().min(4000)];
         let reference = read(head, "head").unwrap();
         for cut in 0..head.len() {
@@ -460,7 +460,7 @@ mod tests {
         for (bytes, name) in [(&b""[..], "empty"), (b"\xff\xfe\x00", "noise"), (b"\x1f\x8b", "gzip head")] {
             assert!(read(bytes, name).unwrap_err().to_string().starts_with(name));
         }
-        let packed = include_bytes!("../../data/brdc1820-2010.n.gz");
+        let packed = include_bytes!("data/brdc1820-2010.n.gz");
         for cut in (1..packed.len()).step_by(5003) {
             assert!(read(&packed[..cut], "cut").is_err());
         }
@@ -484,7 +484,7 @@ mod tests {
 
     #[test]
     fn elements_out_of_their_field_s_range_leave_the_record_out_with_a_reason() {
-        let whole = unpack(include_bytes!("../../data/brdc1820-2010.n.gz"), "test").unwrap();
+        let whole = unpack(include_bytes!("data/brdc1820-2010.n.gz"), "test").unwrap();
         let text = String::from_utf8(whole[..3000].to_vec()).unwrap();
         let broken = text.replacen("0.483528291807D-02", "0.483528291807D+02", 1);
         assert_ne!(text, broken);

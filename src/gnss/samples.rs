@@ -8,7 +8,7 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use crate::gnss::time::{Epoch, Rate};
+use crate::time::{Epoch, Rate};
 
 /// How one sample is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

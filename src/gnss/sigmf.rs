@@ -14,11 +14,11 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
-use crate::gnss::packed::{Components, Encoding, Interleaved};
-use crate::gnss::recording::{Description, Samples};
-use crate::gnss::samples::{Format, IfMetadata};
-use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, Rate};
+use crate::packed::{Components, Encoding, Interleaved};
+use crate::recording::{Description, Samples};
+use crate::samples::{Format, IfMetadata};
+use crate::signal::Signal;
+use crate::time::{Epoch, Rate};
 
 const VERSION: &str = "1.2.0";
 const EXTENSION: &str = "gnss_twin";
@@ -487,8 +487,8 @@ impl File<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::samples::Format;
+    use crate::gps::l1ca::L1_CA;
+    use crate::samples::Format;
 
     #[test]
     fn metadata_read_back_as_written() {

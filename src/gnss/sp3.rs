@@ -1,32 +1,28 @@
-//! Precise orbits and clocks, SP3 versions c and d: an adapter over the `sp3` crate that yields satellites of
-//! GPS and Galileo.
+//! Precise orbits and clocks: SP3 files of versions c and d, read for satellites of GPS and Galileo.
 //!
-//! Source: The Extended Standard Product 3 Orbit Format (SP3-d), S. Hilla, 2016. Positions are of the centre
-//! of mass in the axes of the Earth; clocks belong to the ionosphere-free combination of P1 and P2 and leave
-//! out the periodic part of relativity, as broadcast ones do before theirs is added. The crate panics on
-//! damaged lines, gives a missing clock as 999999 µs, drops fractions of seconds, reads a version a in the
-//! wrong time and writes y into the x of velocities, so here the call is fenced, the first three are looked
-//! after and versions a and b refused; velocities are not used.
+//! Source: The Extended Standard Product 3 Orbit Format (SP3-d), S. Hilla, 2016; the columns below are those
+//! of its tables. Positions are of the centre of mass in the axes of the Earth. Clocks belong to the
+//! ionosphere-free combination of P1 and P2 and leave out the periodic part of relativity, as broadcast
+//! clocks do before that part is added. Limits: velocities, accuracies and correlations are not read,
+//! versions a and b are refused, and epochs are at whole seconds.
 
-use std::cell::Cell;
 use std::collections::BTreeMap;
-use std::io::BufReader;
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Once;
 
-use ::sp3::prelude::{Constellation, SP3, TimeScale, Version};
 use nalgebra::Vector3;
 use thiserror::Error;
 
-use crate::gnss::inflate::{InflateError, inflate};
-use crate::gnss::rinex::clean;
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::time::Epoch;
+use crate::inflate::{InflateError, inflate};
+use crate::rinex::clean;
+use crate::satellite::Sv;
+use crate::time::{self, Epoch, TimeScale};
 
 /// Largest file that is read, in bytes after decompression.
 const LARGEST_BYTES: u64 = 256 << 20;
 /// A clock from here on is none (SP3-d, table of the position record).
 const NO_CLOCK_US: f64 = 999_999.0;
+/// Distances from the Earth's centre that a satellite of GPS (26 560 km, an eccentricity below 0.1) or
+/// Galileo (29 600 km; two at 27 980 km with 0.16) can have.
+const RADII_M: std::ops::RangeInclusive<f64> = 2.3e7..=3.3e7;
 
 /// One satellite at one epoch of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,79 +94,139 @@ pub enum Sp3Error {
 pub fn read(bytes: &[u8], name: &str) -> Result<Precise, Sp3Error> {
     let packed = |source| Sp3Error::Packed { name: name.to_owned(), source };
     let text = clean(&inflate(bytes, LARGEST_BYTES).map_err(packed)?);
-    check_lines(&text, name)?;
-    let damaged = |detail: String| Sp3Error::Damaged { name: name.to_owned(), detail };
-    let file = quietly(|| SP3::from_reader(&mut BufReader::new(text.as_slice())))
-        .map_err(|()| damaged("its parser gave up on a malformed line".to_owned()))?
-        .map_err(|error| damaged(error.to_string()))?;
-    if !matches!(file.header.version, Version::C | Version::D) {
-        return Err(damaged(format!("version {}", file.header.version)));
+    // `clean` left nothing but ASCII, so columns are bytes.
+    let text = String::from_utf8_lossy(&text);
+    if !["#cP", "#cV", "#dP", "#dV"].iter().any(|begin| text.starts_with(begin)) {
+        return Err(Sp3Error::NotSp3 { name: name.to_owned(), found: quoted(text.lines().next().unwrap_or_default()) });
     }
-    let mut precise = Precise::default();
-    for (key, entry) in &file.data {
-        let (x_km, y_km, z_km) = entry.position_km;
-        let position_m = Vector3::new(x_km, y_km, z_km) * 1e3;
-        let system = match key.sv.constellation {
-            Constellation::GPS => System::Gps,
-            Constellation::Galileo => System::Galileo,
-            _ => continue,
-        };
-        let sv = Sv { system, number: key.sv.prn };
-        // Orbits of any age: 26 560 km and an eccentricity below 0.1, 29 600 km, and two of 27 980 km and
-        // 0.16.
-        let radius_m = position_m.norm();
-        if !(2.3e7..=3.3e7).contains(&radius_m) {
-            let epoch = key.epoch;
-            let what = format!("{sv} at {epoch}: {radius_m:e} m from the Earth's centre, expected 2.3e7 to 3.3e7");
-            return Err(damaged(what));
-        }
-        let nanoseconds = key.epoch.to_time_scale(TimeScale::GPST).duration.total_nanoseconds();
-        let seconds = i64::try_from(nanoseconds / 1_000_000_000).map_err(|e| damaged(e.to_string()))?;
-        let clock_s = entry.clock_us.filter(|us| us.abs() < NO_CLOCK_US).map(|us| us * 1e-6);
-        let sample = Sample { position_m, clock_s, broken: entry.clock_event || entry.maneuver };
-        precise.satellites.entry(sv).or_default().insert(seconds, sample);
+    let mut reader = Reader::default();
+    for (index, line) in text.lines().enumerate().take_while(|(_, line)| !line.starts_with("EOF")) {
+        reader.take(line).map_err(|fault| fault.at(name, index + 1, line))?;
     }
+    let precise = reader.precise;
     if precise.satellites.is_empty() { Err(Sp3Error::Nothing { name: name.to_owned() }) } else { Ok(precise) }
 }
 
-thread_local! {
-    static QUIET: Cell<bool> = const { Cell::new(false) };
+/// What is wrong with a line.
+enum Fault {
+    /// Its epoch has a fraction of a second.
+    Fraction,
+    /// Anything else.
+    Damaged(String),
 }
 
-/// Runs what may panic; its panic becomes `Err` and prints nothing. Panics elsewhere print as before.
-fn quietly<T>(run: impl FnOnce() -> T) -> Result<T, ()> {
-    static HOOK: Once = Once::new();
-    HOOK.call_once(|| {
-        let previous = std::panic::take_hook();
-        std::panic::set_hook(Box::new(move |info| {
-            if !QUIET.with(Cell::get) {
-                previous(info);
-            }
-        }));
-    });
-    let before = QUIET.with(|quiet| quiet.replace(true));
-    let outcome = catch_unwind(AssertUnwindSafe(run));
-    QUIET.with(|quiet| quiet.set(before));
-    outcome.map_err(|_| ())
-}
-
-/// The first line's version, and that epochs are at whole seconds.
-fn check_lines(text: &[u8], name: &str) -> Result<(), Sp3Error> {
-    // `clean` left nothing but ASCII.
-    let text = String::from_utf8_lossy(text);
-    let first = text.lines().next().unwrap_or_default();
-    if !["#cP", "#cV", "#dP", "#dV"].iter().any(|begin| first.starts_with(begin)) {
-        let found = first.chars().take(40).flat_map(char::escape_default).collect();
-        return Err(Sp3Error::NotSp3 { name: name.to_owned(), found });
-    }
-    for (index, line) in text.lines().enumerate().filter(|(_, line)| line.starts_with("*  ")) {
-        let fraction = line.split_once('.').map_or("", |(_, digits)| digits.trim_end());
-        if fraction.bytes().any(|digit| digit != b'0') {
-            let found = line.chars().take(40).flat_map(char::escape_default).collect();
-            return Err(Sp3Error::Fraction { name: name.to_owned(), line: index + 1, found });
+impl Fault {
+    fn at(self, name: &str, line: usize, text: &str) -> Sp3Error {
+        let name = name.to_owned();
+        match self {
+            Self::Fraction => Sp3Error::Fraction { name, line, found: quoted(text) },
+            Self::Damaged(what) => Sp3Error::Damaged { name, detail: format!("line {line}: {what}") },
         }
     }
-    Ok(())
+}
+
+/// The beginning of a line as an error shows it.
+fn quoted(line: &str) -> String {
+    line.chars().take(40).flat_map(char::escape_default).collect()
+}
+
+/// Columns `first` to `last` of a line, counted from 1 as the standard does; what the line lacks is missing.
+fn columns(line: &str, first: usize, last: usize) -> &str {
+    line.get(first - 1..last.min(line.len())).unwrap_or_default()
+}
+
+/// The state of reading: the scale of time of the file and the epoch of the records that follow.
+#[derive(Default)]
+struct Reader {
+    scale: Option<&'static TimeScale>,
+    epoch: Option<Epoch>,
+    precise: Precise,
+}
+
+impl Reader {
+    fn take(&mut self, line: &str) -> Result<(), Fault> {
+        match line.as_bytes().first() {
+            // The second line of this kind holds nothing yet.
+            Some(b'%') if line.starts_with("%c") && self.scale.is_none() => {
+                self.scale = Some(time_scale(columns(line, 10, 12))?);
+            }
+            Some(b'*') => self.epoch = Some(self.scale().map(|scale| epoch(line, scale))??),
+            Some(b'P') => self.position(line)?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn scale(&self) -> Result<&'static TimeScale, Fault> {
+        self.scale.ok_or_else(|| Fault::Damaged("an epoch before the line '%c' with its scale of time".to_owned()))
+    }
+
+    /// Takes a position and clock record (SP3-d, table of the position record).
+    fn position(&mut self, line: &str) -> Result<(), Fault> {
+        let at = self.epoch.ok_or_else(|| Fault::Damaged("a position before any epoch".to_owned()))?;
+        let sv = columns(line, 2, 4).replace(' ', "0");
+        if !sv.starts_with(['G', 'E']) {
+            return Ok(());
+        }
+        let sv: Sv = sv.parse().map_err(|_| Fault::Damaged(format!("'{sv}': expected a satellite such as G01")))?;
+        let [x_km, y_km, z_km] = [(5, 18), (19, 32), (33, 46)].map(|(first, last)| decimal(line, first, last));
+        let position_m = Vector3::new(x_km?, y_km?, z_km?) * 1e3;
+        // Three zeros stand for a position that is not known.
+        if position_m == Vector3::zeros() {
+            return Ok(());
+        }
+        let radius_m = position_m.norm();
+        if !RADII_M.contains(&radius_m) {
+            return Err(Fault::Damaged(format!(
+                "{sv} at {at}: {radius_m:e} m from the Earth's centre, expected 2.3e7 to 3.3e7"
+            )));
+        }
+        let no_clock = columns(line, 47, 60).trim().is_empty();
+        let clock_us = if no_clock { None } else { Some(decimal(line, 47, 60)?) };
+        let clock_s = clock_us.filter(|us| us.abs() < NO_CLOCK_US).map(|us| us * 1e-6);
+        let broken = columns(line, 75, 75) == "E" || columns(line, 79, 79) == "M";
+        self.precise.satellites.entry(sv).or_default().insert(at.seconds(), Sample { position_m, clock_s, broken });
+        Ok(())
+    }
+}
+
+/// The scale of time by its name in the first line `%c`.
+fn time_scale(name: &str) -> Result<&'static TimeScale, Fault> {
+    /// International atomic time, 19 s ahead of GPS time.
+    static TAI: TimeScale = TimeScale { name: "TAI", behind_gpst_s: -19, has_leap_seconds: false };
+    match name {
+        "GPS" => Ok(&time::GPST),
+        "GAL" => Ok(&time::GST),
+        "QZS" => Ok(&time::QZSST),
+        "IRN" => Ok(&time::IRNSST),
+        "BDT" => Ok(&time::BDT),
+        "TAI" => Ok(&TAI),
+        // The standard's GLO is the UTC of GLONASS, without the three hours of Moscow.
+        "UTC" | "GLO" => Ok(&time::UTC),
+        _ => Err(Fault::Damaged(format!("scale of time '{name}': expected GPS, GAL, QZS, IRN, BDT, TAI, UTC or GLO"))),
+    }
+}
+
+/// The instant of an epoch header: year in columns 4 to 7, then two columns each after a blank, seconds in 21
+/// to 31.
+fn epoch(line: &str, scale: &TimeScale) -> Result<Epoch, Fault> {
+    let fields = [(4, 7), (9, 10), (12, 13), (15, 16), (18, 19)].map(|(first, last)| columns(line, first, last).trim());
+    let seconds = columns(line, 21, 31).trim();
+    let (whole, fraction) = seconds.split_once('.').unwrap_or((seconds, ""));
+    if fraction.bytes().any(|digit| digit.is_ascii_digit() && digit != b'0') {
+        return Err(Fault::Fraction);
+    }
+    let [year, month, day, hour, minute] = fields;
+    let stamp = format!("{year:0>4}-{month:0>2}-{day:0>2}T{hour:0>2}:{minute:0>2}:{whole:0>2}");
+    let label = Epoch::parse(&stamp).map_err(|_| Fault::Damaged(format!("'{}': expected an epoch", quoted(line))))?;
+    Ok(scale.instant(label))
+}
+
+/// A decimal number in some columns.
+fn decimal(line: &str, first: usize, last: usize) -> Result<f64, Fault> {
+    let field = columns(line, first, last).trim();
+    let number = field.parse().ok().filter(|number: &f64| number.is_finite());
+    number.ok_or_else(|| Fault::Damaged(format!("'{field}' in columns {first} to {last}: expected a number")))
 }
 
 impl Precise {
@@ -192,6 +248,7 @@ impl Precise {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::satellite::System;
 
     const HEAD: &str = "#dP2020  6 25  0  0  0.00000000       2 ORBIT IGS14 HLM  IGS\n\
         ## 2111 345600.00000000   900.00000000 59025 0.0000000000000\n\

@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 
 use thiserror::Error;
 
-use crate::gnss::inflate::{InflateError, inflate};
+use crate::inflate::{InflateError, inflate};
 
 /// Largest file that is read, in bytes after decompression: the 1° grid of GPT3 has 27 MB.
 pub const LARGEST_BYTES: u64 = 64 << 20;

@@ -6,7 +6,7 @@
 //! Their numbers, as TU Wien gives them out, are in `data/vmf3.csv`. Limits: b and c fit coefficients a of
 //! VMF3 grids or of GPT3, not VMF1's.
 
-use crate::gnss::vienna::{Season, ViennaError, season_terms};
+use crate::vienna::{Season, ViennaError, season_terms};
 
 const DEGREE: usize = 12;
 /// Pairs of degree and order.
@@ -45,7 +45,7 @@ impl Vmf3 {
     /// # Errors
     /// As [`Self::read`]; a test sees to it that there are none.
     pub fn embedded() -> Result<Self, ViennaError> {
-        Self::read(include_str!("../../data/vmf3.csv"), "embedded vmf3.csv")
+        Self::read(include_str!("data/vmf3.csv"), "embedded vmf3.csv")
     }
 
     /// Reads an expansion whose `name` goes into errors; sines of order zero, which add nothing, are not in
@@ -188,7 +188,7 @@ mod tests {
 
     #[test]
     fn a_damaged_table_is_refused_with_its_line() {
-        let text = include_str!("../../data/vmf3.csv");
+        let text = include_str!("data/vmf3.csv");
         let error = |text: &str| Vmf3::read(text, "t").unwrap_err().to_string();
         assert!(error("").starts_with("t:1") && error("quantity\n").contains("the columns quantity,factor"));
         let short: Vec<&str> = text.lines().take(676).collect();

@@ -4,13 +4,13 @@
 //! it. A scene whose motion is known before goes out in ticks too, and takes neither states nor events.
 //! Limits: one front end.
 
-use crate::generator::event::{Event, EventError};
-use crate::generator::scene::Scene;
-use crate::generator::stream::{GenerateError, Generated, Options, Stream};
-use crate::generator::synth::RUN_SAMPLES;
-use crate::generator::truth;
-use crate::generator::vehicle::Knot;
-use crate::generator::vehicle::joining::{Joiner, Push, Refusal, Tick};
+use generator::event::{Event, EventError};
+use generator::scene::Scene;
+use generator::stream::{GenerateError, Generated, Options, Stream};
+use generator::synth::RUN_SAMPLES;
+use generator::truth;
+use generator::vehicle::Knot;
+use generator::vehicle::joining::{Joiner, Push, Refusal, Tick};
 
 /// A scene on its way to samples.
 pub struct Driver<'a> {

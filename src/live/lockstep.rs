@@ -7,16 +7,16 @@
 
 use thiserror::Error;
 
-use crate::generator::event::{Event, EventError};
-use crate::generator::scene::Scene;
-use crate::generator::stream::{GenerateError, Generated};
-use crate::generator::truth;
-use crate::generator::vehicle::joining::{Push, Refusal};
-use crate::live::drive::{Driver, Made};
-use crate::receiver::output;
-use crate::receiver::settings::Settings;
-use crate::receiver::{Outcome, ReceiveError, Receiver};
-use crate::twin::settings_for;
+use crate::drive::{Driver, Made};
+use generator::event::{Event, EventError};
+use generator::scene::Scene;
+use generator::stream::{GenerateError, Generated};
+use generator::truth;
+use generator::vehicle::joining::{Push, Refusal};
+use receiver::output;
+use receiver::settings::Settings;
+use receiver::{Outcome, ReceiveError, Receiver};
+use twin::settings_for;
 
 /// Why a step is not made.
 #[derive(Debug, Error)]
@@ -66,10 +66,10 @@ pub struct Finished {
 /// Generator and receiver in step with a simulation.
 ///
 /// ```
-/// use gnss_twin::generator::scenario::Scenario;
-/// use gnss_twin::generator::vehicle::joining::Push;
-/// use gnss_twin::live::lockstep::Lockstep;
-/// use gnss_twin::receiver::settings::Settings;
+/// use generator::scenario::Scenario;
+/// use generator::vehicle::joining::Push;
+/// use live::lockstep::Lockstep;
+/// use receiver::settings::Settings;
 /// use nalgebra::Vector3;
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -15,10 +15,10 @@ mod nmea;
 use nalgebra::Vector3;
 use thiserror::Error;
 
-use crate::generator::event::{Event, EventError};
-use crate::generator::vehicle::joining::Push;
-use crate::generator::vehicle::turn::PushedTurn;
-use crate::gnss::time::Epoch;
+use generator::event::{Event, EventError};
+use generator::vehicle::joining::Push;
+use generator::vehicle::turn::PushedTurn;
+use gnss::time::Epoch;
 
 /// Bytes of a datagram or a line at most.
 pub const MOST_BYTES: usize = 512;
@@ -298,7 +298,7 @@ mod tests {
         let sum = body.bytes().fold(0, |sum, byte| sum ^ byte);
         let Ok(Message::Push(push)) = read(&format!("${body}*{sum:02X}")) else { panic!() };
         assert!((push.t_s - 5.0).abs() < 1e-6, "{push:?}");
-        assert!((crate::gnss::earth::Geodetic::from_ecef(&push.position_m).height_m - 520.0).abs() < 1e-6);
+        assert!((gnss::earth::Geodetic::from_ecef(&push.position_m).height_m - 520.0).abs() < 1e-6);
         assert!(matches!(read(&format!("${body}*{:02X}", sum ^ 1)), Err(WireError::Nmea(_))));
     }
 

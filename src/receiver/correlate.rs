@@ -14,8 +14,8 @@
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::signal::{Component, Layers, Shape, Tone};
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::signal::{Component, Layers, Shape, Tone};
 
 mod carrier;
 pub mod fixed;
@@ -427,8 +427,8 @@ pub fn correlation(shape: &Shape, edge: Edge, chips_per_sample: f64, offset: f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::galileo::e1::E1;
-    use crate::gnss::gps::l1ca::L1_CA;
+    use gnss::galileo::e1::E1;
+    use gnss::gps::l1ca::L1_CA;
 
     fn noise(n: usize, seed: u64) -> Vec<f32> {
         let mut state = seed;
@@ -441,7 +441,7 @@ mod tests {
     }
 
     fn replica(edge: Edge) -> Replica {
-        Replica::new(crate::gnss::gps::l1ca::code(7).unwrap(), edge).unwrap()
+        Replica::new(gnss::gps::l1ca::code(7).unwrap(), edge).unwrap()
     }
 
     /// What every level of this processor gives, which has to be the same.
@@ -632,7 +632,7 @@ mod tests {
 
     #[test]
     fn taps_stand_anywhere_in_the_longest_code_with_the_code_anywhere_in_it() {
-        let component = &crate::gnss::signal::synthetic::MIXED.components[0];
+        let component = &gnss::signal::synthetic::MIXED.components[0];
         let replica = Replica::of(Wave::new(component, 4).unwrap(), Edge::Area).unwrap();
         let period = replica.period();
         let step = chips_to_units(1.023 / 5.3);

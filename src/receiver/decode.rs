@@ -5,15 +5,15 @@
 //! time. A time that contradicts the one before drops both. Of a message that does not say its time the
 //! beginnings of units are known, and another signal of the satellite shows which ones they are.
 
-use crate::gnss::augmentation::Content;
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::ionosphere::Coefficients;
-use crate::gnss::message::{Read, Reader};
-use crate::gnss::record::NavigationRow;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, TimePolynomial, TimeScale, WEEK_S};
-use crate::receiver::track::Symbol;
+use crate::track::Symbol;
+use gnss::augmentation::Content;
+use gnss::broadcast::Ephemeris;
+use gnss::ionosphere::Coefficients;
+use gnss::message::{Read, Reader};
+use gnss::record::NavigationRow;
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
+use gnss::time::{Epoch, TimePolynomial, TimeScale, WEEK_S};
 
 /// What a symbol completed.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,10 +2,10 @@
 
 use std::fmt;
 
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
-use crate::receiver::position::NoFix;
-use crate::receiver::position::least_squares::UNKNOWNS;
+use crate::position::NoFix;
+use crate::position::least_squares::UNKNOWNS;
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
 
 /// Symbols come a second or two after the start: of a strong signal, whose edges or overlay are found then.
 const SYMBOLS_S: f64 = 2.0;
@@ -254,8 +254,8 @@ impl fmt::Display for Diagnosis {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::gps::l1c::L1C;
-    use crate::gnss::gps::l1ca::L1_CA;
+    use gnss::gps::l1c::L1C;
+    use gnss::gps::l1ca::L1_CA;
 
     #[test]
     fn a_diagnosis_names_the_stage_the_numbers_and_what_to_check() {

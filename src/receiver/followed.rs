@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use crate::gnss::signal::{Component, Layer, Layers, Signal};
-use crate::receiver::lead::{lead, other_side};
-use crate::receiver::settings::Settings;
+use crate::lead::{lead, other_side};
+use crate::settings::Settings;
+use gnss::signal::{Component, Layer, Layers, Signal};
 
 /// How a signal is followed, as `receiver.json` says it.
 #[derive(Clone, Debug, Serialize)]

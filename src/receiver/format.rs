@@ -8,7 +8,7 @@
 
 use std::fmt;
 
-use crate::gnss::samples::Format;
+use gnss::samples::Format;
 
 /// Bytes that are looked at, from the start of the recording.
 pub const LOOKED_AT_BYTES: usize = 1 << 16;

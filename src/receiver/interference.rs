@@ -19,13 +19,13 @@ mod own;
 
 use std::sync::Arc;
 
-use rustfft::num_complex::Complex;
-use rustfft::{Fft, FftPlanner};
+use fft::{Fft, Planner};
+use num_complex::Complex;
 
-use crate::gnss::record::LineRow;
-use crate::gnss::samples::IfMetadata;
-use crate::receiver::source::{Packed, Planes};
-use crate::receiver::threshold::threshold;
+use crate::source::{Packed, Planes};
+use crate::threshold::threshold;
+use gnss::record::LineRow;
+use gnss::samples::IfMetadata;
 
 pub use own::Followed;
 
@@ -49,7 +49,7 @@ const OWN_LINE: f64 = 0.0075 * 4.0;
 /// Spectra of the samples, second after second.
 pub struct Watch {
     metadata: IfMetadata,
-    rate: crate::gnss::time::Rate,
+    rate: gnss::time::Rate,
     is_real: bool,
     fft: Arc<dyn Fft<f32>>,
     scratch: Vec<Complex<f32>>,
@@ -77,7 +77,7 @@ impl Watch {
     /// A watch over samples as `metadata` describes them.
     pub fn new(metadata: &IfMetadata) -> Self {
         let bins = ((metadata.rate.hz() / BIN_HZ) as usize).next_power_of_two().clamp(1024, 1 << 17);
-        let fft = FftPlanner::new().plan_fft_forward(bins);
+        let fft = Planner::<f32>::new().plan_fft_forward(bins);
         let angle = |n: usize| std::f64::consts::TAU * n as f64 / bins as f64;
         let is_real = !metadata.format.is_complex();
         let tested = if is_real { bins / 2 } else { bins };
@@ -273,9 +273,9 @@ impl Sliding {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::samples::Format;
-    use crate::gnss::time::Rate;
-    use crate::receiver::source::Source;
+    use crate::source::Source;
+    use gnss::samples::Format;
+    use gnss::time::Rate;
 
     fn metadata(format: Format, rate_hz: f64) -> IfMetadata {
         let rate = Rate::from_hz(rate_hz).unwrap();
@@ -394,7 +394,7 @@ mod tests {
     /// Ten satellites of 52 dB-Hz as an antenna may meet them.
     fn sky() -> Vec<Followed> {
         let one = |k: u8| Followed {
-            link: crate::gnss::gps::l1ca::L1_CA.link(crate::gnss::satellite::Sv::gps(3 * k + 1)),
+            link: gnss::gps::l1ca::L1_CA.link(gnss::satellite::Sv::gps(3 * k + 1)),
             cn0_hz: libm::pow(10.0, 5.2),
             doppler_hz: 731.0 * f64::from(k) - 3300.0,
             sample: 0,

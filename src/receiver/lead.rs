@@ -1,7 +1,7 @@
 //! The component of a signal that a receiver searches and follows.
 
-use crate::gnss::signal::{self, Component, Layers, Shape, Signal};
-use crate::receiver::correlate::fits;
+use crate::correlate::fits;
+use gnss::signal::{self, Component, Layers, Shape, Signal};
 
 /// The strongest component whose code is short enough to be made; of equally strong ones a pilot.
 ///
@@ -122,12 +122,12 @@ pub fn undated(signals: &[&'static Signal]) -> Option<(&'static Signal, String)>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::galileo::e1::E1;
-    use crate::gnss::galileo::e5::{E5A, E5B};
-    use crate::gnss::galileo::e6::E6;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::signal::Overlay;
-    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, MULTIPLEXED, MULTIPLEXED_DATA, QUADRATURE, QUADRATURE_DATA};
+    use gnss::galileo::e1::E1;
+    use gnss::galileo::e5::{E5A, E5B};
+    use gnss::galileo::e6::E6;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::signal::Overlay;
+    use gnss::signal::synthetic::{LONG_BOC, MIXED, MULTIPLEXED, MULTIPLEXED_DATA, QUADRATURE, QUADRATURE_DATA};
 
     #[test]
     fn the_strongest_component_that_can_be_made_leads_and_pilots_go_first() {

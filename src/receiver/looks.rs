@@ -12,11 +12,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::gnss::signal::Link;
-use crate::gnss::time::Rate;
-use crate::receiver::acquire::Acquired;
-use crate::receiver::lead::lead;
-use crate::receiver::parting::{Estimate, common};
+use crate::acquire::Acquired;
+use crate::lead::lead;
+use crate::parting::{Estimate, common};
+use gnss::signal::Link;
+use gnss::time::Rate;
 
 /// Deviation of a search's code phase.
 const SIGMA_CHIPS: f64 = 0.1;
@@ -78,8 +78,8 @@ fn code_doppler(before: &Acquired, hit: &Acquired, passed_s: f64) -> Option<(f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::satellite::Sv;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::satellite::Sv;
 
     const DOPPLERS_HZ: [f64; 6] = [-3900.0, -2500.0, -700.0, 300.0, 2100.0, 4400.0];
 

@@ -6,13 +6,13 @@
 //! whose time of sending is out of line with the others' (a wrong bit edge or code period of another) are
 //! left out.
 
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::record::Observation;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, Rate, SampleClock, WEEK_S};
-use crate::receiver::decode::Decoder;
-use crate::receiver::track::Measurement;
+use crate::decode::Decoder;
+use crate::track::Measurement;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::record::Observation;
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
+use gnss::time::{Epoch, Rate, SampleClock, WEEK_S};
 
 /// Travel time to the nearest satellite in a medium orbit that is assumed when the clock is set from
 /// satellites alone.
@@ -210,7 +210,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::gps::l1ca::L1_CA;
+    use gnss::gps::l1ca::L1_CA;
 
     fn reading(prn: u8, of_week: (i64, f64)) -> Reading {
         let measurement = Measurement {

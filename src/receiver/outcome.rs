@@ -5,15 +5,15 @@ use std::fmt;
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::gnss::record::LineRow;
-use crate::gnss::satellite::Sv;
-use crate::receiver::acquire::AcquireError;
-use crate::receiver::diagnosis::{Diagnosis, duration};
-use crate::receiver::gap::Jump;
-use crate::receiver::output::OutputError;
-use crate::receiver::parting::Parted;
-use crate::receiver::settings::SettingsError;
-use crate::receiver::track::LoopMargin;
+use crate::acquire::AcquireError;
+use crate::diagnosis::{Diagnosis, duration};
+use crate::gap::Jump;
+use crate::output::OutputError;
+use crate::parting::Parted;
+use crate::settings::SettingsError;
+use crate::track::LoopMargin;
+use gnss::record::LineRow;
+use gnss::satellite::Sv;
 
 /// Why a reception was broken off.
 #[derive(Debug, Error)]

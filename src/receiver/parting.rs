@@ -19,10 +19,10 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::gnss::signal::Link;
-use crate::gnss::time::Rate;
-use crate::receiver::correlate::TURN;
-use crate::receiver::lead::lead;
+use crate::correlate::TURN;
+use crate::lead::lead;
+use gnss::signal::Link;
+use gnss::time::Rate;
 
 /// Seconds of a line's memory, beyond which the past fades.
 const MEMORY_S: f64 = 30.0;
@@ -254,8 +254,8 @@ impl fmt::Display for Parted {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::satellite::Sv;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::satellite::Sv;
 
     const RATE_HZ: f64 = 2.6e6;
 

@@ -8,18 +8,18 @@ use std::io::{ErrorKind, Read};
 
 use serde_json::json;
 
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::samples::IfMetadata;
-use crate::gnss::satellite::Sv;
-use crate::receiver::acquire;
-use crate::receiver::diagnosis::{Diagnosis, Stage};
-use crate::receiver::followed::Followed;
-use crate::receiver::format::Check;
-use crate::receiver::outcome::{Outcome, ReceiveError};
-use crate::receiver::output::{Record, Sink};
-use crate::receiver::session::{Session, held};
-use crate::receiver::settings::Settings;
-use crate::receiver::source::{Packed, Queue, Source};
+use crate::acquire;
+use crate::diagnosis::{Diagnosis, Stage};
+use crate::followed::Followed;
+use crate::format::Check;
+use crate::outcome::{Outcome, ReceiveError};
+use crate::output::{Record, Sink};
+use crate::session::{Session, held};
+use crate::settings::Settings;
+use crate::source::{Packed, Queue, Source};
+use gnss::gps::l1ca::L1_CA;
+use gnss::samples::IfMetadata;
+use gnss::satellite::Sv;
 
 /// Length of the blocks that channels work on.
 const BLOCK_MS: u64 = 50;
@@ -255,10 +255,10 @@ fn take_blocks(
 /// A receiver whose results are values: nothing is written.
 ///
 /// ```no_run
-/// use gnss_twin::gnss::samples::{Format, IfMetadata};
-/// use gnss_twin::gnss::time::Rate;
-/// use gnss_twin::receiver::output::Record;
-/// use gnss_twin::receiver::{Receiver, settings::Settings};
+/// use gnss::samples::{Format, IfMetadata};
+/// use gnss::time::Rate;
+/// use receiver::output::Record;
+/// use receiver::{Receiver, settings::Settings};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let rate = Rate::from_hz(4e6).ok_or("no rate")?;
@@ -437,8 +437,8 @@ fn summary(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::samples::Format;
-    use crate::gnss::time::Rate;
+    use gnss::samples::Format;
+    use gnss::time::Rate;
 
     #[test]
     fn a_failing_reader_is_an_error_with_its_place_and_an_interruption_is_none() {

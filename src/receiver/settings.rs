@@ -9,12 +9,12 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 use toml::{Table, Value};
 
-use crate::gnss::place::Keys;
-use crate::gnss::time::{Epoch, TimeError};
-use crate::receiver::acquire::{AcquireError, AcquisitionSettings};
-use crate::receiver::described::described;
-use crate::receiver::position::PositionSettings;
-use crate::receiver::track::{TrackingSettings, TrackingSettingsError};
+use crate::acquire::{AcquireError, AcquisitionSettings};
+use crate::described::described;
+use crate::position::PositionSettings;
+use crate::track::{TrackingSettings, TrackingSettingsError};
+use gnss::place::Keys;
+use gnss::time::{Epoch, TimeError};
 
 /// All choices of the receiver.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

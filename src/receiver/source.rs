@@ -12,8 +12,8 @@ use std::ops::Range;
 
 use kernel::{fixed, unpack};
 
-use crate::gnss::samples::Format;
-use crate::receiver::correlate::fixed::{Fixed, FixedSamples};
+use crate::correlate::fixed::{Fixed, FixedSamples};
+use gnss::samples::Format;
 
 /// Consecutive samples; `q` is all zeros for a real recording.
 #[derive(Clone, Copy, Debug)]
@@ -71,7 +71,7 @@ impl Packed<'_> {
 
 /// Samples that something looks at more than once: in planes, or as they were packed.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::receiver) enum Stretch<'a> {
+pub(crate) enum Stretch<'a> {
     Planes(Block<'a>),
     Packed(Packed<'a>),
 }
@@ -108,7 +108,7 @@ impl Stretch<'_> {
 
 /// Samples that come piece by piece, kept as they are packed.
 #[derive(Clone, Debug)]
-pub(in crate::receiver) struct Gathered {
+pub(crate) struct Gathered {
     first: u64,
     format: Format,
     bytes: Vec<u8>,

@@ -4,11 +4,11 @@
 //! of taps correlates by R(τ)/R(0); the power outside, 1−R(0), is lost. Tabulated with its slope and
 //! interpolated by cubics. Offsets and frequencies count in chips and chip rates.
 
-use crate::analysis::expect::theory::dll::{BandIntegrals, Discriminator, Taps, raw_on_chips};
-use crate::analysis::waveform::Waveform;
-use crate::gnss::signal::{Component, Layers, sinc_squared};
-use crate::receiver::lead::shapes;
-use crate::receiver::track::loops::CodeShape;
+use analysis::expect::theory::dll::{BandIntegrals, Discriminator, Taps, raw_on_chips};
+use analysis::waveform::Waveform;
+use gnss::signal::{Component, Layers, sinc_squared};
+use receiver::lead::shapes;
+use receiver::track::loops::CodeShape;
 
 /// R and R' over positive offsets in chips.
 #[derive(Clone, Debug)]
@@ -149,7 +149,7 @@ impl Correlation {
     /// the dot product behind one.
     pub fn raw_chips(&self, discriminator: Discriminator, d: f64, t_s: f64, cn0_hz: f64) -> Option<f64> {
         match self {
-            Self::Triangle => Some(crate::analysis::expect::theory::dll::raw_chips(discriminator, d, t_s, cn0_hz)),
+            Self::Triangle => Some(analysis::expect::theory::dll::raw_chips(discriminator, d, t_s, cn0_hz)),
             Self::Pulses(_) | Self::Replica { .. } => {
                 Some(raw_on_chips(discriminator, self.taps(d), t_s * cn0_hz * self.efficiency()))
             }

@@ -14,15 +14,15 @@ use super::measure::Moments;
 use super::motion::{Motion, Truth};
 use super::normal::{Normals, Purpose, symbol};
 use super::watch::Watch;
-use crate::analysis::expect::theory::clock::PowerLaw;
-use crate::gnss::signal::{self, Carrier, Component, Signal};
-use crate::receiver::correlate::units_to_chips;
-use crate::receiver::lead::{lead, other_side};
-use crate::receiver::track::closed::{Loops, Mode, Update};
-use crate::receiver::track::cn0::Cn0;
-use crate::receiver::track::loops::Rates;
-use crate::receiver::track::side::SidePeaks;
-use crate::receiver::track::{TrackingSettings, pilot_group};
+use analysis::expect::theory::clock::PowerLaw;
+use gnss::signal::{self, Carrier, Component, Signal};
+use receiver::correlate::units_to_chips;
+use receiver::lead::{lead, other_side};
+use receiver::track::closed::{Loops, Mode, Update};
+use receiver::track::cn0::Cn0;
+use receiver::track::loops::Rates;
+use receiver::track::side::SidePeaks;
+use receiver::track::{TrackingSettings, pilot_group};
 
 /// One channel to be simulated.
 #[derive(Clone, Debug)]

@@ -8,10 +8,10 @@
 
 use std::f64::consts::TAU;
 
-use crate::analysis::expect::theory::linear::controlled_root;
-use crate::analysis::expect::theory::pll;
-use crate::receiver::track::TrackingSettings;
-use crate::receiver::track::loops::Gains;
+use analysis::expect::theory::linear::controlled_root;
+use analysis::expect::theory::pll;
+use receiver::track::TrackingSettings;
+use receiver::track::loops::Gains;
 
 /// What a line of sight asks of the loop.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -17,21 +17,21 @@ use thiserror::Error;
 
 use super::leaving::Leaving;
 use super::search::Model;
-use crate::analysis::JudgeError;
-use crate::analysis::show::plot::canvas::{Axis, BLUE, Chart, Mark, ORANGE, Series, figure};
-use crate::analysis::show::write::{write_rows, write_whole};
-use crate::analysis::waveform::leading;
-use crate::generator::scenario::{Overrides, Scenario};
-use crate::generator::scene::Scene;
-use crate::generator::spoof::Constellation;
-use crate::generator::stream::{Options, generate_with};
-use crate::generator::truth;
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::samples::IfMetadata;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Component, Link};
-use crate::receiver::acquire::{self, AcquireError, AcquisitionSettings, Searcher, samples_needed};
-use crate::receiver::source::Block;
+use analysis::JudgeError;
+use analysis::show::plot::canvas::{Axis, BLUE, Chart, Mark, ORANGE, Series, figure};
+use analysis::show::write::{write_rows, write_whole};
+use analysis::waveform::leading;
+use generator::scenario::{Overrides, Scenario};
+use generator::scene::Scene;
+use generator::spoof::Constellation;
+use generator::stream::{Options, generate_with};
+use generator::truth;
+use gnss::gps::l1ca::L1_CA;
+use gnss::samples::IfMetadata;
+use gnss::satellite::Sv;
+use gnss::signal::{Component, Link};
+use receiver::acquire::{self, AcquireError, AcquisitionSettings, Searcher, samples_needed};
+use receiver::source::Block;
 
 /// The satellite that is there.
 const PRESENT: u8 = 23;

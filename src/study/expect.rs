@@ -8,12 +8,12 @@
 use std::f64::consts::TAU;
 
 use super::correlator::Case;
-use crate::analysis::expect::theory::dll::Discriminator;
-use crate::analysis::expect::theory::linear::{AssistedLoop, Feedback, FrequencyLoop, Linear, Pairs, PhaseLoop};
-use crate::analysis::expect::theory::{fll, pll};
-use crate::receiver::track::closed::Mode;
-use crate::receiver::track::loops::Gains;
-use crate::receiver::track::{CodeDiscriminator, TrackingSettings};
+use analysis::expect::theory::dll::Discriminator;
+use analysis::expect::theory::linear::{AssistedLoop, Feedback, FrequencyLoop, Linear, Pairs, PhaseLoop};
+use analysis::expect::theory::{fll, pll};
+use receiver::track::closed::Mode;
+use receiver::track::loops::Gains;
+use receiver::track::{CodeDiscriminator, TrackingSettings};
 
 /// A jitter and how much of a run counts as one value of it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,7 @@
 //! independent ones as have the same law (`receiver::acquire::independent_cells`).
 
 use super::normal::{Normals, Purpose, uniform};
-use crate::analysis::expect::theory::detection::threshold;
+use analysis::expect::theory::detection::threshold;
 
 /// Dopplers of noise: a share of a quarter, what the first bar lets stay, is then known to 0.03.
 const COLUMNS: usize = 256;

@@ -9,15 +9,15 @@ use super::correlation::Correlation;
 use super::correlator::{Case, Loss, run, simulate};
 use super::expect::{self, Jitter};
 use super::motion::Motion;
-use crate::analysis::expect::theory::clock::PowerLaw;
-use crate::analysis::expect::theory::oscillator;
-use crate::analysis::expect::theory::pll;
-use crate::gnss::gps::l1ca;
-use crate::gnss::signal::Signal;
-use crate::receiver::lead::lead;
-use crate::receiver::track::TrackingSettings;
-use crate::receiver::track::closed::Mode;
-use crate::receiver::track::loops::Gains;
+use analysis::expect::theory::clock::PowerLaw;
+use analysis::expect::theory::oscillator;
+use analysis::expect::theory::pll;
+use gnss::gps::l1ca;
+use gnss::signal::Signal;
+use receiver::lead::lead;
+use receiver::track::TrackingSettings;
+use receiver::track::closed::Mode;
+use receiver::track::loops::Gains;
 
 /// Jitter of the loops at one C/N0; predicted and measured.
 #[derive(Clone, Copy, Debug)]
@@ -95,7 +95,7 @@ pub fn level(settings: &TrackingSettings, noise: &PowerLaw, cn0_dbhz: f64, durat
 ///
 /// The simulated one is `None` where the loop lets go within four seconds.
 pub fn jerk_stress_deg(settings: &TrackingSettings, jerk_mps3: f64) -> (f64, Option<f64>) {
-    let jerk_hz_s2 = jerk_mps3 / l1ca::L1_CA.wavelength_m(crate::gnss::satellite::Sv::gps(1));
+    let jerk_hz_s2 = jerk_mps3 / l1ca::L1_CA.wavelength_m(gnss::satellite::Sv::gps(1));
     let mut case = Case { settle_s: 0.0, duration_s: 4.0, ..channel(settings, Mode::Phase, None) };
     case.motion.steps.push(super::motion::Step { at_s: 0.0, rate_step_hz_s: 0.0, jerk_hz_s2 });
     let gains = Gains::design(settings.pll_order, settings.pll_bandwidth_hz * case.update_s());

@@ -7,7 +7,7 @@
 //! 1 % of 1/f inside their span.
 
 use super::normal::{Normals, Purpose};
-use crate::analysis::expect::theory::clock::PowerLaw;
+use analysis::expect::theory::clock::PowerLaw;
 
 /// A change of the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,7 +4,7 @@
 
 use num_complex::Complex64;
 
-use crate::generator::synth::noise::{BLOCK_SAMPLES, add_block};
+use generator::synth::noise::{BLOCK_SAMPLES, add_block};
 
 /// What a stream is drawn for, so that one seed gives independent streams.
 #[derive(Clone, Copy, Debug)]

@@ -12,9 +12,9 @@ use super::correlator::{Case, Loss, Outcome, run};
 use super::expect::{self, Jitter};
 use super::measure::{Moments, relative_error};
 use super::motion::Motion;
-use crate::gnss::gps::l1ca;
-use crate::receiver::track::closed::Mode;
-use crate::receiver::track::{CodeDiscriminator, TrackingSettings};
+use gnss::gps::l1ca;
+use receiver::track::closed::Mode;
+use receiver::track::{CodeDiscriminator, TrackingSettings};
 
 /// What a cell measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -5,11 +5,11 @@ use std::path::Path;
 
 use super::limits::{Level, jerk_stress_deg};
 use super::proof::{BAR, FREQUENCY_BAR, LARGEST_BANDWIDTH_TIME, LEAST_SNR, ProofRow, Quantity};
-use crate::analysis::JudgeError;
-use crate::analysis::expect::theory::{dll, fll, oscillator, pll};
-use crate::analysis::show::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, figure};
-use crate::analysis::show::write::write_whole;
-use crate::receiver::track::TrackingSettings;
+use analysis::JudgeError;
+use analysis::expect::theory::{dll, fll, oscillator, pll};
+use analysis::show::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, figure};
+use analysis::show::write::write_whole;
+use receiver::track::TrackingSettings;
 
 /// Writes all three files into a directory; `preface` says when and how fast it was run.
 ///

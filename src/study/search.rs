@@ -14,8 +14,8 @@ use num_complex::Complex64;
 
 use super::leaving::Leaving;
 use super::normal::{Normals, Purpose, uniform};
-use crate::analysis::waveform::Waveform;
-use crate::gnss::signal::{Signal, sinc_squared};
+use analysis::waveform::Waveform;
+use gnss::signal::{Signal, sinc_squared};
 
 /// Cells to either side of the nearest one that are drawn, in code and in Doppler.
 const SIDE_LAGS: i32 = 3;
@@ -250,9 +250,9 @@ impl Symbols {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::expect::theory::detection;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::signal::synthetic::LONG_BOC;
+    use analysis::expect::theory::detection;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::signal::synthetic::LONG_BOC;
 
     fn chips() -> Waveform {
         Waveform::of(&L1_CA).unwrap()

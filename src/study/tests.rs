@@ -8,15 +8,15 @@ use super::expect;
 use super::limits::{channel, jerk_stress_deg};
 use super::motion::{Motion, Step};
 use super::proof::{self, Quantity};
-use crate::analysis::expect::theory::clock::PowerLaw;
-use crate::analysis::expect::theory::dll::{self, BandIntegrals, Discriminator};
-use crate::analysis::expect::theory::linear::{FrequencyLoop, Pairs};
-use crate::analysis::expect::theory::oscillator::{TCXO, jitter_discrete_rad};
-use crate::analysis::expect::theory::{fll, pll};
-use crate::gnss::galileo::e1::E1;
-use crate::receiver::track::closed::Mode;
-use crate::receiver::track::loops::{self, Gains, Rates};
-use crate::receiver::track::{CodeDiscriminator, TrackingSettings};
+use analysis::expect::theory::clock::PowerLaw;
+use analysis::expect::theory::dll::{self, BandIntegrals, Discriminator};
+use analysis::expect::theory::linear::{FrequencyLoop, Pairs};
+use analysis::expect::theory::oscillator::{TCXO, jitter_discrete_rad};
+use analysis::expect::theory::{fll, pll};
+use gnss::galileo::e1::E1;
+use receiver::track::closed::Mode;
+use receiver::track::loops::{self, Gains, Rates};
+use receiver::track::{CodeDiscriminator, TrackingSettings};
 
 fn hz(dbhz: f64) -> f64 {
     libm::pow(10.0, dbhz / 10.0)

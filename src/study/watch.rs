@@ -2,8 +2,8 @@
 
 use num_complex::Complex64;
 
-use crate::receiver::track::TrackingSettings;
-use crate::receiver::track::lock::{LockChange, LockState, SymbolLock, is_weak};
+use receiver::track::TrackingSettings;
+use receiver::track::lock::{LockChange, LockState, SymbolLock, is_weak};
 
 /// Phase lock and signal strength over time, counted in code periods.
 #[derive(Clone, Debug)]

@@ -75,7 +75,7 @@ fn no_semi_major_axis_and_no_reference_time_are_no_orbit() {
         matches!(error, Err(OrbitError::Element { element: "sqrt_a", .. }))
     });
     the.all("√A that is none: refused by name", refused.count(), bad.len());
-    let packed = include_bytes!("../../data/brdc1820-2010.n.gz");
+    let packed = include_bytes!("../../src/gnss/data/brdc1820-2010.n.gz");
     let mut text = String::new();
     flate2::read::MultiGzDecoder::new(&packed[..]).read_to_string(&mut text).unwrap();
     // One record of eight lines behind the header; its fourth line begins with the reference time.

@@ -93,7 +93,7 @@ fn received_bias_m(rate_khz: usize, edge: Edge<'_>, replica: correlate::Edge) ->
 fn bias_m(rate_khz: usize, edge: Edge<'_>) -> f64 {
     let transform = |x: Vec<f64>| {
         let mut x: Vec<Complex64> = x.into_iter().map(Complex64::from).collect();
-        rustfft::FftPlanner::new().plan_fft_forward(x.len()).process(&mut x);
+        fft::Planner::<f64>::new().plan_fft_forward(x.len()).process(&mut x);
         x
     };
     let chips = transform(l1ca::code(7).unwrap().iter().map(|chip| if *chip { -1.0 } else { 1.0 }).collect());

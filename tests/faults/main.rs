@@ -10,6 +10,8 @@ mod determinism;
 mod files;
 mod fuzz;
 mod legal;
+#[path = "../common/long.rs"]
+mod long;
 mod machine;
 mod memory;
 mod mounts;

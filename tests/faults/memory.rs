@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::Stdio;
 
 use crate::machine::{NO_FIX, scene, twin};
-use crate::tally::{End, Tally, long};
+use crate::tally::{End, Tally};
 
 const FAMILY: &str = "A machine that fails";
 
@@ -42,7 +42,7 @@ const EPOCH_BYTES: f64 = 400.0;
 
 #[test]
 fn ten_minutes_take_the_memory_of_a_short_run_and_the_judge_that_of_its_epochs() {
-    if !long() {
+    if !crate::long::is_asked_for() {
         return;
     }
     let place = tempfile::tempdir().unwrap();

@@ -11,7 +11,7 @@ use crate::damage::{CLASSES, Random, damaged};
 use crate::tally::{End, Tally, cases};
 
 const FAMILY: &str = "Navigation files";
-const DAY: &[u8] = include_bytes!("../../data/brdc1820-2010.n.gz");
+const DAY: &[u8] = include_bytes!("../../src/gnss/data/brdc1820-2010.n.gz");
 
 /// Three records of the embedded day as a file of each version.
 pub fn bases() -> [(u8, String); 3] {

@@ -1,4 +1,5 @@
-//! The order of rooms, and the imports that run against it.
+//! The order of rooms within each crate, and the imports that run against it. The order of the crates is in
+//! their manifests, where cargo refuses a ring.
 
 use crate::source::Source;
 
@@ -7,10 +8,10 @@ pub type Order<'a> = &'a [(&'a str, &'a [&'a [&'a str]])];
 
 /// The whole. Names that are not there yet, or not any more, cost nothing.
 pub const ORDER: Order<'static> = &[
-    ("", &[&["plant"], &["gnss"], &["generator", "receiver", "analysis"], &["twin"], &["study"], &["live"], &["cli"]]),
     (
         "gnss",
         &[
+            &["plant"],
             &["time", "earth", "satellite", "crc", "fec", "inflate", "place", "weil"],
             &["bits", "bdgim", "klobuchar", "nequick", "ionex", "samples", "vienna"],
             &["ionosphere"],
@@ -196,7 +197,7 @@ pub const EXCEPTIONS: &[&str] = &[
 /// Imports against the order of a source, as "room: room that it imports".
 pub fn arrows(source: &Source, order: Order<'_>) -> Vec<String> {
     let mut found = Vec::new();
-    for path in paths(&source.module, &source.code) {
+    for path in paths(source) {
         for (folder, groups) in order {
             let folder: Vec<&str> = folder.split('/').filter(|part| !part.is_empty()).collect();
             let inside = |module: &[String]| {
@@ -220,9 +221,9 @@ pub fn arrows(source: &Source, order: Order<'_>) -> Vec<String> {
     found
 }
 
-/// Every path from the crate's root that a blanked source names.
-fn paths(module: &[String], code: &str) -> Vec<Vec<String>> {
-    let tokens = tokens(code);
+/// Every path of its own crate that a source names, from `src`.
+fn paths(source: &Source) -> Vec<Vec<String>> {
+    let (module, tokens) = (&source.module, tokens(&source.code));
     let mut found = Vec::new();
     // Modules inside the file, with the depth of braces at which each ends.
     let (mut inner, mut depth) = (Vec::<(String, usize)>::new(), 0_usize);
@@ -240,7 +241,7 @@ fn paths(module: &[String], code: &str) -> Vec<Vec<String>> {
                     module.iter().cloned().chain(inner.iter().map(|(name, _)| name.clone())).collect();
                 let mut leaves = Vec::new();
                 i = tree(&tokens, i, &[], &mut leaves);
-                found.extend(leaves.iter().filter_map(|leaf| resolve(&here, leaf)));
+                found.extend(leaves.iter().filter_map(|leaf| resolve(&here, source.root, leaf)));
                 continue;
             }
             _ => {}
@@ -282,20 +283,24 @@ fn tree<'a>(tokens: &[&'a str], mut i: usize, before: &[&'a str], leaves: &mut V
     }
 }
 
-/// A path as written in module `here`, from the crate's root; `None` of one that leaves the crate.
-fn resolve(here: &[String], path: &[&str]) -> Option<Vec<String>> {
+/// A path as written in module `here`, whose crate begins behind `root` modules, from `src`; `None` of one
+/// that leaves the crate.
+fn resolve(here: &[String], root: usize, path: &[&str]) -> Option<Vec<String>> {
     let mut base = here.to_vec();
     let mut rest = path;
     match *path.first()? {
         "crate" => {
-            base.clear();
+            base.truncate(root);
             rest = &path[1..];
         }
         "self" => rest = &path[1..],
         _ => {}
     }
     while let Some((&"super", behind)) = rest.split_first() {
-        base.pop()?;
+        if base.len() <= root {
+            return None;
+        }
+        base.pop();
         rest = behind;
     }
     base.extend(rest.iter().filter(|part| **part != "self").map(|part| (*part).to_owned()));

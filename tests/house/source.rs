@@ -7,8 +7,10 @@ use std::path::Path;
 pub struct Source {
     /// From the package's root, with slashes.
     pub path: String,
-    /// Its modules from the crate's root: `["gnss", "time"]`.
+    /// Its modules from `src`: `["gnss", "time"]`.
     pub module: Vec<String>,
+    /// How many of them lead to the root of its crate: one where that folder is a crate of its own.
+    pub root: usize,
     /// Comments, texts and test modules blanked; lines stay where they are.
     pub code: String,
 }
@@ -17,8 +19,13 @@ impl Source {
     /// Of a file `path` below `src`.
     pub fn new(path: &str, text: &str) -> Self {
         let inner = path.trim_start_matches("src/").trim_end_matches(".rs");
-        let module = inner.split('/').filter(|part| !matches!(*part, "mod" | "lib")).map(str::to_owned).collect();
-        Self { path: path.to_owned(), module, code: without_tests(&blanked(text)) }
+        let module: Vec<String> =
+            inner.split('/').filter(|part| !matches!(*part, "mod" | "lib")).map(str::to_owned).collect();
+        let is_crate = |folder: &String| {
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("src").join(folder).join("Cargo.toml").is_file()
+        };
+        let root = usize::from(module.first().is_some_and(is_crate));
+        Self { path: path.to_owned(), module, root, code: without_tests(&blanked(text)) }
     }
 
     /// All that are no tests: neither named so nor declared under `#[cfg(test)]`.
@@ -46,7 +53,7 @@ impl Source {
 
 /// Names of the rooms in a folder of `src`, those of tests apart.
 pub fn rooms(sources: &[Source], folder: &str) -> Vec<String> {
-    let prefix = if folder.is_empty() { "src/".to_owned() } else { format!("src/{folder}/") };
+    let prefix = format!("src/{folder}/");
     let mut found: Vec<String> = sources
         .iter()
         .filter_map(|source| source.path.strip_prefix(&prefix)?.split('/').next().map(str::to_owned))

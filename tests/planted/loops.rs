@@ -165,7 +165,7 @@ fn carriers_beside_codes(directory: &Path) -> Vec<String> {
 
 fn holds(scene: &str, limits: &str) {
     let directory = tempfile::tempdir().unwrap();
-    let in_receiver = std::env::var(gnss_twin::plant::VARIABLE).is_ok_and(|fault| fault.starts_with("receiver."));
+    let in_receiver = std::env::var(gnss_twin::gnss::plant::VARIABLE).is_ok_and(|fault| fault.starts_with("receiver."));
     match std::env::var_os(judge::RUN).filter(|_| in_receiver) {
         Some(kept) => receive_again(scene, Path::new(&kept), directory.path()),
         None => run(scene, directory.path()),

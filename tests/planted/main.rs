@@ -3,11 +3,12 @@
 //! [`FAULTS`] is the one list. A child process with the fault's name in its environment runs one test of this
 //! target; without a fault the same tests pass in this very run. `GNSS_TWIN_WRITE_PLANTED` names the report
 //! that the run writes.
-#![cfg(feature = "planted")]
 
 mod faults;
 mod judge;
 mod laws;
+#[path = "../common/long.rs"]
+mod long;
 mod loops;
 mod runner;
 mod sides;

@@ -2,8 +2,8 @@
 //!
 //! Files that the repository ships are tested everywhere; the rest where `GNSS_TWIN_DATA` points (default
 //! `../shared/data`). What was skipped is listed in the last lines of `cargo test`
-//! (`tests/witness_skips.rs`). They are tests of this target because most planted faults of `gnss` are theirs
-//! to notice, and one target compiles and runs them once.
+//! (`tests/common/skipped.rs`). They are tests of this target because most planted faults of `gnss` are
+//! theirs to notice, and one target compiles and runs them once.
 
 #[path = "../witness/altboc.rs"]
 mod altboc;

@@ -40,7 +40,7 @@ pub fn keplerian<'a>(record: &'a [&'a str]) -> (Ephemeris, impl Fn(usize, usize)
     (set, v)
 }
 
-/// The path of a file under `GNSS_TWIN_DATA`, or `None` where it is not there. `tests/witness_skips.rs`
+/// The path of a file under `GNSS_TWIN_DATA`, or `None` where it is not there. `tests/common/skipped.rs`
 /// reports at the end of the run what was missed: a line goes past the capture of test output at once, and a
 /// note to the build's directory.
 pub fn external(name: &str) -> Option<PathBuf> {

@@ -221,7 +221,7 @@ fn the_next_day_s_rogues_are_left_out_too() {
 fn every_version_reads_to_the_number_of_records_that_it_holds() {
     // GPS LNAV and Galileo I/NAV records, counted in the files by their first lines; of records of one time
     // and satellite one stays.
-    let day = || Some(include_bytes!("../../data/brdc1820-2010.n.gz").to_vec());
+    let day = || Some(include_bytes!("../../src/gnss/data/brdc1820-2010.n.gz").to_vec());
     let cases = [
         ("brdc1820.10n", day(), 421, 0),
         ("gps-sdr-sim/brdc0010.22n", outside("gps-sdr-sim/brdc0010.22n"), 422, 0),
@@ -285,7 +285,7 @@ fn damaged_files_of_every_version_never_panic() {
 
 #[test]
 fn the_rinex_crate_reads_the_same_elements() {
-    let day = include_bytes!("../../data/brdc1820-2010.n.gz").to_vec();
+    let day = include_bytes!("../../src/gnss/data/brdc1820-2010.n.gz").to_vec();
     let mut files = vec![("brdc1820", day)];
     for name in ["gps-sdr-sim/brdc0010.22n", "nav/BRD400DLR_S_20230710000_01D_MN.rnx.gz"] {
         files.extend(external(name).map(|path| (name, std::fs::read(path).unwrap())));
@@ -333,7 +333,7 @@ fn the_rinex_crate_reads_the_same_elements() {
 #[test]
 fn the_rinex_crate_reads_the_same_orbits_of_other_systems() {
     let mut files = vec![
-        ("CARD", include_bytes!("../../data/CARD00ESP_R_20203340900_15H_MN.rnx.gz").to_vec()),
+        ("CARD", include_bytes!("../../src/gnss/data/CARD00ESP_R_20203340900_15H_MN.rnx.gz").to_vec()),
         ("navic", include_bytes!("../../scenarios/navic_2026-03-09_10h_12h.rnx").to_vec()),
         ("full sky", include_bytes!("../../scenarios/full_sky_2026-03-09_10h_12h.rnx").to_vec()),
     ];

@@ -89,7 +89,7 @@ fn one_bit_samples_of_l1_hold_gps_and_galileo_as_listed_and_none_else() {
 #[test]
 fn one_bit_samples_of_l2_hold_l2c_as_listed_and_none_else() {
     let place = tempfile::tempdir().unwrap();
-    let Some(file) = hanoi(place.path()).filter(|_| is_long()) else { return };
+    let Some(file) = hanoi(place.path()).filter(|_| crate::long::is_asked_for()) else { return };
     let found = received(&file, &["--channel", "L2"], &["GPS L2C"], "");
     assert_found(&found, &[("GPS L2C", "G01 G03 G07 G30", "G06 G09 G17")]);
 }
@@ -127,7 +127,7 @@ fn two_bit_samples_of_l1_hold_gps_and_galileo_as_listed_and_none_else() {
 /// C02, which stands still over the equator as C05 does, and has its Doppler to 2 Hz.
 #[test]
 fn fifty_megahertz_hold_four_signals_of_three_systems_as_listed_and_none_else() {
-    let Some(file) = external(super::recording_e5::FILE).filter(|_| is_long()) else { return };
+    let Some(file) = external(super::recording_e5::FILE).filter(|_| crate::long::is_asked_for()) else { return };
     // What GPS L1 would have: 1575.42 MHz less 1191.795 MHz beyond the IF of E5's middle.
     let flags = [&MUNICH[..], &["--rate-hz", "100e6", "--if-hz", "458624467.6"]].concat();
     let signals = ["GPS L5", "Galileo E5a", "Galileo E5b", "BeiDou B2I"];
@@ -159,18 +159,13 @@ fn both_bands_of_glonass_hold_the_channels_listed_and_none_else() {
     }
 }
 
-/// What takes long is run.
-fn is_long() -> bool {
-    std::env::var_os("GNSS_TWIN_LONG").is_some()
-}
-
 const POCKET: &str = "if/pocket_l1_2021-12-02_4msps_ci8.bin";
 const POCKET_FLAGS: [&str; 5] = ["--format", "ci8", "--rate-hz", "4e6", "--inverted"];
 
 /// By 60 ms of the half second, as G04 is below the threshold of 20 ms (`GNSS_TWIN_LONG=1`).
 #[test]
 fn half_a_second_holds_gps_and_galileo_as_listed_and_none_else() {
-    let Some(file) = external(POCKET).filter(|_| is_long()) else { return };
+    let Some(file) = external(POCKET).filter(|_| crate::long::is_asked_for()) else { return };
     let found = received(&file, &POCKET_FLAGS, &["GPS L1 C/A", "Galileo E1"], "noncoherent_sums = 30");
     let galileo = "E07 E15 E20 E21 E27 E30";
     assert_found(&found, &[("GPS L1 C/A", "G04 G16 G18 G25 G26 G29 G31 G32", ""), ("Galileo E1", galileo, "E19")]);
@@ -180,7 +175,9 @@ fn half_a_second_holds_gps_and_galileo_as_listed_and_none_else() {
 /// sums over 200 ms the one that both carriers' ratio makes of it, to a hertz.
 #[test]
 fn half_a_second_of_the_second_carrier_holds_l2c_as_listed_and_none_else() {
-    let Some(file) = external("if/pocket_l2_2021-12-02_4msps_ci8.bin").filter(|_| is_long()) else { return };
+    let Some(file) = external("if/pocket_l2_2021-12-02_4msps_ci8.bin").filter(|_| crate::long::is_asked_for()) else {
+        return;
+    };
     // What L1 would have: 347.82 MHz above L2, and the spectrum is mirrored.
     let flags = [&POCKET_FLAGS[..], &["--if-hz=-347.82e6"]].concat();
     let found = received(&file, &flags, &["GPS L2C"], "");
@@ -190,7 +187,7 @@ fn half_a_second_of_the_second_carrier_holds_l2c_as_listed_and_none_else() {
 /// Codes of 10 ms take long to find: `GNSS_TWIN_LONG=1`.
 #[test]
 fn half_a_second_holds_the_pilots_of_b1c_and_l1c_as_listed_and_none_else() {
-    let Some(file) = external(POCKET).filter(|_| is_long()) else { return };
+    let Some(file) = external(POCKET).filter(|_| crate::long::is_asked_for()) else { return };
     let found = received(&file, &POCKET_FLAGS, &["BeiDou B1C", "GPS L1C", "QZSS L1C"], "");
     assert_found(
         &found,

@@ -7,10 +7,10 @@
 //! spectrum ρ is that of one component and of the cross term in turn. Orders beyond 32 count as
 //! white. Limits: samples are Gaussian, so that a strong line through a coarse converter is not described.
 
-use rustfft::num_complex::Complex;
+use num_complex::Complex;
 use statrs::function::erf::erf;
 
-use crate::gnss::facts::ConverterSpec;
+use gnss::facts::ConverterSpec;
 
 /// Orders of the series: what is left out has a correlation of ρ³³ at other lags.
 const ORDERS: usize = 32;

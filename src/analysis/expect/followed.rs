@@ -3,9 +3,9 @@
 
 use serde::Deserialize;
 
-use crate::analysis::read::Run;
-use crate::analysis::waveform::{Waveform, leading};
-use crate::gnss::signal::{Component, Layer, Layers, Signal, Tone};
+use crate::read::Run;
+use crate::waveform::{Waveform, leading};
+use gnss::signal::{Component, Layer, Layers, Signal, Tone};
 
 /// What `receiver.json` says of a signal.
 #[derive(Clone, Debug, Deserialize)]
@@ -24,7 +24,7 @@ struct Entry {
 
 /// What a receiver follows of a signal.
 #[derive(Clone, Debug)]
-pub(in crate::analysis) struct Followed {
+pub(crate) struct Followed {
     /// The component, and the layer of it that the replica has; none where it has all.
     pub component: &'static Component,
     pub made: Option<&'static Layer>,
@@ -98,9 +98,9 @@ impl Followed {
 
 #[cfg(test)]
 mod tests {
-    use crate::gnss::galileo::e1::E1;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::signal::Layers;
+    use gnss::galileo::e1::E1;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::signal::Layers;
 
     #[test]
     fn a_pilot_s_boc_finds_half_the_power_less_a_tenth_and_a_bit_for_a_wide_slope() {

@@ -1,12 +1,12 @@
 //! A front end as the judge knows it from the scene's facts, one of several or the only one.
 
-use crate::analysis::expect::welch::Looks;
-use crate::analysis::read::Run;
-use crate::analysis::response::Response;
-use crate::analysis::waveform::Sampler;
-use crate::gnss::facts::{BalanceSpec, FilterSpec, StageSpec, converter, filters};
-use crate::gnss::samples::Format;
-use crate::gnss::signal::Signal;
+use crate::expect::welch::Looks;
+use crate::read::Run;
+use crate::response::Response;
+use crate::waveform::Sampler;
+use gnss::facts::{BalanceSpec, FilterSpec, StageSpec, converter, filters};
+use gnss::samples::Format;
+use gnss::signal::Signal;
 
 /// What is known of a front end.
 #[derive(Clone, Debug)]

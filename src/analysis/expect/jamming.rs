@@ -8,14 +8,14 @@
 
 use std::collections::BTreeMap;
 
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex;
+use fft::Planner;
+use num_complex::Complex;
 
-use crate::analysis::read::Run;
-use crate::analysis::statistics::mean;
-use crate::analysis::waveform::{Sampler, Waveform};
-use crate::gnss::facts::Interference;
-use crate::gnss::signal::sinc_squared;
+use crate::read::Run;
+use crate::statistics::mean;
+use crate::waveform::{Sampler, Waveform};
+use gnss::facts::Interference;
+use gnss::signal::sinc_squared;
 
 /// Cycles of a sweep beyond which its lines lie too close to be distinguished from a band.
 const MOST_CYCLES: f64 = 4096.0;
@@ -91,7 +91,7 @@ impl Spectrum {
                 Complex::new(cos, sin)
             })
             .collect();
-        FftPlanner::new().plan_fft_forward(points).process(&mut wave);
+        Planner::<f64>::new().plan_fft_forward(points).process(&mut wave);
         let half = points as i64 / 2;
         let line = |(k, c): (usize, &Complex<f64>)| {
             let k = if k as i64 >= half { k as i64 - points as i64 } else { k as i64 };
@@ -189,8 +189,8 @@ pub(super) fn hann(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::waveform::Edge;
-    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::waveform::Edge;
+    use gnss::gps::l1ca::L1_CA;
 
     /// Separation from C/A at the carrier, wide sampling, in dB of seconds.
     fn separation_db(shape: &Interference, frequency_hz: f64) -> f64 {

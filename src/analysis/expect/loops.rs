@@ -6,19 +6,19 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::followed::Followed;
-use crate::analysis::expect::peak::{Code, Peak, raw_chips};
-use crate::analysis::expect::spectrum::edge_cost_db;
-use crate::analysis::expect::theory::clock::PowerLaw;
-use crate::analysis::expect::theory::linear::{Feedback, PhaseLoop, controlled_root, controlled_root_gains};
-use crate::analysis::expect::theory::{dll, fll, oscillator, pll};
-use crate::analysis::expect::timeline::Timeline;
-use crate::analysis::read::Run;
-use crate::analysis::statistics::Sum;
-use crate::analysis::waveform::{Edge, Waveform, leading};
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::signal::{Link, Signal, sinc_squared};
+use crate::error::JudgeError;
+use crate::expect::followed::Followed;
+use crate::expect::peak::{Code, Peak, raw_chips};
+use crate::expect::spectrum::edge_cost_db;
+use crate::expect::theory::clock::PowerLaw;
+use crate::expect::theory::linear::{Feedback, PhaseLoop, controlled_root, controlled_root_gains};
+use crate::expect::theory::{dll, fll, oscillator, pll};
+use crate::expect::timeline::Timeline;
+use crate::read::Run;
+use crate::statistics::Sum;
+use crate::waveform::{Edge, Waveform, leading};
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::signal::{Link, Signal, sinc_squared};
 
 /// Which loop a row is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -68,7 +68,7 @@ impl Settings {
 
 impl Settings {
     /// These as the receiver fits them to a signal.
-    pub(in crate::analysis) fn fitted(self, followed: &Followed) -> Self {
+    pub(crate) fn fitted(self, followed: &Followed) -> Self {
         Self {
             spacing_chips: followed.spacing_chips.unwrap_or(self.spacing_chips),
             pll_bandwidth_hz: followed.pll_bandwidth_hz.unwrap_or(self.pll_bandwidth_hz),
@@ -114,7 +114,7 @@ struct Response {
 }
 
 /// Natural frequency of a loop whose roots all lie at exp(−ωT), radians a second.
-pub(in crate::analysis) fn natural_radps(closed: &PhaseLoop, order: u32, update_s: f64) -> f64 {
+pub(crate) fn natural_radps(closed: &PhaseLoop, order: u32, update_s: f64) -> f64 {
     -libm::log(controlled_root(order, closed.gains)) / update_s
 }
 
@@ -200,7 +200,7 @@ impl<'a> Follower<'a> {
 ///
 /// An interval is of whole code periods, so a place stays while the range does: in 10 ms it is not anywhere.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::analysis) struct Places {
+pub(crate) struct Places {
     count: usize,
     sum: f64,
     squares: f64,
@@ -226,7 +226,7 @@ impl Places {
 }
 
 /// The three loops of a receiver as theory sees them at one integration time.
-pub(in crate::analysis) struct Theory {
+pub(crate) struct Theory {
     settings: Settings,
     pub update_s: f64,
     pub chip_m: f64,
@@ -372,7 +372,7 @@ impl Theory {
 
 /// What a loop's error without noise comes to, in its unit.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::analysis) struct Stress {
+pub(crate) struct Stress {
     sum: Sum,
     pub max: f64,
 }
@@ -391,7 +391,7 @@ impl Stress {
 
 /// Stresses of a satellite's three loops over the times from `from_s` to `to_s`.
 #[derive(Default)]
-pub(in crate::analysis) struct Stresses {
+pub(crate) struct Stresses {
     of: BTreeMap<Loop, Stress>,
 }
 

@@ -6,14 +6,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::analysis::read::Run;
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::ionosphere::{Coefficients, Model};
-use crate::gnss::message::Message as Form;
-use crate::gnss::record::{Event, EventRow, NavigationRow};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Link;
-use crate::gnss::time::{Epoch, TimeScale};
+use crate::read::Run;
+use gnss::broadcast::Ephemeris;
+use gnss::ionosphere::{Coefficients, Model};
+use gnss::message::Message as Form;
+use gnss::record::{Event, EventRow, NavigationRow};
+use gnss::satellite::Sv;
+use gnss::signal::Link;
+use gnss::time::{Epoch, TimeScale};
 
 /// What all satellites sent.
 #[derive(Clone, Debug, Default)]

@@ -11,14 +11,14 @@
 
 pub mod converter;
 pub mod due;
-pub(in crate::analysis) mod followed;
+pub(crate) mod followed;
 pub mod front_end;
 pub mod jamming;
-pub(in crate::analysis) mod loops;
+pub(crate) mod loops;
 pub mod message;
 pub mod multipath;
 pub mod multiple_access;
-pub(in crate::analysis) mod peak;
+pub(crate) mod peak;
 pub mod quantile;
 pub mod samples;
 pub mod smoothing;

@@ -7,16 +7,16 @@
 use std::collections::HashMap;
 use std::iter::Peekable;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::peak::Code;
-use crate::analysis::read::Run;
-use crate::analysis::read::spill_store::Cursor;
-use crate::gnss::record::RayRow;
-use crate::gnss::signal::Link;
+use crate::error::JudgeError;
+use crate::expect::peak::Code;
+use crate::read::Run;
+use crate::read::spill_store::Cursor;
+use gnss::record::RayRow;
+use gnss::signal::Link;
 
 /// Where the loop rests, in chips late of the direct ray, for rays of (excess in chips, amplitude, phase in
 /// cycles).
-pub(in crate::analysis) fn error_chips(code: &Code, rays: &[(f64, f64, f64)], spacing_chips: f64) -> f64 {
+pub(crate) fn error_chips(code: &Code, rays: &[(f64, f64, f64)], spacing_chips: f64) -> f64 {
     if rays.iter().all(|ray| ray.1 == 0.0) {
         return 0.0;
     }
@@ -44,7 +44,7 @@ pub(in crate::analysis) fn error_chips(code: &Code, rays: &[(f64, f64, f64)], sp
 type Ray = (f64, f64, f64);
 
 /// The reflected rays of a satellite, sample by sample: those of one are held, or all where samples fall.
-pub(in crate::analysis) struct Rays<'r> {
+pub(crate) struct Rays<'r> {
     cursor: Peekable<Cursor<'r, Link, RayRow>>,
     all: Option<HashMap<u64, Vec<Ray>>>,
     chip_m: f64,
@@ -119,9 +119,9 @@ impl<'r> Rays<'r> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::waveform::Waveform;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::signal::synthetic::LONG_BOC;
+    use crate::waveform::Waveform;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::signal::synthetic::LONG_BOC;
 
     #[test]
     fn a_single_ray_errs_as_the_envelope_says() {

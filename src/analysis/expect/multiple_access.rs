@@ -12,12 +12,12 @@
 use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap};
 
-use crate::analysis::expect::jamming;
-use crate::analysis::read::levels::LevelFinder;
-use crate::analysis::read::{Emission, Run};
-use crate::analysis::waveform::Waveform;
-use crate::gnss::record::Observation;
-use crate::gnss::signal::{Link, Signal};
+use crate::expect::jamming;
+use crate::read::levels::LevelFinder;
+use crate::read::{Emission, Run};
+use crate::waveform::Waveform;
+use gnss::record::Observation;
+use gnss::signal::{Link, Signal};
 
 /// C/N0 that a receiver can measure, per true observation.
 pub struct MultipleAccess<'r> {

@@ -1,9 +1,9 @@
 //! Correlation of a signal with a replica about its peak, and the noise of early minus late there.
 
-use crate::analysis::expect::followed::Followed;
-use crate::analysis::expect::theory::dll::{self, Discriminator, Taps};
-use crate::analysis::waveform::Waveform;
-use crate::gnss::signal::Tone;
+use crate::expect::followed::Followed;
+use crate::expect::theory::dll::{self, Discriminator, Taps};
+use crate::waveform::Waveform;
+use gnss::signal::Tone;
 
 /// Correlation of a signal with a replica, either or both of them averaged over the sampler's interval, for
 /// early minus late.
@@ -71,7 +71,7 @@ impl Peak {
 
 /// A code's correlation in chips, as sent.
 #[derive(Clone, Debug, PartialEq)]
-pub(in crate::analysis) struct Code {
+pub(crate) struct Code {
     peak: Peak,
     /// Up to where it falls without rising again.
     pub reach_chips: f64,
@@ -114,9 +114,9 @@ pub(super) fn raw_chips(signal: &Peak, noise: &Peak, d: f64, snr: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::signal::Signal;
-    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, QUADRATURE};
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::signal::Signal;
+    use gnss::signal::synthetic::{LONG_BOC, MIXED, QUADRATURE};
 
     #[test]
     fn peaks_are_the_triangle_without_averages_and_rounded_with_them() {

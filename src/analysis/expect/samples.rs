@@ -13,21 +13,21 @@
 
 use std::collections::BTreeMap;
 
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex;
+use fft::Planner;
+use num_complex::Complex;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::converter::Staircase;
-use crate::analysis::expect::front_end::FrontEnd;
-use crate::analysis::expect::jamming::{self, Source};
-use crate::analysis::expect::welch;
-use crate::analysis::read::{PsdRow, Run};
-use crate::analysis::waveform::Waveform;
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::facts::{Interference, converter};
-use crate::gnss::record::RayRow;
-use crate::gnss::samples::Format;
-use crate::gnss::signal::{Link, Signal};
+use crate::error::JudgeError;
+use crate::expect::converter::Staircase;
+use crate::expect::front_end::FrontEnd;
+use crate::expect::jamming::{self, Source};
+use crate::expect::welch;
+use crate::read::{PsdRow, Run};
+use crate::waveform::Waveform;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::facts::{Interference, converter};
+use gnss::record::RayRow;
+use gnss::samples::Format;
+use gnss::signal::{Link, Signal};
 
 /// Bins about a line that it fills: its frequency within a run, not its level, decides what they hold.
 const LINE_BINS: f64 = 8.0;
@@ -225,7 +225,7 @@ impl Expected {
         let peak = self.density.iter().copied().fold(0.0, f64::max);
         let near = rows.iter().zip(&self.density).filter(|(_, density)| **density > 0.01 * peak);
         let off_db: Vec<f64> = near.map(|(row, density)| row.density_db - 10.0 * libm::log10(*density)).collect();
-        let scale = libm::pow(10.0, crate::analysis::statistics::median(&off_db).unwrap_or(0.0) / 10.0);
+        let scale = libm::pow(10.0, crate::statistics::median(&off_db).unwrap_or(0.0) / 10.0);
         self.density.iter_mut().for_each(|value| *value *= scale);
     }
 
@@ -330,7 +330,7 @@ fn shown(front_end: &FrontEnd<'_>, mut smooth: Vec<f64>, absolute: bool) -> Show
     smooth.rotate_left(points / 2);
     let step_hz = front_end.rate_hz / points as f64;
     let mut lags: Vec<Complex<f64>> = smooth.into_iter().map(|value| Complex::new(value * step_hz, 0.0)).collect();
-    let mut planner = FftPlanner::new();
+    let mut planner = Planner::<f64>::new();
     planner.plan_fft_inverse(points).process(&mut lags);
     let components = if front_end.is_real() { 1.0 } else { 2.0 };
     let dc_lsb2 = front_end.balance().map_or(0.0, |balance| balance.dc_power_lsb2);
@@ -384,11 +384,11 @@ fn jammers<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::hand_made::{Draw, planted};
-    use crate::analysis::measure::psd::Psd;
-    use crate::analysis::waveform::Edge;
-    use crate::gnss::facts::{ConverterSpec, FilterShape, FilterSpec, StageSpec};
-    use crate::gnss::galileo::e1::E1;
+    use crate::hand_made::{Draw, planted};
+    use crate::measure::psd::Psd;
+    use crate::waveform::Edge;
+    use gnss::facts::{ConverterSpec, FilterShape, FilterSpec, StageSpec};
+    use gnss::galileo::e1::E1;
 
     fn grid(rate_hz: f64, bins: usize) -> Vec<PsdRow> {
         let at = |k: usize| (k as f64 / bins as f64 - 0.5) * rate_hz;
@@ -501,7 +501,7 @@ mod tests {
         }
         let ray = RayRow {
             sample: 0,
-            sv: crate::gnss::satellite::Sv::gps(11),
+            sv: gnss::satellite::Sv::gps(11),
             signal: &E1,
             ray: 1,
             excess_m: 100.0,

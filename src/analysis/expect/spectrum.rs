@@ -8,17 +8,17 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::converter::Staircase;
-use crate::analysis::expect::followed::Followed;
-use crate::analysis::expect::front_end::FrontEnd;
-use crate::analysis::expect::samples::{Expected, Sent};
-use crate::analysis::read::{Emission, Run, replica_edge};
-use crate::analysis::statistics::median;
-use crate::analysis::waveform::{Sampler, Waveform};
-use crate::gnss::facts::{converter, filters};
-use crate::gnss::samples::Format;
-use crate::gnss::signal::Signal;
+use crate::error::JudgeError;
+use crate::expect::converter::Staircase;
+use crate::expect::followed::Followed;
+use crate::expect::front_end::FrontEnd;
+use crate::expect::samples::{Expected, Sent};
+use crate::read::{Emission, Run, replica_edge};
+use crate::statistics::median;
+use crate::waveform::{Sampler, Waveform};
+use gnss::facts::{converter, filters};
+use gnss::samples::Format;
+use gnss::signal::Signal;
 
 /// The section `psd` of `summary.json`: frequencies from the carrier.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -59,7 +59,7 @@ pub fn judge(run: &Run, theory_db: &[f64]) -> Spectrum {
     let errors: Vec<f64> = pairs().map(|(row, theory)| row.density_db - theory).collect();
     found.level_error_db = median(&errors);
     let about: Vec<f64> = errors.iter().map(|e| (e - found.level_error_db.unwrap_or(0.0)).abs()).collect();
-    found.shape_error_p95_db = crate::analysis::statistics::percentile(&about, 0.95);
+    found.shape_error_p95_db = crate::statistics::percentile(&about, 0.95);
     match nulls(run, theory_db) {
         Ok([low, high]) => {
             (found.null_low_hz, found.null_low_expected_hz) = (Some(low.0), Some(low.1));
@@ -227,14 +227,14 @@ fn parabola(points: &[(f64, f64)], middle_hz: f64, scale_hz: f64) -> Option<f64>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::hand_made::{Draw, planted};
-    use crate::analysis::measure::psd::Psd;
-    use crate::analysis::read::{MeanSignal, PsdRow};
-    use crate::analysis::waveform::Edge;
-    use crate::gnss::facts::{FilterShape, FilterSpec, FrontEndFacts, StageSpec};
-    use crate::gnss::galileo::e1::E1;
-    use crate::gnss::gps::l1c::L1C;
-    use crate::gnss::gps::l5::L5;
+    use crate::hand_made::{Draw, planted};
+    use crate::measure::psd::Psd;
+    use crate::read::{MeanSignal, PsdRow};
+    use crate::waveform::Edge;
+    use gnss::facts::{FilterShape, FilterSpec, FrontEndFacts, StageSpec};
+    use gnss::galileo::e1::E1;
+    use gnss::gps::l1c::L1C;
+    use gnss::gps::l5::L5;
 
     #[test]
     fn a_parabola_has_its_bottom_where_it_was_put() {

@@ -10,10 +10,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::analysis::expect::followed::Followed;
-use crate::analysis::expect::spectrum::{costs_db, edge_cost_db};
-use crate::analysis::read::Run;
-use crate::gnss::signal::{Component, Layer, Link, Signal};
+use crate::expect::followed::Followed;
+use crate::expect::spectrum::{costs_db, edge_cost_db};
+use crate::read::Run;
+use gnss::signal::{Component, Layer, Link, Signal};
 
 /// Those losses.
 #[derive(Clone, Debug, Default)]
@@ -99,10 +99,10 @@ fn at_no_delay(link: Link, pilot: &Component, made: Option<&Layer>, data: &Compo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::galileo::e1::E1;
-    use crate::gnss::galileo::e5::E5A;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::satellite::{Sv, System};
+    use gnss::galileo::e1::E1;
+    use gnss::galileo::e5::E5A;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::satellite::{Sv, System};
 
     fn rho(signal: &'static Signal, number: u8) -> f64 {
         let [data, pilot] = [&signal.components[0], &signal.components[1]];

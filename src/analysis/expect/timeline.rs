@@ -11,13 +11,13 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::multiple_access::MultipleAccess;
-use crate::analysis::read::Run;
-use crate::analysis::statistics::median;
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::signal::Link;
-use crate::gnss::time::Epoch;
+use crate::error::JudgeError;
+use crate::expect::multiple_access::MultipleAccess;
+use crate::read::Run;
+use crate::statistics::median;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::signal::Link;
+use gnss::time::Epoch;
 
 /// A satellite's signal at an instant, by a perfect clock.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -14,9 +14,9 @@ use serde_json::Value;
 use thiserror::Error;
 use toml::{Table, Value as Toml};
 
-use crate::analysis::judge::judgement::{Bound, Judgement, MARGINAL_SHARE};
-use crate::analysis::judge::schema::{self, Figures};
-use crate::gnss::place::Keys;
+use crate::judge::judgement::{Bound, Judgement, MARGINAL_SHARE};
+use crate::judge::schema::{self, Figures};
+use gnss::place::Keys;
 
 /// Why a file of limits cannot be used. `name` is the file's, with line and column where they are known.
 #[derive(Debug, Error, PartialEq)]
@@ -253,7 +253,7 @@ fn as_f64(value: &Toml) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::judge::judgement::Status;
+    use crate::judge::judgement::Status;
 
     fn summary() -> Value {
         serde_json::json!({

@@ -1,14 +1,14 @@
 //! The schema of `summary.json`: every key with its unit and meaning, and paths into it.
 //!
-//! `assets/summary.schema.json` is a JSON Schema (draft 2020-12) with one annotation more: `unit`, which is
-//! `1` for counts, ratios and names. A key that may be any word, such as a signal's name, is `*` in a path. A
-//! test compares it with what a run really writes.
+//! `src/analysis/assets/summary.schema.json` is a JSON Schema (draft 2020-12) with one annotation more:
+//! `unit`, which is `1` for counts, ratios and names. A key that may be any word, such as a signal's name, is
+//! `*` in a path. A test compares it with what a run really writes.
 
 use serde_json::{Map, Value};
 use std::sync::OnceLock;
 
 /// The schema's text.
-pub static TEXT: &str = include_str!("../../../assets/summary.schema.json");
+pub static TEXT: &str = include_str!("../assets/summary.schema.json");
 
 /// One figure of the summary.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -83,7 +83,8 @@ pub struct Figures {
 }
 
 /// Those of `summary.json`.
-pub static SUMMARY: Figures = Figures { file: "summary.json", listed: "assets/summary.schema.json", leaves };
+pub static SUMMARY: Figures =
+    Figures { file: "summary.json", listed: "src/analysis/assets/summary.schema.json", leaves };
 
 impl Figures {
     /// The figure at a path.
@@ -133,8 +134,8 @@ pub fn find<'a>(summary: &'a Value, path: &str) -> Option<&'a Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::hand_made::{planted, reported, two_bands, write};
-    use crate::analysis::judge;
+    use crate::hand_made::{planted, reported, two_bands, write};
+    use crate::judge;
     use std::fs;
 
     #[test]
@@ -160,10 +161,10 @@ mod tests {
         // A list that this run does not have is one null.
         let covered = |path: &str| leaf(path).is_some() || is_branch(path);
         let undocumented: Vec<_> = written.iter().filter(|path| !covered(path)).collect();
-        assert!(undocumented.is_empty(), "not in assets/summary.schema.json: {undocumented:?}");
+        assert!(undocumented.is_empty(), "not in src/analysis/assets/summary.schema.json: {undocumented:?}");
         let there = |path: &str| written.iter().any(|own| covers(path, own) || path.starts_with(&format!("{own}.")));
         let absent: Vec<_> = documented.iter().filter(|path| !there(path)).collect();
-        assert!(absent.is_empty(), "in assets/summary.schema.json, but not written: {absent:?}");
+        assert!(absent.is_empty(), "in src/analysis/assets/summary.schema.json, but not written: {absent:?}");
         for leaf in leaves() {
             assert!(!leaf.unit.is_empty() && leaf.meaning.len() > 3, "{} has no unit or no meaning", leaf.path);
             // Where a key ends with a unit, the schema says the same one.

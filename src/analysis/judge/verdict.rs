@@ -5,7 +5,7 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::analysis::judge::judgement::{Bound, Judgement, MARGINAL_SHARE, Status};
+use crate::judge::judgement::{Bound, Judgement, MARGINAL_SHARE, Status};
 
 /// Every figure of a run that is judged.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -11,13 +11,13 @@ use nalgebra::{Cholesky, Matrix3};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::measure::errors::Errors;
-use crate::analysis::measure::independent::Correlated;
-use crate::analysis::read::spill_store::{SpillRow, Words};
-use crate::analysis::read::{Run, Table};
-use crate::analysis::statistics::Sum;
-use crate::gnss::record::Fix;
+use crate::error::JudgeError;
+use crate::measure::errors::Errors;
+use crate::measure::independent::Correlated;
+use crate::read::spill_store::{SpillRow, Words};
+use crate::read::{Run, Table};
+use crate::statistics::Sum;
+use gnss::record::Fix;
 
 /// Degrees of freedom of one fix.
 pub const FREEDOM: f64 = 3.0;
@@ -181,7 +181,7 @@ fn factor(fix: &Fix) -> Option<Cholesky<f64, nalgebra::Const<3>>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::measure::independent::tests::Draw;
+    use crate::measure::independent::tests::Draw;
 
     #[test]
     fn bands_are_those_of_the_tables() {

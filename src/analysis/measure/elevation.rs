@@ -11,11 +11,11 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::measure::errors::{Errors, Link, SignalError};
-use crate::analysis::read::{Numbers, Run};
-use crate::analysis::statistics::Sum;
-use crate::gnss::satellite::Sv;
+use crate::error::JudgeError;
+use crate::measure::errors::{Errors, Link, SignalError};
+use crate::read::{Numbers, Run};
+use crate::statistics::Sum;
+use gnss::satellite::Sv;
 
 /// Width of a band of elevation.
 const BAND_DEG: f64 = 10.0;
@@ -296,7 +296,7 @@ impl ArcMeans {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::gps::l1ca::L1_CA;
+    use gnss::gps::l1ca::L1_CA;
 
     #[test]
     fn bands_part_errors_by_elevation_and_the_clock_is_no_error() {

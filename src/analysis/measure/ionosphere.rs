@@ -5,11 +5,11 @@
 
 use serde::Serialize;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::read::{Numbers, Run};
-use crate::analysis::statistics::Sum;
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::record::SkyRow;
+use crate::error::JudgeError;
+use crate::read::{Numbers, Run};
+use crate::statistics::Sum;
+use gnss::gps::l1ca::L1_CA;
+use gnss::record::SkyRow;
 
 /// `ionosphere` in `summary.json`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -59,8 +59,8 @@ impl Ionosphere {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::hand_made::{planted, two_bands};
-    use crate::analysis::read::Run;
+    use crate::hand_made::{planted, two_bands};
+    use crate::read::Run;
 
     #[test]
     fn its_figures_are_those_of_the_planted_errors() {

@@ -4,7 +4,7 @@
 //! Raw and closed-loop figures are never mixed: a discriminator's value is noise of one integration,
 //! √(1/(2B·T)) times what the loop lets through. The theory takes the loops as the settings file describes
 //! them, controlled roots of exact bandwidth, with phase and rate fed back
-//! ([`crate::analysis::expect::theory::linear`]), at the C/N0 of which the measured one is stated
+//! ([`crate::expect::theory::linear`]), at the C/N0 of which the measured one is stated
 //! ([`Stated::effective_dbhz`]) and at the places in the loops' intervals where observations fall, and adds
 //! the scene's oscillator and the stress that the true motion puts on that same linear loop. In the tracking
 //! stage the frequency is that of the phase loop; its row judges the rate. Limits: discriminators as of
@@ -13,16 +13,16 @@
 
 use serde::Serialize;
 
-use crate::analysis::error::JudgeError;
-pub use crate::analysis::expect::loops::{Loop, Settings, motion_error_deg};
-use crate::analysis::expect::loops::{Places, Stresses, Theory};
-use crate::analysis::expect::stated::Stated;
-use crate::analysis::expect::timeline::Timeline;
-use crate::analysis::measure::errors::{Errors, Link, PULL_IN_S, SignalError};
-use crate::analysis::measure::independent::Correlated;
-use crate::analysis::read::{Numbers, Run};
-use crate::analysis::statistics::{mean, median};
-use crate::gnss::record::TrackingRow;
+use crate::error::JudgeError;
+pub use crate::expect::loops::{Loop, Settings, motion_error_deg};
+use crate::expect::loops::{Places, Stresses, Theory};
+use crate::expect::stated::Stated;
+use crate::expect::timeline::Timeline;
+use crate::measure::errors::{Errors, Link, PULL_IN_S, SignalError};
+use crate::measure::independent::Correlated;
+use crate::read::{Numbers, Run};
+use crate::statistics::{mean, median};
+use gnss::record::TrackingRow;
 
 /// One loop of one satellite: a row of `jitter.csv`. Sigmas and limits are in `unit`: chips, degrees or
 /// hertz.

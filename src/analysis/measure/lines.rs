@@ -9,10 +9,10 @@ use std::collections::BTreeSet;
 
 use serde::Serialize;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::read::Run;
-use crate::gnss::facts::Interference;
-use crate::gnss::record::{InterferenceRow, LineRow};
+use crate::error::JudgeError;
+use crate::read::Run;
+use gnss::facts::Interference;
+use gnss::record::{InterferenceRow, LineRow};
 
 /// Waves this strong have to be reported: 8 dB above what shows at 2.6 Msps, for wider bins and for waves
 /// between two.
@@ -109,9 +109,9 @@ impl Lines {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::hand_made::{RATE_HZ, planted, reported, write};
-    use crate::analysis::judge;
-    use crate::analysis::judge::judgement::Status;
+    use crate::hand_made::{RATE_HZ, planted, reported, write};
+    use crate::judge;
+    use crate::judge::judgement::Status;
     use std::fs;
 
     #[test]

@@ -1,14 +1,14 @@
 //! Power spectral density of the samples by Welch's method.
 //!
 //! Hann window, half overlap, periodograms averaged in f64 (Welch 1967).
-//! [`crate::analysis::expect::spectrum`] says what is expected of it.
+//! [`crate::expect::spectrum`] says what is expected of it.
 
 use std::sync::Arc;
 
-use rustfft::num_complex::Complex;
-use rustfft::{Fft, FftPlanner};
+use fft::{Fft, Planner};
+use num_complex::Complex;
 
-use crate::analysis::read::PsdRow;
+use crate::read::PsdRow;
 
 /// A spectrum being accumulated from blocks of planar samples.
 pub struct Psd {
@@ -29,7 +29,7 @@ impl Psd {
     /// samples.
     pub fn new(rate_hz: f64, one_sided: bool, bins: usize) -> Self {
         let bins = bins.max(8).next_multiple_of(2);
-        let fft = FftPlanner::new().plan_fft_forward(bins);
+        let fft = Planner::<f32>::new().plan_fft_forward(bins);
         let angle = |n: usize| std::f64::consts::TAU * n as f64 / bins as f64;
         Self {
             rate_hz,

@@ -14,15 +14,15 @@ use std::ops::RangeInclusive;
 
 use serde::Serialize;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::loops::update_s;
-use crate::analysis::expect::multiple_access::MultipleAccess;
-use crate::analysis::expect::theory::pll;
-use crate::analysis::measure::errors::{Errors, Link, SLIP_CYCLES, SignalError, first_jump_of};
-use crate::analysis::measure::jitter::{Settings, motion_error_deg};
-use crate::analysis::read::Run;
-use crate::analysis::statistics::median;
-use crate::gnss::record::Event;
+use crate::error::JudgeError;
+use crate::expect::loops::update_s;
+use crate::expect::multiple_access::MultipleAccess;
+use crate::expect::theory::pll;
+use crate::measure::errors::{Errors, Link, SLIP_CYCLES, SignalError, first_jump_of};
+use crate::measure::jitter::{Settings, motion_error_deg};
+use crate::read::Run;
+use crate::statistics::median;
+use gnss::record::Event;
 
 /// A fall of the true C/N0 against its median over the run that counts as an obstruction or a fade.
 pub const FADE_DB: f64 = 6.0;
@@ -100,7 +100,7 @@ pub struct Slip {
 }
 
 /// The first line of `slips.csv`, which is there without slips too.
-pub(in crate::analysis) const COLUMNS: &str = "sample,time_s,sv,signal,kind,declared,size_cycles,remainder_cycles,\
+pub(crate) const COLUMNS: &str = "sample,time_s,sv,signal,kind,declared,size_cycles,remainder_cycles,\
      cause,cn0_dbhz,interference_db,motion_deg,noise_3sigma_deg\n";
 
 /// All slips and losses of a run.
@@ -349,7 +349,7 @@ impl<'r> Evidence<'r> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::measure::errors::tests::arc;
+    use crate::measure::errors::tests::arc;
 
     #[test]
     fn sizes_are_those_of_the_steps_and_what_is_declared_is_found_once() {
@@ -385,7 +385,7 @@ mod tests {
         };
         for rows in [vec![slip], Vec::new()] {
             let lines = 1 + rows.len();
-            crate::analysis::show::tables::write_slips(run.path(), &Slips { rows }).unwrap();
+            crate::show::tables::write_slips(run.path(), &Slips { rows }).unwrap();
             let text = std::fs::read_to_string(run.path().join("slips.csv")).unwrap();
             assert!(text.starts_with(COLUMNS) && text.lines().count() == lines, "{text}");
         }

@@ -14,13 +14,13 @@
 //! error of the expectation. Bins that a line fills, those 40 dB below the peak, and of real samples the ends
 //! of the band are left out. Limits: [`excuse`] names what is not judged.
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::front_end::FrontEnd;
-use crate::analysis::expect::quantile::largest;
-use crate::analysis::expect::samples::{Expected, Sent};
-use crate::analysis::expect::welch;
-use crate::analysis::read::{PsdRow, Run};
-use crate::gnss::facts::Interference;
+use crate::error::JudgeError;
+use crate::expect::front_end::FrontEnd;
+use crate::expect::quantile::largest;
+use crate::expect::samples::{Expected, Sent};
+use crate::expect::welch;
+use crate::read::{PsdRow, Run};
+use gnss::facts::Interference;
 
 /// Slices of the band.
 const SLICES: usize = 32;
@@ -209,8 +209,8 @@ pub fn excuse(run: &Run, front_end: &FrontEnd<'_>) -> Option<&'static str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::hand_made::{Draw, planted};
-    use crate::analysis::measure::psd::Psd;
+    use crate::hand_made::{Draw, planted};
+    use crate::measure::psd::Psd;
 
     #[test]
     fn white_noise_is_within_its_limits_and_no_more_than_its_scatter_is_needed() {

@@ -5,9 +5,9 @@
 
 use serde::Serialize;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::read::Run;
-use crate::analysis::statistics::percentile;
+use crate::error::JudgeError;
+use crate::read::Run;
+use crate::statistics::percentile;
 
 /// Distance between truth and claim from which on a fix can be assigned to one of them.
 pub const APART_M: f64 = 20.0;

@@ -12,10 +12,10 @@ use std::collections::{BTreeMap, HashMap};
 use serde_json::Value;
 
 use super::delay;
-use crate::analysis::waveform::{Edge, Sampler, Waveform};
-use crate::gnss::facts::{FilterSpec, SceneFacts, filters, oscillator_offset_hz};
-use crate::gnss::record::Observation;
-use crate::gnss::signal::{Link, Signal};
+use crate::waveform::{Edge, Sampler, Waveform};
+use gnss::facts::{FilterSpec, SceneFacts, filters, oscillator_offset_hz};
+use gnss::record::Observation;
+use gnss::signal::{Link, Signal};
 
 /// What the ionosphere may make of a carrier less its pseudorange, metres a second.
 const LEAST_WOUND_MPS: f64 = 0.02;
@@ -25,7 +25,7 @@ const USUAL_SPACING_CHIPS: f64 = 0.5;
 
 /// How the receiver's replica meets samples, as it says itself; one that does not say it has the samples'
 /// own edges, but no filter.
-pub(in crate::analysis) fn replica_edge(receiver: &Value, samples: Edge) -> Edge {
+pub(crate) fn replica_edge(receiver: &Value, samples: Edge) -> Edge {
     let settings = receiver.get("settings").unwrap_or(receiver);
     match (settings.pointer("/tracking/replica").and_then(Value::as_str), samples) {
         (Some("area"), _) | (None, Edge::Area) => Edge::Area,

@@ -11,9 +11,9 @@
 
 use num_complex::Complex64;
 
-use crate::analysis::response::Response;
-use crate::analysis::waveform::{Sampler, Waveform};
-use crate::gnss::facts::{FilterShape, FilterSpec};
+use crate::response::Response;
+use crate::waveform::{Sampler, Waveform};
+use gnss::facts::{FilterShape, FilterSpec};
 
 /// Steps of the integral over half the band of the samples: 5 kHz at 10 Msps, far below what a response or a
 /// lag of a chip turns in.
@@ -97,8 +97,8 @@ fn phasor(radians: f64) -> Complex64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::waveform::Edge;
-    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::waveform::Edge;
+    use gnss::gps::l1ca::L1_CA;
 
     /// Delay of C/A in metres behind a Butterworth filter of order 4, at half a chip.
     fn delay_m(bandwidth_hz: f64, rate_hz: f64, edge: Edge) -> f64 {

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::read::spill_store::SpillStore;
-use crate::analysis::statistics::Sum;
-use crate::gnss::record::Observation;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Link, Signal};
+use crate::error::JudgeError;
+use crate::read::spill_store::SpillStore;
+use crate::statistics::Sum;
+use gnss::record::Observation;
+use gnss::satellite::Sv;
+use gnss::signal::{Link, Signal};
 
 /// A signal on a carrier: that of all satellites, or of those that share a channel of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
-use crate::analysis::error::JudgeError;
+use crate::error::JudgeError;
 
 pub(super) fn missing(path: &Path, remedy: &'static str) -> JudgeError {
     JudgeError::Missing { path: path.to_owned(), remedy }

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::read::spill_store::{Cursor, Finder, SpillRow, Words};
-use crate::analysis::read::table::Table;
-use crate::gnss::record::{Fix, IonosphereModel};
+use crate::error::JudgeError;
+use crate::read::spill_store::{Cursor, Finder, SpillRow, Words};
+use crate::read::table::Table;
+use gnss::record::{Fix, IonosphereModel};
 
 /// The fixes of a run in the order of their table.
 #[derive(Debug)]
@@ -256,7 +256,7 @@ impl Fixes {
 
     /// The same fixes after a change of their list.
     #[cfg(test)]
-    pub(in crate::analysis) fn change(&mut self, change: impl FnOnce(&mut Vec<Fix>)) {
+    pub(crate) fn change(&mut self, change: impl FnOnce(&mut Vec<Fix>)) {
         let mut all = self.map(|fix| fix).unwrap();
         change(&mut all);
         *self = Self::new(self.table.directory());
@@ -299,7 +299,7 @@ impl Iterator for InOrder<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::hand_made::planted;
+    use crate::hand_made::planted;
 
     fn text(fixes: impl IntoIterator<Item = Fix>) -> String {
         fixes.into_iter().map(|fix| format!("{fix:?}\n")).collect()

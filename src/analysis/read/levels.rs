@@ -7,8 +7,8 @@ use std::collections::{BTreeMap, HashMap};
 use std::hash::Hash;
 use std::path::Path;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::read::spill_store::{Finder, SpillRow, SpillStore, Words};
+use crate::error::JudgeError;
+use crate::read::spill_store::{Finder, SpillRow, SpillStore, Words};
 
 /// One number.
 struct Level {
@@ -40,17 +40,12 @@ pub struct Levels<K> {
 
 impl<K: Copy + Ord + Hash> Levels<K> {
     /// None yet; they spill to a file in that directory.
-    pub(in crate::analysis) fn new(directory: &Path) -> Self {
+    pub(crate) fn new(directory: &Path) -> Self {
         Self { store: SpillStore::new(directory), sample: 0, open: BTreeMap::new(), all: None }
     }
 
     /// Makes another number of the one at a sample, which is 0 at first.
-    pub(in crate::analysis) fn change(
-        &mut self,
-        sample: u64,
-        key: K,
-        of: impl FnOnce(f64) -> f64,
-    ) -> Result<(), JudgeError> {
+    pub(crate) fn change(&mut self, sample: u64, key: K, of: impl FnOnce(f64) -> f64) -> Result<(), JudgeError> {
         if sample < self.sample && self.all.is_none() {
             self.close()?;
             let mut all = HashMap::new();
@@ -76,7 +71,7 @@ impl<K: Copy + Ord + Hash> Levels<K> {
     }
 
     /// Puts away what is held of the last epoch.
-    pub(in crate::analysis) fn close(&mut self) -> Result<(), JudgeError> {
+    pub(crate) fn close(&mut self) -> Result<(), JudgeError> {
         for (key, value) in std::mem::take(&mut self.open) {
             self.store.push(key, &Level { sample: self.sample, value })?;
         }

@@ -22,7 +22,7 @@ pub mod table;
 mod word_file;
 
 pub use common::Common;
-pub(in crate::analysis) use common::replica_edge;
+pub(crate) use common::replica_edge;
 pub use emission::{Emission, MeanSignal};
 pub use fault::Fault;
 pub use fixes::Fixes;

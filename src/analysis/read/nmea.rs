@@ -8,9 +8,9 @@
 
 use nalgebra::Vector3;
 
-use crate::analysis::read::fault::Fault;
-use crate::gnss::earth::Geodetic;
-use crate::gnss::time::Epoch;
+use crate::read::fault::Fault;
+use gnss::earth::Geodetic;
+use gnss::time::Epoch;
 
 /// One position.
 #[derive(Clone, Debug, PartialEq)]

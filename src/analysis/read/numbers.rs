@@ -1,5 +1,5 @@
 //! A list of numbers that may be longer than memory: mean, spread and percentiles, exactly as
-//! [`crate::analysis::statistics`] has them of a list that is held.
+//! [`crate::statistics`] has them of a list that is held.
 //!
 //! Up to 16 384 numbers are held, the rest lie in a file without a name and are read again for each sum. An
 //! order statistic is found by its bits, sixteen at a time: a count of how many numbers begin with each
@@ -7,9 +7,9 @@
 
 use std::path::Path;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::read::word_file::WordFile;
-use crate::analysis::statistics::{Spread, Sum, deviation, rank};
+use crate::error::JudgeError;
+use crate::read::word_file::WordFile;
+use crate::statistics::{Spread, Sum, deviation, rank};
 
 /// Numbers that are held.
 const HELD: usize = 1 << 14;
@@ -209,7 +209,7 @@ impl Pooled {
         Ok(())
     }
 
-    /// As [`crate::analysis::statistics::pooled_std`].
+    /// As [`crate::statistics::pooled_std`].
     pub fn std(&self) -> Option<f64> {
         (self.freedom > 0).then(|| (self.squares / self.freedom as f64).sqrt())
     }
@@ -218,8 +218,8 @@ impl Pooled {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::hand_made::Draw;
-    use crate::analysis::statistics::{mean, percentile, pooled_std, rms, spread, std};
+    use crate::hand_made::Draw;
+    use crate::statistics::{mean, percentile, pooled_std, rms, spread, std};
 
     #[test]
     fn every_figure_is_that_of_a_list_that_is_held_to_the_last_bit() {

@@ -9,9 +9,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::analysis::read::fault::Fault;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::read::fault::Fault;
+use gnss::satellite::Sv;
+use gnss::time::Epoch;
 
 /// What one satellite's signal gave at one epoch; a blank or a zero in the file is `None`.
 #[derive(Clone, Debug, Default, PartialEq)]

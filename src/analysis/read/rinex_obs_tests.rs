@@ -83,7 +83,6 @@ fn a_file_cut_anywhere_or_with_any_byte_changed_is_read_or_refused() {
 }
 
 /// The crate that everyone uses reads the same numbers from the same file.
-#[cfg(feature = "generator")]
 #[test]
 fn the_rinex_crate_reads_the_same_values() {
     use ::rinex::prelude::{Rinex, TimeScale};

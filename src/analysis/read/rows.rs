@@ -1,9 +1,9 @@
 //! How the rows of a run's long tables are put into a [`super::spill_store::SpillStore`].
 
-use crate::analysis::read::spill_store::{SpillRow, Words};
-use crate::gnss::record::{IonosphereRow, Observation, RayRow, SkyRow, TrackingRow, TrajectoryRow};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Link;
+use crate::read::spill_store::{SpillRow, Words};
+use gnss::record::{IonosphereRow, Observation, RayRow, SkyRow, TrackingRow, TrajectoryRow};
+use gnss::satellite::Sv;
+use gnss::signal::Link;
 
 impl SpillRow<Link> for Observation {
     const WORDS: usize = 8;
@@ -145,8 +145,8 @@ impl SpillRow<Link> for RayRow {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::read::spill_store::SpillStore;
-    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::read::spill_store::SpillStore;
+    use gnss::gps::l1ca::L1_CA;
 
     #[test]
     fn a_row_of_each_kind_comes_back_as_it_was() {

@@ -1,6 +1,6 @@
 //! Everything that a run wrote, read once.
 //!
-//! Truth and estimate are CSV files of the rows in [`crate::gnss::record`]; the scene and the receiver's
+//! Truth and estimate are CSV files of the rows in [`gnss::record`]; the scene and the receiver's
 //! settings are JSON. Tables with a row for every satellite of every epoch go to spill stores, grouped by
 //! satellite, those with a row an epoch to spilled tables; shorter ones stay in memory.
 
@@ -13,20 +13,20 @@ use serde_json::Value;
 use super::common::Common;
 use super::emission::{self, Emission, MeanSignal};
 use super::files::{believable, each, json, missing, optional, rows, text};
-use crate::analysis::error::JudgeError;
-use crate::analysis::read::fixes::Fixes;
-use crate::analysis::read::levels::{LevelFinder, Levels};
-use crate::analysis::read::spill_store::{Finder, SpillStore};
-use crate::analysis::read::table::Table;
-use crate::analysis::statistics::{mean, median};
-use crate::analysis::waveform::Sampler;
-use crate::gnss::facts::{FrontEndFacts, SceneFacts};
-use crate::gnss::record::{
+use crate::error::JudgeError;
+use crate::read::fixes::Fixes;
+use crate::read::levels::{LevelFinder, Levels};
+use crate::read::spill_store::{Finder, SpillStore};
+use crate::read::table::Table;
+use crate::statistics::{mean, median};
+use crate::waveform::Sampler;
+use gnss::facts::{FrontEndFacts, SceneFacts};
+use gnss::record::{
     AcquisitionRow, EventRow, Fix, InterferenceRow, IonosphereRow, LineRow, NavigationRow, Observation, RayRow, SkyRow,
     TrackingRow, TrajectoryRow,
 };
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Link, Signal};
+use gnss::satellite::Sv;
+use gnss::signal::{Link, Signal};
 
 /// How fast the stages ran: `speed.json`, and the section of the summary.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -465,7 +465,7 @@ impl Counts {
         }
     }
 
-    /// As [`crate::analysis::statistics::median`] has it.
+    /// As [`crate::statistics::median`] has it.
     fn median(&self) -> Option<f64> {
         let last = self.0.values().sum::<usize>().checked_sub(1)?;
         let at = |rank: usize| {
@@ -484,10 +484,10 @@ impl Counts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::hand_made::planted;
-    use crate::analysis::judge;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::signal::synthetic::{CHANNELS, LONG_BOC};
+    use crate::hand_made::planted;
+    use crate::judge;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::signal::synthetic::{CHANNELS, LONG_BOC};
     use std::fs;
 
     #[test]

@@ -13,8 +13,8 @@ use std::io;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::read::word_file::WordFile;
+use crate::error::JudgeError;
+use crate::read::word_file::WordFile;
 
 /// Rows of a key that are kept in memory.
 const MOST_ROWS: usize = 256;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::read::spill_store::{Cursor, Finder, SpillRow, SpillStore};
+use crate::error::JudgeError;
+use crate::read::spill_store::{Cursor, Finder, SpillRow, SpillStore};
 
 /// A table of which the first and the last row are held.
 #[derive(Debug)]

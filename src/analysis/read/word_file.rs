@@ -5,7 +5,7 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use crate::analysis::error::JudgeError;
+use crate::error::JudgeError;
 
 /// The file, made once there is something to write.
 #[derive(Debug)]

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::judge::foreign::Judgement;
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::show::plot;
-use crate::analysis::show::write::{write_rows, write_whole};
+use crate::error::JudgeError;
+use crate::judge::foreign::Judgement;
+use crate::judge::verdict::Verdict;
+use crate::show::plot;
+use crate::show::write::{write_rows, write_whole};
 
 /// Writes tables, verdict, pictures and `foreign.json` into an existing directory.
 ///

@@ -11,8 +11,8 @@ pub mod pdf;
 pub mod plot;
 pub mod report;
 #[cfg(feature = "pdf")]
-pub(in crate::analysis) mod run_report;
+pub(crate) mod run_report;
 pub mod staged;
 pub mod tables;
 pub mod trade;
-pub(crate) mod write;
+pub mod write;

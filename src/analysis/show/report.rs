@@ -2,11 +2,11 @@
 
 use std::fmt;
 
-use crate::analysis::judge::judgement::Status;
-use crate::analysis::judge::summary::Summary;
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::measure::consistency::Calibration;
-use crate::analysis::statistics::Spread;
+use crate::judge::judgement::Status;
+use crate::judge::summary::Summary;
+use crate::judge::verdict::Verdict;
+use crate::measure::consistency::Calibration;
+use crate::statistics::Spread;
 
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -8,18 +8,18 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::measure::elevation::Elevations;
-use crate::analysis::measure::errors::PositionError;
-use crate::analysis::measure::jitter::Jitter;
-use crate::analysis::measure::psd::Psd;
-use crate::analysis::measure::slips::{COLUMNS, Slips};
-use crate::analysis::show::plot::Judged;
-use crate::analysis::show::plot::jitter::{Histogram, loops};
-use crate::analysis::show::write::{Table, write_read_rows, write_rows, write_whole};
-use crate::gnss::record::Fix;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Link;
+use crate::error::JudgeError;
+use crate::measure::elevation::Elevations;
+use crate::measure::errors::PositionError;
+use crate::measure::jitter::Jitter;
+use crate::measure::psd::Psd;
+use crate::measure::slips::{COLUMNS, Slips};
+use crate::show::plot::Judged;
+use crate::show::plot::jitter::{Histogram, loops};
+use crate::show::write::{Table, write_read_rows, write_rows, write_whole};
+use gnss::record::Fix;
+use gnss::satellite::Sv;
+use gnss::signal::Link;
 
 /// A row of `errors.csv`; estimate minus truth.
 #[derive(Serialize)]
@@ -91,7 +91,7 @@ pub fn write_psd(path: &Path, psd: &Psd) -> Result<(), JudgeError> {
 }
 
 /// Writes the tables of a run's measurements, all but those of [`write()`].
-pub(in crate::analysis) fn write_measured(
+pub(crate) fn write_measured(
     directory: &Path,
     judged: &Judged<'_>,
     elevations: &Elevations,
@@ -108,14 +108,14 @@ pub(in crate::analysis) fn write_measured(
 }
 
 /// Writes `slips.csv`, whose header is there without rows too.
-pub(in crate::analysis) fn write_slips(directory: &Path, slips: &Slips) -> Result<(), JudgeError> {
+pub(crate) fn write_slips(directory: &Path, slips: &Slips) -> Result<(), JudgeError> {
     let path = directory.join("slips.csv");
     if slips.rows.is_empty() { write_whole(&path, COLUMNS.as_bytes()) } else { write_rows(&path, slips.rows.iter()) }
 }
 
 /// Writes `errors.csv`, `position.csv`, `histograms.csv`, `psd_theory.csv` and `verdict.csv` into a run's
 /// directory.
-pub(in crate::analysis) fn write(directory: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
+pub(crate) fn write(directory: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
     let mut errors = Table::create(&directory.join("errors.csv"))?;
     for link in judged.errors.signals.keys() {
         let Link { sv, signal } = link;

@@ -10,9 +10,9 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::show::plot::canvas::{Axis, BLUE, Chart, GREY, Mark, ORANGE, Series, figure};
-use crate::analysis::show::write::{write_rows, write_whole};
+use crate::error::JudgeError;
+use crate::show::plot::canvas::{Axis, BLUE, Chart, GREY, Mark, ORANGE, Series, figure};
+use crate::show::write::{write_rows, write_whole};
 
 /// One setting and what was measured for it; errors are against the `reference` level.
 #[derive(Clone, Debug, PartialEq, Serialize)]

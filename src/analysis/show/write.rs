@@ -8,10 +8,10 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::staged::Staged;
-use crate::analysis::error::JudgeError;
+use crate::error::JudgeError;
 
 /// A CSV file that is still being written.
-pub(crate) struct Table {
+pub struct Table {
     path: PathBuf,
     staged: Staged,
     rows: csv::Writer<File>,
@@ -47,14 +47,14 @@ impl Table {
 }
 
 /// Writes rows as a CSV file.
-pub(crate) fn write_rows<T: Serialize>(path: &Path, mut rows: impl Iterator<Item = T>) -> Result<(), JudgeError> {
+pub fn write_rows<T: Serialize>(path: &Path, mut rows: impl Iterator<Item = T>) -> Result<(), JudgeError> {
     let mut table = Table::create(path)?;
     rows.try_for_each(|row| table.row(&row))?;
     table.finish()
 }
 
 /// The same of rows that are read while they are written.
-pub(crate) fn write_read_rows<T: Serialize>(
+pub fn write_read_rows<T: Serialize>(
     path: &Path,
     mut rows: impl Iterator<Item = Result<T, JudgeError>>,
 ) -> Result<(), JudgeError> {
@@ -72,7 +72,7 @@ fn part(path: &Path) -> PathBuf {
 }
 
 /// Writes a file so that a reader sees the old one or the new one, never a part.
-pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), JudgeError> {
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), JudgeError> {
     Staged::file(part(path))
         .and_then(|(staged, mut file)| {
             file.write_all(bytes)?;

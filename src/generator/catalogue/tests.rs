@@ -1,8 +1,8 @@
 use super::*;
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::rinex;
-use crate::gnss::signal::synthetic::QUADRATURE;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::gps::l1ca::L1_CA;
+use gnss::rinex;
+use gnss::signal::synthetic::QUADRATURE;
 
 fn day() -> Vec<Ephemeris> {
     rinex::embedded().unwrap().ephemerides

@@ -11,8 +11,8 @@ pub mod oscillator;
 
 use std::sync::Arc;
 
-use crate::generator::vehicle::shaking::Shaking;
-use crate::gnss::time::Epoch;
+use crate::vehicle::shaking::Shaking;
+use gnss::time::Epoch;
 use oscillator::Oscillator;
 
 /// A clock that is `bias_s` ahead of GPS time at the scene's start and gains `drift` seconds a second.

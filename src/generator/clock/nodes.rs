@@ -5,7 +5,7 @@
 //! where nodes lie between samples, runs end at the first sample behind a node, and what steps at a node does
 //! so there.
 
-use crate::gnss::time::{Rate, SampleClock};
+use gnss::time::{Rate, SampleClock};
 
 /// Samples between nodes: the largest power of two within a millisecond.
 pub fn node_samples(rate: Rate) -> u64 {

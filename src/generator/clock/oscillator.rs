@@ -10,9 +10,9 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::nodes::node_samples;
-use crate::generator::random::Stream;
-use crate::generator::random::markov::{Process, State, Track};
-use crate::gnss::time::Rate;
+use crate::random::Stream;
+use crate::random::markov::{Process, State, Track};
+use gnss::time::Rate;
 
 /// Fine nodes in a coarse cell.
 const CELL_NODES: usize = 1024;

@@ -13,10 +13,10 @@ use serde::Deserialize;
 use thiserror::Error;
 
 use super::wind_up::dipoles;
-use crate::generator::ray::Sight;
-use crate::generator::vehicle::Trajectory;
-use crate::gnss::earth::Look;
-use crate::gnss::time::Epoch;
+use crate::ray::Sight;
+use crate::vehicle::Trajectory;
+use gnss::earth::Look;
+use gnss::time::Epoch;
 
 /// Gain over angle (degrees, ascending), linear between the points and constant outside.
 pub(super) type Curve = [(f64, f64)];

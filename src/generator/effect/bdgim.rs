@@ -4,12 +4,12 @@
 //! not: here one interval passes into the next over [`MIDNIGHT_S`]. Limits: where the model's least content
 //! begins its delay has a bend; above the shell the delay fades as in [`super::ionosphere`].
 
-use crate::generator::effect::ionosphere::{MIDNIGHT_S, delay_groups, share_above, smooth};
-use crate::generator::ray::{Effect, Ray, Sight};
-use crate::gnss::bdgim::{Bdgim, INTERVAL_S, Pierce, delay_s, forecast_tecu, interval};
-use crate::gnss::earth::{Geodetic, Look};
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use crate::effect::ionosphere::{MIDNIGHT_S, delay_groups, share_above, smooth};
+use crate::ray::{Effect, Ray, Sight};
+use gnss::bdgim::{Bdgim, INTERVAL_S, Pierce, delay_s, forecast_tecu, interval};
+use gnss::earth::{Geodetic, Look};
+use gnss::signal::Signal;
+use gnss::time::Epoch;
 
 /// BDGIM with smooth ends of its intervals.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,7 +60,7 @@ impl Effect for BdgimIonosphere {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::time::BDT;
+    use gnss::time::BDT;
 
     #[test]
     fn no_even_hour_moves_the_content_by_a_step() {

@@ -10,11 +10,11 @@
 //! delay by up to 0.13 m. The model is meant for users below the ionosphere; it is applied in full below 350
 //! km, fades to zero at 1000 km and is absent above.
 
-use crate::generator::ray::{Effect, Ray, Sight};
-use crate::gnss::earth::{Geodetic, Look};
-use crate::gnss::klobuchar::{Bulge, DAY_S, Klobuchar, L1_HZ, NIGHT_S, SERIES_END_RAD, cosine_series};
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use crate::ray::{Effect, Ray, Sight};
+use gnss::earth::{Geodetic, Look};
+use gnss::klobuchar::{Bulge, DAY_S, Klobuchar, L1_HZ, NIGHT_S, SERIES_END_RAD, cosine_series};
+use gnss::signal::Signal;
+use gnss::time::Epoch;
 
 /// Phase over which the bulge fades: 0.03 rad is 6 min at the shortest period. The delay then departs from
 /// the printed one by less than 3 % of the bulge's amplitude, little more than the step itself.
@@ -109,7 +109,7 @@ pub(crate) fn smooth(u: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+    use gnss::earth::SPEED_OF_LIGHT_MPS;
 
     const PRINTED: Klobuchar =
         Klobuchar { alpha: [1.118e-8, -7.451e-9, -5.961e-8, 1.192e-7], beta: [1.167e5, -2.294e5, -1.311e5, 1.049e6] };
@@ -161,13 +161,13 @@ mod tests {
     #[test]
     fn code_is_delayed_by_what_the_carrier_is_advanced() {
         let effect = KlobucharIonosphere::of_gps(PRINTED);
-        let sight = crate::generator::effect::link::tests::sight(30.0, 0.0);
+        let sight = crate::effect::link::tests::sight(30.0, 0.0);
         let mut rays = vec![Ray { code_delay_s: 1.0, carrier_delay_s: 1.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
-        effect.act(&sight, &crate::gnss::gps::l1ca::L1_CA, &mut rays);
+        effect.act(&sight, &gnss::gps::l1ca::L1_CA, &mut rays);
         assert!(rays[0].code_delay_s > 1.0 && rays[0].code_delay_s + rays[0].carrier_delay_s == 2.0);
-        let high = crate::generator::effect::link::tests::sight(30.0, 1.1e6);
+        let high = crate::effect::link::tests::sight(30.0, 1.1e6);
         let mut above = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
-        effect.act(&high, &crate::gnss::gps::l1ca::L1_CA, &mut above);
+        effect.act(&high, &gnss::gps::l1ca::L1_CA, &mut above);
         assert_eq!(above[0].code_delay_s, 0.0);
     }
 }

@@ -9,11 +9,11 @@
 
 use super::antenna::{Antenna, Pattern, gain_db};
 use super::transmit::Block;
-use crate::generator::ray::{Effect, Ray, Sight};
-use crate::gnss::earth::{SEMI_MAJOR_AXIS_M, SPEED_OF_LIGHT_MPS};
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::signal::Signal;
+use crate::ray::{Effect, Ray, Sight};
+use gnss::earth::{SEMI_MAJOR_AXIS_M, SPEED_OF_LIGHT_MPS};
+use gnss::gps::l1ca::L1_CA;
+use gnss::satellite::{Sv, System};
+use gnss::signal::Signal;
 
 /// k·T0 in dBW/Hz as the budget rounds it: a matched source at 290 K gives −203.98.
 const REFERENCE_NOISE_DBWHZ: f64 = -204.0;
@@ -186,11 +186,11 @@ pub(crate) mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::gnss::broadcast::State;
-    use crate::gnss::earth::{Geodetic, Look};
-    use crate::gnss::galileo::e1::E1;
-    use crate::gnss::signal::Carrier;
-    use crate::gnss::time::Epoch;
+    use gnss::broadcast::State;
+    use gnss::earth::{Geodetic, Look};
+    use gnss::galileo::e1::E1;
+    use gnss::signal::Carrier;
+    use gnss::time::Epoch;
 
     /// A sight line with the spherical geometry of the reference table: radii 6378 and 26 560 km.
     pub(crate) fn sight(elevation_deg: f64, height_m: f64) -> Sight {

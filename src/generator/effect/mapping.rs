@@ -9,10 +9,10 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use crate::gnss::earth::Geodetic;
-use crate::gnss::time::Epoch;
-use crate::gnss::vienna::{Gpt3, MappingA, MappingGrid, Vienna};
-use crate::gnss::vmf3::{MappingBc, Vmf3};
+use gnss::earth::Geodetic;
+use gnss::time::Epoch;
+use gnss::vienna::{Gpt3, MappingA, MappingGrid, Vienna};
+use gnss::vmf3::{MappingBc, Vmf3};
 
 /// Elevation below which the mapping no longer grows: 1°. NMF was fitted from 3° up.
 pub const LOWEST_RAD: f64 = PI / 180.0;

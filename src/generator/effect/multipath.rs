@@ -9,11 +9,11 @@
 
 use nalgebra::Vector3;
 
-use crate::generator::ray::{Effect, Ray, Sight};
-use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use crate::ray::{Effect, Ray, Sight};
+use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
+use gnss::time::Epoch;
 
 /// Where a ray's detour comes from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -130,9 +130,9 @@ impl Effect for Multipath {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::broadcast::State;
-    use crate::gnss::earth::look;
-    use crate::gnss::gps::l1ca::L1_CA;
+    use gnss::broadcast::State;
+    use gnss::earth::look;
+    use gnss::gps::l1ca::L1_CA;
 
     /// A satellite at 2e7 m in that direction.
     fn sight(azimuth_deg: f64, elevation_deg: f64, moved_enu_m: Vector3<f64>) -> (Sight, Vector3<f64>) {

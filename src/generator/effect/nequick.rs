@@ -8,12 +8,12 @@
 
 use nalgebra::Vector3;
 
-use crate::generator::effect::ionosphere::{MIDNIGHT_S, delay_groups, smooth};
-use crate::generator::ray::{Effect, Ray, Sight};
-use crate::gnss::earth::Geodetic;
-use crate::gnss::nequick::{NequickG, delay_s};
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use crate::effect::ionosphere::{MIDNIGHT_S, delay_groups, smooth};
+use crate::ray::{Effect, Ray, Sight};
+use gnss::earth::Geodetic;
+use gnss::nequick::{NequickG, delay_s};
+use gnss::signal::Signal;
+use gnss::time::Epoch;
 
 /// NeQuick-G with smooth midnights.
 #[derive(Clone, Copy, Debug, PartialEq)]

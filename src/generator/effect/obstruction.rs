@@ -12,10 +12,10 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::generator::effect::ionosphere::smooth;
-use crate::generator::ray::{Effect, Ray, Sight};
-use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
-use crate::gnss::signal::Signal;
+use crate::effect::ionosphere::smooth;
+use crate::ray::{Effect, Ray, Sight};
+use gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
+use gnss::signal::Signal;
 
 /// An obstruction.
 #[derive(Clone, Debug, PartialEq)]
@@ -317,11 +317,7 @@ mod tests {
             ];
             let effect = Obstruction::new(obstacles, origin());
             let mut rays = vec![ray(31_622.776_601), ray(5e3)];
-            effect.act(
-                &crate::generator::effect::link::tests::sight(30.0, 0.0),
-                &crate::gnss::gps::l1ca::L1_CA,
-                &mut rays,
-            );
+            effect.act(&crate::effect::link::tests::sight(30.0, 0.0), &gnss::gps::l1ca::L1_CA, &mut rays);
             assert_eq!(rays[0] == ray(31_622.776_601), kept);
             assert_eq!(rays[1], ray(5e3));
         }

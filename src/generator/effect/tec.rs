@@ -8,11 +8,11 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use crate::generator::effect::ionosphere::{delay_groups, share_above};
-use crate::generator::ray::{Effect, Ray, Sight};
-use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
-use crate::gnss::ionex::{Interpolation, Maps};
-use crate::gnss::signal::Signal;
+use crate::effect::ionosphere::{delay_groups, share_above};
+use crate::ray::{Effect, Ray, Sight};
+use gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
+use gnss::ionex::{Interpolation, Maps};
+use gnss::signal::Signal;
 
 /// Metres of delay on a carrier of 1 Hz for one electron/m², times 1e16 electrons/m² of a TEC unit.
 const METRES_PER_TECU_HZ2: f64 = 40.3e16;
@@ -107,7 +107,7 @@ pub struct ShellIonosphere {
 
 impl ShellIonosphere {
     /// Slant electron content of a whole crossing in TEC units.
-    pub fn slant_tecu(&self, user: Geodetic, look: Look, at: crate::gnss::time::Epoch) -> f64 {
+    pub fn slant_tecu(&self, user: Geodetic, look: Look, at: gnss::time::Epoch) -> f64 {
         let pierce = self.shell.pierce(user, look);
         let vertical_tecu = match &self.content {
             Content::Constant(tecu) => *tecu,
@@ -154,9 +154,9 @@ impl Effect for ShellIonosphere {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generator::effect::link::tests::sight;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::signal::Carrier;
+    use crate::effect::link::tests::sight;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::signal::Carrier;
 
     const SHELL: Shell = Shell { radius_m: EARTH_RADIUS_M, height_m: 450e3, mapping: Mapping::SingleLayer };
 

@@ -9,8 +9,8 @@
 //! too low by a side lobe, some 10 dB.
 
 use super::antenna::Curve;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use gnss::satellite::Sv;
+use gnss::time::Epoch;
 
 /// A generation of satellites.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -156,7 +156,7 @@ const IIRM: [(f64, f64); 16] = [
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generator::effect::antenna::gain_db;
+    use crate::effect::antenna::gain_db;
 
     #[test]
     fn every_beam_covers_the_earth_s_edge_as_the_interface_document_asks() {

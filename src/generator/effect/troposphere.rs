@@ -7,13 +7,13 @@
 //! of Askne & Nordius 1987. Limits: above 44.3 km the pressure of the standard atmosphere, and so the delay,
 //! is zero; GPT3's fades there.
 
-use crate::generator::effect::ionosphere::smooth;
-use crate::generator::effect::mapping::{Mapping, season_day};
-use crate::generator::ray::{Effect, Ray, Sight};
-use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
-use crate::gnss::vienna::{self, Gpt3};
+use crate::effect::ionosphere::smooth;
+use crate::effect::mapping::{Mapping, season_day};
+use crate::ray::{Effect, Ray, Sight};
+use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::signal::Signal;
+use gnss::time::Epoch;
+use gnss::vienna::{self, Gpt3};
 
 /// Standard atmosphere: relative loss of pressure base per metre, exponent, lapse rate (ICAO Doc 7488).
 const PRESSURE_LAPSE_PM: f64 = 2.2557e-5;

@@ -23,15 +23,15 @@ use counted::Counted;
 
 use nalgebra::Vector3;
 
-use crate::generator::catalogue::Catalogue;
-use crate::generator::ray::{Effect, Ray, Sight};
-use crate::generator::sky::emission;
-use crate::generator::vehicle::Trajectory;
-use crate::generator::vehicle::attitude::Attitude;
-use crate::gnss::broadcast::OrbitError;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use crate::catalogue::Catalogue;
+use crate::ray::{Effect, Ray, Sight};
+use crate::sky::emission;
+use crate::vehicle::Trajectory;
+use crate::vehicle::attitude::Attitude;
+use gnss::broadcast::OrbitError;
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
+use gnss::time::Epoch;
 
 /// Seconds of a day, and 2000-01-01T12:00 UTC in GPS time.
 const DAY_S: f64 = 86_400.0;
@@ -200,9 +200,9 @@ mod tests {
     use nalgebra::Unit;
 
     use super::*;
-    use crate::generator::vehicle::attitude::Nose;
-    use crate::gnss::earth::Geodetic;
-    use crate::gnss::rinex;
+    use crate::vehicle::attitude::Nose;
+    use gnss::earth::Geodetic;
+    use gnss::rinex;
 
     fn body(nose: Nose, spin_hz: f64, boresight: Vector3<f64>) -> Attitude {
         Attitude { nose, spin_hz, lever_arm_m: Vector3::zeros(), boresight: Unit::new_normalize(boresight) }

@@ -12,10 +12,10 @@ pub mod scintillation;
 use satellite::SatelliteClocks;
 use scintillation::Scintillation;
 
-use crate::generator::clock::ReceiverClock;
-use crate::generator::clock::nodes::Nodes;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::{Rate, SampleClock};
+use crate::clock::ReceiverClock;
+use crate::clock::nodes::Nodes;
+use gnss::satellite::Sv;
+use gnss::time::{Rate, SampleClock};
 
 /// What is added to a satellite's signal at one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]

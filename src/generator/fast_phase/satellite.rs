@@ -8,8 +8,8 @@
 use std::collections::BTreeMap;
 
 use super::Sources;
-use crate::generator::clock::oscillator::Oscillator;
-use crate::gnss::satellite::Sv;
+use crate::clock::oscillator::Oscillator;
+use gnss::satellite::Sv;
 
 /// A change of a clock between two nodes; the end is `u64::MAX` where there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]

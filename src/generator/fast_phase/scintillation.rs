@@ -12,10 +12,10 @@ use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::generator::clock::nodes::node_samples;
-use crate::generator::random::Stream;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Rate;
+use crate::clock::nodes::node_samples;
+use crate::random::Stream;
+use gnss::satellite::Sv;
+use gnss::time::Rate;
 
 /// a τ with e^−aτ (cos aτ + sin aτ) = 1/e.
 const DECAY: f64 = 1.239_646_4;

@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use crate::generator::arrival;
-use crate::generator::error::GenerateError;
-use crate::generator::scene::Scene;
-use crate::generator::stream::{Options, transmitters};
-use crate::generator::synth::{Edge, RUN_SAMPLES};
+use crate::arrival;
+use crate::error::GenerateError;
+use crate::scene::Scene;
+use crate::stream::{Options, transmitters};
+use crate::synth::{Edge, RUN_SAMPLES};
 
 /// Roots of each satellite's grid that a plan looks at.
 const PLANNED_ROOTS: u64 = 16;

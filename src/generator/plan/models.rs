@@ -1,8 +1,8 @@
 //! What a scene has and what it has not, by the tables of its scenario.
 
 use super::Model;
-use crate::generator::scene::{CodeEdge, Scene, is_outside};
-use crate::gnss::signal::SIGNALS;
+use crate::scene::{CodeEdge, Scene, is_outside};
+use gnss::signal::SIGNALS;
 
 /// Everything that a scenario can switch on, and whether this one does.
 pub(super) fn models(scene: &Scene) -> Vec<Model> {

@@ -6,7 +6,7 @@
 //! correcting a free path by what it misses at its end (Doucet 2010), so that any stretch can be made without
 //! the ones before it.
 
-use crate::generator::random::Stream;
+use crate::random::Stream;
 
 /// Phase in s and fractional frequency.
 pub type State = [f64; 2];

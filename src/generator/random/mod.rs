@@ -6,7 +6,7 @@
 
 pub mod markov;
 
-use crate::gnss::satellite::{Sv, System};
+use gnss::satellite::{Sv, System};
 
 /// SplitMix64's increment, the golden ratio in 64 bits.
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;

@@ -4,7 +4,7 @@ use nalgebra::{Unit, Vector3};
 
 use super::ScenarioError;
 use super::read::Table;
-use crate::generator::vehicle::attitude::{Attitude, Nose};
+use crate::vehicle::attitude::{Attitude, Nose};
 
 pub(super) fn attitude(table: &Table<'_>) -> Result<Attitude, ScenarioError> {
     let kinds = [("fixed", 0), ("velocity", 1), ("pushed", 2)];

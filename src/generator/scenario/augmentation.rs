@@ -5,13 +5,13 @@ use std::sync::Arc;
 use super::read::Table;
 use super::satellite::SatelliteFault;
 use super::{Scenario, ScenarioError, satellite_list};
-use crate::generator::augmentation::{Departure, Ground, GroundNetwork};
-use crate::generator::catalogue::Catalogue;
-use crate::generator::message::{FOREVER_S, MessageFault};
-use crate::generator::ray::Effect;
-use crate::generator::vehicle::Trajectory;
-use crate::gnss::augmentation::Network;
-use crate::gnss::satellite::{Sv, System};
+use crate::augmentation::{Departure, Ground, GroundNetwork};
+use crate::catalogue::Catalogue;
+use crate::message::{FOREVER_S, MessageFault};
+use crate::ray::Effect;
+use crate::vehicle::Trajectory;
+use gnss::augmentation::Network;
+use gnss::satellite::{Sv, System};
 
 /// `[sbas]`.
 #[derive(Clone, Debug, Default, PartialEq)]

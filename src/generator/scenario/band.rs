@@ -3,10 +3,10 @@
 
 use super::front_end::{FrontEnd, Tuned, is_place_of_real};
 use super::{Overrides, Scenario, ScenarioError};
-use crate::generator::scene::{folded_hz, is_link_outside, is_outside, main_lobe_hz};
-use crate::gnss::samples::IfMetadata;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Carrier, Signal};
+use crate::scene::{folded_hz, is_link_outside, is_outside, main_lobe_hz};
+use gnss::samples::IfMetadata;
+use gnss::satellite::Sv;
+use gnss::signal::{Carrier, Signal};
 
 /// Samples of one scene at most: 19 days at 60 Msps.
 const MAX_SAMPLES: f64 = 1e14;

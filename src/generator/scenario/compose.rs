@@ -10,28 +10,28 @@ use super::files::Files;
 use super::front_end::FrontEnd;
 use super::stages::PlaybackSpec;
 use super::{Scenario, ScenarioError, parts, satellite, spoofing_and_jamming};
-use crate::generator::catalogue::Catalogue;
-use crate::generator::clock::ReceiverClock;
-use crate::generator::clock::nodes::Nodes;
-use crate::generator::fast_phase::satellite::SatelliteClocks;
-use crate::generator::fast_phase::scintillation::Scintillation;
-use crate::generator::message::{MessageFault, Senders};
-use crate::generator::presence;
-use crate::generator::random::Stream;
-use crate::generator::ray::{Effect, Ray};
-use crate::generator::scene::Scene;
-use crate::generator::sky::emission;
-use crate::generator::stage::playback::Playback;
-use crate::generator::switches::Switches;
-use crate::generator::vehicle::Trajectory;
-use crate::gnss::broadcast::OrbitError;
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::samples::{Format, IfMetadata};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::SampleClock;
+use crate::catalogue::Catalogue;
+use crate::clock::ReceiverClock;
+use crate::clock::nodes::Nodes;
+use crate::fast_phase::satellite::SatelliteClocks;
+use crate::fast_phase::scintillation::Scintillation;
+use crate::message::{MessageFault, Senders};
+use crate::presence;
+use crate::random::Stream;
+use crate::ray::{Effect, Ray};
+use crate::scene::Scene;
+use crate::sky::emission;
+use crate::stage::playback::Playback;
+use crate::switches::Switches;
+use crate::vehicle::Trajectory;
+use gnss::broadcast::OrbitError;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::samples::{Format, IfMetadata};
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
+use gnss::time::SampleClock;
 
-/// Beyond this the equations of [`crate::generator::sky`], which keep no square of speed over light's for the
+/// Beyond this the equations of [`crate::sky`], which keep no square of speed over light's for the
 /// user, are no longer a receiver's world.
 const LARGEST_SPEED_MPS: f64 = 0.1 * SPEED_OF_LIGHT_MPS;
 

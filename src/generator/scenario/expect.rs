@@ -2,8 +2,8 @@
 
 use super::read::Table;
 use super::{Scenario, ScenarioError, satellite_list};
-use crate::generator::scenario::{MessageKind, SatelliteFault};
-use crate::gnss::facts::{Expect, Fault, FaultKind, Fixes, Interval, Losses, Sizes, Terms};
+use crate::scenario::{MessageKind, SatelliteFault};
+use gnss::facts::{Expect, Fault, FaultKind, Fixes, Interval, Losses, Sizes, Terms};
 
 pub(super) fn expect(table: &Table<'_>, duration_s: f64) -> Result<Expect, ScenarioError> {
     let intervals = table.tables("interval")?.unwrap_or_default();
@@ -88,7 +88,7 @@ impl Scenario {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::satellite::Sv;
+    use gnss::satellite::Sv;
 
     const SCENE: &str = "name = \"x\"\nstart = 2010-07-01T10:00:00\nduration_s = 60\n[motion]\nkind = \"static\"\n\
                          latitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n";

@@ -6,10 +6,10 @@
 use super::read::{Refusals, Table};
 use super::stages::{self, Stages};
 use super::{Scenario, ScenarioError, fidelity_of, signal_list};
-use crate::generator::scene::Fidelity;
-use crate::gnss::samples::Format;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Rate;
+use crate::scene::Fidelity;
+use gnss::samples::Format;
+use gnss::signal::Signal;
+use gnss::time::Rate;
 
 /// Front ends of one scene at most.
 const MOST: usize = 16;

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use super::ScenarioError;
 use super::read::Table;
-use crate::generator::clock::ReceiverClock;
-use crate::generator::clock::oscillator::{Oscillator, PowerLaw};
-use crate::generator::random::Stream;
-use crate::generator::vehicle::Trajectory;
-use crate::generator::vehicle::shaking::Shaking;
-use crate::gnss::time::Rate;
+use crate::clock::ReceiverClock;
+use crate::clock::oscillator::{Oscillator, PowerLaw};
+use crate::random::Stream;
+use crate::vehicle::Trajectory;
+use crate::vehicle::shaking::Shaking;
+use gnss::time::Rate;
 
 /// The receiver's clock as written.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -6,10 +6,10 @@ use super::keys::motion::PLACE_IF_ANY;
 use super::motion::{MotionSpec, place};
 use super::read::Table;
 use super::{ScenarioError, satellite_list};
-use crate::generator::spoof::Advantage;
-use crate::gnss::earth::Geodetic;
-use crate::gnss::samples::Format;
-use crate::gnss::satellite::Sv;
+use crate::spoof::Advantage;
+use gnss::earth::Geodetic;
+use gnss::samples::Format;
+use gnss::satellite::Sv;
 
 /// How strong an interferer is.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,14 +5,14 @@ use std::sync::Arc;
 
 use super::read::Table;
 use super::{Overrides, Scenario, ScenarioError};
-use crate::generator::effect::antenna::{self, Antenna, Pattern};
-use crate::generator::effect::link::{FixedCn0, LinkBudget};
-use crate::generator::effect::transmit::{self, Block};
-use crate::generator::ray::{Effect, Ray, Sight};
-use crate::generator::vehicle::Trajectory;
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
+use crate::effect::antenna::{self, Antenna, Pattern};
+use crate::effect::link::{FixedCn0, LinkBudget};
+use crate::effect::transmit::{self, Block};
+use crate::ray::{Effect, Ray, Sight};
+use crate::vehicle::Trajectory;
+use gnss::gps::l1ca::L1_CA;
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
 
 /// How strong the satellites are.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use super::ScenarioError;
 use super::read::Table;
-use crate::generator::vehicle::orbit::Orbit;
-use crate::generator::vehicle::rocket::Rocket;
-use crate::generator::vehicle::route::{Limits, Turning, Waypoint};
-use crate::gnss::earth::Geodetic;
+use crate::vehicle::orbit::Orbit;
+use crate::vehicle::rocket::Rocket;
+use crate::vehicle::route::{Limits, Turning, Waypoint};
+use gnss::earth::Geodetic;
 
 /// How a trajectory file is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,8 +2,8 @@
 
 use super::read::Table;
 use super::{Scenario, ScenarioError};
-use crate::generator::effect::multipath::{Detour, Echo, Multipath};
-use crate::generator::vehicle::Trajectory;
+use crate::effect::multipath::{Detour, Echo, Multipath};
+use crate::vehicle::Trajectory;
 
 #[derive(Clone, Copy)]
 enum Kind {

@@ -2,7 +2,7 @@
 
 use super::ScenarioError;
 use super::read::Table;
-use crate::generator::effect::obstruction::{Building, Obstacle};
+use crate::effect::obstruction::{Building, Obstacle};
 
 pub(super) fn obstacle(table: &Table<'_>) -> Result<Obstacle, ScenarioError> {
     let kinds = [("horizon", 0), ("sector", 1), ("building", 2)];

@@ -4,21 +4,21 @@ use std::path::Path;
 
 use super::files::Files;
 use super::{Ionosphere, Overrides, Scenario, ScenarioError, multipath, satellite};
-use crate::generator::catalogue::Catalogue;
-use crate::generator::effect::obstruction::Obstruction;
-use crate::generator::effect::wind_up::WindUp;
-use crate::generator::message::Senders;
-use crate::generator::ray::Effect;
-use crate::generator::vehicle::Trajectory;
-use crate::gnss::bdgim::Bdgim;
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::gps::lnav::UtcData;
-use crate::gnss::ionosphere::NAVIC_HZ;
-use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::message::Common;
-use crate::gnss::rinex::{self, Navigation};
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::time::TimePolynomial;
+use crate::catalogue::Catalogue;
+use crate::effect::obstruction::Obstruction;
+use crate::effect::wind_up::WindUp;
+use crate::message::Senders;
+use crate::ray::Effect;
+use crate::vehicle::Trajectory;
+use gnss::bdgim::Bdgim;
+use gnss::broadcast::Ephemeris;
+use gnss::gps::lnav::UtcData;
+use gnss::ionosphere::NAVIC_HZ;
+use gnss::klobuchar::Klobuchar;
+use gnss::message::Common;
+use gnss::rinex::{self, Navigation};
+use gnss::satellite::{Sv, System};
+use gnss::time::TimePolynomial;
 
 /// Warnings of one kind that are listed in full.
 const LISTED: usize = 4;
@@ -210,7 +210,7 @@ fn outside(ephemerides: &[Ephemeris], system: System, scenario: &Scenario) -> St
     let reach = |e: &Ephemeris, sign: f64| e.toe.plus_s(sign * 0.5 * e.fit_interval_s());
     let first = ephemerides.iter().map(|e| reach(e, -1.0)).min_by(|a, b| a.since(*b).total_cmp(&0.0));
     let last = ephemerides.iter().map(|e| reach(e, 1.0)).max_by(|a, b| a.since(*b).total_cmp(&0.0));
-    let text = |at: Option<crate::gnss::time::Epoch>| at.map_or_else(|| "nowhere".to_owned(), |at| at.to_string());
+    let text = |at: Option<gnss::time::Epoch>| at.map_or_else(|| "nowhere".to_owned(), |at| at.to_string());
     format!(
         "{} and {} s from then on: no {system} ephemeris of the navigation file fits; expected a scene within {} to {}",
         scenario.start,

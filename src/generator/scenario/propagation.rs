@@ -5,22 +5,22 @@ use std::path::{Path, PathBuf};
 use super::files::Files;
 use super::read::Table;
 use super::{Scenario, ScenarioError};
-use crate::generator::effect::bdgim::BdgimIonosphere;
-use crate::generator::effect::ionosphere::KlobucharIonosphere;
-use crate::generator::effect::mapping;
-use crate::generator::effect::nequick::NequickIonosphere;
-use crate::generator::effect::tec::{Content, EARTH_RADIUS_M, Mapping, Shell, ShellIonosphere};
-use crate::generator::effect::troposphere::{Air, Troposphere, Weather};
-use crate::generator::ray::Effect;
-use crate::gnss::bdgim::Bdgim;
-use crate::gnss::ionex::{Interpolation, Maps};
-use crate::gnss::ionosphere::NAVIC_HZ;
-use crate::gnss::klobuchar::{Klobuchar, L1_HZ};
-use crate::gnss::nequick::NequickG;
-use crate::gnss::rinex::Navigation;
-use crate::gnss::time::Epoch;
-use crate::gnss::vienna::{Gpt3, MappingGrid, Vienna};
-use crate::gnss::vmf3::Vmf3;
+use crate::effect::bdgim::BdgimIonosphere;
+use crate::effect::ionosphere::KlobucharIonosphere;
+use crate::effect::mapping;
+use crate::effect::nequick::NequickIonosphere;
+use crate::effect::tec::{Content, EARTH_RADIUS_M, Mapping, Shell, ShellIonosphere};
+use crate::effect::troposphere::{Air, Troposphere, Weather};
+use crate::ray::Effect;
+use gnss::bdgim::Bdgim;
+use gnss::ionex::{Interpolation, Maps};
+use gnss::ionosphere::NAVIC_HZ;
+use gnss::klobuchar::{Klobuchar, L1_HZ};
+use gnss::nequick::NequickG;
+use gnss::rinex::Navigation;
+use gnss::time::Epoch;
+use gnss::vienna::{Gpt3, MappingGrid, Vienna};
+use gnss::vmf3::Vmf3;
 
 /// What the ionosphere truly is, and what the satellites say that it is.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,12 +10,12 @@ use std::path::Path;
 use super::files::Files;
 use super::motion::MotionSpec;
 use super::{Overrides, Scenario, ScenarioError};
-use crate::generator::event;
-use crate::generator::scene::Scene;
-use crate::generator::synth::RUN_SAMPLES;
-use crate::generator::vehicle::grown::Joining;
-use crate::generator::vehicle::{Knot, Motion, Trajectory, file, log};
-use crate::gnss::time::Rate;
+use crate::event;
+use crate::scene::Scene;
+use crate::synth::RUN_SAMPLES;
+use crate::vehicle::grown::Joining;
+use crate::vehicle::{Knot, Motion, Trajectory, file, log};
+use gnss::time::Rate;
 
 /// Knots of a live run that are kept: four seconds at 1000 ticks a second.
 const KEPT: usize = 4096;

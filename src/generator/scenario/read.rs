@@ -10,8 +10,7 @@ mod refusals;
 use std::fmt::Display;
 
 use refusals::ABSENT;
-pub use refusals::Place;
-pub(crate) use refusals::{Refusals, Source};
+pub use refusals::{Place, Refusals, Source};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -20,7 +19,7 @@ use super::schema::{Absent, Key, Value};
 
 /// One table of the scenario.
 #[derive(Clone)]
-pub(crate) struct Table<'t> {
+pub struct Table<'t> {
     source: &'t Source<'t>,
     path: String,
     at: usize,
@@ -178,6 +177,7 @@ impl<'t> Table<'t> {
         }
     }
 
+    /// Whether the table has the key.
     pub fn has(&self, name: &str) -> bool {
         self.get(name).is_some()
     }
@@ -200,6 +200,7 @@ impl<'t> Table<'t> {
         self.number(name)?.or(default).ok_or_else(|| self.bad(name, self.expected(name)))
     }
 
+    /// An array of `N` numbers within the key's bounds.
     pub fn numbers<const N: usize>(&self, name: &str) -> Result<Option<[f64; N]>, ScenarioError> {
         let Some(numbers) = self.list(name)? else { return Ok(None) };
         numbers.try_into().map(Some).map_err(|_| self.bad(name, self.expected(name)))
@@ -241,6 +242,7 @@ impl<'t> Table<'t> {
         self.integer(name)?.or(default).ok_or_else(|| self.bad(name, self.expected(name)))
     }
 
+    /// A text as the key's kind allows it.
     pub fn text(&self, name: &str) -> Result<Option<&'t str>, ScenarioError> {
         match self.get(name).map(Spanned::get_ref) {
             None => Ok(None),
@@ -262,6 +264,7 @@ impl<'t> Table<'t> {
         }
     }
 
+    /// A truth value.
     pub fn flag(&self, name: &str) -> Result<Option<bool>, ScenarioError> {
         match self.get(name).map(Spanned::get_ref) {
             None => Ok(None),
@@ -323,6 +326,7 @@ impl<'t> Table<'t> {
         Ok(Some(Self { each, ..Self::new(self.source, &self.key(name), value.span().start, table, keys) }))
     }
 
+    /// An array of tables with the key's own keys.
     pub fn tables(&self, name: &str) -> Result<Option<Vec<Table<'t>>>, ScenarioError> {
         let Some(value) = self.get(name) else { return Ok(None) };
         let expected = "an array of tables";
@@ -357,7 +361,6 @@ impl<'t> Table<'t> {
 }
 
 /// Values of any type, for those who pass them on.
-#[cfg(feature = "study")]
 impl Table<'_> {
     /// An array of plain values: numbers, texts, truth values, times and arrays of them.
     pub fn values(&self, name: &str) -> Result<Option<Vec<toml::Value>>, ScenarioError> {
@@ -399,8 +402,7 @@ fn as_number(value: &DeValue<'_>) -> Option<f64> {
 }
 
 /// A value without its place; `None` for a table or a number that is none.
-#[cfg(feature = "study")]
-pub(crate) fn plain(value: &DeValue<'_>) -> Option<toml::Value> {
+pub fn plain(value: &DeValue<'_>) -> Option<toml::Value> {
     Some(match value {
         DeValue::Integer(i) => toml::Value::Integer(i64::from_str_radix(i.as_str(), i.radix()).ok()?),
         DeValue::Float(_) => toml::Value::Float(as_number(value)?),
@@ -415,7 +417,7 @@ pub(crate) fn plain(value: &DeValue<'_>) -> Option<toml::Value> {
 }
 
 /// The candidate most like `word`, if any is like it at all.
-pub(crate) fn nearest(word: &str, candidates: &[&str]) -> Option<String> {
+pub fn nearest(word: &str, candidates: &[&str]) -> Option<String> {
     let lower = word.to_lowercase();
     candidates
         .iter()

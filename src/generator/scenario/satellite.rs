@@ -10,19 +10,19 @@ use super::interference::times;
 use super::keys::satellites::parameters;
 use super::read::Table;
 use super::{Scenario, ScenarioError, satellite_list};
-use crate::generator::catalogue::Catalogue;
-use crate::generator::clock::ReceiverClock;
-use crate::generator::clock::nodes::node_samples;
-use crate::generator::clock::oscillator::{Oscillator, PowerLaw};
-use crate::generator::fast_phase::satellite::{Change, ChangeKind, SatelliteClocks};
-use crate::generator::message::{FOREVER_S, Kind, MessageFault, spoiled};
-use crate::generator::orbit_error::Displacement;
-use crate::generator::precise::{Hardware, Orbits};
-use crate::generator::random::Stream;
-use crate::gnss::message::Message;
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::sp3::{self, Precise};
-use crate::gnss::time::Rate;
+use crate::catalogue::Catalogue;
+use crate::clock::ReceiverClock;
+use crate::clock::nodes::node_samples;
+use crate::clock::oscillator::{Oscillator, PowerLaw};
+use crate::fast_phase::satellite::{Change, ChangeKind, SatelliteClocks};
+use crate::message::{FOREVER_S, Kind, MessageFault, spoiled};
+use crate::orbit_error::Displacement;
+use crate::precise::{Hardware, Orbits};
+use crate::random::Stream;
+use gnss::message::Message;
+use gnss::satellite::{Sv, System};
+use gnss::sp3::{self, Precise};
+use gnss::time::Rate;
 
 /// True time beyond both ends of the scene for which there must be orbits: light times and the receiver's
 /// clock.

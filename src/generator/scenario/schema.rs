@@ -104,17 +104,13 @@ const fn key(name: &'static str, value: Value, meaning: &'static str) -> Key {
     Key { name, value, absent: Absent::Optional, kinds: &[], meaning }
 }
 
-pub(crate) const fn number(
-    name: &'static str,
-    least: f64,
-    most: f64,
-    unit: &'static str,
-    meaning: &'static str,
-) -> Key {
+/// A number within two bounds, with its unit.
+pub const fn number(name: &'static str, least: f64, most: f64, unit: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Number { least, most, unit }, meaning)
 }
 
-pub(crate) const fn numbers(
+/// An array of `count` numbers within the same bounds, with their unit.
+pub const fn numbers(
     name: &'static str,
     count: usize,
     (least, most): (f64, f64),
@@ -124,79 +120,94 @@ pub(crate) const fn numbers(
     key(name, Value::Numbers { count, least, most, unit }, meaning)
 }
 
-pub(crate) const fn list(name: &'static str, least: f64, most: f64, unit: &'static str, meaning: &'static str) -> Key {
+/// An array of any length of numbers within two bounds, with their unit.
+pub const fn list(name: &'static str, least: f64, most: f64, unit: &'static str, meaning: &'static str) -> Key {
     key(name, Value::List { least, most, unit }, meaning)
 }
 
-pub(crate) const fn integer(name: &'static str, least: u64, most: u64, meaning: &'static str) -> Key {
+/// A whole number within two bounds.
+pub const fn integer(name: &'static str, least: u64, most: u64, meaning: &'static str) -> Key {
     key(name, Value::Integer { least, most }, meaning)
 }
 
-pub(crate) const fn flag(name: &'static str, meaning: &'static str) -> Key {
+/// A truth value.
+pub const fn flag(name: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Flag, meaning)
 }
 
-pub(crate) const fn text(name: &'static str, expected: &'static str, meaning: &'static str) -> Key {
+/// A text; `expected` says what it must be.
+pub const fn text(name: &'static str, expected: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Text(expected), meaning)
 }
 
-pub(crate) const fn time(name: &'static str, meaning: &'static str) -> Key {
+/// An instant, as TOML or as text.
+pub const fn time(name: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Time, meaning)
 }
 
-pub(crate) const fn word(name: &'static str, words: fn() -> Vec<&'static str>, meaning: &'static str) -> Key {
+/// One word of a list.
+pub const fn word(name: &'static str, words: fn() -> Vec<&'static str>, meaning: &'static str) -> Key {
     key(name, Value::Word(words), meaning)
 }
 
-pub(crate) const fn words(name: &'static str, expected: &'static str, meaning: &'static str) -> Key {
+/// An array of words; `expected` says of which.
+pub const fn words(name: &'static str, expected: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Words(expected), meaning)
 }
 
-pub(crate) const fn texts(name: &'static str, expected: &'static str, meaning: &'static str) -> Key {
+/// A text or an array of texts; `expected` says what they are.
+pub const fn texts(name: &'static str, expected: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Texts(expected), meaning)
 }
 
-#[cfg(feature = "study")]
-pub(crate) const fn values(name: &'static str, meaning: &'static str) -> Key {
+/// An array of plain values of any type.
+pub const fn values(name: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Values, meaning)
 }
 
-pub(crate) const fn by_satellite(name: &'static str, each: &'static Key, meaning: &'static str) -> Key {
+/// A table with an entry `each` for every satellite that it names.
+pub const fn by_satellite(name: &'static str, each: &'static Key, meaning: &'static str) -> Key {
     key(name, Value::BySatellite(each), meaning)
 }
 
-pub(crate) const fn table(name: &'static str, keys: &'static [Key], meaning: &'static str) -> Key {
+/// A table of keys.
+pub const fn table(name: &'static str, keys: &'static [Key], meaning: &'static str) -> Key {
     key(name, Value::Table(keys), meaning)
 }
 
-pub(crate) const fn tables(name: &'static str, keys: &'static [Key], meaning: &'static str) -> Key {
+/// An array of tables with the same keys.
+pub const fn tables(name: &'static str, keys: &'static [Key], meaning: &'static str) -> Key {
     key(name, Value::Tables(keys), meaning)
 }
 
-pub(crate) const fn one_or_more(name: &'static str, keys: &'static [Key], meaning: &'static str) -> Key {
+/// A table or an array of tables with the same keys.
+pub const fn one_or_more(name: &'static str, keys: &'static [Key], meaning: &'static str) -> Key {
     key(name, Value::OneOrMore(keys), meaning)
 }
 
-pub(crate) const fn foreign(name: &'static str, found: &'static str, meaning: &'static str) -> Key {
+/// A table whose keys another reference has; `found` says which.
+pub const fn foreign(name: &'static str, found: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Foreign(found), meaning)
 }
 
 impl Key {
-    pub(crate) const fn required(self) -> Self {
+    /// The same key, which must be there.
+    pub const fn required(self) -> Self {
         Self { absent: Absent::Required, ..self }
     }
 
     /// The number that holds if the key is absent.
-    pub(crate) const fn or(self, number: f64) -> Self {
+    pub const fn or(self, number: f64) -> Self {
         Self { absent: Absent::Number(number), ..self }
     }
 
     /// What holds if the key is absent, in words.
-    pub(crate) const fn or_else(self, words: &'static str) -> Self {
+    pub const fn or_else(self, words: &'static str) -> Self {
         Self { absent: Absent::Means(words), ..self }
     }
 
-    pub(crate) const fn of(self, kinds: &'static [&'static str]) -> Self {
+    /// The same key, which only tables of these kinds know.
+    pub const fn of(self, kinds: &'static [&'static str]) -> Self {
         Self { kinds, ..self }
     }
 

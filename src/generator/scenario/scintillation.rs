@@ -2,7 +2,7 @@
 
 use super::read::Table;
 use super::{ScenarioError, satellite_list};
-use crate::generator::fast_phase::scintillation::Strength;
+use crate::fast_phase::scintillation::Strength;
 
 pub(super) fn scintillation(table: &Table<'_>) -> Result<Strength, ScenarioError> {
     let strength = Strength {

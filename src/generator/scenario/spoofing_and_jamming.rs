@@ -7,17 +7,17 @@ use nalgebra::Vector3;
 
 use super::interference::{InterferenceSpec, Kind, SpooferSpec, Strength};
 use super::{MotionSpec, Overrides, Power, Scenario, ScenarioError};
-use crate::generator::effect::link::LinkBudget;
-use crate::generator::levels::strongest;
-use crate::generator::scene::{CodeEdge, Scene};
-use crate::generator::spoof::{Constellation, Drag, Place};
-use crate::generator::stage::interference::arrival::{Path as Way, Repetition, Tuning};
-use crate::generator::stage::interference::{ChipEdge, Interferer, Recorded, Waveform};
-use crate::generator::synth::band::Filter;
-use crate::generator::synth::resample::Interpolator;
-use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::samples::Format;
+use crate::effect::link::LinkBudget;
+use crate::levels::strongest;
+use crate::scene::{CodeEdge, Scene};
+use crate::spoof::{Constellation, Drag, Place};
+use crate::stage::interference::arrival::{Path as Way, Repetition, Tuning};
+use crate::stage::interference::{ChipEdge, Interferer, Recorded, Waveform};
+use crate::synth::band::Filter;
+use crate::synth::resample::Interpolator;
+use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::gps::l1ca::L1_CA;
+use gnss::samples::Format;
 
 /// Source samples a cycle of a noise's bandwidth: its filter falls within 0.08 of that beyond each edge.
 const NOISE_RATE: f64 = 1.5;

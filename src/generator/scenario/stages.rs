@@ -4,14 +4,14 @@
 use super::ScenarioError;
 use super::front_end::{FrontEnd, Tuned};
 use super::read::Table;
-use crate::generator::random::Stream;
-use crate::generator::scene::folded_hz;
-use crate::generator::stage::Stage;
-use crate::generator::stage::converter::Converter;
-use crate::generator::stage::filter::{Filter, Shape};
-use crate::generator::stage::mixer::{Balance, Oscillator, PhaseNoise};
-use crate::generator::synth::RUN_SAMPLES;
-use crate::gnss::samples::Format;
+use crate::random::Stream;
+use crate::scene::folded_hz;
+use crate::stage::Stage;
+use crate::stage::converter::Converter;
+use crate::stage::filter::{Filter, Shape};
+use crate::stage::mixer::{Balance, Oscillator, PhaseNoise};
+use crate::synth::RUN_SAMPLES;
+use gnss::samples::Format;
 
 /// A filter as written.
 #[derive(Clone, Copy, Debug, PartialEq)]

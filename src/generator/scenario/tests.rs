@@ -13,11 +13,11 @@ use satellite::FAULTS;
 
 use super::schema::{Absent, Value, tables_of};
 use super::*;
-use crate::generator::clock::oscillator::PowerLaw;
-use crate::generator::effect::multipath::Detour;
-use crate::generator::effect::transmit::Block;
-use crate::generator::vehicle::attitude::Nose;
-use crate::gnss::samples::Format;
+use crate::clock::oscillator::PowerLaw;
+use crate::effect::multipath::Detour;
+use crate::effect::transmit::Block;
+use crate::vehicle::attitude::Nose;
+use gnss::samples::Format;
 
 const MINIMAL: &str = "name = \"test\"\nstart = 2010-07-01T10:00:00\nduration_s = 10\n";
 const STATIC: &str = "[motion]\nkind = \"static\"\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n";
@@ -186,7 +186,7 @@ fn a_link_budget_is_refused_for_a_signal_whose_least_power_is_not_known() {
     let mut scenario = parse(&format!("{MINIMAL}{STATIC}[power]\nkind = \"link_budget\"\n")).unwrap();
     let compose = |scenario: &Scenario| scenario.compose(Path::new("scenarios"), &Overrides::default());
     assert!(compose(&scenario).is_ok());
-    scenario.signals.push(&crate::gnss::signal::synthetic::LONG_BOC);
+    scenario.signals.push(&gnss::signal::synthetic::LONG_BOC);
     let Err(error) = compose(&scenario) else { panic!("composed") };
     let error = error.to_string();
     assert!(error.contains("power.kind") && error.contains("synthetic A"), "{error}");
@@ -292,7 +292,7 @@ fn files_must_lie_below_the_scenario_s_directory() {
     let room = tempfile::tempdir().unwrap();
     let inside = room.path().join("scenes");
     std::fs::create_dir(&inside).unwrap();
-    let p = crate::gnss::earth::Geodetic::from_degrees(26.5, 80.2, 130.0).to_ecef();
+    let p = gnss::earth::Geodetic::from_degrees(26.5, 80.2, 130.0).to_ecef();
     let row = |t: f64| format!("{t},{},{},{}\n", p.x, p.y, p.z);
     let ride = format!("time_s,x_m,y_m,z_m\n{}{}{}", row(0.0), row(2.0), row(4.0));
     std::fs::write(room.path().join("ride.csv"), &ride).unwrap();
@@ -360,13 +360,9 @@ fn power_by_satellite_reaches_the_rays() {
     let (scene, _) = parse(&text).unwrap().compose(Path::new("."), &Overrides::default()).unwrap();
     let motion = scene.trajectory.at(0.0);
     for (sv, cn0_hz) in [(Sv::gps(13), 1e3), (Sv::gps(23), 31_622.776_601_683_79)] {
-        let found = crate::generator::sky::emission(&scene.catalogue, sv, scene.clock.start, &motion).unwrap().unwrap();
-        let mut rays = vec![crate::generator::ray::Ray {
-            code_delay_s: 0.0,
-            carrier_delay_s: 0.0,
-            phase_cycles: 0.0,
-            cn0_hz: 0.0,
-        }];
+        let found = crate::sky::emission(&scene.catalogue, sv, scene.clock.start, &motion).unwrap().unwrap();
+        let mut rays =
+            vec![crate::ray::Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
         scene.effects.iter().for_each(|e| e.act(&found.sight, scene.signals[0], &mut rays));
         // Ten to the tenth of a decimal number: relative rounding of a few 1e-16.
         assert!((rays[0].cn0_hz / cn0_hz - 1.0).abs() < 1e-12, "{sv} {rays:?}");

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use super::motion::{FileKind, MotionSpec};
 use super::{Overrides, Scenario, ScenarioError};
-use crate::generator::vehicle::attitude::Nose;
-use crate::generator::vehicle::{Trajectory, file, route};
+use crate::vehicle::attitude::Nose;
+use crate::vehicle::{Trajectory, file, route};
 
 impl Scenario {
     /// A motion, with its file read.

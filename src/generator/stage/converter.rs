@@ -7,9 +7,9 @@
 //! samples; without, it is the thermal noise's as the scene sets it. The scene's first run has nothing before
 //! it and is measured itself, whole, whatever part of it is asked for. Limits: the gain of a run is constant.
 
-use crate::generator::stage::{Block, Stage};
-use crate::generator::synth::RUN_SAMPLES;
-use crate::gnss::facts::{ConverterSpec, StageSpec};
+use crate::stage::{Block, Stage};
+use crate::synth::RUN_SAMPLES;
+use gnss::facts::{ConverterSpec, StageSpec};
 
 /// Steps in units of the deviation that lose least, by bits.
 const BEST_STEP: [(u32, f64); 7] =
@@ -122,7 +122,7 @@ pub(super) fn level(y: f32, half: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generator::synth::noise::add_block;
+    use crate::synth::noise::add_block;
 
     /// Correlation loss of a weak signal: 10 lg of (E[x Q(x)])² / E[Q(x)²], for Gaussian x.
     fn loss_db(converter: &Converter, sigma: f32) -> f64 {

@@ -10,8 +10,8 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
-use crate::generator::stage::{Block, Stage};
-use crate::gnss::facts::{FilterShape, FilterSpec, StageSpec};
+use crate::stage::{Block, Stage};
+use gnss::facts::{FilterShape, FilterSpec, StageSpec};
 
 /// Shapes of filters, by the name that a scenario uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,10 +7,10 @@
 //! Microelectronics, 4.2). Limits: noise of the reference itself is the receiver clock's; what is left out of
 //! the response is e^−12.
 
-use crate::generator::random::Stream;
-use crate::generator::stage::{Block, Stage};
-use crate::gnss::facts::{BalanceSpec, StageSpec};
-use crate::gnss::time::{Rate, tone_turns};
+use crate::random::Stream;
+use crate::stage::{Block, Stage};
+use gnss::facts::{BalanceSpec, StageSpec};
+use gnss::time::{Rate, tone_turns};
 
 /// Nodes in a time constant, and time constants of response.
 const NODES_PER_TIME: f64 = 20.0;
@@ -108,7 +108,7 @@ impl Stage for Oscillator {
         let step = tone_turns(self.offset_hz, self.rate, 1);
         let mut turns = tone_turns(self.offset_hz, self.rate, block.start);
         for (n, (i, q)) in (block.start..).zip(block.i.iter_mut().zip(block.q.iter_mut())) {
-            let mut phase = crate::generator::synth::radians(turns);
+            let mut phase = crate::synth::radians(turns);
             if let Some((spacing, first, nodes)) = &noise {
                 let (node, u) = ((n / spacing - first) as usize, (n % spacing) as f64 / *spacing as f64);
                 let at = |k: usize| nodes.get(k).copied().unwrap_or(0.0);

@@ -12,8 +12,8 @@ pub mod mixer;
 pub mod noise;
 pub mod playback;
 
-use crate::generator::synth::isa::Level;
-use crate::gnss::facts::StageSpec;
+use crate::synth::isa::Level;
+use gnss::facts::StageSpec;
 
 /// A stretch of planar samples on its way from the antenna to the file, in LSB of the sample format.
 pub struct Block<'a> {

@@ -1,9 +1,9 @@
-//! Thermal noise of the receiver: the kernels of [`synth::noise`](crate::generator::synth::noise) as a stage.
+//! Thermal noise of the receiver: the kernels of [`synth::noise`](crate::synth::noise) as a stage.
 
-use crate::generator::fidelity::Arithmetic;
-use crate::generator::stage::{Block, Stage};
-use crate::generator::synth::isa;
-use crate::generator::synth::noise::{BLOCK_SAMPLES, add_block_exact};
+use crate::fidelity::Arithmetic;
+use crate::stage::{Block, Stage};
+use crate::synth::isa;
+use crate::synth::noise::{BLOCK_SAMPLES, add_block_exact};
 
 /// Thermal noise of the receiver, white over the band of the samples.
 #[derive(Clone, Copy, Debug, PartialEq)]

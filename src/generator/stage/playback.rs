@@ -5,8 +5,8 @@
 //! converter lie outside the sampled band and are not made; an error of its reference acts on carriers, codes
 //! and times alike and is therefore the receiver clock's drift, with the opposite sign.
 
-use crate::generator::stage::converter::level;
-use crate::generator::stage::{Block, Stage};
+use crate::stage::converter::level;
+use crate::stage::{Block, Stage};
 
 /// A converter and what lies behind it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,13 +3,13 @@
 //! A block is a pure function of the scene and of what transmitters have prepared, so blocks are made side by
 //! side. What stages look back at is rendered before it and not sent on.
 
-use crate::generator::scene::{CodeEdge, Scene};
-use crate::generator::stage::Block;
-use crate::generator::synth::band::Filter;
-use crate::generator::synth::isa;
-use crate::generator::synth::{Edge, Kernel, RUN_SAMPLES};
-use crate::generator::transmit::{Scratch, Transmitter};
-use crate::gnss::samples::Format;
+use crate::scene::{CodeEdge, Scene};
+use crate::stage::Block;
+use crate::synth::band::Filter;
+use crate::synth::isa;
+use crate::synth::{Edge, Kernel, RUN_SAMPLES};
+use crate::transmit::{Scratch, Transmitter};
+use gnss::samples::Format;
 
 /// The sample at which the run of a sample begins.
 pub(super) fn run_begin(sample: u64) -> u64 {

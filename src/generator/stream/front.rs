@@ -8,15 +8,15 @@ use rayon::prelude::*;
 
 use super::block::{Worker, edge, first_run, render, run_begin};
 use super::{GenerateError, Generated, Options};
-use crate::generator::geometry::{Geometry, Places};
-use crate::generator::scene::{CodeEdge, Scene};
-use crate::generator::spoof::Constellation;
-use crate::generator::synth::band::Filter;
-use crate::generator::synth::isa::Level;
-use crate::generator::synth::{Edge, Kernel, RUN_SAMPLES};
-use crate::generator::transmit::Transmitter;
-use crate::gnss::record::{NavigationRow, PassRow};
-use crate::gnss::satellite::Sv;
+use crate::geometry::{Geometry, Places};
+use crate::scene::{CodeEdge, Scene};
+use crate::spoof::Constellation;
+use crate::synth::band::Filter;
+use crate::synth::isa::Level;
+use crate::synth::{Edge, Kernel, RUN_SAMPLES};
+use crate::transmit::Transmitter;
+use gnss::record::{NavigationRow, PassRow};
+use gnss::satellite::Sv;
 
 /// Length of a block at least, in units of what its stages look back at.
 const LEADS_PER_BLOCK: u64 = 8;

@@ -10,11 +10,11 @@ use std::io;
 use super::front::{Front, share_geometry};
 use super::ticks::Ticks;
 use super::{GenerateError, Generated, Options, end};
-use crate::generator::geometry::is_shared;
-use crate::generator::scene::Scene;
-use crate::generator::synth::RUN_SAMPLES;
-use crate::generator::truth::Sink;
-use crate::gnss::record::PassRow;
+use crate::geometry::is_shared;
+use crate::scene::Scene;
+use crate::synth::RUN_SAMPLES;
+use crate::truth::Sink;
+use gnss::record::PassRow;
 
 /// The front ends of a scene on their way to samples.
 pub struct Fronts<'a> {

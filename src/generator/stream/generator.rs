@@ -1,8 +1,8 @@
 //! The generator as an iterator: batches of samples with the truth of each.
 
 use super::{GenerateError, Generated, Options, Stream};
-use crate::generator::scene::Scene;
-use crate::generator::truth::Record;
+use crate::scene::Scene;
+use crate::truth::Record;
 
 /// Consecutive samples of a scene, and what is true of them.
 #[derive(Clone, Debug)]
@@ -21,9 +21,9 @@ pub struct Batch {
 /// A batch has half a million samples by default, and memory holds one: how the work is cut changes no byte.
 ///
 /// ```
-/// use gnss_twin::generator::scenario::Scenario;
-/// use gnss_twin::generator::stream::Generator;
-/// use gnss_twin::generator::truth::Record;
+/// use generator::scenario::Scenario;
+/// use generator::stream::Generator;
+/// use generator::truth::Record;
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let scene = Scenario::from_toml(

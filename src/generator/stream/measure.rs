@@ -5,11 +5,11 @@ use std::ops::Range;
 use super::GenerateError;
 use super::block::{Worker, edge, first_run, pack, run_begin, satellites};
 use super::front::transmitters;
-use crate::generator::scene::{CodeEdge, Scene};
-use crate::generator::stage::Block;
-use crate::generator::synth::band::Filter;
-use crate::generator::synth::isa::Level;
-use crate::generator::synth::{Kernel, RUN_SAMPLES};
+use crate::scene::{CodeEdge, Scene};
+use crate::stage::Block;
+use crate::synth::band::Filter;
+use crate::synth::isa::Level;
+use crate::synth::{Kernel, RUN_SAMPLES};
 
 /// What a stretch of the scene's samples holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

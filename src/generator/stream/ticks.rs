@@ -6,13 +6,13 @@ use rayon::prelude::*;
 
 use super::GenerateError;
 use super::front::Front;
-use crate::generator::scene::{Scene, sources};
-use crate::generator::spoof::Constellation;
-use crate::generator::switches::Source;
-use crate::generator::truth::{self, Record, Sink};
-use crate::gnss::broadcast::OrbitError;
-use crate::gnss::record::{InterferenceRow, TrajectoryRow};
-use crate::gnss::satellite::Sv;
+use crate::scene::{Scene, sources};
+use crate::spoof::Constellation;
+use crate::switches::Source;
+use crate::truth::{self, Record, Sink};
+use gnss::broadcast::OrbitError;
+use gnss::record::{InterferenceRow, TrajectoryRow};
+use gnss::satellite::Sv;
 
 /// The samples at which there is truth.
 pub(super) struct Ticks {

@@ -34,7 +34,7 @@ pub(crate) fn ramp<const N: usize>(start: u64, step: u64) -> [u32; N] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generator::synth::radians;
+    use crate::synth::radians;
 
     #[test]
     fn sine_and_cosine_are_those_of_libm_all_around_the_turn() {

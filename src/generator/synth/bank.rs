@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use super::lanes::Buffers;
 use super::{Kernel, Run, exact, isa};
-use crate::generator::fidelity::Arithmetic;
+use crate::fidelity::Arithmetic;
 
 /// Runs, the strips that they read, and scratch of the kernels.
 #[derive(Default)]

@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use crate::gnss::time::{Epoch, TimeScale};
+use gnss::time::{Epoch, TimeScale};
 
 use super::{CODE_BITS, CODE_ONE};
 
@@ -280,10 +280,10 @@ impl<'a> Changes<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generator::synth::waveform::plain;
-    use crate::gnss::gps::l1ca::{self, L1_CA};
-    use crate::gnss::signal::synthetic::OWN_TIME;
-    use crate::gnss::time::GPST;
+    use crate::synth::waveform::plain;
+    use gnss::gps::l1ca::{self, L1_CA};
+    use gnss::signal::synthetic::OWN_TIME;
+    use gnss::time::GPST;
 
     #[test]
     fn a_strip_holds_each_chip_with_the_data_of_its_period() {

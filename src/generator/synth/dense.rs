@@ -69,10 +69,10 @@ fn signed(length: u64, signs: u64) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generator::synth::chips::{CodeTime, MAX_STEP};
-    use crate::generator::synth::waveform::plain;
-    use crate::generator::synth::{Edge, reference};
-    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::synth::chips::{CodeTime, MAX_STEP};
+    use crate::synth::waveform::plain;
+    use crate::synth::{Edge, reference};
+    use gnss::gps::l1ca::L1_CA;
 
     #[test]
     fn means_are_those_of_the_definition_to_the_last_bit() {

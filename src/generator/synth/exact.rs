@@ -283,11 +283,11 @@ const COSINE: [f64; 8] = [
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generator::synth::band::Filter;
-    use crate::generator::synth::chips::CodeTime;
-    use crate::generator::synth::waveform::plain;
-    use crate::generator::synth::{radians, reference};
-    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::synth::band::Filter;
+    use crate::synth::chips::CodeTime;
+    use crate::synth::waveform::plain;
+    use crate::synth::{radians, reference};
+    use gnss::gps::l1ca::L1_CA;
 
     #[test]
     fn sine_and_cosine_are_those_of_libm_all_around_the_turn() {

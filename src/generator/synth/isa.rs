@@ -5,10 +5,10 @@
 
 use super::lanes::{self, Buffers};
 use super::{Edge, Run, exact};
-use crate::generator::synth::noise;
-use crate::generator::synth::resample::{self, Interpolator, Position};
-use crate::generator::synth::tone::{self, Tone};
-use crate::gnss::samples::Format;
+use crate::synth::noise;
+use crate::synth::resample::{self, Interpolator, Position};
+use crate::synth::tone::{self, Tone};
+use gnss::samples::Format;
 
 /// An instruction set for which kernels are compiled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

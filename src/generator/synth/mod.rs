@@ -27,7 +27,7 @@ pub mod waveform;
 
 use band::Filter;
 
-use crate::generator::fidelity::Arithmetic;
+use crate::fidelity::Arithmetic;
 
 /// Longest run; the single-precision carrier of the fast kernel is re-anchored at least this often.
 pub const RUN_SAMPLES: usize = 4096;

@@ -5,7 +5,7 @@
 //! sample (cosine to I, sine to Q). Limits: |x| ≤ 6.77 σ; logarithm and sines within 3e-7.
 
 use super::angle::cos_sin;
-use crate::generator::random::mix;
+use crate::random::mix;
 
 /// Samples in one independently seeded block.
 pub const BLOCK_SAMPLES: usize = 4096;

@@ -5,10 +5,10 @@
 //! the source's rate about the cut-off. Limits: noise is drawn on the samples' own grid, so a drifting clock
 //! moves its band and not its shape.
 
-use crate::generator::synth::angle::cos_sin;
-use crate::generator::synth::band::windowed_sinc;
-use crate::generator::synth::isa::{self, Level};
-use crate::generator::synth::noise::{BLOCK_SAMPLES, LANES};
+use crate::synth::angle::cos_sin;
+use crate::synth::band::windowed_sinc;
+use crate::synth::isa::{self, Level};
+use crate::synth::noise::{BLOCK_SAMPLES, LANES};
 
 /// Neighbours that make one sample.
 pub const TAPS: usize = 64;

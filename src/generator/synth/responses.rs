@@ -374,9 +374,9 @@ fn changes(bits: &[u64], number: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generator::synth::Edge;
-    use crate::generator::synth::chips::{MARGIN_STEPS, MAX_STEP};
-    use crate::generator::synth::reference;
+    use crate::synth::Edge;
+    use crate::synth::chips::{MARGIN_STEPS, MAX_STEP};
+    use crate::synth::reference;
 
     #[test]
     fn a_tile_is_the_definition_wherever_changes_fall() {

@@ -6,8 +6,8 @@
 //! Where the momentary frequency lies outside the samples' band there is silence, as behind a front end's
 //! filter; sidebands of a fast sweep beyond the band still fold.
 
-use crate::generator::synth::angle::cos_sin;
-use crate::generator::synth::noise::LANES;
+use crate::synth::angle::cos_sin;
+use crate::synth::noise::LANES;
 
 /// The frequency over one repetition, as the reach of the phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -166,7 +166,7 @@ fn lanes(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generator::synth::isa::{self, Level};
+    use crate::synth::isa::{self, Level};
 
     /// The obvious twin: one sample in `f64` with the library's functions.
     fn sample(tone: &Tone, n: u64) -> (f64, f64) {

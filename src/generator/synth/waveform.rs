@@ -14,8 +14,8 @@ use thiserror::Error;
 
 use super::Edge;
 use super::chips::{MAX_STEP, Pace, Spreading, packed, window};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Component, Layer, Layers, Link, Signal};
+use gnss::satellite::Sv;
+use gnss::signal::{Component, Layer, Layers, Link, Signal};
 
 /// A sequence with its part in the component.
 #[derive(Clone, Debug)]

@@ -2,16 +2,16 @@
 
 use std::path::Path;
 
-use crate::generator::dynamics::*;
-use crate::generator::scenario::{Overrides, Scenario};
-use crate::generator::scene::Scene;
-use crate::generator::stream::{Options, generate_with};
-use crate::generator::truth;
-use crate::gnss::satellite::Sv;
+use crate::dynamics::*;
+use crate::scenario::{Overrides, Scenario};
+use crate::scene::Scene;
+use crate::stream::{Options, generate_with};
+use crate::truth;
+use gnss::satellite::Sv;
 
 fn lines(text: &str) -> (Scene, Vec<LineOfSight>) {
     let scenario = Scenario::parse(text, "lines").unwrap();
-    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
     let (scene, _) = scenario.compose(&directory, &Overrides::default()).unwrap();
     let lines = lines_of_sight(&scene).unwrap();
     (scene, lines)
@@ -54,7 +54,7 @@ fn the_satellites_share_is_the_second_difference_of_the_true_range() {
 #[test]
 fn rows_by_the_thousand_describe_the_same_signal_as_few() {
     let directory = tempfile::tempdir().unwrap();
-    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
     let scene = include_str!("../../../scenarios/trajectory_file.toml").replace("duration_s = 60", "duration_s = 1.5");
     // 30 m/s along a straight line. Nodes of a satellite's curve are as dense as rows, and beyond five a
     // second its orbit is a polynomial that they share.

@@ -3,12 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use crate::generator::scenario::{Overrides, Scenario};
-use crate::generator::stream::{Fronts, Options};
-use crate::generator::truth::{self, Record, Sink};
-use crate::gnss::exchange::Version;
-use crate::gnss::record::{Observation, TrajectoryRow};
+use crate::scenario::{Overrides, Scenario};
+use crate::stream::{Fronts, Options};
+use crate::truth::{self, Record, Sink};
 use ::rinex::prelude::{Rinex, TimeScale};
+use gnss::exchange::Version;
+use gnss::record::{Observation, TrajectoryRow};
 
 /// Three systems, five signals on three carriers, ten readings.
 const SCENE: &str = "name = \"x\"\nstart = 2020-11-29T12:50:30\nduration_s = 0.5\nseed = 7\n\

@@ -4,14 +4,14 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use crate::generator::fast_phase::{FastPhase, FastPhases};
-use crate::generator::scenario::{Overrides, Scenario};
-use crate::generator::scene::Scene;
-use crate::generator::stream::*;
-use crate::generator::truth;
-use crate::gnss::record::{InterferenceRow, Observation, PassRow};
-use crate::gnss::signal::register;
-use crate::gnss::signal::synthetic::QUADRATURE;
+use crate::fast_phase::{FastPhase, FastPhases};
+use crate::scenario::{Overrides, Scenario};
+use crate::scene::Scene;
+use crate::stream::*;
+use crate::truth;
+use gnss::record::{InterferenceRow, Observation, PassRow};
+use gnss::signal::register;
+use gnss::signal::synthetic::QUADRATURE;
 
 /// Two bands, each with its own rate, format and stages; everything that is random is there.
 const TWO: &str = r#"
@@ -252,7 +252,7 @@ fn one_source_is_one_source_for_every_front_end_but_noise_is_each_ones_own() {
     assert_eq!(one.interference[0].seed, other.interference[0].seed);
     assert_ne!(one.noise_seed(), other.noise_seed());
     assert!(one.noise_seed() != one.seed && one.signals == other.signals);
-    assert_eq!(crate::generator::scene::sources(both.iter()).len(), 1);
+    assert_eq!(crate::scene::sources(both.iter()).len(), 1);
     // The clock is one object.
     let clock = |scene: &Scene| std::sync::Arc::as_ptr(scene.receiver_clock.oscillator.as_ref().unwrap());
     assert_eq!(clock(one), clock(other));

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use crate::generator::levels::*;
-use crate::generator::scenario::{Overrides, Scenario};
-use crate::generator::scene::Scene;
-use crate::generator::stream::{Options, Stream};
-use crate::generator::truth;
+use crate::levels::*;
+use crate::scenario::{Overrides, Scenario};
+use crate::scene::Scene;
+use crate::stream::{Options, Stream};
+use crate::truth;
 
 /// Two seconds at 2.6 Msps with nothing above the mask.
 const EMPTY: &str = "name = \"levels\"\nstart = 2010-07-01T08:05:58\nduration_s = 2\n[motion]\nkind = \"static\"\n\

@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use crate::generator::levels::Levels;
-use crate::generator::plan::*;
-use crate::generator::scenario::{Overrides, Scenario};
-use crate::gnss::record::PassEnd;
-use crate::gnss::satellite::Sv;
+use crate::levels::Levels;
+use crate::plan::*;
+use crate::scenario::{Overrides, Scenario};
+use gnss::record::PassEnd;
+use gnss::satellite::Sv;
 
 fn plan(text: &str) -> Plan {
     let scenario = Scenario::parse(text, "plan").unwrap();
-    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
     let (scene, _) = scenario.compose(&directory, &Overrides::default()).unwrap();
     let machinery = Machinery {
         knot_spacing_s: 0.5,

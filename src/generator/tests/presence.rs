@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use crate::generator::presence::*;
-use crate::generator::scenario::{Overrides, Scenario};
-use crate::generator::scene::Scene;
-use crate::generator::{stream, truth};
-use crate::gnss::record::{PassEnd, PassRow};
-use crate::gnss::time::Epoch;
+use crate::presence::*;
+use crate::scenario::{Overrides, Scenario};
+use crate::scene::Scene;
+use crate::{stream, truth};
+use gnss::record::{PassEnd, PassRow};
+use gnss::time::Epoch;
 use std::ops::Range;
 
 /// The embedded day's last sets end at midnight, but for those of two uploads.
@@ -41,7 +41,7 @@ fn a_satellite_whose_ephemeris_ends_is_warned_of_by_name_and_time() {
     }
     assert!(ended >= 6, "{missing:?}");
     // Before midnight the same file says all there is to say.
-    assert!(crate::generator::presence::missing(&scene, 599.0).unwrap().is_empty());
+    assert!(crate::presence::missing(&scene, 599.0).unwrap().is_empty());
 }
 
 #[test]

@@ -9,24 +9,24 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 
-use crate::generator::catalogue::Catalogue;
-use crate::generator::scenario::{Overrides, Scenario};
-use crate::generator::scene::{Arithmetic, Scene};
-use crate::generator::stream::{GenerateError, Options, generate_part};
-use crate::generator::synth::band::{Filter, HALF_WIDTH};
-use crate::generator::synth::bank::Bank;
-use crate::generator::synth::isa::Level;
-use crate::generator::synth::waveform::{Voice, Waveform, WaveformError};
-use crate::generator::synth::{CODE_ONE, Edge, Kernel, RUN_SAMPLES, Run, reference};
-use crate::generator::truth;
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::galileo::e1::E1;
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::rinex;
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE, SYNTHETIC};
-use crate::gnss::signal::{Carrier, Component, Layer, Layers, Overlay, Shape, Signal, always};
-use crate::gnss::time::{Epoch, TimeScale};
+use crate::catalogue::Catalogue;
+use crate::scenario::{Overrides, Scenario};
+use crate::scene::{Arithmetic, Scene};
+use crate::stream::{GenerateError, Options, generate_part};
+use crate::synth::band::{Filter, HALF_WIDTH};
+use crate::synth::bank::Bank;
+use crate::synth::isa::Level;
+use crate::synth::waveform::{Voice, Waveform, WaveformError};
+use crate::synth::{CODE_ONE, Edge, Kernel, RUN_SAMPLES, Run, reference};
+use crate::truth;
+use gnss::broadcast::Ephemeris;
+use gnss::galileo::e1::E1;
+use gnss::gps::l1ca::L1_CA;
+use gnss::rinex;
+use gnss::satellite::{Sv, System};
+use gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE, SYNTHETIC};
+use gnss::signal::{Carrier, Component, Layer, Layers, Overlay, Shape, Signal, always};
+use gnss::time::{Epoch, TimeScale};
 
 /// Week 1590, whose beginning is that of every code and overlay.
 const WEEK: i64 = 1590 * 604_800;
@@ -467,7 +467,7 @@ fn scene(signal: &'static Signal, edge: &str, rate_hz: f64) -> Scene {
     scene.excluded.clear();
     scene.signals = vec![signal];
     scene.metadata.center_hz = signal.centre_hz() - 0.1e6;
-    scene.receiver_clock = crate::generator::clock::ReceiverClock::steady(2e-5, 1e-7);
+    scene.receiver_clock = crate::clock::ReceiverClock::steady(2e-5, 1e-7);
     scene
 }
 

@@ -13,23 +13,23 @@ use std::sync::Arc;
 
 use symbols::{Data, Symbols};
 
-use crate::generator::arrival;
-use crate::generator::error::GenerateError;
-use crate::generator::fast_phase::FastPhases;
-use crate::generator::geometry::{Geometry, Places};
-use crate::generator::knots::{Grid, Part, Path};
-use crate::generator::presence::Passes;
-use crate::generator::scene::Scene;
-use crate::generator::sky;
-use crate::generator::spoof::Constellation;
-use crate::generator::synth::bank::Bank;
-use crate::generator::synth::chips::{CodeTime, Spreading};
-use crate::generator::synth::waveform::{Voice, Waveform};
-use crate::generator::synth::{CODE_ONE, Edge, RUN_SAMPLES, Run};
-use crate::gnss::broadcast::OrbitError;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Carrier, Signal};
-use crate::gnss::time::{Epoch, tone_turns};
+use crate::arrival;
+use crate::error::GenerateError;
+use crate::fast_phase::FastPhases;
+use crate::geometry::{Geometry, Places};
+use crate::knots::{Grid, Part, Path};
+use crate::presence::Passes;
+use crate::scene::Scene;
+use crate::sky;
+use crate::spoof::Constellation;
+use crate::synth::bank::Bank;
+use crate::synth::chips::{CodeTime, Spreading};
+use crate::synth::waveform::{Voice, Waveform};
+use crate::synth::{CODE_ONE, Edge, RUN_SAMPLES, Run};
+use gnss::broadcast::OrbitError;
+use gnss::satellite::Sv;
+use gnss::signal::{Carrier, Signal};
+use gnss::time::{Epoch, tone_turns};
 
 /// Length of a short polynomial of an orbit at least, where roots are shorter.
 const SPAN_S: f64 = 8.0;
@@ -455,4 +455,4 @@ fn turns(cycles: f64) -> u64 {
     ((cycles - cycles.floor()) * 18_446_744_073_709_551_616.0) as u64
 }
 
-const _: () = assert!(RUN_SAMPLES == crate::generator::synth::noise::BLOCK_SAMPLES);
+const _: () = assert!(RUN_SAMPLES == crate::synth::noise::BLOCK_SAMPLES);

@@ -4,12 +4,12 @@
 //! a stream. A satellite well above the mask has been there for some time, because nothing moves faster than
 //! its bound: so the search leaps back as far as the elevation allows, and ends in single seconds.
 
-use crate::generator::presence::Presence;
-use crate::generator::ray::Sight;
-use crate::generator::scene::Scene;
-use crate::generator::spoof::Constellation;
-use crate::gnss::earth::SEMI_MAJOR_AXIS_M;
-use crate::gnss::satellite::Sv;
+use crate::presence::Presence;
+use crate::ray::Sight;
+use crate::scene::Scene;
+use crate::spoof::Constellation;
+use gnss::earth::SEMI_MAJOR_AXIS_M;
+use gnss::satellite::Sv;
 
 /// Satellites in the Earth's axes are slower: 3.9 km/s the fastest, and a quarter more for a fault's own.
 const SATELLITE_MPS: f64 = 5000.0;
@@ -81,8 +81,8 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::generator::arrival;
-    use crate::generator::scenario::{Overrides, Scenario};
+    use crate::arrival;
+    use crate::scenario::{Overrides, Scenario};
 
     /// A day of the embedded file at 1.1 Msps.
     fn day(motion: &str, mask_deg: f64) -> Scene {

@@ -2,15 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::generator::error::GenerateError;
-use crate::generator::message::{self, Sent as SentSymbols, Slot};
-use crate::generator::scene::Scene;
-use crate::generator::spoof::Constellation;
-use crate::gnss::message::Message;
-use crate::gnss::record::NavigationRow;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Component, Signal};
-use crate::gnss::time::Epoch;
+use crate::error::GenerateError;
+use crate::message::{self, Sent as SentSymbols, Slot};
+use crate::scene::Scene;
+use crate::spoof::Constellation;
+use gnss::message::Message;
+use gnss::record::NavigationRow;
+use gnss::satellite::Sv;
+use gnss::signal::{Component, Signal};
+use gnss::time::Epoch;
 
 /// What a satellite sends in a stretch of time.
 pub struct Symbols {

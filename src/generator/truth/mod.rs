@@ -1,6 +1,6 @@
 //! What is true at one reading of the receiver's clock, as records and as the files that the judge reads.
 //!
-//! Delays and phases are those of [`arrival`](crate::generator::arrival), which samples have too. Doppler is
+//! Delays and phases are those of [`arrival`](crate::arrival), which samples have too. Doppler is
 //! minus the derivative of that same carrier by the receiver's clock, of pushed motion within its tick.
 //! Limits: tropospheric and ionospheric shares in `sky.csv` are half the sum and half the difference of code
 //! and carrier delays.
@@ -11,17 +11,17 @@ mod rinex;
 mod skyline;
 mod writer;
 
-pub use crate::generator::arrival::{Seen, in_view, in_view_from, presence_from, seen, seen_by, seen_from, seen_on};
-use crate::generator::arrival::{received, seen_near};
-use crate::generator::geometry::Geometry;
-use crate::generator::knots::Arrival;
-use crate::generator::scene::Scene;
-use crate::generator::spoof::Constellation;
-use crate::gnss::broadcast::OrbitError;
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::record::{Observation, RayRow, SkyRow, TrajectoryRow};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
+pub use crate::arrival::{Seen, in_view, in_view_from, presence_from, seen, seen_by, seen_from, seen_on};
+use crate::arrival::{received, seen_near};
+use crate::geometry::Geometry;
+use crate::knots::Arrival;
+use crate::scene::Scene;
+use crate::spoof::Constellation;
+use gnss::broadcast::OrbitError;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::record::{Observation, RayRow, SkyRow, TrajectoryRow};
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
 pub use place::{Nmea, Tracks};
 pub use record::{Record, Several, Sink, TruthError};
 pub use rinex::Rinex;

@@ -13,11 +13,11 @@ use std::path::{Path, PathBuf};
 use nalgebra::DMatrix;
 
 use super::{Record, Sink, TruthError};
-use crate::generator::scene::Scene;
-use crate::gnss::exchange::{Track, TrackForm};
-use crate::gnss::nmea::{self, Place, Seen};
-use crate::gnss::record::{Observation, TrajectoryRow};
-use crate::gnss::satellite::{Sv, System};
+use crate::scene::Scene;
+use gnss::exchange::{Track, TrackForm};
+use gnss::nmea::{self, Place, Seen};
+use gnss::record::{Observation, TrajectoryRow};
+use gnss::satellite::{Sv, System};
 
 /// Base of the files' names.
 const BASE: &str = "trajectory";
@@ -165,12 +165,12 @@ fn refused(path: &Path, source: io::Error) -> TruthError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::earth::Geodetic;
-    use crate::gnss::galileo::e1::E1;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::record::SkyRow;
-    use crate::gnss::signal::Signal;
-    use crate::gnss::time::Epoch;
+    use gnss::earth::Geodetic;
+    use gnss::galileo::e1::E1;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::record::SkyRow;
+    use gnss::signal::Signal;
+    use gnss::time::Epoch;
 
     fn seen(sv: Sv, azimuth_deg: f64, elevation_deg: f64) -> Seen {
         Seen { sv, signal: None, azimuth_deg, elevation_deg, used: true }

@@ -10,8 +10,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use crate::generator::scene::Scene;
-use crate::gnss::record::{InterferenceRow, NavigationRow, Observation, PassRow, RayRow, SkyRow, TrajectoryRow};
+use crate::scene::Scene;
+use gnss::record::{InterferenceRow, NavigationRow, Observation, PassRow, RayRow, SkyRow, TrajectoryRow};
 
 /// Why a sink does not take the truth.
 #[derive(Debug, Error)]

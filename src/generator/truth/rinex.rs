@@ -6,10 +6,10 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::{Record, Sink, TruthError};
-use crate::generator::scene::Scene;
-use crate::gnss::exchange::{NavigationSets, ObservationFile, Version};
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use crate::scene::Scene;
+use gnss::exchange::{NavigationSets, ObservationFile, Version};
+use gnss::signal::Signal;
+use gnss::time::Epoch;
 
 /// Writes `observations.rnx` as the truth comes, and `navigation.rnx` at the end: what an ideal receiver
 /// would have, its clock that of the scene's.

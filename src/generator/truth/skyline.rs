@@ -1,9 +1,9 @@
 //! The line below which the scene's obstructions hide satellites, for pictures of the sky.
 
-use crate::generator::ray::{Ray, Sight};
-use crate::generator::scene::Scene;
-use crate::gnss::broadcast::State;
-use crate::gnss::earth::{Geodetic, Look};
+use crate::ray::{Ray, Sight};
+use crate::scene::Scene;
+use gnss::broadcast::State;
+use gnss::earth::{Geodetic, Look};
 
 /// Azimuth and elevation (degrees) below which a direct ray has lost half of its power at the start, if
 /// anything in the scene is in the way.

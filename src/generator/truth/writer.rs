@@ -10,11 +10,11 @@ use serde::Serialize;
 
 use super::record::{Record, Sink, TruthError};
 use super::skyline::skyline_deg;
-use crate::generator::scene::{CodeEdge, Scene, sources};
-use crate::generator::switches::{Stray, Switches};
-use crate::gnss::facts::{Fault, FaultKind, FrontEndFacts, OscillatorFacts, SceneFacts, TimeOffset};
-use crate::gnss::record::{Geographic, TrajectoryRow};
-use crate::gnss::time::Rate;
+use crate::scene::{CodeEdge, Scene, sources};
+use crate::switches::{Stray, Switches};
+use gnss::facts::{Fault, FaultKind, FrontEndFacts, OscillatorFacts, SceneFacts, TimeOffset};
+use gnss::record::{Geographic, TrajectoryRow};
+use gnss::time::Rate;
 
 struct Table {
     path: PathBuf,

@@ -13,7 +13,7 @@ use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
 use super::Motion;
 use super::turn::Turn;
-use crate::gnss::earth::Geodetic;
+use gnss::earth::Geodetic;
 
 /// Weight of the direction at rest against the velocity.
 const REST_MPS: f64 = 1.0;

@@ -16,8 +16,8 @@ use thiserror::Error;
 
 use super::Trajectory;
 use super::spline::Row;
-use crate::gnss::earth::Geodetic;
-use crate::gnss::time::Epoch;
+use gnss::earth::Geodetic;
+use gnss::time::Epoch;
 pub use nmea::{Rmc, gga, rising, rmc};
 use rows::Rows;
 

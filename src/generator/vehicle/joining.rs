@@ -15,7 +15,7 @@ use thiserror::Error;
 use super::grown::Joining;
 use super::turn::{PushedTurn, Turn, Turning};
 use super::{Knot, Motion, between, third_fourth_fifth};
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
 
 /// Pushes that wait for their time at most.
 const MOST_WAITING: usize = 1024;

@@ -26,7 +26,7 @@ use grown::{Grown, Joining};
 use nalgebra::Vector3;
 use turn::Turn;
 
-use crate::gnss::earth::Geodetic;
+use gnss::earth::Geodetic;
 
 /// Position, velocity and acceleration of the antenna in ECEF.
 #[derive(Clone, Copy, Debug, PartialEq)]

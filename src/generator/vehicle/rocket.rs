@@ -11,7 +11,7 @@ use thiserror::Error;
 
 use super::ramp::Ramp;
 use super::{Knot, Motion, Trajectory};
-use crate::gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, SEMI_MAJOR_AXIS_M};
+use gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, SEMI_MAJOR_AXIS_M};
 
 /// Earth's gravitational parameter with its atmosphere (NGA.STND.0036, table 3.1).
 pub(super) const MU_M3PS2: f64 = 3.986_004_418e14;
@@ -180,7 +180,7 @@ impl Rocket {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::earth::rotate_earth;
+    use gnss::earth::rotate_earth;
 
     const G_MPS2: f64 = 9.806_65;
 

@@ -11,7 +11,7 @@ use thiserror::Error;
 
 use super::ramp::Ramp;
 use super::{Knot, Motion, Trajectory};
-use crate::gnss::earth::Geodetic;
+use gnss::earth::Geodetic;
 
 /// A place on the route and how it is passed.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -77,7 +77,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::generator::vehicle::{Knot, Motion};
+    use crate::vehicle::{Knot, Motion};
 
     #[test]
     fn twenty_g_for_a_second_shift_a_tcxo_by_what_its_sensitivity_says() {

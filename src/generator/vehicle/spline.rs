@@ -143,7 +143,7 @@ fn smooth_accelerations(rows: &[Row], velocities: &[Vector3<f64>]) -> Vec<Vector
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generator::vehicle::Trajectory;
+    use crate::vehicle::Trajectory;
 
     /// A circle of 100 m flown at 20 m/s, sampled every `h` seconds with uneven steps.
     fn circle(h: f64, with_velocity: bool) -> Vec<Row> {

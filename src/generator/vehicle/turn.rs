@@ -217,7 +217,7 @@ fn slope_of_rate(vector: &Vector3<f64>, rate: &Vector3<f64>) -> Vector3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generator::vehicle::attitude::turned;
+    use crate::vehicle::attitude::turned;
 
     fn pushed(angles_rad: [f64; 3], rates_radps: [f64; 3]) -> Turn {
         PushedTurn { angles_rad, rates_radps: Some(rates_radps) }.turn()

@@ -5,7 +5,7 @@
 //! cells of 10° beyond 55° and the bands 9 and 10 around the poles are left out; a line of sight that meets
 //! the shell there has no delay.
 
-use crate::gnss::earth::{Geodetic, Look};
+use crate::earth::{Geodetic, Look};
 
 /// The shell and the Earth below it (A.4.4.10.1).
 const SHELL_M: f64 = 350e3;

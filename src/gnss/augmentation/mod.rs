@@ -6,7 +6,7 @@
 
 use std::fmt;
 
-use crate::gnss::time::Epoch;
+use crate::time::Epoch;
 use accuracy::NOT_MONITORED;
 
 pub mod accuracy;

@@ -17,8 +17,8 @@ mod table;
 
 use std::f64::consts::{PI, TAU};
 
-use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
-use crate::gnss::time::{BDT, Epoch};
+use crate::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
+use crate::time::{BDT, Epoch};
 use table::{AMPLITUDES, BROADCAST, FORECAST, PERIODS_D};
 
 /// Radius of the sphere and height of the shell, in metres (7.8.2).

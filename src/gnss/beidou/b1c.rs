@@ -10,11 +10,11 @@
 
 use std::sync::LazyLock;
 
-use crate::gnss::beidou::bcnav1::B_CNAV1;
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal};
-use crate::gnss::time::{BDT, Epoch};
-use crate::gnss::weil::Legendre;
+use crate::beidou::bcnav1::B_CNAV1;
+use crate::satellite::System;
+use crate::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::time::{BDT, Epoch};
+use crate::weil::Legendre;
 
 /// 4.1.
 pub const CARRIER_HZ: f64 = 1_575.42e6;

@@ -8,13 +8,13 @@
 
 use std::sync::LazyLock;
 
-use crate::gnss::beidou::b1c::{piece, sent};
-use crate::gnss::beidou::bcnav2::B_CNAV2;
-use crate::gnss::beidou::in_phase::registers;
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal};
-use crate::gnss::time::BDT;
-use crate::gnss::weil::Legendre;
+use crate::beidou::b1c::{piece, sent};
+use crate::beidou::bcnav2::B_CNAV2;
+use crate::beidou::in_phase::registers;
+use crate::satellite::System;
+use crate::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::time::BDT;
+use crate::weil::Legendre;
 
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 10_230;

@@ -8,12 +8,12 @@
 //! medium orbits, 2 dB less of inclined ones. Below some 38 dB-Hz the phase detector of single periods
 //! declares slips that are none.
 
-use crate::gnss::beidou::b1c::sent;
-use crate::gnss::beidou::bcnav3::B_CNAV3;
-use crate::gnss::beidou::in_phase::registers;
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal};
-use crate::gnss::time::BDT;
+use crate::beidou::b1c::sent;
+use crate::beidou::bcnav3::B_CNAV3;
+use crate::beidou::in_phase::registers;
+use crate::satellite::System;
+use crate::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::time::BDT;
 
 /// 4.1.
 pub const CARRIER_HZ: f64 = 1_207.14e6;

@@ -10,10 +10,10 @@
 //! integrate over 20 ms, ours over one code period; below some 38 dB-Hz its phase detector declares slips
 //! that are none.
 
-use crate::gnss::beidou::d1d2::D1_D2;
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal, always};
-use crate::gnss::time::BDT;
+use crate::beidou::d1d2::D1_D2;
+use crate::satellite::System;
+use crate::signal::{Carrier, Component, Layer, Overlay, Signal, always};
+use crate::time::BDT;
 
 /// B1I: 763 times 2.046 MHz.
 pub static B1I: Signal = Signal {

@@ -4,11 +4,11 @@
 //! have as zero.
 
 use super::Ephemeris;
-use crate::gnss::time::Epoch;
+use crate::time::Epoch;
 
 impl Ephemeris {
     /// The set with `at`, of the same week, as the reference time of orbit and clock; issues stay.
-    pub(in crate::gnss) fn carried_to(&self, at: Epoch) -> Self {
+    pub(crate) fn carried_to(&self, at: Epoch) -> Self {
         let (since_toe_s, since_toc_s) = (at.since(self.toe), at.since(self.toc));
         Self {
             toe: at,

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::gnss::satellite::Sv;
+use crate::satellite::Sv;
 
 /// Why elements give no state.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]

@@ -6,8 +6,8 @@
 use std::fmt;
 
 use super::{B1I_HZ, B2I_HZ, Ephemeris};
-use crate::gnss::satellite::System;
-use crate::gnss::signal::Signal;
+use crate::satellite::System;
+use crate::signal::Signal;
 
 /// What clock, delays and health of a set mean: messages of one satellite have the same orbit, but clocks of
 /// other signals.

@@ -10,7 +10,7 @@
 use nalgebra::Vector3;
 
 use super::{OrbitError, State};
-use crate::gnss::satellite::{Sv, System};
+use crate::satellite::{Sv, System};
 
 /// Gravitational constant, second zonal harmonic, equatorial radius and rotation of the Earth in PZ-90.11
 /// (GLONASS ICD L1, L2 5.1, table A.1).

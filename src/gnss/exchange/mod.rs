@@ -8,7 +8,7 @@
 //! of navigation what a message's `rinex` names; no date of the run stands in the header, since the same run
 //! gives the same bytes at any time.
 
-pub(in crate::gnss) mod modern;
+pub(crate) mod modern;
 mod navigation;
 mod observation;
 mod offset;
@@ -23,8 +23,8 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use crate::gnss::satellite::System;
-use crate::gnss::time::Epoch;
+use crate::satellite::System;
+use crate::time::Epoch;
 
 /// A version of RINEX that is written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -4,9 +4,9 @@
 //! reference time of the clock, with which a record begins, is that of the orbit too where the record has no
 //! other.
 
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::message::{Raw, RecordLine};
-use crate::gnss::time::WEEK_S;
+use crate::broadcast::Ephemeris;
+use crate::message::{Raw, RecordLine};
+use crate::time::WEEK_S;
 
 /// The four lines of the orbit; the third begins with a time of its own.
 pub fn orbit(set: &Ephemeris, time_s: Option<f64>) -> Vec<RecordLine> {

@@ -5,13 +5,13 @@ use std::io::{self, Write};
 
 use super::offset::offsets;
 use super::{Version, calendar, header_line, opening};
-use crate::gnss::broadcast::{Ephemeris, StateVector, status_of_record};
-use crate::gnss::ionosphere::{Coefficients, Model};
-use crate::gnss::message::{Message, Raw, RecordLine, Records};
-use crate::gnss::record::NavigationRow;
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::signal::Signal;
-use crate::gnss::time::{BDT, BDT_WEEK, Epoch, TimeScale, UTC};
+use crate::broadcast::{Ephemeris, StateVector, status_of_record};
+use crate::ionosphere::{Coefficients, Model};
+use crate::message::{Message, Raw, RecordLine, Records};
+use crate::record::NavigationRow;
+use crate::satellite::{Sv, System};
+use crate::signal::Signal;
+use crate::time::{BDT, BDT_WEEK, Epoch, TimeScale, UTC};
 
 /// The parameters of a set, or of what is common to all, by name.
 type Raws = BTreeMap<String, i64>;
@@ -340,34 +340,34 @@ fn sisa_m(index: u8) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::bdgim::Bdgim;
-    use crate::gnss::beidou::b1c::B1C;
-    use crate::gnss::beidou::b2a::B2A;
-    use crate::gnss::beidou::b2b::B2B;
-    use crate::gnss::beidou::bcnav1::B_CNAV1;
-    use crate::gnss::beidou::bcnav2::B_CNAV2;
-    use crate::gnss::beidou::bcnav3::B_CNAV3;
-    use crate::gnss::beidou::d1d2::D1_D2;
-    use crate::gnss::beidou::in_phase::B1I;
-    use crate::gnss::galileo::e1::E1;
-    use crate::gnss::galileo::e5::{E5A, E5B};
-    use crate::gnss::galileo::fnav::FNAV;
-    use crate::gnss::galileo::inav::{INAV, INAV_E5B};
-    use crate::gnss::glonass::fdma::channel;
-    use crate::gnss::glonass::gnav::GNAV;
-    use crate::gnss::gps;
-    use crate::gnss::gps::cnav::CNAV;
-    use crate::gnss::gps::cnav2::CNAV2;
-    use crate::gnss::gps::l1c::L1C;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::gps::lnav::{LNAV, UtcData};
-    use crate::gnss::klobuchar::Klobuchar;
-    use crate::gnss::message::Common;
-    use crate::gnss::navic::nav::SPS_NAV;
-    use crate::gnss::navic::sps::L5;
-    use crate::gnss::rinex;
-    use crate::gnss::sbas::message::SBAS;
-    use crate::gnss::time::{TimePolynomial, WEEK_S};
+    use crate::bdgim::Bdgim;
+    use crate::beidou::b1c::B1C;
+    use crate::beidou::b2a::B2A;
+    use crate::beidou::b2b::B2B;
+    use crate::beidou::bcnav1::B_CNAV1;
+    use crate::beidou::bcnav2::B_CNAV2;
+    use crate::beidou::bcnav3::B_CNAV3;
+    use crate::beidou::d1d2::D1_D2;
+    use crate::beidou::in_phase::B1I;
+    use crate::galileo::e1::E1;
+    use crate::galileo::e5::{E5A, E5B};
+    use crate::galileo::fnav::FNAV;
+    use crate::galileo::inav::{INAV, INAV_E5B};
+    use crate::glonass::fdma::channel;
+    use crate::glonass::gnav::GNAV;
+    use crate::gps;
+    use crate::gps::cnav::CNAV;
+    use crate::gps::cnav2::CNAV2;
+    use crate::gps::l1c::L1C;
+    use crate::gps::l1ca::L1_CA;
+    use crate::gps::lnav::{LNAV, UtcData};
+    use crate::klobuchar::Klobuchar;
+    use crate::message::Common;
+    use crate::navic::nav::SPS_NAV;
+    use crate::navic::sps::L5;
+    use crate::rinex;
+    use crate::sbas::message::SBAS;
+    use crate::time::{TimePolynomial, WEEK_S};
 
     const NAVIC: &[u8] = include_bytes!("../../../scenarios/navic_2026-03-09_10h_12h.rnx");
     const QZSS: &[u8] = include_bytes!("../../../scenarios/qzss_2023-03-12_02h_04h.rnx");
@@ -681,7 +681,7 @@ mod tests {
     #[test]
     fn accuracies_are_those_of_their_index() {
         for index in (0..=125).chain([255]) {
-            assert_eq!(crate::gnss::galileo::inav::sisa_index(Some(sisa_m(index)).filter(|m| *m >= 0.0)), index);
+            assert_eq!(crate::galileo::inav::sisa_index(Some(sisa_m(index)).filter(|m| *m >= 0.0)), index);
         }
         assert_eq!([0, 6, 7, 14].map(ura_m), [2.0, 16.0, 32.0, 4096.0]);
     }

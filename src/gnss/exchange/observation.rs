@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use super::{Version, calendar, header_line, opening};
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::record::Observation;
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::signal::{Carrier, Link, Signal};
-use crate::gnss::time::Epoch;
+use crate::earth::SPEED_OF_LIGHT_MPS;
+use crate::record::Observation;
+use crate::satellite::{Sv, System};
+use crate::signal::{Carrier, Link, Signal};
+use crate::time::Epoch;
 
 /// Satellites with their channels on a line of the header.
 const CHANNELS_ON_A_LINE: usize = 8;
@@ -211,8 +211,8 @@ fn values(row: &Observation, slipped: bool) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::galileo::e1::E1;
-    use crate::gnss::gps::l1ca::L1_CA;
+    use crate::galileo::e1::E1;
+    use crate::gps::l1ca::L1_CA;
 
     fn row(sample: u64, sv: Sv, signal: &'static Signal, locked_s: f64) -> Observation {
         let sent_s = Epoch::parse("2010-07-01T08:06:18").unwrap().seconds() + sample as i64;

@@ -2,11 +2,11 @@
 //! `STO` records of version 4.
 
 use super::{calendar, header_line};
-use crate::gnss::bits::Field;
-use crate::gnss::exchange::navigation::exponent;
-use crate::gnss::message::{Raw, Records};
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
+use crate::bits::Field;
+use crate::exchange::navigation::exponent;
+use crate::message::{Raw, Records};
+use crate::satellite::{Sv, System};
+use crate::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
 
 /// One time scale against another, as a message says it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,8 +8,8 @@ use std::io::{self, Write};
 
 use nalgebra::Vector3;
 
-use crate::gnss::earth::Geodetic;
-use crate::gnss::time::Epoch;
+use crate::earth::Geodetic;
+use crate::time::Epoch;
 
 /// A form of track.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

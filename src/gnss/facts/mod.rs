@@ -11,7 +11,7 @@ mod scene;
 
 use serde::{Deserialize, Serialize};
 
-use crate::gnss::satellite::Sv;
+use crate::satellite::Sv;
 pub use front_end::{
     BalanceSpec, ConverterSpec, Edge, FilterShape, FilterSpec, StageSpec, converter, filters, oscillator_offset_hz,
 };

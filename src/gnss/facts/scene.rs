@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Edge, Expect, Fault, Interference, StageSpec, TimeOffset};
-use crate::gnss::signal::Layers;
+use crate::signal::Layers;
 
 /// The facts of a scene. What a file may lack has a default: a scene without it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

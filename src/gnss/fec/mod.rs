@@ -8,6 +8,6 @@ pub mod ldpc64;
 pub mod reed_solomon;
 pub mod register;
 #[cfg(test)]
-pub(in crate::gnss) mod reliability;
+pub(crate) mod reliability;
 pub mod running;
 pub mod subframes;

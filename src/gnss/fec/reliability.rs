@@ -36,7 +36,7 @@ fn failing(code: &Ldpc, half: usize, ebn0_db: f64, words: u32) -> f64 {
 /// is reliable there. At that rate a word of 1200 symbols can fail once in a hundred from 0.9 dB on, one of
 /// 548 from 1.2 dB on (normal approximation, Polyanskiy, Poor and Verdu 2010, eq. 296); min-sum and a
 /// structured code cost a decibel more at most.
-pub(in crate::gnss) fn is_as_codes_of_its_length(code: &Ldpc, half: usize) {
+pub(crate) fn is_as_codes_of_its_length(code: &Ldpc, half: usize) {
     let mut normal = Normal(5);
     let sent: Vec<bool> = (0..half).map(|_| normal.next() > 0.0).collect();
     let word = code.encode(&sent);

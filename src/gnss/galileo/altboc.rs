@@ -12,7 +12,7 @@
 //! within ±32.5 MHz.
 
 use super::e5::{self, Code};
-use crate::gnss::signal::{Carrier, Component, Layer, Signal};
+use crate::signal::{Carrier, Component, Layer, Signal};
 
 /// E5 with I/NAV on its upper side and F/NAV on its lower.
 pub static E5: Signal = Signal {

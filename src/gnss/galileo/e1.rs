@@ -5,12 +5,12 @@
 //! have no generator: the document prints them, and `e1_codes.bin` holds the same chips. Limits: signals of
 //! infinite bandwidth; the document's reference receiver has 24.552 MHz.
 
-use crate::gnss::galileo::inav::INAV;
-pub use crate::gnss::galileo::memory::Code;
-use crate::gnss::galileo::memory::{self, COUNT};
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal, always};
-use crate::gnss::time::GST;
+use crate::galileo::inav::INAV;
+pub use crate::galileo::memory::Code;
+use crate::galileo::memory::{self, COUNT};
+use crate::satellite::System;
+use crate::signal::{Carrier, Component, Layer, Overlay, Signal, always};
+use crate::time::GST;
 
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 4092;

@@ -7,12 +7,12 @@
 
 use std::sync::LazyLock;
 
-use crate::gnss::galileo::fnav::FNAV;
-use crate::gnss::galileo::inav::INAV_E5B;
-use crate::gnss::message::Message;
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal, always};
-use crate::gnss::time::GST;
+use crate::galileo::fnav::FNAV;
+use crate::galileo::inav::INAV_E5B;
+use crate::message::Message;
+use crate::satellite::System;
+use crate::signal::{Carrier, Component, Layer, Overlay, Signal, always};
+use crate::time::GST;
 
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 10_230;

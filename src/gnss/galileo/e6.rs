@@ -7,13 +7,13 @@
 //! delay of E6 is broadcast (`status`). Limits: the pilot's minus sign is the document's and has not been
 //! measured; E6-A is left out.
 
-use crate::gnss::galileo::cnav::CNAV;
-use crate::gnss::galileo::e5;
-pub use crate::gnss::galileo::memory::Code;
-use crate::gnss::galileo::memory::{self, COUNT};
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal, always};
-use crate::gnss::time::GST;
+use crate::galileo::cnav::CNAV;
+use crate::galileo::e5;
+pub use crate::galileo::memory::Code;
+use crate::galileo::memory::{self, COUNT};
+use crate::satellite::System;
+use crate::signal::{Carrier, Component, Layer, Overlay, Signal, always};
+use crate::time::GST;
 
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 5115;

@@ -8,8 +8,8 @@
 //! is delayed by the mean of what delays its sides, which have equal power.
 
 use super::e5;
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::signal::Signal;
+use crate::broadcast::Ephemeris;
+use crate::signal::Signal;
 
 /// Where the three bits of a signal are in [`Ephemeris::health`].
 #[derive(Clone, Copy, Debug)]

@@ -9,10 +9,10 @@
 //! satellite on another channel is left out where a file has it. The code at high accuracy, in quadrature, is
 //! not sent.
 
-use crate::gnss::glonass::gnav::GNAV;
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal, always};
-use crate::gnss::time::GLONASST;
+use crate::glonass::gnav::GNAV;
+use crate::satellite::System;
+use crate::signal::{Carrier, Component, Layer, Overlay, Signal, always};
+use crate::time::GLONASST;
 
 /// The band around 1602 MHz.
 pub static G1: Signal = Signal {
@@ -74,7 +74,7 @@ fn code() -> Vec<i8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::satellite::Sv;
+    use crate::satellite::Sv;
 
     #[test]
     fn opposite_slots_share_a_channel_and_every_channel_has_two_slots_at_most() {

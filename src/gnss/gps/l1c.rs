@@ -10,12 +10,12 @@
 
 use std::sync::LazyLock;
 
-use crate::gnss::gps::cnav2::CNAV2;
-use crate::gnss::gps::modernised;
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal};
-use crate::gnss::time::GPST;
-use crate::gnss::weil::Legendre;
+use crate::gps::cnav2::CNAV2;
+use crate::gps::modernised;
+use crate::satellite::System;
+use crate::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::time::GPST;
+use crate::weil::Legendre;
 
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 10_230;

@@ -4,10 +4,10 @@
 //! registers and the G2 delays; PRN 34 and 37 share a code, as the table says. Those of PRN 120 to 158 are
 //! of augmentation systems and those of PRN 193 to 202 of QZSS (IS-GPS-200N, table 6-I).
 
-use crate::gnss::gps::lnav::LNAV;
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal, always};
-use crate::gnss::time::GPST;
+use crate::gps::lnav::LNAV;
+use crate::satellite::System;
+use crate::signal::{Carrier, Component, Layer, Overlay, Signal, always};
+use crate::time::GPST;
 
 /// Chips in a C/A code period.
 pub const CODE_CHIPS: u32 = 1023;

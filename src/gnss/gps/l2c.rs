@@ -6,11 +6,11 @@
 //! the other has its turn. Limits: the power is that of Blocks IIR-M and IIF; the phase is that of CM, with
 //! no P code beside it.
 
-use crate::gnss::gps::cnav::CNAV_L2C;
-use crate::gnss::gps::modernised;
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal};
-use crate::gnss::time::GPST;
+use crate::gps::cnav::CNAV_L2C;
+use crate::gps::modernised;
+use crate::satellite::System;
+use crate::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::time::GPST;
 
 /// Chips of CM and of CL.
 pub const MODERATE_CHIPS: u32 = 10_230;
@@ -57,7 +57,7 @@ fn gps(number: u8) -> Option<u8> {
 }
 
 /// The chips of a satellite by its number where they have their turn, those of CM first.
-pub(in crate::gnss) fn placed(which: Code, number: u8) -> Option<Vec<i8>> {
+pub(crate) fn placed(which: Code, number: u8) -> Option<Vec<i8>> {
     let first = match which {
         Code::Moderate => 0,
         Code::Long => 1,

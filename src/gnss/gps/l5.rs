@@ -7,11 +7,11 @@
 
 use std::sync::LazyLock;
 
-use crate::gnss::gps::cnav::CNAV;
-use crate::gnss::gps::modernised;
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal};
-use crate::gnss::time::GPST;
+use crate::gps::cnav::CNAV;
+use crate::gps::modernised;
+use crate::satellite::System;
+use crate::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::time::GPST;
 
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 10_230;

@@ -8,7 +8,7 @@
 //! day on which a satellite was set healthy. Witnessed are seven days of 2020 to 2026 (`tests/witness`), for
 //! L1C one recording alone. Limits: outages, changes after 2026-03-09.
 
-use crate::gnss::time::Epoch;
+use crate::time::Epoch;
 
 /// What a satellite can send.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

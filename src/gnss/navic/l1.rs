@@ -11,10 +11,10 @@
 //! are as in the literature on the signal; the least power is unchecked; the product that keeps the envelope
 //! constant is the data's code on BOC(6,1), and counts as part of the data.
 
-use crate::gnss::navic::l1nav::L1_NAV;
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal};
-use crate::gnss::time::{Epoch, IRNSST};
+use crate::navic::l1nav::L1_NAV;
+use crate::satellite::System;
+use crate::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::time::{Epoch, IRNSST};
 
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 10_230;

@@ -7,10 +7,10 @@
 //! BOC(5,2), is not made, so that the rest is one BPSK(1) of constant envelope, and powers are the service's
 //! alone.
 
-use crate::gnss::navic::nav::SPS_NAV;
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{Carrier, Component, Layer, Overlay, Signal, always};
-use crate::gnss::time::IRNSST;
+use crate::navic::nav::SPS_NAV;
+use crate::satellite::System;
+use crate::signal::{Carrier, Component, Layer, Overlay, Signal, always};
+use crate::time::IRNSST;
 
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 1023;

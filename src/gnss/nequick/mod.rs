@@ -10,8 +10,8 @@
 
 use nalgebra::Vector3;
 
-use crate::gnss::earth::Geodetic;
-use crate::gnss::time::Epoch;
+use crate::earth::Geodetic;
+use crate::time::Epoch;
 use profile::Sun;
 
 mod maps;
@@ -75,7 +75,7 @@ impl NequickG {
 
 /// Group delay of so many electrons on a carrier, in seconds.
 pub fn delay_s(tecu: f64, carrier_hz: f64) -> f64 {
-    DELAY_M3PS2 * TECU * tecu / (carrier_hz * carrier_hz) / crate::gnss::earth::SPEED_OF_LIGHT_MPS
+    DELAY_M3PS2 * TECU * tecu / (carrier_hz * carrier_hz) / crate::earth::SPEED_OF_LIGHT_MPS
 }
 
 /// A straight line past the Earth's centre, by the distance from the place that is nearest to it.

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use thiserror::Error;
 
 use super::{Encoding, Layout};
-use crate::gnss::samples::Format;
+use crate::samples::Format;
 
 /// Values of codes of at most 8 bits lie between these.
 const LEAST: i32 = -256;
@@ -132,7 +132,7 @@ impl<W: Write> Write for Packer<W> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::packed::{Components, Interleaved};
+    use crate::packed::{Components, Interleaved};
 
     #[test]
     fn what_is_packed_is_unpacked_again_in_every_form_however_it_is_written() {

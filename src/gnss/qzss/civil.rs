@@ -6,11 +6,11 @@
 //! GPS in their order (10, 11, 30, 33; page 1). Real satellites send 60 and 61 and page 61 for Japan, 32,
 //! 37, and others.
 
-use crate::gnss::broadcast::{Ephemeris, SetForm};
-use crate::gnss::gps::{cnav, cnav2};
-use crate::gnss::message::Message;
-use crate::gnss::qzss::lnav::{LNAV_SETS, unhealthy};
-use crate::gnss::qzss::own::{OwnReader, as_gps, like, named};
+use crate::broadcast::{Ephemeris, SetForm};
+use crate::gps::{cnav, cnav2};
+use crate::message::Message;
+use crate::qzss::lnav::{LNAV_SETS, unhealthy};
+use crate::qzss::own::{OwnReader, as_gps, like, named};
 
 /// CNAV as L5 of QZSS names it.
 pub static CNAV: Message = Message {

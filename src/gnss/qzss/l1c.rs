@@ -4,12 +4,12 @@
 //! Source: IS-QZSS-PNT-005, 3.1 and 3.2.2. Data and pilot are in phase, as those of J02 and J03 are in a
 //! recording. Limits: of J01, of Block I, the phase may be another.
 
-use crate::gnss::gps::l1c::{self, Code, OVERLAY_CHIPS, code, overlay};
-use crate::gnss::qzss::civil::CNAV2;
-use crate::gnss::qzss::satellites::{SATELLITES, prn};
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{Component, Overlay, Signal, always};
-use crate::gnss::time::QZSST;
+use crate::gps::l1c::{self, Code, OVERLAY_CHIPS, code, overlay};
+use crate::qzss::civil::CNAV2;
+use crate::qzss::satellites::{SATELLITES, prn};
+use crate::satellite::System;
+use crate::signal::{Component, Overlay, Signal, always};
+use crate::time::QZSST;
 
 /// The signal: L1C-P, and L1C-D with CNAV-2.
 pub static L1C: Signal = Signal {

@@ -3,12 +3,12 @@
 //! Source: IS-QZSS-PNT-005, 3.1 and 3.2.2. Limits: L1C/B, which some satellites send in its place, is not
 //! there; the power is that of the document's Block I.
 
-use crate::gnss::gps::l1ca::{self, code};
-use crate::gnss::qzss::lnav::LNAV;
-use crate::gnss::qzss::satellites::{self, SATELLITES, prn};
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{Component, Signal};
-use crate::gnss::time::QZSST;
+use crate::gps::l1ca::{self, code};
+use crate::qzss::lnav::LNAV;
+use crate::qzss::satellites::{self, SATELLITES, prn};
+use crate::satellite::System;
+use crate::signal::{Component, Signal};
+use crate::time::QZSST;
 
 /// The signal.
 pub static L1_CA: Signal = Signal {

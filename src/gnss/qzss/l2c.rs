@@ -2,12 +2,12 @@
 //!
 //! Source: IS-QZSS-PNT-005, 3.1 and 3.2.2. Limits: the power is that of the document's Block I.
 
-use crate::gnss::gps::l2c::{self, Code, placed};
-use crate::gnss::qzss::civil::CNAV_L2C;
-use crate::gnss::qzss::satellites::{self, SATELLITES, prn};
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{Component, Signal};
-use crate::gnss::time::QZSST;
+use crate::gps::l2c::{self, Code, placed};
+use crate::qzss::civil::CNAV_L2C;
+use crate::qzss::satellites::{self, SATELLITES, prn};
+use crate::satellite::System;
+use crate::signal::{Component, Signal};
+use crate::time::QZSST;
 
 /// The signal: CM with CNAV, and CL.
 pub static L2C: Signal = Signal {

@@ -2,12 +2,12 @@
 //!
 //! Source: IS-QZSS-PNT-005, 3.1 and 3.2.2. Limits: the power is that of the document's Block I.
 
-use crate::gnss::gps::l5::{self, Code, code};
-use crate::gnss::qzss::civil::CNAV;
-use crate::gnss::qzss::satellites::{SATELLITES, prn};
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{Component, Signal, always};
-use crate::gnss::time::QZSST;
+use crate::gps::l5::{self, Code, code};
+use crate::qzss::civil::CNAV;
+use crate::qzss::satellites::{SATELLITES, prn};
+use crate::satellite::System;
+use crate::signal::{Component, Signal, always};
+use crate::time::QZSST;
 
 /// The signal: I5 with CNAV, and Q5.
 pub static L5: Signal = Signal {

@@ -6,12 +6,12 @@
 //! ionosphere and UTC is sent, where GPS has it, with the coefficients of GPS; real satellites have their
 //! own of two regions, and almanacs.
 
-use crate::gnss::broadcast::{Ephemeris, SetForm};
-use crate::gnss::gps::lnav::{self, Broadcast};
-use crate::gnss::message::{Common, Message};
-use crate::gnss::qzss::own::{OwnReader, as_gps, like, named};
-use crate::gnss::qzss::{l1c, l2c, l5};
-use crate::gnss::signal::Signal;
+use crate::broadcast::{Ephemeris, SetForm};
+use crate::gps::lnav::{self, Broadcast};
+use crate::message::{Common, Message};
+use crate::qzss::own::{OwnReader, as_gps, like, named};
+use crate::qzss::{l1c, l2c, l5};
+use crate::signal::Signal;
 
 /// LNAV as signals of QZSS name it.
 pub static LNAV: Message = Message {

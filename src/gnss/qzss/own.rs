@@ -1,13 +1,13 @@
 //! What every message of QZSS has of that of GPS: sets and readers that bear other names.
 
-use crate::gnss::broadcast::{Ephemeris, SetForm};
-use crate::gnss::gps;
-use crate::gnss::message::{Message, Read, Reader};
-use crate::gnss::qzss::{civil, l1c, l1ca, l2c, l5, lnav};
-use crate::gnss::record::NavigationRow;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use crate::broadcast::{Ephemeris, SetForm};
+use crate::gps;
+use crate::message::{Message, Read, Reader};
+use crate::qzss::{civil, l1c, l1ca, l2c, l5, lnav};
+use crate::record::NavigationRow;
+use crate::satellite::Sv;
+use crate::signal::Signal;
+use crate::time::Epoch;
 
 /// Signals of QZSS with those of GPS that they are like.
 static SIGNALS: [(&Signal, &Signal); 4] = [

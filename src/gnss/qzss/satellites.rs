@@ -6,8 +6,8 @@
 //! day between 2025-02-15 and 2025-08-21; here until the latter. Limits: of J05, J06, J09 and J10 nothing
 //! is known, they count as J08 does.
 
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::time::Epoch;
+use crate::satellite::{Sv, System};
+use crate::time::Epoch;
 
 /// Numbers of satellites that have codes.
 pub const SATELLITES: u8 = 10;

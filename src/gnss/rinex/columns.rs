@@ -12,10 +12,10 @@ mod corrections;
 mod numbers;
 mod record;
 
-use crate::gnss::bdgim::Bdgim;
-use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::time::Epoch;
+use crate::bdgim::Bdgim;
+use crate::klobuchar::Klobuchar;
+use crate::satellite::{Sv, System};
+use crate::time::Epoch;
 use corrections::{Thirds, delta_utc, leap_event, system_time};
 use numbers::{digits, fields, numbers};
 pub(super) use record::Record;

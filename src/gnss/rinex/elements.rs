@@ -7,17 +7,17 @@
 use nalgebra::Vector3;
 
 use super::columns::Record;
-use crate::gnss::beidou::d1d2::issue;
-use crate::gnss::broadcast::{Ephemeris, StateVector, status_of_record};
-use crate::gnss::galileo::fnav::FNAV_SETS;
-use crate::gnss::galileo::inav::{INAV_SETS, sisa_index};
-use crate::gnss::glonass::fdma::channel;
-use crate::gnss::glonass::gnav::GNAV_SETS;
-use crate::gnss::gps::lnav::LNAV_SETS;
-use crate::gnss::qzss::lnav;
-use crate::gnss::satellite::System;
-use crate::gnss::sbas::message::{SBAS_SETS, step_of_day};
-use crate::gnss::time::{BDT, BDT_WEEK, Epoch, GLONASST, UTC, WEEK_S};
+use crate::beidou::d1d2::issue;
+use crate::broadcast::{Ephemeris, StateVector, status_of_record};
+use crate::galileo::fnav::FNAV_SETS;
+use crate::galileo::inav::{INAV_SETS, sisa_index};
+use crate::glonass::fdma::channel;
+use crate::glonass::gnav::GNAV_SETS;
+use crate::gps::lnav::LNAV_SETS;
+use crate::qzss::lnav;
+use crate::satellite::System;
+use crate::sbas::message::{SBAS_SETS, step_of_day};
+use crate::time::{BDT, BDT_WEEK, Epoch, GLONASST, UTC, WEEK_S};
 
 /// An element that must be there and lie within its range, in SI units.
 fn field(record: &Record, key: &'static str, least: f64, most: f64) -> Result<f64, String> {

@@ -4,11 +4,11 @@
 //! Satellites are timed by the network, which keeps within 50 ns of GPS time: it is taken for GPS time.
 //! Limits: the power is the least that is promised; which numbers range says the message alone.
 
-use crate::gnss::gps::l1ca::{self, code};
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::sbas::message::SBAS;
-use crate::gnss::signal::{Component, Signal, always};
-use crate::gnss::time::GPST;
+use crate::gps::l1ca::{self, code};
+use crate::satellite::{Sv, System};
+use crate::sbas::message::SBAS;
+use crate::signal::{Component, Signal, always};
+use crate::time::GPST;
 
 /// First and last number of a satellite.
 pub const SATELLITES: [u8; 2] = [20, 58];

@@ -1,7 +1,7 @@
 //! Signals whose messages say when they are sent and from where, and those that take it from these.
 
 use super::Signal;
-use crate::gnss::message::Message;
+use crate::message::Message;
 
 impl Signal {
     /// The messages of its components.

@@ -13,11 +13,11 @@ use std::sync::{PoisonError, RwLock};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::message::Message;
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::time::{Epoch, TimeScale};
-use crate::gnss::{beidou, galileo, glonass, gps, navic, qzss, sbas};
+use crate::earth::SPEED_OF_LIGHT_MPS;
+use crate::message::Message;
+use crate::satellite::{Sv, System};
+use crate::time::{Epoch, TimeScale};
+use crate::{beidou, galileo, glonass, gps, navic, qzss, sbas};
 
 mod dated;
 mod shape;
@@ -239,7 +239,7 @@ impl Signal {
     /// `None` for a number to which the document assigns none.
     ///
     /// ```
-    /// use gnss_twin::gnss::gps::l1ca::L1_CA;
+    /// use gnss::gps::l1ca::L1_CA;
     ///
     /// // IS-GPS-200, table 3-Ia: the code of PRN 7 begins with 1131 octal, and a 1 is sent as −1.
     /// let code = L1_CA.code(7).unwrap();

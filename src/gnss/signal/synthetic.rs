@@ -4,12 +4,12 @@
 //! scale goes wrong with one of them.
 
 use super::{Carrier, Component, Layer, Overlay, Signal, always};
-use crate::gnss::galileo::altboc::{DOWN, UP};
-use crate::gnss::galileo::fnav::FNAV;
-use crate::gnss::galileo::inav::{INAV, INAV_E5B};
-use crate::gnss::gps::lnav::LNAV;
-use crate::gnss::satellite::System;
-use crate::gnss::time::{GPST, GST, TimeScale};
+use crate::galileo::altboc::{DOWN, UP};
+use crate::galileo::fnav::FNAV;
+use crate::galileo::inav::{INAV, INAV_E5B};
+use crate::gps::lnav::LNAV;
+use crate::satellite::System;
+use crate::time::{GPST, GST, TimeScale};
 
 /// All of them.
 pub static SYNTHETIC: [&Signal; 6] = [&LONG_BOC, &QUADRATURE, &CHANNELS, &MULTIPLEXED, &MIXED, &SIDES];

@@ -107,8 +107,8 @@ fn line(wave: &[Complex64], half_cycles: i32) -> Complex64 {
 mod tests {
     use super::super::{Layer, SIGNALS};
     use super::*;
-    use crate::gnss::galileo::altboc::E5;
-    use crate::gnss::signal::synthetic::{SIDES, SYNTHETIC};
+    use crate::galileo::altboc::E5;
+    use crate::signal::synthetic::{SIDES, SYNTHETIC};
 
     #[test]
     fn pulses_that_turn_an_eighth_a_step_have_one_line_with_the_power_of_eight_steps() {

@@ -3,10 +3,10 @@
 //! the one before.
 
 use super::{Message, WireError};
-use crate::generator::vehicle::file::{Rmc, gga, rising, rmc};
-use crate::generator::vehicle::joining::Push;
-use crate::gnss::earth::Geodetic;
-use crate::gnss::time::Epoch;
+use generator::vehicle::file::{Rmc, gga, rising, rmc};
+use generator::vehicle::joining::Push;
+use gnss::earth::Geodetic;
+use gnss::time::Epoch;
 
 /// Heights further apart say nothing of the speed upwards.
 const CLIMB_S: f64 = 2.0;

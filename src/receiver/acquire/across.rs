@@ -11,11 +11,11 @@ use std::collections::BTreeMap;
 
 use super::window::Window;
 use super::{AcquireError, Acquired, Band, Code, Known, Searcher, WEAK_SHARE};
-use crate::gnss::record::AcquisitionRow;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Link;
-use crate::receiver::lead::lead;
-use crate::receiver::source::Stretch;
+use crate::lead::lead;
+use crate::source::Stretch;
+use gnss::record::AcquisitionRow;
+use gnss::satellite::Sv;
+use gnss::signal::Link;
 
 /// A row for a candidate, and where it was found.
 type Found = (AcquisitionRow, Option<Acquired>);
@@ -85,10 +85,10 @@ mod tests {
     use super::super::tests::{Sent, metadata, record};
     use super::super::{AcquisitionSettings, samples_needed};
     use super::*;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::qzss::l1ca::L1_CA as QZSS_L1_CA;
-    use crate::gnss::samples::Format;
-    use crate::receiver::source::Block;
+    use crate::source::Block;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::qzss::l1ca::L1_CA as QZSS_L1_CA;
+    use gnss::samples::Format;
 
     #[test]
     fn what_a_strong_signal_makes_in_codes_of_another_is_taken_away_and_what_is_there_stays() {

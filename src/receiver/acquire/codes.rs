@@ -17,9 +17,9 @@ use super::removal;
 use super::replica::Replica;
 use super::window::Window;
 use super::{AcquireError, Band, companion};
-use crate::gnss::signal::{Component, Link};
-use crate::receiver::correlate::{self, Edge, Wave};
-use crate::receiver::lead::lead;
+use crate::correlate::{self, Edge, Wave};
+use crate::lead::lead;
+use gnss::signal::{Component, Link};
 
 /// Spectra that are kept from one search to the next, in bytes.
 const KEPT_BYTES: usize = 8 << 20;

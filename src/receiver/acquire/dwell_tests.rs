@@ -4,7 +4,7 @@ use num_complex::Complex;
 
 use super::dwells::Dwells;
 use super::tests::Noise;
-use crate::receiver::threshold::{of_one_cell, threshold};
+use crate::threshold::{of_one_cell, threshold};
 
 /// Independent cells of a code period at 2.6 Msps, and Dopplers.
 const CELLS: usize = 3120;

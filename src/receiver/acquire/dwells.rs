@@ -28,7 +28,7 @@ use super::grid::{Grid, Strip};
 use super::kernel::{self, Spectrum};
 use super::multiple_access::{LEAST_CODES, Law, Raised};
 use super::powers::Powers;
-use crate::receiver::threshold::{of_one_cell, threshold};
+use crate::threshold::{of_one_cell, threshold};
 
 /// A share of the dwells after which a Doppler may be left, and the probability that noise stays.
 type Stay = (f64, f64);

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::gnss::satellite::Sv;
+use gnss::satellite::Sv;
 
 /// Why a search could not be made.
 #[derive(Debug, Error, PartialEq)]

@@ -12,9 +12,9 @@ use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;
 
+use fft::{Fft, Planner};
 use num_complex::Complex;
 use rayon::prelude::*;
-use rustfft::{Fft, FftPlanner};
 
 use super::Acquired;
 use super::dwells::{Dwells, Room, Rooms, Spectra};
@@ -25,11 +25,11 @@ use super::refine::{self, Refined};
 use super::replica::Replica;
 use super::settings::AcquisitionSettings;
 use super::sums::Sums;
-use crate::gnss::samples::IfMetadata;
-use crate::gnss::signal::Component;
-use crate::receiver::correlate::steps_of_chip;
-use crate::receiver::source::Block;
-use crate::receiver::threshold::{of_one_cell, threshold};
+use crate::correlate::steps_of_chip;
+use crate::source::Block;
+use crate::threshold::{of_one_cell, threshold};
+use gnss::samples::IfMetadata;
+use gnss::signal::Component;
 
 /// Cells within this of a peak are not noise.
 const PEAK_CHIPS: f64 = 2.0;
@@ -163,7 +163,7 @@ impl Grid {
         metadata: &IfMetadata,
         settings: &AcquisitionSettings,
         centre_hz: f64,
-        planner: &mut FftPlanner<f32>,
+        planner: &mut Planner<f32>,
     ) -> Option<Self> {
         let rate_hz = metadata.rate.hz();
         let period_samples = component.period_s() * rate_hz;

@@ -53,15 +53,15 @@ mod window;
 
 use std::collections::BTreeMap;
 
+use fft::Planner;
 use rayon::prelude::*;
-use rustfft::FftPlanner;
 
-use crate::gnss::record::AcquisitionRow;
-use crate::gnss::samples::IfMetadata;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Component, Layers, Link, Signal};
-use crate::receiver::lead::{beside, followed_db, lead};
-use crate::receiver::source::{Block, Stretch};
+use crate::lead::{beside, followed_db, lead};
+use crate::source::{Block, Stretch};
+use gnss::record::AcquisitionRow;
+use gnss::samples::IfMetadata;
+use gnss::satellite::Sv;
+use gnss::signal::{Component, Layers, Link, Signal};
 
 use codes::{Code, Codes};
 use dwells::Rooms;
@@ -76,7 +76,7 @@ use window::Window;
 ///
 /// One C/A code appears in the correlator of another at most 21 dB down, several together seldom above 14 dB
 /// down.
-pub(in crate::receiver) const WEAK_SHARE: f64 = 0.1;
+pub(crate) const WEAK_SHARE: f64 = 0.1;
 /// A hit this much weaker than the strongest (40 dB) is not believed even then: subtraction leaves something
 /// over, and without noise to cover it that something has the cross-correlation's peaks.
 const LEAST_SHARE: f64 = 1e-4;
@@ -126,7 +126,7 @@ pub fn can_hold(metadata: &IfMetadata, signal: &Signal) -> bool {
 }
 
 /// The same of a satellite's own carrier.
-pub(in crate::receiver) fn can_hold_carrier(metadata: &IfMetadata, link: Link) -> bool {
+pub(crate) fn can_hold_carrier(metadata: &IfMetadata, link: Link) -> bool {
     let far_hz = far_hz(metadata, link.signal, link.carrier_hz());
     !metadata.format.is_complex() || far_hz.abs() <= 0.5 * metadata.rate.hz()
 }
@@ -177,7 +177,7 @@ pub fn independent_cells(
 fn grid(metadata: &IfMetadata, signal: &'static Signal, settings: &AcquisitionSettings) -> Result<Grid, AcquireError> {
     settings.validate()?;
     let one = |component| (component, companion(component, signal).is_some(), signal.centre_hz());
-    let mut planner = FftPlanner::new();
+    let mut planner = Planner::<f32>::new();
     let grid = lead(signal).and_then(|component| Grid::new(one(component), metadata, settings, 0.0, &mut planner));
     grid.ok_or(AcquireError::NoCode { signal: signal.name, sv: Sv { system: signal.system, number: 0 } })
 }
@@ -204,7 +204,7 @@ pub struct Searcher {
     have: Option<u64>,
     grids: BTreeMap<Band, Grid>,
     /// Signals with codes of one length share their transforms.
-    planner: FftPlanner<f32>,
+    planner: Planner<f32>,
     codes: Codes,
 }
 
@@ -253,7 +253,7 @@ impl Searcher {
             centre_hz,
             have: None,
             grids: BTreeMap::new(),
-            planner: FftPlanner::new(),
+            planner: Planner::<f32>::new(),
             codes: Codes::default(),
         })
     }
@@ -263,7 +263,7 @@ impl Searcher {
     ///
     /// # Errors
     /// As [`AcquisitionSettings::validate`].
-    pub(in crate::receiver) fn fitted(
+    pub(crate) fn fitted(
         metadata: &IfMetadata,
         settings: &AcquisitionSettings,
         have: u64,
@@ -282,7 +282,7 @@ impl Searcher {
     ///
     /// # Errors
     /// As [`AcquisitionSettings::validate`].
-    pub(in crate::receiver) fn has_room(&self, signal: &Signal) -> Result<bool, AcquireError> {
+    pub(crate) fn has_room(&self, signal: &Signal) -> Result<bool, AcquireError> {
         Ok(self.settings_of(signal)?.is_some())
     }
 
@@ -318,7 +318,7 @@ impl Searcher {
     }
 
     /// The same of samples as they are.
-    pub(in crate::receiver) fn search_stretch(
+    pub(crate) fn search_stretch(
         &mut self,
         stretch: &Stretch,
         candidates: &[Link],

@@ -16,7 +16,7 @@
 //! alarm. Elsewhere the threshold is that of noise. Limits: fewer codes than [`LEAST_CODES`] say nothing; a
 //! bin that is raised by less than 0.7 dB is not noticed.
 
-use crate::receiver::threshold::{of_one_cell, threshold};
+use crate::threshold::{of_one_cell, threshold};
 
 /// Fewer codes are no sample.
 pub(super) const LEAST_CODES: usize = 12;
@@ -199,7 +199,7 @@ fn quantile(values: &mut [f64], share: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::receiver::acquire::tests::Noise;
+    use crate::acquire::tests::Noise;
 
     /// Largest of `cells` chi-square values of 20 degrees, by the inverse of its law.
     fn largest(uniform: f64, cells: f64) -> f64 {

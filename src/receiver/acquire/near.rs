@@ -3,10 +3,10 @@
 use super::grid::Grid;
 use super::window::Window;
 use super::{AcquireError, Acquired, AcquisitionSettings, Searcher, companion};
-use crate::gnss::record::AcquisitionRow;
-use crate::gnss::signal::Link;
-use crate::receiver::lead::lead;
-use crate::receiver::source::Stretch;
+use crate::lead::lead;
+use crate::source::Stretch;
+use gnss::record::AcquisitionRow;
+use gnss::signal::Link;
 
 impl Searcher {
     /// Searches the beginning of `stretch` for every one of `near`, within `half_hz` of its Doppler; rows
@@ -15,7 +15,7 @@ impl Searcher {
     ///
     /// # Errors
     /// As [`Searcher::search`].
-    pub(in crate::receiver) fn search_near(
+    pub(crate) fn search_near(
         &mut self,
         stretch: &Stretch,
         near: &[(Link, f64)],

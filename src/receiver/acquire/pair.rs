@@ -11,7 +11,7 @@ use num_complex::Complex;
 use rayon::prelude::*;
 
 use super::grid::Grid;
-use crate::receiver::source::Block;
+use crate::source::Block;
 
 /// Parts of a bin to which a Doppler is met.
 const PARTS: f64 = 64.0;

@@ -5,11 +5,11 @@ use num_complex::Complex;
 use super::dwells::Dwells;
 use super::tests::Noise;
 use super::*;
-use crate::gnss::galileo::e1::{self, E1};
-use crate::gnss::samples::Format;
-use crate::gnss::satellite::System;
-use crate::gnss::time::Rate;
-use crate::receiver::threshold::{of_one_cell, threshold};
+use crate::threshold::{of_one_cell, threshold};
+use gnss::galileo::e1::{self, E1};
+use gnss::samples::Format;
+use gnss::satellite::System;
+use gnss::time::Rate;
 
 fn metadata(rate_hz: f64, if_hz: f64, inverted: bool) -> IfMetadata {
     let offset_hz = if inverted { if_hz } else { -if_hz };
@@ -60,7 +60,7 @@ fn a_spectrum_that_is_read_from_another_bin_on_is_that_of_the_turned_samples() {
         let metadata = metadata(rate_hz, if_hz, inverted);
         let settings = AcquisitionSettings { noncoherent_sums: 2, doppler_max_hz: 1000.0, ..Default::default() };
         let of = |pair| {
-            Grid::new((lead(&E1).unwrap(), pair, E1.centre_hz()), &metadata, &settings, 0.0, &mut FftPlanner::new())
+            Grid::new((lead(&E1).unwrap(), pair, E1.centre_hz()), &metadata, &settings, 0.0, &mut Planner::<f32>::new())
                 .unwrap()
         };
         let (grid, alone) = (of(true), of(false));

@@ -137,8 +137,8 @@ mod tests {
         for (cells, correlation) in [(1.0, 0.0), (2.0, 0.5)] {
             let mut random = Noise(77);
             let (count, trials) = (512, 400);
-            let bar = crate::receiver::threshold::threshold(
-                crate::receiver::threshold::of_one_cell(0.5, independent(count, correlation) as f64),
+            let bar = crate::threshold::threshold(
+                crate::threshold::of_one_cell(0.5, independent(count, correlation) as f64),
                 16,
             );
             let above = (0..trials)

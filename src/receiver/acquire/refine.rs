@@ -6,13 +6,13 @@
 //! amplitudes, half a chip to either side, centres the code phase. The noise power comes from
 //! correlators at code phases where the code's own autocorrelation is small.
 
+use fft::Planner;
 use num_complex::Complex;
-use rustfft::FftPlanner;
 
 use super::grid::Grid;
-use crate::gnss::signal::{Component, Layer, Shape};
-use crate::receiver::correlate::{self, Nco, TURN, chips_to_units, steps_of_chip, units_to_chips};
-use crate::receiver::source::Block;
+use crate::correlate::{self, Nco, TURN, chips_to_units, steps_of_chip, units_to_chips};
+use crate::source::Block;
+use gnss::signal::{Component, Layer, Shape};
 
 /// Correlators that measure the noise.
 const NOISE_TAPS: usize = 16;
@@ -192,7 +192,7 @@ fn square_frequency_cycles(prompts: &[Complex<f64>], reach: f64) -> f64 {
     let length = (prompts.len() * PADDING).next_power_of_two();
     let mut spectrum: Vec<Complex<f64>> = prompts.iter().map(|p| p * p).collect();
     spectrum.resize(length, Complex::default());
-    FftPlanner::new().plan_fft_forward(length).process(&mut spectrum);
+    Planner::<f64>::new().plan_fft_forward(length).process(&mut spectrum);
     let power = |n: usize| spectrum[n % length].norm();
     let within = |n: usize| n.min(length - n) as f64 <= reach * length as f64;
     let mut best = 0;

@@ -3,8 +3,8 @@
 //! The mean is a difference of the code's running integral, so a chip's edge falls where the phase
 //! says and not on the nearest sample; any chip shape made of equal steps works.
 
-use crate::gnss::signal::Component;
-use crate::receiver::correlate::Wave;
+use crate::correlate::Wave;
+use gnss::signal::Component;
 
 /// The running integral of one code period, in steps of the chip's shape.
 #[derive(Clone, Debug)]
@@ -77,7 +77,7 @@ impl Replica {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::gps::l1ca;
+    use gnss::gps::l1ca;
 
     #[test]
     fn a_sample_holds_the_mean_of_the_chips_that_it_covers() {

@@ -1,9 +1,9 @@
 //! Samples that searches look at, and searches that do with the samples there are.
 
 use super::{AcquireError, AcquisitionSettings, can_hold, grid};
-use crate::gnss::samples::IfMetadata;
-use crate::gnss::signal::Signal;
-use crate::receiver::lead::lead;
+use crate::lead::lead;
+use gnss::samples::IfMetadata;
+use gnss::signal::Signal;
 
 /// Samples that a search for the signals that are asked for looks at, from the first sample of its block.
 ///

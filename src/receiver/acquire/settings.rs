@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::signal::{self, Component, Signal};
-use crate::receiver::described::described;
+use crate::described::described;
+use gnss::gps::l1ca::L1_CA;
+use gnss::signal::{self, Component, Signal};
 
 use super::AcquireError;
 

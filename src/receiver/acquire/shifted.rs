@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::grid::Grid;
 use super::kernel;
-use crate::receiver::source::Block;
+use crate::source::Block;
 
 /// What a shift may be off a whole bin, in bins: a period's sum then loses 0.0002 of its power.
 const MOST_OFF: f64 = 0.008;

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 
 use super::tests::{Noise, Recording, Sent, all, difference_chips, metadata, record};
 use super::*;
-use crate::gnss::samples::Format;
+use gnss::samples::Format;
 
 /// What searches of many skies came to.
 #[derive(Debug, Default)]
@@ -229,7 +229,7 @@ fn beside_satellites_that_are_known_weak_ones_are_found_and_none_that_is_not_the
         let known: Vec<Acquired> = (sent[..4].iter())
             .map(|sent| Acquired {
                 sv: Sv::gps(sent.prn),
-                signal: &crate::gnss::gps::l1ca::L1_CA,
+                signal: &gnss::gps::l1ca::L1_CA,
                 sample: 0,
                 code_phase_chips: sent.phase_chips.rem_euclid(1023.0) + 0.02,
                 doppler_hz: sent.doppler_hz + 2.0,

@@ -5,7 +5,7 @@ use num_complex::Complex;
 use super::grid::Grid;
 use super::pair::Transforms;
 use super::shifted::Shifted;
-use crate::receiver::source::Block;
+use crate::source::Block;
 
 /// Samples from which the coherent sums of any Doppler are made.
 pub(super) enum Sums<'a> {

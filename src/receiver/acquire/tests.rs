@@ -3,9 +3,9 @@ use std::f64::consts::TAU;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::*;
-use crate::gnss::gps::l1ca::{self, L1_CA};
-use crate::gnss::samples::Format;
-use crate::gnss::time::Rate;
+use gnss::gps::l1ca::{self, L1_CA};
+use gnss::samples::Format;
+use gnss::time::Rate;
 
 /// Uniform numbers from a 64-bit mixing function (splitmix64), pairs of Gaussian ones by Box and Muller.
 pub(super) struct Noise(pub u64);
@@ -224,7 +224,7 @@ fn detection_probability(value: f64, degrees: u32, noncentrality: f64) -> f64 {
     (0..400)
         .map(|j| {
             let weight = libm::exp(f64::from(j) * libm::log(half) - half - libm::lgamma(f64::from(j) + 1.0));
-            weight * crate::receiver::threshold::exceedance(value, degrees + 2 * j)
+            weight * crate::threshold::exceedance(value, degrees + 2 * j)
         })
         .sum()
 }
@@ -334,7 +334,7 @@ fn a_spectrum_that_dopplers_share_is_that_of_each_by_itself() {
         let metadata = IfMetadata { format: Format::Ci8, rate, center_hz, inverted, start: None };
         let settings = AcquisitionSettings::default();
         let one = (lead(&L1_CA).unwrap(), false, L1_CA.centre_hz());
-        let grid = grid::Grid::new(one, &metadata, &settings, 0.0, &mut rustfft::FftPlanner::new()).unwrap();
+        let grid = grid::Grid::new(one, &metadata, &settings, 0.0, &mut fft::Planner::<f32>::new()).unwrap();
         let Recording { i, q, .. } = record(metadata, grid.samples_needed() as usize, &[], 4);
         let block = Block { first: 0, i: &i, q: &q };
         let shifted = shifted::Shifted::new(&grid, &block, 1.0).unwrap();

@@ -10,11 +10,11 @@
 
 use std::f64::consts::TAU;
 
+use fft::Planner;
 use num_complex::Complex;
-use rustfft::FftPlanner;
 
 use super::window::Window;
-use crate::receiver::interference::hann_peak;
+use crate::interference::hann_peak;
 
 /// Power over noise density from which a wave is taken out: 50 dB-Hz.
 const STRONG_HZ: f64 = 1e5;
@@ -76,7 +76,7 @@ fn lines(window: &Window, rate_hz: f64, complex: bool) -> Vec<f64> {
 
 /// Powers of the segments together, by a Hann window.
 fn spectrum(window: &Window, bins: usize) -> Vec<f64> {
-    let fft = FftPlanner::new().plan_fft_forward(bins);
+    let fft = Planner::<f32>::new().plan_fft_forward(bins);
     let mut powers = vec![0.0; bins];
     let last = window.i.len() - bins;
     for segment in 0..SEGMENTS {

@@ -1,6 +1,6 @@
 //! The samples of one search.
 
-use crate::receiver::source::{Block, Stretch};
+use crate::source::{Block, Stretch};
 
 /// The samples of one search, with their mean taken out: a front end's constant offset correlates with
 /// the spectral lines of every code, one each kilohertz for C/A, and would pass for satellites there.

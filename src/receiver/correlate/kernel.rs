@@ -40,7 +40,7 @@ pub(super) enum Fast {
 
 /// An instruction set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::receiver) enum Level {
+pub(crate) enum Level {
     Baseline,
     #[cfg(target_arch = "x86_64")]
     Avx2,
@@ -51,7 +51,7 @@ pub(in crate::receiver) enum Level {
 impl Level {
     /// What this processor can run, the best last.
     #[cfg(test)]
-    pub(in crate::receiver) fn all() -> Vec<Self> {
+    pub(crate) fn all() -> Vec<Self> {
         let mut levels = vec![Self::Baseline];
         #[cfg(target_arch = "x86_64")]
         {
@@ -66,7 +66,7 @@ impl Level {
     }
 
     /// The best that this processor can run.
-    pub(in crate::receiver) fn best() -> Self {
+    pub(crate) fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
         {
             if avx512() {

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
 use super::*;
-use crate::gnss::galileo::altboc::E5;
+use gnss::galileo::altboc::E5;
 
 const NUMBER: u8 = 11;
 const SAMPLES: usize = 4000;

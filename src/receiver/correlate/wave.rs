@@ -6,7 +6,7 @@
 //! of a sub-carrier chips are made without steps, and the sub-carrier as a tone beside the carrier: it lacks
 //! lines that no front end passes.
 
-use crate::gnss::signal::{Component, Layer, Layers, Signal};
+use gnss::signal::{Component, Layer, Layers, Signal};
 
 /// Why samples at `rate_hz` do not do for replicas of these layers, if they do not: area edges want a sample
 /// in each step.
@@ -76,8 +76,8 @@ pub fn steps_of_chip(component: &Component) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::gps::l1ca::{self, L1_CA};
-    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, MULTIPLEXED};
+    use gnss::gps::l1ca::{self, L1_CA};
+    use gnss::signal::synthetic::{LONG_BOC, MIXED, MULTIPLEXED};
 
     #[test]
     fn a_period_has_the_strongest_layer_of_every_chip_that_has_it() {

@@ -1,9 +1,7 @@
-#![cfg(feature = "generator")]
-
 use super::*;
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::gps::lnav::{Broadcast, quantised};
-use crate::gnss::rinex;
+use gnss::gps::l1ca::L1_CA;
+use gnss::gps::lnav::{Broadcast, quantised};
+use gnss::rinex;
 
 /// A real ephemeris moved to be sent around `start`.
 fn ephemeris(start: Epoch) -> Ephemeris {

@@ -7,11 +7,11 @@
 
 use std::sync::Arc;
 
-use rustfft::num_complex::Complex;
-use rustfft::{Fft, FftPlanner};
+use fft::{Fft, Planner};
+use num_complex::Complex;
 
-use crate::receiver::correlate::{Nco, Replica, TURN};
-use crate::receiver::source::Block;
+use crate::correlate::{Nco, Replica, TURN};
+use crate::source::Block;
 
 /// Code periods before a decision is tried, and taken of one block at most.
 const LEAST_PERIODS: u32 = 20;
@@ -54,7 +54,7 @@ impl Scan {
     /// For codes that repeat every `period_s`.
     pub fn new(period_s: f64, rate_hz: f64) -> Self {
         let length = ((period_s * rate_hz).round() as usize).max(2);
-        let mut planner = FftPlanner::new();
+        let mut planner = Planner::<f32>::new();
         Self { length, forward: planner.plan_fft_forward(2 * length), inverse: planner.plan_fft_inverse(2 * length) }
     }
 

@@ -1,7 +1,7 @@
 use super::scan::{Found, Profile, Scan};
 use super::*;
-use crate::receiver::correlate::{Edge, Nco, Replica, TURN, chips_to_units};
-use crate::receiver::source::Block;
+use crate::correlate::{Edge, Nco, Replica, TURN, chips_to_units};
+use crate::source::Block;
 
 /// Standard normal draws: the sum of twelve uniforms.
 fn noise(state: &mut u64) -> f64 {
@@ -162,7 +162,7 @@ fn scanned(samples: i64, seconds: f64, dbhz: f64, state: &mut u64) -> Option<Fou
     let (mut i, mut q) = (vec![0.0_f32; length], vec![0.0_f32; length]);
     let satellites: Vec<(Replica, Nco, f64)> = [(3, -2.1, 0.1), (9, 0.4, 0.21), (17, 1.2, -0.3), (28, 2.5, 0.07)]
         .map(|(prn, gain, turns)| {
-            let replica = Replica::new(crate::gnss::gps::l1ca::code(prn).unwrap(), Edge::Area).unwrap();
+            let replica = Replica::new(gnss::gps::l1ca::code(prn).unwrap(), Edge::Area).unwrap();
             let nco = Nco {
                 carrier: 0,
                 carrier_step: (turns * TURN) as i128 as u64,

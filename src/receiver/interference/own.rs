@@ -9,12 +9,12 @@
 //! Limits: symbols that turn within a segment spread the lines; layers of a pulse other than the strongest,
 //! and signals that are not followed, are not counted.
 
-use rustfft::Fft;
-use rustfft::num_complex::Complex;
+use fft::Fft;
+use num_complex::Complex;
 
-use crate::gnss::samples::IfMetadata;
-use crate::gnss::signal::Link;
-use crate::receiver::correlate::Wave;
+use crate::correlate::Wave;
+use gnss::samples::IfMetadata;
+use gnss::signal::Link;
 
 /// A satellite that is followed.
 #[derive(Clone, Copy, Debug)]

@@ -7,8 +7,8 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use super::{OutputError, Record, Sink, write_error};
-use crate::gnss::earth::Geodetic;
-use crate::gnss::record::Fix;
+use gnss::earth::Geodetic;
+use gnss::record::Fix;
 
 /// Writes fixes, satellites in view, the ionosphere that two bands show, channels, searches, events and lines
 /// of interference, and at the end the summary. Observations and parameters of messages are in tables alone.

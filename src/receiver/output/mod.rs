@@ -18,11 +18,11 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::gnss::record::{
+use gnss::record::{
     AcquisitionRow, ClockRow, EventRow, Fix, Geographic, IonosphereRow, LineRow, NavigationRow, Observation, SightRow,
     TrackingRow,
 };
-use crate::gnss::time::GPST;
+use gnss::time::GPST;
 pub use json::JsonLines;
 pub use nmea::Nmea;
 pub use rinex::Rinex;
@@ -379,9 +379,9 @@ impl Sink for Output {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::record::Event;
-    use crate::gnss::satellite::Sv;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::record::Event;
+    use gnss::satellite::Sv;
 
     /// A row written under the header that serde would have written.
     fn header<T: Serialize>(row: &T) -> String {

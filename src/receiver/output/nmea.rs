@@ -5,10 +5,10 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use super::{OutputError, Record, Sink, write_error};
-use crate::gnss::nmea::{Place, Seen, epoch};
-use crate::gnss::record::{Fix, Observation, SightRow};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
+use gnss::nmea::{Place, Seen, epoch};
+use gnss::record::{Fix, Observation, SightRow};
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
 
 /// Writes the sentences of every fix, in one piece each.
 pub struct Nmea<W> {

@@ -5,9 +5,9 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use super::{OutputError, Record, Sink, create_error, write_error};
-use crate::gnss::exchange::{NavigationSets, ObservationFile, Version};
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use gnss::exchange::{NavigationSets, ObservationFile, Version};
+use gnss::signal::Signal;
+use gnss::time::Epoch;
 
 /// Writes `observations.rnx` as observations come, and `navigation.rnx` at the end.
 pub struct Rinex {

@@ -5,7 +5,7 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use super::{OutputError, Record, Sink, create_error, write_error};
-use crate::gnss::exchange::{Track, TrackForm};
+use gnss::exchange::{Track, TrackForm};
 
 /// Writes `fixes.kml` and `fixes.gpx`.
 pub struct Tracks {

@@ -12,13 +12,13 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::least_squares::Range;
-use crate::gnss::augmentation::accuracy::{DO_NOT_USE, NOT_MONITORED, ageing_of, delay_variance_m2, range_variance_m2};
-use crate::gnss::augmentation::grid::{Point, Vertical, pierce, points, vertical};
-use crate::gnss::augmentation::{ALARM, Content, DELAY_SLOTS, Delays, FAST_SLOTS, Fast, Half, LongTerm, Mask};
-use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
-use crate::gnss::klobuchar::L1_HZ;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use gnss::augmentation::accuracy::{DO_NOT_USE, NOT_MONITORED, ageing_of, delay_variance_m2, range_variance_m2};
+use gnss::augmentation::grid::{Point, Vertical, pierce, points, vertical};
+use gnss::augmentation::{ALARM, Content, DELAY_SLOTS, Delays, FAST_SLOTS, Fast, Half, LongTerm, Mask};
+use gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
+use gnss::klobuchar::L1_HZ;
+use gnss::satellite::Sv;
+use gnss::time::Epoch;
 
 /// Seconds for which what is said stays in force (table A-25): an indicator of accuracy, a long-term
 /// correction, masks, and a delay of the grid.
@@ -142,7 +142,7 @@ impl Store {
             }
             Content::Fast(fast) => self.take_fast(fast, FAST_SLOTS, sent),
             Content::Mixed(mixed) => {
-                self.take_fast(&mixed.fast, crate::gnss::augmentation::MIXED_SLOTS, sent);
+                self.take_fast(&mixed.fast, gnss::augmentation::MIXED_SLOTS, sent);
                 self.take_half(&mixed.half, sent);
             }
             Content::LongTerm(halves) => halves.iter().for_each(|half| self.take_half(half, sent)),
@@ -316,8 +316,8 @@ pub fn model_sigma_m(delay_m: f64, user: Geodetic, look: Look) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::augmentation::{Degradation, GridMask, Integrity, MASKED};
-    use crate::gnss::satellite::System;
+    use gnss::augmentation::{Degradation, GridMask, Integrity, MASKED};
+    use gnss::satellite::System;
 
     const FROM: Sv = Sv { system: System::Sbas, number: 31 };
 

@@ -9,10 +9,10 @@
 //! against the other adds a₂ times that, alike for all satellites that are combined, but not for those beside
 //! them that have one carrier alone.
 
-use crate::gnss::broadcast::ClockState;
-use crate::gnss::record::Observation;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
+use gnss::broadcast::ClockState;
+use gnss::record::Observation;
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
 
 /// Carriers nearer to each other than this share are one band: noise would grow by ten and more.
 const LEAST_APART: f64 = 0.05;
@@ -135,8 +135,8 @@ pub fn paired(observations: &[Observation]) -> Vec<Used<'_>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::signal::Carrier;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::signal::Carrier;
 
     static L2: Signal = Signal { name: "L2", carrier: Carrier::Common(1_227.60e6), ..L1_CA };
     static NEAR: Signal = Signal { name: "near", carrier: Carrier::Common(1_576e6), ..L1_CA };

@@ -8,9 +8,9 @@
 
 use super::combination::{Used, paired};
 use super::{Sets, Solver};
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::record::{IonosphereRow, Observation};
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::gps::l1ca::L1_CA;
+use gnss::record::{IonosphereRow, Observation};
 
 /// Window of the smoothing. Reflections pass in minutes; ten of them leave of a code's noise a fortieth.
 pub(super) const WINDOW_S: f64 = 600.0;

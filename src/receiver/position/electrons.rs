@@ -8,10 +8,10 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 
 use super::least_squares::Range;
-use crate::gnss::earth::Geodetic;
-use crate::gnss::nequick::NequickG;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use gnss::earth::Geodetic;
+use gnss::nequick::NequickG;
+use gnss::satellite::Sv;
+use gnss::time::Epoch;
 
 /// A content is integrated anew after so long, or so far away.
 const KEPT_S: f64 = 1.0;

@@ -18,7 +18,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::NoFix;
 use super::least_squares::{self, Corrections, Range, Solution, freedom};
-use crate::gnss::satellite::Sv;
+use gnss::satellite::Sv;
 
 /// Sets of one size that are tried: all five of twelve satellites, all four of thirteen.
 const LARGEST_TRIED: usize = 1000;

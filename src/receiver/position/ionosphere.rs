@@ -13,12 +13,12 @@ use std::f64::consts::PI;
 use nalgebra::Vector3;
 
 use super::least_squares::{IONOSPHERE_TOP_M, Range};
-use crate::gnss::bdgim::Bdgim;
-use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
-use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::nequick;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use gnss::bdgim::Bdgim;
+use gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
+use gnss::klobuchar::Klobuchar;
+use gnss::nequick;
+use gnss::satellite::Sv;
+use gnss::time::Epoch;
 
 /// Coefficients of the nominal ionosphere: even in magnetic latitude, with a period of 100 000 s.
 ///

@@ -10,14 +10,14 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Matrix4, MatrixXx3, Vector3, Vector4};
 
-use crate::gnss::broadcast::{ClockState, State};
-use crate::gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, Look, SPEED_OF_LIGHT_MPS, look, rotate_earth};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, GPST, TimeScale};
-use crate::receiver::position::augmentation::{Grid, model_sigma_m};
-use crate::receiver::position::ionosphere::{DelayError, Delays, NOMINAL};
-use crate::receiver::position::{NoFix, troposphere};
+use crate::position::augmentation::{Grid, model_sigma_m};
+use crate::position::ionosphere::{DelayError, Delays, NOMINAL};
+use crate::position::{NoFix, troposphere};
+use gnss::broadcast::{ClockState, State};
+use gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, Look, SPEED_OF_LIGHT_MPS, look, rotate_earth};
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
+use gnss::time::{Epoch, GPST, TimeScale};
 
 /// Unknown coordinates; each time scale adds a clock.
 pub const COORDINATES: usize = 3;

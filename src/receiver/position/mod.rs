@@ -14,16 +14,16 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::gnss::augmentation::Content;
-use crate::gnss::earth::Geodetic;
-use crate::gnss::ionosphere::{Coefficients, Model, NAVIC_HZ};
-use crate::gnss::klobuchar::L1_HZ;
-use crate::gnss::record::{ClockRow, Fix, IonosphereModel, IonosphereRow, Observation, SightRow};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, Rate, SampleClock, TimePolynomial, TimeScale};
-use crate::receiver::described::described;
-use crate::receiver::track::loops::CodeShape;
+use crate::described::described;
+use crate::track::loops::CodeShape;
+use gnss::augmentation::Content;
+use gnss::earth::Geodetic;
+use gnss::ionosphere::{Coefficients, Model, NAVIC_HZ};
+use gnss::klobuchar::L1_HZ;
+use gnss::record::{ClockRow, Fix, IonosphereModel, IonosphereRow, Observation, SightRow};
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
+use gnss::time::{Epoch, Rate, SampleClock, TimePolynomial, TimeScale};
 
 pub mod augmentation;
 pub mod combination;

@@ -10,13 +10,13 @@ use super::least_squares::{self, Corrections, Ionosphere, Range, freedom};
 use super::reduced::InShort;
 use super::smooth::Smoothed;
 use super::{IonosphereChoice, Sets, Solver, SystemClocks};
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::record::Observation;
-use crate::gnss::satellite::System;
-use crate::gnss::signal::Link;
-use crate::gnss::time::GPST;
+use gnss::broadcast::Ephemeris;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::gps::l1ca::L1_CA;
+use gnss::record::Observation;
+use gnss::satellite::System;
+use gnss::signal::Link;
+use gnss::time::GPST;
 
 /// Half of the shorter and of the longer curve fit interval (IS-GPS-200N, 20.3.3.4.3.1).
 const HALF_FIT_S: f64 = 7200.0;

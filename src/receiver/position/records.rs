@@ -3,10 +3,10 @@
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::least_squares::{COORDINATES, Range, Solution};
-use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use crate::gnss::record::{ClockRow, Fix, IonosphereModel, SightRow};
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::{Epoch, GPST, SampleClock, TimeScale};
+use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::record::{ClockRow, Fix, IonosphereModel, SightRow};
+use gnss::satellite::Sv;
+use gnss::time::{Epoch, GPST, SampleClock, TimeScale};
 
 /// The record of a solution.
 #[expect(clippy::too_many_arguments, reason = "a record with as many sources")]

@@ -7,10 +7,10 @@
 //! names no satellite.
 
 use super::Solver;
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::galileo::inav::REDUCED_VALID_S;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use gnss::broadcast::Ephemeris;
+use gnss::galileo::inav::REDUCED_VALID_S;
+use gnss::signal::Signal;
+use gnss::time::Epoch;
 
 /// Standard deviation of a range by the elements.
 const ELEMENTS_M: f64 = 2.0;
@@ -45,13 +45,13 @@ impl Solver {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::galileo::e1::E1;
-    use crate::gnss::record::Observation;
-    use crate::gnss::rinex;
-    use crate::gnss::satellite::System;
-    use crate::gnss::time::Rate;
-    use crate::receiver::position::{CodeNoise, PositionSettings, Sets};
-    use crate::receiver::track::loops::CodeShape;
+    use crate::position::{CodeNoise, PositionSettings, Sets};
+    use crate::track::loops::CodeShape;
+    use gnss::galileo::e1::E1;
+    use gnss::record::Observation;
+    use gnss::rinex;
+    use gnss::satellite::System;
+    use gnss::time::Rate;
 
     #[test]
     fn elements_in_short_serve_for_ten_minutes_until_the_whole_set_does_and_only_if_wanted() {

@@ -3,13 +3,13 @@
 //! A set serves the signals whose delays its message has ([`SetForm::serves`]). For several signals together
 //! one set is taken that serves them all, so that they have one clock.
 //!
-//! [`SetForm::serves`]: crate::gnss::broadcast::SetForm::serves
+//! [`SetForm::serves`]: gnss::broadcast::SetForm::serves
 
 use std::collections::BTreeMap;
 
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
+use gnss::broadcast::Ephemeris;
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
 
 /// Sets by satellite.
 #[derive(Clone, Debug, Default)]
@@ -73,16 +73,16 @@ impl FromIterator<Ephemeris> for Sets {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::galileo::e1::E1;
-    use crate::gnss::galileo::e5::{E5A, E5B};
-    use crate::gnss::galileo::fnav::FNAV_SETS;
-    use crate::gnss::galileo::inav::INAV_SETS;
-    use crate::gnss::gps::cnav::CNAV_SETS;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::gps::l5::L5;
-    use crate::gnss::gps::lnav::LNAV_SETS;
-    use crate::gnss::satellite::System;
-    use crate::gnss::time::Epoch;
+    use gnss::galileo::e1::E1;
+    use gnss::galileo::e5::{E5A, E5B};
+    use gnss::galileo::fnav::FNAV_SETS;
+    use gnss::galileo::inav::INAV_SETS;
+    use gnss::gps::cnav::CNAV_SETS;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::gps::l5::L5;
+    use gnss::gps::lnav::LNAV_SETS;
+    use gnss::satellite::System;
+    use gnss::time::Epoch;
 
     #[test]
     fn each_signal_has_the_set_of_its_own_message_and_a_pair_one_that_has_the_clock_of_both() {

@@ -5,18 +5,18 @@
 //! (first-order loop: correlation exp(−4 B t)) and not assumed to fall with the count. A diverging ionosphere
 //! biases the result by twice its rate times the window.
 //!
-//! Where code and carrier part at a known rate ([`parting`](crate::receiver::parting)), that rate is taken
+//! Where code and carrier part at a known rate ([`parting`](crate::parting)), that rate is taken
 //! off. How much of it the filter has taken in is carried beside its value, so that a better rate corrects
 //! the past as well. Two carriers are smoothed in the [`combination`](super::combination) that has no
 //! ionosphere.
 
 use std::collections::BTreeMap;
 
-use crate::gnss::record::Observation;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Rate;
-use crate::receiver::position::combination::Combination;
+use crate::position::combination::Combination;
+use gnss::record::Observation;
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
+use gnss::time::Rate;
 
 /// A gap longer than this breaks the carrier.
 const LONGEST_GAP_S: f64 = 1.05;
@@ -203,7 +203,7 @@ fn is_of((_, first, second): &Key, signals: &[&'static Signal]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::gps::l1ca::L1_CA;
+    use gnss::gps::l1ca::L1_CA;
 
     fn observation(k: u64, pseudorange_m: f64, carrier_m: f64) -> Observation {
         Observation {

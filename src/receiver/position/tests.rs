@@ -3,12 +3,12 @@ use nalgebra::{Vector3, Vector4};
 use super::ionosphere::{DelayError, Delays, NOMINAL, NOMINAL_ERROR};
 use super::least_squares::{Corrections, Ionosphere, Range, position};
 use super::{NoFix, chi_square_threshold, consistent};
-use crate::gnss::broadcast::{ClockState, State};
-use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, rotate_earth};
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::klobuchar::L1_HZ;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::{Epoch, GPST};
+use gnss::broadcast::{ClockState, State};
+use gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, rotate_earth};
+use gnss::gps::l1ca::L1_CA;
+use gnss::klobuchar::L1_HZ;
+use gnss::satellite::Sv;
+use gnss::time::{Epoch, GPST};
 
 /// Azimuth and elevation in degrees of a reference sky with known dilutions of precision.
 const SKY: [(f64, f64); 10] = [
@@ -235,12 +235,11 @@ fn a_model_without_error_is_solved_as_a_known_one() {
     assert_eq!(uncertain.ionosphere_error, Vector3::zeros());
 }
 
-#[cfg(feature = "generator")]
 mod with_real_orbits {
     use super::*;
-    use crate::gnss::broadcast::Ephemeris;
-    use crate::gnss::rinex;
-    use crate::receiver::position::least_squares::velocity;
+    use crate::position::least_squares::velocity;
+    use gnss::broadcast::Ephemeris;
+    use gnss::rinex;
 
     /// When a satellite sent what arrives at `seconds` after `start` at a place that moves, by its clock,
     /// relative to `start`.

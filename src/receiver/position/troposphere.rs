@@ -5,7 +5,7 @@
 //! functions of Niell 1996 (tables 3 and 4). The receiver knows no weather, so true delays differ from it by
 //! several centimetres at the zenith. Below 2° the mapping is constant.
 
-use crate::gnss::earth::Geodetic;
+use gnss::earth::Geodetic;
 
 /// Niell's columns: a, b, c of the average hydrostatic, of its yearly amplitude, and of the wet mapping.
 struct Column {

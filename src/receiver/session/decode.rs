@@ -2,12 +2,12 @@
 
 use super::step::Counted;
 use super::{FrontEnd, Session, Shared, Track};
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::record::{Event, EventRow};
-use crate::gnss::satellite::Sv;
-use crate::receiver::decode::News;
-use crate::receiver::outcome::ReceiveError;
-use crate::receiver::output::{Record, Sink};
+use crate::decode::News;
+use crate::outcome::ReceiveError;
+use crate::output::{Record, Sink};
+use gnss::broadcast::Ephemeris;
+use gnss::record::{Event, EventRow};
+use gnss::satellite::Sv;
 
 impl Session {
     /// Gives the decoders the symbols that ended by a tick of the running block, or all that are left of it.

@@ -1,10 +1,10 @@
 //! Observations and a fix at one tick.
 
 use super::{FrontEnd, Session, Tick, WRONG_TIME_FIXES};
-use crate::gnss::record::{Event, EventRow, Observation};
-use crate::receiver::observe::Reading;
-use crate::receiver::outcome::ReceiveError;
-use crate::receiver::output::{Record, Sink};
+use crate::observe::Reading;
+use crate::outcome::ReceiveError;
+use crate::output::{Record, Sink};
+use gnss::record::{Event, EventRow, Observation};
 
 /// Residuals beyond this are no noise: the channel has the wrong time.
 const WRONG_TIME_M: f64 = 10_000.0;

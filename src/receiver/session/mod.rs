@@ -6,18 +6,18 @@
 //! [`Shared`]: [`decode`] takes in messages, [`measure`] observes and solves with the signals of all. Records
 //! count samples of the first front end ([`step`]).
 
-use crate::gnss::samples::IfMetadata;
-use crate::receiver::correlate::layers_refusal;
-use crate::receiver::diagnosis::Stage;
-use crate::receiver::lead::{lead, refusal, undated};
-use crate::receiver::outcome::{Conditioning, Outcome, ReceiveError};
-use crate::receiver::output::Sink;
-use crate::receiver::position::Noises;
-use crate::receiver::position::least_squares::LARGEST_CONDITION;
-use crate::receiver::settings::{Settings, SettingsError};
-use crate::receiver::source::Packed;
-use crate::receiver::track::LoopMargin;
+use crate::correlate::layers_refusal;
+use crate::diagnosis::Stage;
+use crate::lead::{lead, refusal, undated};
+use crate::outcome::{Conditioning, Outcome, ReceiveError};
+use crate::output::Sink;
+use crate::position::Noises;
+use crate::position::least_squares::LARGEST_CONDITION;
+use crate::settings::{Settings, SettingsError};
+use crate::source::Packed;
+use crate::track::LoopMargin;
 use front_end::{FrontEnd, Track, Window};
+use gnss::samples::IfMetadata;
 use shared::Shared;
 use step::{Step, Tick};
 pub(super) use suited::held;

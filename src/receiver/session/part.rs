@@ -3,10 +3,10 @@
 use super::FrontEnd;
 use super::plan::SKY_HZ;
 use super::shared::Shared;
-use crate::gnss::record::AcquisitionRow;
-use crate::receiver::acquire::Acquired;
-use crate::receiver::looks::Pattern;
-use crate::receiver::parting::{Change, Estimate, Parted, common};
+use crate::acquire::Acquired;
+use crate::looks::Pattern;
+use crate::parting::{Change, Estimate, Parted, common};
+use gnss::record::AcquisitionRow;
 
 /// Lines begin anew so long after the code loops were moved: two time constants 1/(4B) of the narrow loop at
 /// least.

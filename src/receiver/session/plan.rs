@@ -10,8 +10,8 @@
 
 use super::FrontEnd;
 use super::shared::Shared;
-use crate::receiver::acquire::{AcquireError, Searcher, samples_needed};
-use crate::receiver::position::least_squares::UNKNOWNS;
+use crate::acquire::{AcquireError, Searcher, samples_needed};
+use crate::position::least_squares::UNKNOWNS;
 
 /// Widths of searches that find too little, in those of the settings.
 const WIDTHS: [f64; 3] = [1.0, 2.0, 5.0];

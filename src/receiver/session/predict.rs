@@ -14,14 +14,14 @@ use nalgebra::Vector3;
 
 use super::FrontEnd;
 use super::shared::Shared;
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS, look, rotate_earth};
-use crate::gnss::record::{AcquisitionRow, Fix};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Link, Signal};
-use crate::gnss::time::Epoch;
-use crate::receiver::acquire::{Acquired, WEAK_SHARE};
-use crate::receiver::lead::lead;
+use crate::acquire::{Acquired, WEAK_SHARE};
+use crate::lead::lead;
+use gnss::broadcast::Ephemeris;
+use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS, look, rotate_earth};
+use gnss::record::{AcquisitionRow, Fix};
+use gnss::satellite::Sv;
+use gnss::signal::{Link, Signal};
+use gnss::time::Epoch;
 
 /// A Doppler may be so far from the predicted one …
 const HALF_HZ: f64 = 500.0;
@@ -165,16 +165,16 @@ impl FrontEnd {
 mod tests {
     use super::super::Session;
     use super::*;
-    use crate::gnss::beidou::b1c::B1C;
-    use crate::gnss::beidou::in_phase::B2I;
-    use crate::gnss::gps::l1c::L1C;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::gps::l5::L5;
-    use crate::gnss::rinex;
-    use crate::gnss::samples::{Format, IfMetadata};
-    use crate::gnss::satellite::System;
-    use crate::gnss::time::Rate;
-    use crate::receiver::settings::Settings;
+    use crate::settings::Settings;
+    use gnss::beidou::b1c::B1C;
+    use gnss::beidou::in_phase::B2I;
+    use gnss::gps::l1c::L1C;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::gps::l5::L5;
+    use gnss::rinex;
+    use gnss::samples::{Format, IfMetadata};
+    use gnss::satellite::System;
+    use gnss::time::Rate;
 
     #[test]
     fn a_satellite_that_one_front_end_follows_is_foreseen_by_the_other_before_there_is_a_fix() {

@@ -7,16 +7,16 @@ use super::predict::Near;
 use super::shared::Shared;
 use super::step::Counted;
 use super::{FrontEnd, Track, WRONG_TIME_FIXES, Window, suited};
-use crate::gnss::record::{AcquisitionRow, Event, EventRow};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Link;
-use crate::receiver::acquire::{AcquireError, Acquired, Searcher};
-use crate::receiver::decode::Decoder;
-use crate::receiver::outcome::ReceiveError;
-use crate::receiver::output::{Record, Sink};
-use crate::receiver::parting::Line;
-use crate::receiver::source::{Gathered, Packed};
-use crate::receiver::track::{Channel, Report};
+use crate::acquire::{AcquireError, Acquired, Searcher};
+use crate::decode::Decoder;
+use crate::outcome::ReceiveError;
+use crate::output::{Record, Sink};
+use crate::parting::Line;
+use crate::source::{Gathered, Packed};
+use crate::track::{Channel, Report};
+use gnss::record::{AcquisitionRow, Event, EventRow};
+use gnss::satellite::Sv;
+use gnss::signal::Link;
 
 /// A satellite that was lost is searched for eagerly so long.
 const EAGER_S: f64 = 30.0;

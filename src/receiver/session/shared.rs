@@ -3,16 +3,16 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::gnss::ionosphere::{Coefficients, Model};
-use crate::gnss::record::Fix;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Link, Signal};
-use crate::gnss::time::{Epoch, Rate};
-use crate::receiver::diagnosis::Stage;
-use crate::receiver::observe::Timebase;
-use crate::receiver::position::least_squares::UNKNOWNS;
-use crate::receiver::position::{CodeNoise, NoFix, Noises, Sets, Solver};
-use crate::receiver::settings::Settings;
+use crate::diagnosis::Stage;
+use crate::observe::Timebase;
+use crate::position::least_squares::UNKNOWNS;
+use crate::position::{CodeNoise, NoFix, Noises, Sets, Solver};
+use crate::settings::Settings;
+use gnss::ionosphere::{Coefficients, Model};
+use gnss::record::Fix;
+use gnss::satellite::Sv;
+use gnss::signal::{Link, Signal};
+use gnss::time::{Epoch, Rate};
 
 /// What became of a satellite, for the diagnosis.
 #[derive(Clone, Default)]

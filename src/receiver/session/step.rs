@@ -3,10 +3,10 @@
 //! All front ends sample by one clock, each at its own rate. Records count the samples of the first front
 //! end. A front end that lost samples is behind by as many from then on, and [`Step`] knows it.
 
-use crate::gnss::record::{AcquisitionRow, EventRow, LineRow, TrackingRow};
-use crate::gnss::time::Rate;
-use crate::receiver::lead::lead;
-use crate::receiver::output::{OutputError, Record, Sink};
+use crate::lead::lead;
+use crate::output::{OutputError, Record, Sink};
+use gnss::record::{AcquisitionRow, EventRow, LineRow, TrackingRow};
+use gnss::time::Rate;
 
 /// The clock of one front end against that of the first.
 #[derive(Clone, Copy, Debug)]

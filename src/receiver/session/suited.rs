@@ -1,12 +1,12 @@
 //! What of samples and settings makes the results worse than need be, and which links samples can hold.
 
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::samples::IfMetadata;
-use crate::gnss::signal::{self, Component, Link, Signal};
-use crate::receiver::acquire::{self, AcquisitionSettings};
-use crate::receiver::correlate::{layers_refusal, standing_bias_m};
-use crate::receiver::lead::{lead, refusal, undated};
-use crate::receiver::settings::Settings;
+use crate::acquire::{self, AcquisitionSettings};
+use crate::correlate::{layers_refusal, standing_bias_m};
+use crate::lead::{lead, refusal, undated};
+use crate::settings::Settings;
+use gnss::gps::l1ca::L1_CA;
+use gnss::samples::IfMetadata;
+use gnss::signal::{self, Component, Link, Signal};
 
 /// Errors of the code from which on a rate is warned of.
 const STANDING_BIAS_M: f64 = 0.5;
@@ -102,7 +102,7 @@ fn is_within(metadata: &IfMetadata, signal: &Signal) -> bool {
 /// The signals that the bands of these samples hold, as far as this receiver can follow them to a position
 /// without others; without those of two sides of a sub-carrier, whose sides are signals too. At least one:
 /// where the bands hold none, GPS L1 C/A, whose absence has a diagnosis.
-pub(in crate::receiver) fn held(metadata: &[IfMetadata], settings: &Settings) -> Vec<&'static Signal> {
+pub(crate) fn held(metadata: &[IfMetadata], settings: &Settings) -> Vec<&'static Signal> {
     let is_held = |signal: &'static Signal, metadata: &IfMetadata| {
         let rate_hz = metadata.rate.hz();
         is_within(metadata, signal)
@@ -144,8 +144,8 @@ pub(super) fn assigned(metadata: &[IfMetadata], signals: &[&'static Signal]) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::samples::Format;
-    use crate::gnss::time::Rate;
+    use gnss::samples::Format;
+    use gnss::time::Rate;
 
     #[test]
     fn what_is_searched_for_unasked_is_what_the_bands_hold() {

@@ -6,9 +6,9 @@
 use toml::{Table, Value};
 
 use super::{OperationSettings, Settings};
-use crate::receiver::acquire::AcquisitionSettings;
-use crate::receiver::position::PositionSettings;
-use crate::receiver::track::TrackingSettings;
+use crate::acquire::AcquisitionSettings;
+use crate::position::PositionSettings;
+use crate::track::TrackingSettings;
 
 /// One key of the receiver's settings.
 #[derive(Clone, Debug, PartialEq, Eq)]

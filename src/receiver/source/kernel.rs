@@ -1,8 +1,8 @@
 //! [`Format::unpack`], and the same to fixed-point numbers, compiled for the widest vectors that its loops
 //! make use of.
 
-use crate::gnss::samples::Format;
-use crate::receiver::correlate::fixed::POINT_BITS;
+use crate::correlate::fixed::POINT_BITS;
+use gnss::samples::Format;
 
 /// [`Format::unpack`] with the vectors of this processor: the same values on all.
 pub(super) fn unpack(format: Format, bytes: &[u8], i: &mut Vec<f32>, q: &mut Vec<f32>) {

@@ -8,15 +8,15 @@ use rayon::prelude::*;
 
 use super::stream_tests::{Echo, Random, Stream};
 use super::*;
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::galileo::e1::E1;
-use crate::gnss::record::Event;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE};
-use crate::gnss::signal::{Component, Layer, Layers, Shape, Signal};
-use crate::receiver::acquire::{Acquired, AcquisitionSettings, Searcher};
-use crate::receiver::correlate::correlation;
-use crate::receiver::lead::lead;
+use crate::acquire::{Acquired, AcquisitionSettings, Searcher};
+use crate::correlate::correlation;
+use crate::lead::lead;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::galileo::e1::E1;
+use gnss::record::Event;
+use gnss::satellite::Sv;
+use gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE};
+use gnss::signal::{Component, Layer, Layers, Shape, Signal};
 
 fn is_long() -> bool {
     std::env::var_os("GNSS_TWIN_LONG").is_some()

@@ -7,9 +7,9 @@
 //! their true neighbours, two of 20 460.
 
 use super::overlay::{OverlayPhase, Shifts};
-use crate::gnss::signal::{Component, Signal};
-use crate::receiver::correlate::{Edge, Replica, Wave};
-use crate::receiver::lead::long_beside;
+use crate::correlate::{Edge, Replica, Wave};
+use crate::lead::long_beside;
+use gnss::signal::{Component, Signal};
 
 /// Code periods before a decision is tried, and after which a search begins anew.
 const LEAST_PERIODS: u32 = 4;

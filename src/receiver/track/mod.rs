@@ -6,7 +6,7 @@
 //! `pull_in`, the overlay of pilots in `overlay`, both sides of a sub-carrier in `sides`. Limits: loops
 //! follow the component that leads, a code period is at least as long as a few samples.
 
-use crate::gnss::record::{Event, TrackingRow};
+use gnss::record::{Event, TrackingRow};
 
 mod channel;
 pub mod closed;

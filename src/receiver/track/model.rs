@@ -2,9 +2,9 @@
 
 use super::TrackingSettings;
 use super::loops::CodeShape;
-use crate::gnss::signal::{Component, Layers, Shape, Tone};
-use crate::receiver::correlate::correlation;
-use crate::receiver::lead::{efficiency, shapes};
+use crate::correlate::correlation;
+use crate::lead::{efficiency, shapes};
+use gnss::signal::{Component, Layers, Shape, Tone};
 
 /// The correlation of a component with the replica that is made of it.
 #[derive(Clone, Copy, Debug)]
@@ -88,11 +88,11 @@ pub fn side_peak(component: &Component, made: Layers) -> Option<SidePeak> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::galileo::altboc::E5;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::signal::Layer;
-    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED};
-    use crate::receiver::lead::followed_db;
+    use crate::lead::followed_db;
+    use gnss::galileo::altboc::E5;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::signal::Layer;
+    use gnss::signal::synthetic::{LONG_BOC, MIXED};
 
     #[test]
     fn the_nearest_side_peak_is_that_of_the_printed_correlation() {

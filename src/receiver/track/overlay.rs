@@ -110,13 +110,13 @@ impl OverlaySync {
 mod tests {
     use super::super::tests::Normal;
     use super::*;
-    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, QUADRATURE};
+    use gnss::signal::synthetic::{LONG_BOC, MIXED, QUADRATURE};
 
     #[test]
     fn every_phase_and_sign_of_every_overlay_is_found_and_never_in_noise() {
         let mut normal = Normal::new(31);
         for (signal, component, least_dbhz) in [(&LONG_BOC, 1, 25.0), (&QUADRATURE, 1, 27.0), (&MIXED, 0, 25.0)] {
-            let component: &crate::gnss::signal::Component = &signal.components[component];
+            let component: &gnss::signal::Component = &signal.components[component];
             let code = component.overlay.of(3).unwrap();
             for dbhz in [least_dbhz, 35.0, 50.0] {
                 let amplitude = (2.0 * libm::pow(10.0, dbhz / 10.0) * component.period_s()).sqrt();

@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-use crate::receiver::threshold;
+use crate::threshold;
 
 /// Half the range of frequencies, cycles a code period: there a prompt has lost 2.4 dB.
 const REACH_CYCLES: f64 = 0.4;

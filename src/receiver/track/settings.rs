@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::gnss::signal::{Component, Layers};
-use crate::receiver::correlate::{Arithmetic, Edge};
-use crate::receiver::described::described;
+use crate::correlate::{Arithmetic, Edge};
+use crate::described::described;
+use gnss::signal::{Component, Layers};
 
 /// How the code error is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -287,8 +287,8 @@ impl TrackingSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::signal::Signal;
-    use crate::receiver::lead::lead;
+    use crate::lead::lead;
+    use gnss::signal::Signal;
 
     #[test]
     fn defaults_are_valid_and_a_bad_value_names_its_key() {

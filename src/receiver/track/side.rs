@@ -21,8 +21,8 @@
 //! to the next.
 
 use super::model::{SidePeak, side_peak, side_peak_of_both};
-use crate::gnss::signal::{Component, Layers};
-use crate::receiver::correlate::chips_to_units;
+use crate::correlate::chips_to_units;
+use gnss::signal::{Component, Layers};
 
 /// Mean time between false moves of a channel on the main peak, at least: ten years.
 const BETWEEN_FALSE_S: f64 = 3.15e8;
@@ -102,10 +102,10 @@ mod tests {
     use num_complex::Complex64;
 
     use super::*;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::signal::synthetic::{LONG_BOC, MIXED};
-    use crate::receiver::correlate::units_to_chips;
-    use crate::receiver::track::tests::Normal;
+    use crate::correlate::units_to_chips;
+    use crate::track::tests::Normal;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::signal::synthetic::{LONG_BOC, MIXED};
 
     /// Prompt, ahead and behind of a code period with amplitudes and noise that is correlated as BOC(1,1).
     fn powers(normal: &mut Normal, amplitudes: [f64; 3]) -> (f64, [f64; 2]) {

@@ -12,9 +12,9 @@ use super::loops::CodeShape;
 use super::model::ReplicaModel;
 use super::overlay::{OverlayPhase, OverlaySync};
 use super::side::SidePeaks;
-use crate::gnss::signal::{Component, Signal};
-use crate::receiver::correlate::{Replica, chips_to_units};
-use crate::receiver::lead::other_side;
+use crate::correlate::{Replica, chips_to_units};
+use crate::lead::other_side;
+use gnss::signal::{Component, Signal};
 
 /// What a channel needs to follow the other side too.
 #[derive(Clone, Debug)]

@@ -7,13 +7,11 @@ use num_complex::Complex64;
 
 use super::stream_tests::{Stream, symbol};
 use super::*;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::synthetic::{
-    CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, MULTIPLEXED_DATA, QUADRATURE_DATA, SIDES,
-};
-use crate::gnss::signal::{Component, Layers, Link, Signal};
-use crate::receiver::acquire::{Acquired, AcquisitionSettings, search};
-use crate::receiver::lead::{BOTH_SIDES, followed_db, lead, long_beside, other_side};
+use crate::acquire::{Acquired, AcquisitionSettings, search};
+use crate::lead::{BOTH_SIDES, followed_db, lead, long_beside, other_side};
+use gnss::satellite::Sv;
+use gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, MULTIPLEXED_DATA, QUADRATURE_DATA, SIDES};
+use gnss::signal::{Component, Layers, Link, Signal};
 
 /// One satellite's signal: its code at time zero, and a Doppler that code and carrier share.
 struct Sky {

@@ -6,11 +6,11 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 use statrs::distribution::{ContinuousCDF, Normal as Gauss};
 
-use crate::gnss::samples::{Format, IfMetadata};
-use crate::gnss::signal::{Component, Layer, Link};
-use crate::gnss::time::Rate;
-use crate::receiver::lead::lead;
-use crate::receiver::source::Block;
+use crate::lead::lead;
+use crate::source::Block;
+use gnss::samples::{Format, IfMetadata};
+use gnss::signal::{Component, Layer, Link};
+use gnss::time::Rate;
 
 /// Uniform numbers (SplitMix64).
 pub(super) struct Random(pub u64);
@@ -290,8 +290,8 @@ impl Stream {
 
 #[test]
 fn noise_has_unit_power() {
-    use crate::gnss::satellite::Sv;
-    use crate::gnss::signal::synthetic::MIXED;
+    use gnss::satellite::Sv;
+    use gnss::signal::synthetic::MIXED;
     let mut stream = Stream::new(MIXED.link(Sv { system: MIXED.system, number: 2 }), 5.3e6, 3);
     stream.cn0_dbhz = -200.0;
     let block = stream.block(200_000);

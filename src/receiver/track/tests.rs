@@ -2,12 +2,12 @@
 //! satellite.
 
 use super::*;
-use crate::gnss::gps::l1ca;
-use crate::gnss::samples::{Format, IfMetadata};
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::time::Rate;
-use crate::receiver::acquire::Acquired;
-use crate::receiver::source::Block;
+use crate::acquire::Acquired;
+use crate::source::Block;
+use gnss::gps::l1ca;
+use gnss::samples::{Format, IfMetadata};
+use gnss::satellite::{Sv, System};
+use gnss::time::Rate;
 
 /// Gaussian numbers from a linear congruential generator and Box-Muller.
 pub(super) struct Normal {

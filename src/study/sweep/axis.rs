@@ -9,8 +9,8 @@ use std::path::Path;
 use toml::Value;
 
 use super::spec::SCENARIO_KEY;
-use crate::generator::scenario::read::Table;
-use crate::generator::scenario::{Place, ScenarioError};
+use generator::scenario::read::Table;
+use generator::scenario::{Place, ScenarioError};
 
 /// Most cases of a study.
 pub const MOST_CASES: u64 = 10_000_000;

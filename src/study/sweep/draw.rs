@@ -16,7 +16,7 @@ use super::publish::short;
 use super::result::{Cell, Results, THEORY};
 use super::spec::{Plot, PlotKind};
 use super::unit_of;
-use crate::analysis::show::plot::canvas::{
+use analysis::show::plot::canvas::{
     Axis, COLOURS, Chart, Drawing, Failure, GREY, Mark, Series, WIDTH_PX, compose, figure,
 };
 

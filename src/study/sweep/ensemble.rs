@@ -8,7 +8,7 @@ use super::StudyError;
 use super::estimate::Estimate;
 use super::publish::{Rows, short};
 use super::result::Results;
-use crate::analysis::statistics::{median, percentile};
+use analysis::statistics::{median, percentile};
 
 /// How one figure is distributed.
 #[derive(Clone, Debug)]

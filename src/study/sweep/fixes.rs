@@ -7,12 +7,12 @@
 
 use nalgebra::Vector3;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::measure::consistency::Consistency;
-use crate::analysis::measure::errors::Errors;
-use crate::analysis::read::Run;
-use crate::analysis::statistics::percentile;
-use crate::gnss::record::{Fix, IonosphereModel};
+use analysis::error::JudgeError;
+use analysis::measure::consistency::Consistency;
+use analysis::measure::errors::Errors;
+use analysis::read::Run;
+use analysis::statistics::percentile;
+use gnss::record::{Fix, IonosphereModel};
 
 /// What a study may keep of them. `nees` is of a single fix; of an honest receiver its mean over independent
 /// runs is 3 with a variance of 6 over their number.

@@ -1,10 +1,10 @@
-//! Every key of STUDY.toml, declared once: see [`crate::generator::scenario::schema`].
+//! Every key of STUDY.toml, declared once: see [`generator::scenario::schema`].
 
-use crate::generator::clock::oscillator::PowerLaw;
-use crate::generator::scenario::schema::{
+use crate::correlator::signals;
+use generator::clock::oscillator::PowerLaw;
+use generator::scenario::schema::{
     Key, flag, foreign, integer, number, numbers, table, tables, text, values, word, words,
 };
-use crate::study::correlator::signals;
 
 /// Room for any number.
 const ANY: f64 = 1e18;

@@ -37,12 +37,12 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256, Sha512};
 use thiserror::Error;
 
-use crate::analysis::JudgeError;
-use crate::generator::GenerateError;
-use crate::generator::scenario::Place;
-use crate::generator::scenario::ScenarioError;
-use crate::receiver::ReceiveError;
-use crate::receiver::output::OutputError;
+use analysis::JudgeError;
+use generator::GenerateError;
+use generator::scenario::Place;
+use generator::scenario::ScenarioError;
+use receiver::ReceiveError;
+use receiver::output::OutputError;
 
 /// Why a study cannot be planned, run or merged.
 #[derive(Debug, Error)]

@@ -2,28 +2,28 @@
 //! time.
 //!
 //! The base is `[signal]`, `[motion]`, `[loop]`, `[measure]` and `[receiver.tracking]`; figures are in
-//! [`FIGURES`], those of theory under `theory.`. Limits are those of [`crate::study::correlator`]: one
+//! [`FIGURES`], those of theory under `theory.`. Limits are those of [`crate::correlator`]: one
 //! satellite in steady tracking, constant C/N0, no multipath. Where the signal was lost, spreads have no
 //! value.
 
 use super::keys;
-use crate::analysis::expect::theory::clock::PowerLaw;
-use crate::analysis::expect::theory::{dll, fll, oscillator, pll};
-use crate::analysis::waveform::Waveform;
-use crate::generator::clock::oscillator::PowerLaw as Levels;
-use crate::generator::scenario::ScenarioError;
-use crate::generator::scenario::read::{Source, Table};
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::signal::{Component, Signal};
-use crate::receiver::lead::lead;
-use crate::receiver::settings::Settings;
-use crate::receiver::track::TrackingSettings;
-use crate::receiver::track::closed::Mode;
-use crate::study::correlation::Correlation;
-use crate::study::correlator::{Case, Outcome, run, signals};
-use crate::study::expect::{self, Jitter};
-use crate::study::motion::{Motion, Step};
+use crate::correlation::Correlation;
+use crate::correlator::{Case, Outcome, run, signals};
+use crate::expect::{self, Jitter};
+use crate::motion::{Motion, Step};
+use analysis::expect::theory::clock::PowerLaw;
+use analysis::expect::theory::{dll, fll, oscillator, pll};
+use analysis::waveform::Waveform;
+use generator::clock::oscillator::PowerLaw as Levels;
+use generator::scenario::ScenarioError;
+use generator::scenario::read::{Source, Table};
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::gps::l1ca::L1_CA;
+use gnss::signal::{Component, Signal};
+use receiver::lead::lead;
+use receiver::settings::Settings;
+use receiver::track::TrackingSettings;
+use receiver::track::closed::Mode;
 
 /// Standard gravity (CGPM 1901).
 const GRAVITY_MPS2: f64 = 9.80665;
@@ -242,7 +242,7 @@ fn phase_theory_deg(case: &Case) -> Option<f64> {
     Some(libm::hypot(thermal_deg, oscillator_deg))
 }
 
-/// T·C/N0: what the theory of loops in noise wants at least [`LEAST_SNR`](crate::study::proof::LEAST_SNR) of.
+/// T·C/N0: what the theory of loops in noise wants at least [`LEAST_SNR`](crate::proof::LEAST_SNR) of.
 pub const SNR: &str = "theory.snr";
 
 /// What a study may keep. Spreads are of truth minus oscillator, mean over an integration, about their mean;

@@ -6,8 +6,8 @@ use super::plan::Plan;
 use super::publish::{self, Rows};
 use super::result::{Compared, Results};
 use super::spec::Level;
-use crate::analysis::JudgeError;
-use crate::analysis::show::pdf::{Item, Report, Side, Table, Tone};
+use analysis::JudgeError;
+use analysis::show::pdf::{Item, Report, Side, Table, Tone};
 
 /// The report's bytes; they follow from plan and results alone.
 ///

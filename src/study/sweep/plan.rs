@@ -18,8 +18,8 @@ use super::model::Model;
 use super::sampled::{self, Base};
 use super::spec::{Level, Study};
 use super::{StudyError, axis, sha256_hex, temporary, unit_of};
-use crate::analysis::show::staged::Staged;
-use crate::generator::scenario::{Overrides, Scenario};
+use analysis::show::staged::Staged;
+use generator::scenario::{Overrides, Scenario};
 
 /// Version of manifest and shards.
 const SCHEMA: u32 = 1;

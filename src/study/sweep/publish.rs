@@ -11,7 +11,7 @@ use super::plan::Plan;
 use super::result::{self, Agreement, Compared, Results, THEORY};
 use super::spec::Level;
 use super::{StudyError, axis, plan};
-use crate::study::proof::LEAST_SNR;
+use crate::proof::LEAST_SNR;
 
 /// Cells that the report lists; the rest are in `cells.csv`.
 const MOST_LISTED: usize = 60;

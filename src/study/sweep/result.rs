@@ -10,7 +10,7 @@ use super::plan::{Column, Plan};
 use super::shard::{self, Found};
 use super::spec::Study;
 use super::{StudyError, axis, unit_of};
-use crate::study::proof::LEAST_SNR;
+use crate::proof::LEAST_SNR;
 
 /// Figures of theory have this before the name of the figure that they predict.
 pub const THEORY: &str = "theory.";

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use super::plan::Plan;
 use super::{StudyError, axis, sha256_hex, temporary};
-use crate::analysis::show::staged::{Staged, present};
+use analysis::show::staged::{Staged, present};
 
 /// Figures of one case.
 pub type CaseFigures = Vec<Option<f64>>;

@@ -11,9 +11,9 @@ use toml::de::DeTable;
 
 use super::axis::{self, Axis, Grid};
 use super::{fixes, keys, model, sampled};
-use crate::generator::scenario::ScenarioError;
-use crate::generator::scenario::read::{Source, Table, nearest};
-use crate::receiver::settings::Settings;
+use generator::scenario::ScenarioError;
+use generator::scenario::read::{Source, Table, nearest};
+use receiver::settings::Settings;
 
 /// What a case is run on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, SystemTime};
 
 use super::StudyError;
-use crate::analysis::show::staged::{Staged, remove};
+use analysis::show::staged::{Staged, remove};
 
 pub(super) const PREFIX: &str = ".tmp";
 /// Work of another machine whose processes cannot be seen is dead after so long.

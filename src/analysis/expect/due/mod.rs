@@ -3,7 +3,7 @@
 //!
 //! It follows from the truth (who is in view, how strong, how well placed), the receiver's settings
 //! ([`receiver`]), the message's timetable ([`timetable`]) and what the scene itself expects
-//! ([`crate::gnss::facts`]); [`satellite`] has the rules. Nothing that nature or the scene took away is the
+//! ([`gnss::facts`]); [`satellite`] has the rules. Nothing that nature or the scene took away is the
 //! receiver's fault. Limits: searches are those of a cold start with worst losses, so a receiver may be
 //! earlier than required; geometry counts the satellites that must be used, not those that might be.
 
@@ -15,18 +15,18 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Matrix4, Vector4};
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::message::Message;
-use crate::analysis::expect::multiple_access::MultipleAccess;
-use crate::analysis::read::Run;
-use crate::analysis::statistics::median;
-use crate::gnss::earth::Geodetic;
-use crate::gnss::facts::{Expect, FaultKind, Fixes};
-use crate::gnss::ionosphere::Model;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Link;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use crate::error::JudgeError;
+use crate::expect::message::Message;
+use crate::expect::multiple_access::MultipleAccess;
+use crate::read::Run;
+use crate::statistics::median;
+use gnss::earth::Geodetic;
+use gnss::facts::{Expect, FaultKind, Fixes};
+use gnss::ionosphere::Model;
+use gnss::satellite::Sv;
+use gnss::signal::Link;
+use gnss::signal::Signal;
+use gnss::time::Epoch;
 use receiver::Receiver;
 use satellite::{Excuse, Required, SatelliteEpoch, Scene};
 use timetable::Timetable;

@@ -7,10 +7,10 @@
 
 use serde_json::Value;
 
-use crate::analysis::expect::theory::{detection, pll};
-use crate::analysis::read::Run;
-use crate::analysis::waveform::leading;
-use crate::gnss::signal::{SIGNALS, Signal};
+use crate::expect::theory::{detection, pll};
+use crate::read::Run;
+use crate::waveform::leading;
+use gnss::signal::{SIGNALS, Signal};
 
 /// Jitter up to which a phase loop is expected to hold for good: 3σ leaves a third of the discriminator's 45°
 /// to oscillator and motion.
@@ -138,7 +138,7 @@ fn front_end_cost_db(run: &Run) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::gps::l1ca::L1_CA;
+    use gnss::gps::l1ca::L1_CA;
 
     #[test]
     fn the_default_search_finds_38_dbhz_almost_surely_and_28_seldom() {

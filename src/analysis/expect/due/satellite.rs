@@ -7,8 +7,8 @@
 
 use super::receiver::Receiver;
 use super::timetable::Timetable;
-use crate::gnss::facts::{Expect, Fault, FaultKind, Losses};
-use crate::gnss::satellite::Sv;
+use gnss::facts::{Expect, Fault, FaultKind, Losses};
+use gnss::satellite::Sv;
 
 /// Chance of never being found, in that many nepers, below which absence is no bad luck.
 const BAD_LUCK_NP: f64 = 13.815_510_557_964_274;
@@ -249,9 +249,9 @@ mod tests {
     use serde_json::Value;
 
     use super::*;
-    use crate::gnss::facts::{Interval, Terms};
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::time::Epoch;
+    use gnss::facts::{Interval, Terms};
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::time::Epoch;
 
     /// A second a row, all strong but where `weak` says.
     fn rows(seconds: u32, dbhz: impl Fn(f64) -> Option<f64>) -> Vec<SatelliteEpoch> {

@@ -6,9 +6,9 @@
 
 use std::collections::BTreeSet;
 
-use crate::gnss::message::Message;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use gnss::message::Message;
+use gnss::signal::Signal;
+use gnss::time::Epoch;
 
 /// What shows where a unit begins when its time is not known yet: the two words at the beginning of the next
 /// subframe.
@@ -98,10 +98,10 @@ impl Timetable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::galileo::e1::E1;
-    use crate::gnss::galileo::e6::E6;
-    use crate::gnss::gps::l1ca::L1_CA;
-    use crate::gnss::signal::synthetic::LONG_BOC;
+    use gnss::galileo::e1::E1;
+    use gnss::galileo::e6::E6;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::signal::synthetic::LONG_BOC;
 
     fn at(text: &str) -> Timetable {
         Timetable::new(&L1_CA, Epoch::parse(text).unwrap())

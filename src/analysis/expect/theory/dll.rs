@@ -5,7 +5,7 @@
 //! one-sided noise bandwidth of the discrete loop, so the factor (1−½·B·T) of continuous updates is left out.
 //! White noise, no multipath.
 
-use crate::gnss::signal::sinc_squared;
+use gnss::signal::sinc_squared;
 
 /// A code discriminator, by its noise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,9 +8,9 @@
 
 use std::f64::consts::PI;
 
-use crate::analysis::waveform::{Waveform, leading};
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::signal::{Layers, Signal};
+use crate::waveform::{Waveform, leading};
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::signal::{Layers, Signal};
 
 /// Lines a chip rate that are summed. A code of other length has others, whose power is in proportion.
 const LINES: f64 = 1023.0;
@@ -68,7 +68,7 @@ fn locked_m(chip_rate_hz: f64, chips: f64, rate_hz: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::gps::l1ca::L1_CA;
+    use gnss::gps::l1ca::L1_CA;
 
     #[test]
     fn averaged_edges_cost_what_folds_back_at_each_rate() {

@@ -9,8 +9,8 @@ use super::linear::{
 };
 use super::oscillator::{OCXO, TCXO};
 use super::*;
-use crate::analysis::waveform::Waveform;
-use crate::gnss::signal::synthetic::LONG_BOC;
+use crate::waveform::Waveform;
+use gnss::signal::synthetic::LONG_BOC;
 
 const CHIP_M: f64 = 293.052_256;
 const L1_HZ: f64 = 1_575.42e6;

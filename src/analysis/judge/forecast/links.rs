@@ -2,27 +2,27 @@
 //! and C/N0.
 //!
 //! Every figure of a satellite is put over its own limit, so that the worst satellite speaks for all. Theory
-//! is that of [`crate::analysis::measure::jitter`] at the true C/N0 less what front end and converter cost,
+//! is that of [`crate::measure::jitter`] at the true C/N0 less what front end and converter cost,
 //! with the oscillator's noise and the motion's stress. Limits: epochs that interference costs more than
 //! `JAMMED_DB`, or whose C/N0 moved by more than `STEADY_DB` within the receiver's averages, are left out.
 
 use std::collections::BTreeMap;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::loops::{Stresses, Theory, update_s};
-use crate::analysis::expect::multipath::Rays;
-use crate::analysis::expect::multiple_access::MultipleAccess;
-use crate::analysis::expect::quantile::{largest, mean_square};
-use crate::analysis::expect::stated::Stated;
-use crate::analysis::expect::theory::edges;
-use crate::analysis::expect::timeline::Timeline;
-use crate::analysis::judge::forecast::settled::Settled;
-use crate::analysis::measure::errors::Errors;
-use crate::analysis::measure::jitter::{Loop, Settings};
-use crate::analysis::read::{Numbers, Run};
-use crate::analysis::waveform::Edge;
-use crate::gnss::record::TrackingRow;
-use crate::gnss::signal::Link;
+use crate::error::JudgeError;
+use crate::expect::loops::{Stresses, Theory, update_s};
+use crate::expect::multipath::Rays;
+use crate::expect::multiple_access::MultipleAccess;
+use crate::expect::quantile::{largest, mean_square};
+use crate::expect::stated::Stated;
+use crate::expect::theory::edges;
+use crate::expect::timeline::Timeline;
+use crate::judge::forecast::settled::Settled;
+use crate::measure::errors::Errors;
+use crate::measure::jitter::{Loop, Settings};
+use crate::read::{Numbers, Run};
+use crate::waveform::Edge;
+use gnss::record::TrackingRow;
+use gnss::signal::Link;
 
 /// By how much theory's σ may be too small or too large: 1 dB of C/N0 (1.12), and 7 % between linear loops
 /// and real ones; the code's theory leaves out the rounding of both replicas, which lowers jitter by as much

@@ -11,28 +11,28 @@ use std::iter::Peekable;
 
 use nalgebra::Vector3;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::due::satellite::{FADE_DB, is_stepping};
-use crate::analysis::expect::loops::{Places, Theory, update_s};
-use crate::analysis::expect::message::Message;
-use crate::analysis::expect::multipath::{self, Rays};
-use crate::analysis::expect::smoothing::Smoothing;
-use crate::analysis::expect::stated::Stated;
-use crate::analysis::expect::theory::edges;
-use crate::analysis::judge::forecast::links::CN0_DB;
-use crate::analysis::measure::errors::{Errors, SignalError};
-use crate::analysis::measure::jitter::{Loop, Settings};
-use crate::analysis::read::Run;
-use crate::analysis::read::spill_store::{Cursor, Finder};
-use crate::analysis::waveform::Edge;
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, rotate_earth};
-use crate::gnss::ionosphere::{Coefficients, Model};
-use crate::gnss::message::Message as Form;
-use crate::gnss::record::{Event, Fix, IonosphereModel, Observation, SkyRow, TrajectoryRow};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Link, Signal};
-use crate::gnss::time::GPST;
+use crate::error::JudgeError;
+use crate::expect::due::satellite::{FADE_DB, is_stepping};
+use crate::expect::loops::{Places, Theory, update_s};
+use crate::expect::message::Message;
+use crate::expect::multipath::{self, Rays};
+use crate::expect::smoothing::Smoothing;
+use crate::expect::stated::Stated;
+use crate::expect::theory::edges;
+use crate::judge::forecast::links::CN0_DB;
+use crate::measure::errors::{Errors, SignalError};
+use crate::measure::jitter::{Loop, Settings};
+use crate::read::Run;
+use crate::read::spill_store::{Cursor, Finder};
+use crate::waveform::Edge;
+use gnss::broadcast::Ephemeris;
+use gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, rotate_earth};
+use gnss::ionosphere::{Coefficients, Model};
+use gnss::message::Message as Form;
+use gnss::record::{Event, Fix, IonosphereModel, Observation, SkyRow, TrajectoryRow};
+use gnss::satellite::Sv;
+use gnss::signal::{Link, Signal};
+use gnss::time::GPST;
 
 /// The receiver's choices that its accuracy follows from.
 #[derive(Clone, Debug)]

@@ -3,15 +3,15 @@
 
 use std::collections::VecDeque;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::due::satellite::is_stepping;
-use crate::analysis::expect::loops::{Places, Theory};
-use crate::analysis::expect::multipath::{self, Rays};
-use crate::analysis::expect::multiple_access::MultipleAccess;
-use crate::analysis::expect::stated::Stated;
-use crate::analysis::measure::errors::{Errors, PULL_IN_S, SignalError};
-use crate::analysis::read::{Numbers, Run};
-use crate::gnss::signal::Link;
+use crate::error::JudgeError;
+use crate::expect::due::satellite::is_stepping;
+use crate::expect::loops::{Places, Theory};
+use crate::expect::multipath::{self, Rays};
+use crate::expect::multiple_access::MultipleAccess;
+use crate::expect::stated::Stated;
+use crate::measure::errors::{Errors, PULL_IN_S, SignalError};
+use crate::read::{Numbers, Run};
+use gnss::signal::Link;
 
 /// What interference may cost before thermal theory no longer describes the loops.
 const JAMMED_DB: f64 = 1.0;

@@ -13,10 +13,10 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Matrix4, Vector4};
 
 use super::ranges::{Forecast, Scene};
-use crate::analysis::error::JudgeError;
-use crate::analysis::measure::errors::Errors;
-use crate::analysis::read::spill_store::Words;
-use crate::gnss::record::{Fix, IonosphereModel, TrajectoryRow};
+use crate::error::JudgeError;
+use crate::measure::errors::Errors;
+use crate::read::spill_store::Words;
+use gnss::record::{Fix, IonosphereModel, TrajectoryRow};
 
 /// Sums over the satellites of a fix. Vectors are east, north, up and the clocks of all time scales.
 #[derive(Clone, Debug)]
@@ -290,10 +290,10 @@ fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<Expected> {
 
 impl Expected {
     /// Words of a spilled one, its sample left out.
-    pub(in crate::analysis::judge) const WORDS: usize = 4 + 5 * 16 + 3 * 4 + 2;
+    pub(in crate::judge) const WORDS: usize = 4 + 5 * 16 + 3 * 4 + 2;
 
     /// Appends them.
-    pub(in crate::analysis::judge) fn put(&self, words: &mut Vec<u64>) {
+    pub(in crate::judge) fn put(&self, words: &mut Vec<u64>) {
         let flags = [self.corrected, self.steady, self.fading].map(u64::from);
         words.extend([self.satellites.0, self.satellites.1, self.blameless].map(u64::from));
         words.push(flags[0] | flags[1] << 1 | flags[2] << 2);
@@ -307,7 +307,7 @@ impl Expected {
     }
 
     /// The one of those words.
-    pub(in crate::analysis::judge) fn take(sample: u64, words: &mut Words<'_>) -> Self {
+    pub(in crate::judge) fn take(sample: u64, words: &mut Words<'_>) -> Self {
         // Counts were put as such.
         let mut count = || u32::try_from(words.word()).unwrap_or(0);
         let (satellites, blameless) = ((count(), count()), count());
@@ -354,7 +354,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::gnss::satellite::Sv;
+    use gnss::satellite::Sv;
 
     #[test]
     fn a_satellite_counts_once_whatever_it_sends_and_only_if_one_of_its_ranges_is_used() {

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use super::measured::{Measured, Slip};
 use super::pairs::{Pair, by_epoch};
-use crate::analysis::measure::errors::{SLIP_CYCLES, first_jump_of};
-use crate::analysis::statistics::{mean, median, rms};
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::signal::Link;
+use crate::measure::errors::{SLIP_CYCLES, first_jump_of};
+use crate::statistics::{mean, median, rms};
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::signal::Link;
 
 /// Gaps longer than this many intervals break an arc.
 const GAP: f64 = 1.5;

@@ -59,7 +59,7 @@ pub fn mean_of_means(means: &[f64]) -> Option<Estimate> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::measure::independent::tests::Draw;
+    use crate::measure::independent::tests::Draw;
 
     #[test]
     fn three_sigma_hold_the_slope_though_clusters_have_offsets() {

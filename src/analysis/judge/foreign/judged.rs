@@ -2,7 +2,7 @@
 
 use super::measured::Measured;
 use super::place::Places;
-use crate::analysis::expect::timeline;
+use crate::expect::timeline;
 
 /// Everything that a foreign receiver's pictures and summary are made from.
 pub struct Judged {

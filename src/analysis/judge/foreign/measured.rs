@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::fit::Estimate;
-use crate::gnss::signal::Link;
+use gnss::signal::Link;
 
 /// One observation against the truth: a row of `foreign_observations.csv`. Errors are measured minus true;
 /// what is common to the satellites of its epoch is taken out, of carriers also an arc's constant.
@@ -141,7 +141,7 @@ pub struct Measured {
 
 impl Measured {
     /// −1 where the receiver's Doppler has the opposite sign of the truth's.
-    pub(in crate::analysis::judge) fn doppler_sign(&self) -> f64 {
+    pub(in crate::judge) fn doppler_sign(&self) -> f64 {
         if self.doppler_scale.is_some_and(|scale| scale.value < 0.0) { -1.0 } else { 1.0 }
     }
 }

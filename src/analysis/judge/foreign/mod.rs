@@ -1,7 +1,7 @@
 //! Judging a receiver that this project did not write and that was fed this project's samples.
 //!
-//! It is known by its files alone: observations in RINEX 3 ([`crate::analysis::read::rinex_obs`]), positions
-//! in NMEA ([`crate::analysis::read::nmea`]). They are joined with the truth by GPS time ([`timeline`]),
+//! It is known by its files alone: observations in RINEX 3 ([`crate::read::rinex_obs`]), positions
+//! in NMEA ([`crate::read::nmea`]). They are joined with the truth by GPS time ([`timeline`]),
 //! since a foreign receiver knows nothing of sample numbers. [`observables`] and [`place`] measure;
 //! [`report`] names the biases. A receiver that took its week for one 1024 weeks off is moved back, and the
 //! report says so. Results: `foreign.json`, `foreign_{observations,satellites,clock,slips,fixes}.csv` and
@@ -20,10 +20,10 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::timeline;
-use crate::analysis::read::{Fault, Run, nmea, rinex_obs};
-use crate::gnss::time::{Epoch, WEEK_S};
+use crate::error::JudgeError;
+use crate::expect::timeline;
+use crate::read::{Fault, Run, nmea, rinex_obs};
+use gnss::time::{Epoch, WEEK_S};
 
 pub use fit::Estimate;
 pub use judged::Judged;

@@ -13,11 +13,11 @@ use super::carriers::{Arcs, Carriers, carriers};
 use super::fit::{Estimate, mean_of_means, slope};
 use super::measured::{ClockRow, Measured, ObservationError, Satellite};
 use super::pairs::{BySignal, Pair, by_epoch, by_signal, join};
-use crate::analysis::expect::timeline::Timeline;
-use crate::analysis::read::rinex_obs::ObservedEpoch;
-use crate::analysis::statistics::{mean, median, pooled_std, rms, std};
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::signal::{Link, Signal};
+use crate::expect::timeline::Timeline;
+use crate::read::rinex_obs::ObservedEpoch;
+use crate::statistics::{mean, median, pooled_std, rms, std};
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::signal::{Link, Signal};
 
 /// Times that the truth is looked up at a better time.
 const LOOKS: usize = 6;

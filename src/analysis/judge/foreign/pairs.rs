@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::analysis::expect::timeline::{State, Timeline};
-use crate::analysis::read::rinex_obs::{ObservedEpoch, Values};
-use crate::gnss::satellite::System;
-use crate::gnss::signal::{self, Link, Signal};
+use crate::expect::timeline::{State, Timeline};
+use crate::read::rinex_obs::{ObservedEpoch, Values};
+use gnss::satellite::System;
+use gnss::signal::{self, Link, Signal};
 
 /// One observation and the truth at its time.
 #[derive(Clone, Debug)]

@@ -2,17 +2,17 @@
 //!
 //! Positions are compared with the antenna's at the time on their label. A late label shows as an error along
 //! the motion, −δ·v, so that only a moving scene shows it. The sigma of a bias counts errors that remember
-//! each other once ([`crate::analysis::measure::independent`]).
+//! each other once ([`crate::measure::independent`]).
 
 use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::fit::Estimate;
-use crate::analysis::expect::timeline::Timeline;
-use crate::analysis::measure::independent::Correlated;
-use crate::analysis::read::nmea::PlaceFix;
-use crate::analysis::statistics::{mean, percentile, rms};
-use crate::gnss::earth::Geodetic;
+use crate::expect::timeline::Timeline;
+use crate::measure::independent::Correlated;
+use crate::read::nmea::PlaceFix;
+use crate::statistics::{mean, percentile, rms};
+use gnss::earth::Geodetic;
 
 /// One fix against the truth: a row of `foreign_fixes.csv`.
 #[derive(Clone, Copy, Debug, Serialize)]

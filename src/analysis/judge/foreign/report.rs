@@ -13,9 +13,9 @@ use serde_json::Value;
 use super::fit::Estimate;
 use super::judged::Judged;
 use super::measured::Measured;
-use crate::analysis::judge::schema::{Figures, Leaf};
-use crate::analysis::statistics::mean;
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::judge::schema::{Figures, Leaf};
+use crate::statistics::mean;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
 
 /// Paths of `foreign.json` that a user's limits may name.
 pub static FIGURES: Figures = Figures { file: "foreign.json", listed: "any foreign.json", leaves };
@@ -211,7 +211,7 @@ pub struct Position {
     pub time_tag_sigma_s: Option<f64>,
 }
 
-const WEEK_S: i64 = crate::gnss::time::WEEK_S;
+const WEEK_S: i64 = gnss::time::WEEK_S;
 
 impl ForeignSummary {
     /// Condenses what was measured.

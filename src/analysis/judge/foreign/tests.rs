@@ -7,14 +7,14 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use super::*;
-use crate::analysis::judge::judgement::Status;
-use crate::analysis::judge::limits::Limits;
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::measure::independent::tests::Draw;
-use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::record::{Observation, SkyRow, TrajectoryRow};
-use crate::gnss::satellite::Sv;
+use crate::judge::judgement::Status;
+use crate::judge::limits::Limits;
+use crate::judge::verdict::Verdict;
+use crate::measure::independent::tests::Draw;
+use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::gps::l1ca::L1_CA;
+use gnss::record::{Observation, SkyRow, TrajectoryRow};
+use gnss::satellite::Sv;
 
 const SECONDS: f64 = 60.0;
 const RATE_HZ: u64 = 2_600_000;
@@ -273,7 +273,7 @@ fn every_planted_bias_is_named_with_its_size() {
     near("up", position.bias_up_m, -2.0, 5.0 * 0.4 / 50.0_f64.sqrt());
     near("time tag of positions", position.time_tag_offset_s, 3e-3, 5.0 * 0.4 / 20.0 / 50.0_f64.sqrt());
     let verdict = Verdict::of_foreign(&judgement).unwrap();
-    crate::analysis::show::foreign::write(&judgement, &verdict, place.path()).unwrap();
+    crate::show::foreign::write(&judgement, &verdict, place.path()).unwrap();
     for name in [
         "foreign.json",
         "foreign_observations.csv",

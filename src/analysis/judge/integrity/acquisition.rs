@@ -8,13 +8,13 @@
 use std::collections::BTreeSet;
 
 use super::{Finding, Found};
-use crate::analysis::error::JudgeError;
-use crate::analysis::read::Run;
-use crate::analysis::read::spill_store::Finder;
-use crate::analysis::waveform::leading;
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::record::{AcquisitionRow, Event, Observation};
-use crate::gnss::signal::Link;
+use crate::error::JudgeError;
+use crate::read::Run;
+use crate::read::spill_store::Finder;
+use crate::waveform::leading;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::record::{AcquisitionRow, Event, Observation};
+use gnss::signal::Link;
 
 /// A refined Doppler is right within half a bin of the search: 1/(2·2T) of a coherent time of a few periods.
 const DOPPLER_BINS: f64 = 0.5;

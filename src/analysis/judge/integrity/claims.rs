@@ -6,12 +6,12 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::{Finding, Found};
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::message::orbit_parameters;
-use crate::analysis::read::Run;
-use crate::gnss::record::{Event, EventRow, IonosphereModel};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Link;
+use crate::error::JudgeError;
+use crate::expect::message::orbit_parameters;
+use crate::read::Run;
+use gnss::record::{Event, EventRow, IonosphereModel};
+use gnss::satellite::Sv;
+use gnss::signal::Link;
 
 pub(super) fn findings(run: &Run) -> Result<Vec<Finding>, JudgeError> {
     let mut all = vec![

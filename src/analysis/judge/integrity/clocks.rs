@@ -6,12 +6,12 @@
 //! anew within a run has several.
 
 use super::{Finding, Found};
-use crate::analysis::error::JudgeError;
-use crate::analysis::read::{Numbers, Run};
-use crate::analysis::statistics::larger;
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::record::{Event, Observation};
-use crate::gnss::signal::Link;
+use crate::error::JudgeError;
+use crate::read::{Numbers, Run};
+use crate::statistics::larger;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::record::{Event, Observation};
+use gnss::signal::Link;
 
 /// What a lock time may err by: it counts whole updates, of which none is longer than a bit.
 const LOCK_S: f64 = 0.02;

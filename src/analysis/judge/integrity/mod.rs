@@ -10,9 +10,9 @@ mod claims;
 mod clocks;
 mod tables;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::measure::errors::Errors;
-use crate::analysis::read::Run;
+use crate::error::JudgeError;
+use crate::measure::errors::Errors;
+use crate::read::Run;
 
 /// One law of the tables and how far it is broken.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,11 +6,11 @@
 use std::collections::HashSet;
 
 use super::{Finding, Found};
-use crate::analysis::error::JudgeError;
-use crate::analysis::measure::errors::{Errors, Link};
-use crate::analysis::read::{Numbers, Run};
-use crate::analysis::statistics::median;
-use crate::gnss::record::{Event, Fix, Observation, TrackingRow};
+use crate::error::JudgeError;
+use crate::measure::errors::{Errors, Link};
+use crate::read::{Numbers, Run};
+use crate::statistics::median;
+use gnss::record::{Event, Fix, Observation, TrackingRow};
 
 /// Steps beyond this many usual ones are gaps.
 const GAP: f64 = 1.5;

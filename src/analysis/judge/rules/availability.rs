@@ -1,11 +1,11 @@
 //! Whether fixes came when the scene allows them: the first one in time, no epoch and no stretch without.
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::due::{Due, Expectations};
-use crate::analysis::judge::judgement::Bound;
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::read::Run;
-use crate::gnss::facts::{Expect, Fixes};
+use crate::error::JudgeError;
+use crate::expect::due::{Due, Expectations};
+use crate::judge::judgement::Bound;
+use crate::judge::verdict::Verdict;
+use crate::read::Run;
+use gnss::facts::{Expect, Fixes};
 
 /// Share of the epochs that may be without a fix, in percent.
 const LACKING_PERCENT: f64 = 1.0;
@@ -91,7 +91,7 @@ impl Verdict {
                 let source = format!(
                     "the message's own timetable: four satellites found and locked within {} s, their subframes 1 to \
                      3 whole by {:.1} s{page}",
-                    crate::analysis::expect::due::satellite::LOCK_S,
+                    crate::expect::due::satellite::LOCK_S,
                     expected.four_by_s.unwrap_or(0.0)
                 );
                 self.judge(
@@ -174,7 +174,7 @@ fn stretches(expect: &Expect, duration_s: f64) -> Vec<(f64, f64, String)> {
 /// Median of the steps between epochs.
 fn step_s(epochs: &[Due]) -> f64 {
     let steps: Vec<f64> = epochs.windows(2).map(|two| two[1].time_s - two[0].time_s).collect();
-    crate::analysis::statistics::median(&steps).unwrap_or(0.0)
+    crate::statistics::median(&steps).unwrap_or(0.0)
 }
 
 /// The longest time over epochs that follow one another without a fix at any, and when it began.

@@ -2,14 +2,14 @@
 
 use nalgebra::{Matrix3, Matrix4, Vector3};
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::judge::forecast::ranges::Scene;
-use crate::analysis::judge::forecast::solution::{Expected, expected};
-use crate::analysis::measure::errors::{Errors, PositionError};
-use crate::analysis::read::Table;
-use crate::analysis::read::spill_store::{SpillRow, Words};
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::record::Fix;
+use crate::error::JudgeError;
+use crate::judge::forecast::ranges::Scene;
+use crate::judge::forecast::solution::{Expected, expected};
+use crate::measure::errors::{Errors, PositionError};
+use crate::read::Table;
+use crate::read::spill_store::{SpillRow, Words};
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::record::Fix;
 
 /// A fix, its error and what was expected of it.
 #[derive(Clone)]

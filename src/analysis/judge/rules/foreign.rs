@@ -11,22 +11,22 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use super::availability::Came;
 use super::tracking::ONE_BIT_LOSS_DB;
 use super::values::THEORY;
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::due::receiver::Receiver;
-use crate::analysis::expect::due::{Due, Expectations, Observed};
-use crate::analysis::expect::quantile::largest;
-use crate::analysis::expect::theory::dll::{self, Discriminator};
-use crate::analysis::judge::foreign::measured::Measured;
-use crate::analysis::judge::foreign::place::{FixError, Places};
-use crate::analysis::judge::foreign::{ForeignSummary, Judgement};
-use crate::analysis::judge::judgement::Bound;
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::read::Run;
-use crate::analysis::statistics::{median, percentile};
-use crate::analysis::waveform::leading;
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::signal::Link;
-use crate::gnss::time::Epoch;
+use crate::error::JudgeError;
+use crate::expect::due::receiver::Receiver;
+use crate::expect::due::{Due, Expectations, Observed};
+use crate::expect::quantile::largest;
+use crate::expect::theory::dll::{self, Discriminator};
+use crate::judge::foreign::measured::Measured;
+use crate::judge::foreign::place::{FixError, Places};
+use crate::judge::foreign::{ForeignSummary, Judgement};
+use crate::judge::judgement::Bound;
+use crate::judge::verdict::Verdict;
+use crate::read::Run;
+use crate::statistics::{median, percentile};
+use crate::waveform::leading;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::signal::Link;
+use gnss::time::Epoch;
 
 /// Share of a file's epochs, observations and positions that may be without a truth, in percent: those before
 /// its clock is set.

@@ -3,11 +3,11 @@
 
 use serde_json::Value;
 
-use crate::analysis::judge::judgement::Status;
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::read::Run;
-use crate::gnss::earth::Geodetic;
-use crate::gnss::record::IonosphereModel;
+use crate::judge::judgement::Status;
+use crate::judge::verdict::Verdict;
+use crate::read::Run;
+use gnss::earth::Geodetic;
+use gnss::record::IonosphereModel;
 
 /// Delays below this are none: a millimetre.
 const NOTHING_M: f64 = 1e-3;
@@ -74,11 +74,11 @@ fn mismatches(run: &Run) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::judge::judgement::Bound;
+    use crate::judge::judgement::Bound;
 
     #[test]
     fn a_correction_without_its_delay_is_named_with_its_cure_beside_the_figure_that_fails() {
-        let directory = crate::analysis::hand_made::planted();
+        let directory = crate::hand_made::planted();
         let mut run = Run::read(directory.path()).unwrap();
         run.receiver = serde_json::json!({ "position": { "troposphere": "standard", "ionosphere": "none" } });
         (run.troposphere_m, run.ionosphere_m) = (0.0, 0.0);

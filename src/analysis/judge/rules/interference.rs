@@ -1,10 +1,10 @@
 //! What the receiver reported of continuous waves, and whether it followed a spoofer.
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::judge::judgement::Bound;
-use crate::analysis::judge::summary::Summary;
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::read::Run;
+use crate::error::JudgeError;
+use crate::judge::judgement::Bound;
+use crate::judge::summary::Summary;
+use crate::judge::verdict::Verdict;
+use crate::read::Run;
 
 impl Verdict {
     pub(super) fn interference(&mut self, summary: &Summary) {

@@ -1,13 +1,13 @@
-//! The worst satellite of each figure of the loops ([`crate::analysis::judge::forecast::links`]).
+//! The worst satellite of each figure of the loops ([`crate::judge::forecast::links`]).
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::judge::forecast::links::{Figure, Links};
-use crate::analysis::judge::judgement::Bound;
-use crate::analysis::judge::summary::Summary;
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::measure::errors::Errors;
-use crate::analysis::measure::jitter::Loop;
-use crate::analysis::read::Run;
+use crate::error::JudgeError;
+use crate::judge::forecast::links::{Figure, Links};
+use crate::judge::judgement::Bound;
+use crate::judge::summary::Summary;
+use crate::judge::verdict::Verdict;
+use crate::measure::errors::Errors;
+use crate::measure::jitter::Loop;
+use crate::read::Run;
 
 impl Figure {
     /// Words and unit.

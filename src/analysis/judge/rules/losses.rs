@@ -1,20 +1,20 @@
 //! Losses of lock and cycle slips: each is excused for its own satellite in its own moment, or counted.
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::due::receiver::Receiver;
-use crate::analysis::expect::due::satellite::{Excuse, SatelliteEpoch, Scene};
-use crate::analysis::expect::due::timetable::Timetable;
-use crate::analysis::expect::multiple_access::MultipleAccess;
-use crate::analysis::judge::judgement::Bound;
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::measure::slips::{Kind, Slip, Slips};
-use crate::analysis::read::Run;
-use crate::analysis::statistics::median;
-use crate::gnss::facts::{FaultKind, Losses};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Link;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use crate::error::JudgeError;
+use crate::expect::due::receiver::Receiver;
+use crate::expect::due::satellite::{Excuse, SatelliteEpoch, Scene};
+use crate::expect::due::timetable::Timetable;
+use crate::expect::multiple_access::MultipleAccess;
+use crate::judge::judgement::Bound;
+use crate::judge::verdict::Verdict;
+use crate::measure::slips::{Kind, Slip, Slips};
+use crate::read::Run;
+use crate::statistics::median;
+use gnss::facts::{FaultKind, Losses};
+use gnss::satellite::Sv;
+use gnss::signal::Link;
+use gnss::signal::Signal;
+use gnss::time::Epoch;
 
 /// The lock detectors' memory: how long before a declared loss or slip the signal may have failed.
 const LOOK_BACK_S: f64 = 2.0;

@@ -23,14 +23,14 @@ mod tracking;
 mod values;
 mod within;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::due::Expectations;
-use crate::analysis::expect::due::receiver::Receiver;
-use crate::analysis::judge::summary::Summary;
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::measure::errors::Errors;
-use crate::analysis::measure::slips::Slips;
-use crate::analysis::read::Run;
+use crate::error::JudgeError;
+use crate::expect::due::Expectations;
+use crate::expect::due::receiver::Receiver;
+use crate::judge::summary::Summary;
+use crate::judge::verdict::Verdict;
+use crate::measure::errors::Errors;
+use crate::measure::slips::Slips;
+use crate::read::Run;
 use availability::Came;
 
 impl Verdict {

@@ -5,12 +5,12 @@
 
 use std::cell::RefCell;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::loops::{exact_loop, natural_radps};
-use crate::analysis::judge::forecast::ranges::Choices;
-use crate::analysis::read::Run;
-use crate::analysis::read::levels::Levels;
-use crate::gnss::record::TrajectoryRow;
+use crate::error::JudgeError;
+use crate::expect::loops::{exact_loop, natural_radps};
+use crate::judge::forecast::ranges::Choices;
+use crate::read::Run;
+use crate::read::levels::Levels;
+use gnss::record::TrajectoryRow;
 
 /// The rate of a loop (s + ω)³ lags by 3J/ω² under jerk J, that of a loop (s + ω)² by 2a/ω under acceleration
 /// a; neither overshoots.

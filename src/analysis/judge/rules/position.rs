@@ -1,11 +1,11 @@
 //! Errors of the fixes, against the receiver's own covariance.
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::judge::judgement::Bound;
-use crate::analysis::judge::summary::Summary;
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::read::Run;
-use crate::gnss::record::Fix;
+use crate::error::JudgeError;
+use crate::judge::judgement::Bound;
+use crate::judge::summary::Summary;
+use crate::judge::verdict::Verdict;
+use crate::read::Run;
+use gnss::record::Fix;
 
 /// Deviations within which the largest of twelve normals lies with 99 %.
 const WORST_OF_TWELVE: f64 = 3.3;

@@ -3,15 +3,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::due::{Expectations, Satellite};
-use crate::analysis::judge::judgement::Bound;
-use crate::analysis::judge::summary::Summary;
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::read::Run;
-use crate::gnss::record::{Event, Fix, IonosphereModel, NavigationRow};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Link;
+use crate::error::JudgeError;
+use crate::expect::due::{Expectations, Satellite};
+use crate::judge::judgement::Bound;
+use crate::judge::summary::Summary;
+use crate::judge::verdict::Verdict;
+use crate::read::Run;
+use gnss::record::{Event, Fix, IonosphereModel, NavigationRow};
+use gnss::satellite::Sv;
+use gnss::signal::Link;
 
 /// Share of the time over which a satellite must be observed, of what is required. The rest is for one
 /// unlucky search in many.

@@ -1,11 +1,11 @@
 //! The spectrum of each front end's samples against the expected one.
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::front_end::FrontEnd;
-use crate::analysis::judge::judgement::Bound;
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::measure::spectrum::{Departure, Departures};
-use crate::analysis::read::Run;
+use crate::error::JudgeError;
+use crate::expect::front_end::FrontEnd;
+use crate::judge::judgement::Bound;
+use crate::judge::verdict::Verdict;
+use crate::measure::spectrum::{Departure, Departures};
+use crate::read::Run;
 
 impl Verdict {
     /// Rows of level and shape, for each front end whose spectrum was estimated.

@@ -1,12 +1,12 @@
 //! Whether the receiver's tables are whole and agree with one another
-//! ([`crate::analysis::judge::integrity`]).
+//! ([`crate::judge::integrity`]).
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::judge::integrity;
-use crate::analysis::judge::judgement::Bound;
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::measure::errors::Errors;
-use crate::analysis::read::Run;
+use crate::error::JudgeError;
+use crate::judge::integrity;
+use crate::judge::judgement::Bound;
+use crate::judge::verdict::Verdict;
+use crate::measure::errors::Errors;
+use crate::read::Run;
 
 impl Verdict {
     pub(super) fn tables(&mut self, run: &Run, errors: &Errors) -> Result<(), JudgeError> {

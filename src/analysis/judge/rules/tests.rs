@@ -3,15 +3,15 @@
 use std::fs;
 
 use super::*;
-use crate::analysis::hand_made::planted;
-use crate::analysis::judge::judgement::{Bound, Status};
-use crate::analysis::judge::limits::Limits;
-use crate::analysis::judge_against;
-use crate::analysis::measure::errors::{Errors, Link};
-use crate::analysis::read::spill_store::SpillStore;
-use crate::gnss::facts::{Expect, Fixes, Interval, Losses, Terms};
-use crate::gnss::record::{Event, EventRow, Observation};
-use crate::gnss::satellite::Sv;
+use crate::hand_made::planted;
+use crate::judge::judgement::{Bound, Status};
+use crate::judge::limits::Limits;
+use crate::judge_against;
+use crate::measure::errors::{Errors, Link};
+use crate::read::spill_store::SpillStore;
+use gnss::facts::{Expect, Fixes, Interval, Losses, Terms};
+use gnss::record::{Event, EventRow, Observation};
+use gnss::satellite::Sv;
 
 /// Tenths of a second: channels are observed from 10 s on, fixes come from 30 s on.
 const OBSERVED: u64 = 100;
@@ -173,7 +173,7 @@ fn an_oscillator_s_offset_and_a_front_end_s_delay_are_no_errors() {
     }
     run.observations = seen;
     let errors = Errors::measure(&run).unwrap();
-    let worst = |of: fn(&crate::analysis::measure::errors::SignalError) -> f64| {
+    let worst = |of: fn(&crate::measure::errors::SignalError) -> f64| {
         let (all, mut most) = (errors.pooled(None, of).unwrap(), 0.0_f64);
         all.each(|value| most = most.max(value.abs())).unwrap();
         most

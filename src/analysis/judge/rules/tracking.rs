@@ -1,10 +1,10 @@
 //! Loop jitter against its thresholds, and the measured C/N0 against the one that the scene allows.
 
-use crate::analysis::judge::judgement::Bound;
-use crate::analysis::judge::summary::Summary;
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::read::Run;
-use crate::gnss::facts::Sizes;
+use crate::judge::judgement::Bound;
+use crate::judge::summary::Summary;
+use crate::judge::verdict::Verdict;
+use crate::read::Run;
+use gnss::facts::Sizes;
 
 /// 10 lg(π/2).
 pub(super) const ONE_BIT_LOSS_DB: f64 = 1.961;

@@ -1,5 +1,5 @@
 //! Errors of the fixes and what is stated of them, against what theory expects of a sound receiver
-//! ([`crate::analysis::expect`]).
+//! ([`crate::expect`]).
 //!
 //! Each kind of error has three rows: its mean, its 95th percentile, and the largest against the limit of its
 //! own epoch. Limits are quantiles of theory's σ for a stated probability of a false alarm, widened by what
@@ -13,20 +13,20 @@ use nalgebra::{Vector3, Vector4};
 use super::cases::{Case, Stated, cases};
 use super::motion::Motion;
 use super::reception::is_augmented;
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::due::satellite::FADE_DB;
-use crate::analysis::expect::loops::Theory;
-use crate::analysis::expect::quantile::{largest, mean_square};
-use crate::analysis::judge::forecast::ranges::{Choices, Scene};
-use crate::analysis::judge::forecast::solution::{Expected, largest_axis};
-use crate::analysis::judge::judgement::Bound;
-use crate::analysis::judge::summary::Summary;
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::measure::errors::Errors;
-use crate::analysis::read::{Emission, Numbers, Run, Table};
-use crate::analysis::statistics::{Sum, larger};
-use crate::gnss::record::{Event, Fix};
-use crate::gnss::signal::Link;
+use crate::error::JudgeError;
+use crate::expect::due::satellite::FADE_DB;
+use crate::expect::loops::Theory;
+use crate::expect::quantile::{largest, mean_square};
+use crate::judge::forecast::ranges::{Choices, Scene};
+use crate::judge::forecast::solution::{Expected, largest_axis};
+use crate::judge::judgement::Bound;
+use crate::judge::summary::Summary;
+use crate::judge::verdict::Verdict;
+use crate::measure::errors::Errors;
+use crate::read::{Emission, Numbers, Run, Table};
+use crate::statistics::{Sum, larger};
+use gnss::record::{Event, Fix};
+use gnss::signal::Link;
 
 /// By how much theory's σ may be too small: 1 dB of C/N0 (1.12), and 7 % between the linear loop and a real
 /// one.
@@ -327,7 +327,7 @@ impl Verdict {
             memory_s = memory_s.max(case.expected.memory_s);
             steps.extend(before_s.replace(case.error.time_s).map(|before_s| case.error.time_s - before_s));
         })?;
-        let step_s = crate::analysis::statistics::median(&steps).unwrap_or(1.0);
+        let step_s = crate::statistics::median(&steps).unwrap_or(1.0);
         drop(steps);
         let span_s = step_s * cases.len() as f64;
         let slow = (span_s / memory_s.max(step_s)).max(1.0);

@@ -1,9 +1,9 @@
 //! Errors of fixes against the bound that the scene itself states ([`Expect::position_within_m`]): where it
 //! expects more than theory does, a receiver that is lost still fails.
 
-use crate::analysis::judge::judgement::Bound;
-use crate::analysis::judge::verdict::Verdict;
-use crate::gnss::facts::Expect;
+use crate::judge::judgement::Bound;
+use crate::judge::verdict::Verdict;
+use gnss::facts::Expect;
 
 impl Verdict {
     /// Time and error in space of every fix, seconds and metres.
@@ -23,7 +23,7 @@ impl Verdict {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::facts::{Interval, Terms};
+    use gnss::facts::{Interval, Terms};
 
     #[test]
     fn the_fix_nearest_to_the_bound_of_its_own_time_is_judged() {

@@ -7,28 +7,28 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::spectrum::{self, Spectrum};
-use crate::analysis::expect::stated::Stated;
-use crate::analysis::expect::theory::clock::white_phase;
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::measure::allan::{Deviation, Point};
-use crate::analysis::measure::clock;
-use crate::analysis::measure::clock::{Of, Series};
-use crate::analysis::measure::consistency::{Calibration, Consistency};
-use crate::analysis::measure::errors::{Errors, Link, SignalError};
-use crate::analysis::measure::ionosphere::Ionosphere;
-use crate::analysis::measure::jitter::{Jitter as LoopJitter, Loop, Pooled};
-use crate::analysis::measure::lines::Lines;
-use crate::analysis::measure::slips::{Cause, Slips};
-use crate::analysis::measure::spoofing::Spoofing;
-use crate::analysis::read::{Numbers, Run, Speed};
-use crate::analysis::statistics::{Spread, Sum, mean};
-use crate::analysis::waveform::leading;
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::record::{Event, NavigationRow};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Component, Signal};
+use crate::error::JudgeError;
+use crate::expect::spectrum::{self, Spectrum};
+use crate::expect::stated::Stated;
+use crate::expect::theory::clock::white_phase;
+use crate::judge::verdict::Verdict;
+use crate::measure::allan::{Deviation, Point};
+use crate::measure::clock;
+use crate::measure::clock::{Of, Series};
+use crate::measure::consistency::{Calibration, Consistency};
+use crate::measure::errors::{Errors, Link, SignalError};
+use crate::measure::ionosphere::Ionosphere;
+use crate::measure::jitter::{Jitter as LoopJitter, Loop, Pooled};
+use crate::measure::lines::Lines;
+use crate::measure::slips::{Cause, Slips};
+use crate::measure::spoofing::Spoofing;
+use crate::read::{Numbers, Run, Speed};
+use crate::statistics::{Spread, Sum, mean};
+use crate::waveform::leading;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::record::{Event, NavigationRow};
+use gnss::satellite::Sv;
+use gnss::signal::{Component, Signal};
 
 /// Rule-of-thumb bound of a Costas loop's 1σ error (theory: 3σ ≤ 45°).
 pub const PLL_THRESHOLD_DEG: f64 = 15.0;
@@ -170,14 +170,14 @@ pub struct Observables {
     /// Root mean square of the Doppler errors, Hz.
     pub doppler_rms_hz: Option<f64>,
     /// Mean of measured minus expected: the scene's C/N0 with other satellites and interference counted as
-    /// noise (see [`crate::analysis::expect::multiple_access`]), less what edges between samples and the
-    /// replica cost ([`crate::analysis::expect::spectrum::edge_cost_db`]) and what data in phase with a pilot
+    /// noise (see [`crate::expect::multiple_access`]), less what edges between samples and the
+    /// replica cost ([`crate::expect::spectrum::edge_cost_db`]) and what data in phase with a pilot
     /// do. Losses of filter and quantiser are not counted.
     pub cn0_bias_db: Option<f64>,
 }
 
 /// How well the loops held: the loop's oscillator minus truth, each satellite about its own mean, without the
-/// first [`PULL_IN_S`](crate::analysis::measure::errors::PULL_IN_S) of each lock.
+/// first [`PULL_IN_S`](crate::measure::errors::PULL_IN_S) of each lock.
 #[derive(Clone, Debug, Serialize)]
 pub struct Tracking {
     /// Number of losses of lock.
@@ -379,7 +379,7 @@ fn satellites(run: &Run, details: &mut Details) -> Satellites {
 }
 
 fn position(run: &Run, errors: &Errors, details: &mut Details) -> Result<Position, JudgeError> {
-    let of = |f: &dyn Fn(&crate::analysis::measure::errors::PositionError) -> f64| {
+    let of = |f: &dyn Fn(&crate::measure::errors::PositionError) -> f64| {
         let mut found = Numbers::new(errors.positions.directory());
         for error in errors.positions.cursor() {
             found.push(f(&error?))?;

@@ -1,7 +1,7 @@
 //! The summary of a run made by hand: it must find exactly what was planted.
 
-use crate::analysis::hand_made::{CHIP_M, PLANTED, Planted, planted_run};
-use crate::analysis::judge;
+use crate::hand_made::{CHIP_M, PLANTED, Planted, planted_run};
+use crate::judge;
 use std::fs;
 
 #[test]

@@ -1,6 +1,6 @@
 //! Strengths of the power-law noises behind an Allan deviation.
 //!
-//! ln σ²(τ) is fitted by ln Σ h_α × closed form (see [`crate::analysis::expect::theory::clock`]), each point
+//! ln σ²(τ) is fitted by ln Σ h_α × closed form (see [`crate::expect::theory::clock`]), each point
 //! weighted by half its degrees of freedom, the inverse variance of ln χ². No h is negative, and one is
 //! admitted only if it lowers the sum of squares by four. Limits: estimates at different τ are correlated, so
 //! no errors of h are given; white and flicker phase noise differ by a logarithm only and share what there is
@@ -9,7 +9,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::Point;
-use crate::analysis::expect::theory::clock::{EXPONENTS, PowerLaw, allan_variance_of_each};
+use crate::expect::theory::clock::{EXPONENTS, PowerLaw, allan_variance_of_each};
 
 /// What a further noise must take off the weighted sum of squares: that of two standard deviations.
 const WORTH: f64 = 4.0;

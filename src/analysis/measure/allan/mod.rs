@@ -12,7 +12,7 @@ pub mod noise;
 
 use freedom::Estimator;
 
-pub use crate::analysis::expect::theory::clock::Deviation;
+pub use crate::expect::theory::clock::Deviation;
 
 /// A deviation as estimated.
 #[derive(Clone, Copy, Debug, PartialEq)]

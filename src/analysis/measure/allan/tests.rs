@@ -3,7 +3,7 @@
 use super::fit::power_law;
 use super::freedom::{Estimator, degrees_of_freedom, interval};
 use super::*;
-use crate::analysis::expect::theory::clock::{EXPONENTS, white_phase};
+use crate::expect::theory::clock::{EXPONENTS, white_phase};
 
 /// The 1000 frequencies of SP 1065's test suite, from its generator, as 1001 phases.
 fn thousand_points() -> Vec<f64> {
@@ -271,10 +271,10 @@ fn freedom_by_spectrum(alpha: i32, order: i32, m: usize, terms: usize) -> f64 {
     let density = |k: usize| {
         let f = k.min(length - k) as f64 / length as f64;
         let response = (2.0 * libm::sin(std::f64::consts::PI * f * m as f64)).powi(2 * order);
-        rustfft::num_complex::Complex::new(if k == 0 { 0.0 } else { response * f.powi(alpha - 2) }, 0.0)
+        num_complex::Complex::new(if k == 0 { 0.0 } else { response * f.powi(alpha - 2) }, 0.0)
     };
     let mut covariance: Vec<_> = (0..length).map(density).collect();
-    rustfft::FftPlanner::new().plan_fft_forward(length).process(&mut covariance);
+    fft::Planner::<f64>::new().plan_fft_forward(length).process(&mut covariance);
     let square = |lag: usize| covariance[lag].re.powi(2) * (terms - lag) as f64;
     let sum = square(0) + 2.0 * (1..terms).map(square).sum::<f64>();
     (terms as f64 * covariance[0].re).powi(2) / sum

@@ -11,14 +11,14 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::theory::clock::PowerLaw;
-use crate::analysis::measure::allan::{self, Deviation, Point, decades, fit, octaves};
-use crate::analysis::measure::errors::Errors;
-use crate::analysis::read::spill_store::{SpillRow, Words};
-use crate::analysis::read::{Run, Table};
-use crate::analysis::statistics::{mean, median};
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::error::JudgeError;
+use crate::expect::theory::clock::PowerLaw;
+use crate::measure::allan::{self, Deviation, Point, decades, fit, octaves};
+use crate::measure::errors::Errors;
+use crate::read::spill_store::{SpillRow, Words};
+use crate::read::{Run, Table};
+use crate::statistics::{mean, median};
+use gnss::earth::SPEED_OF_LIGHT_MPS;
 
 /// Probability with which an interval contains the true deviation.
 pub const CONFIDENCE: f64 = 0.95;
@@ -239,7 +239,7 @@ impl Clock {
     }
 
     /// Gives the phases of its series back; what was found of them stays.
-    pub(in crate::analysis) fn forget_phases(&mut self) {
+    pub(crate) fn forget_phases(&mut self) {
         self.series.iter_mut().for_each(|series| series.phases_s = Vec::new());
     }
 
@@ -249,7 +249,7 @@ impl Clock {
     }
 
     /// Every point of every curve.
-    pub(in crate::analysis) fn stability(&self) -> impl Iterator<Item = AllanRow> + '_ {
+    pub(crate) fn stability(&self) -> impl Iterator<Item = AllanRow> + '_ {
         self.series.iter().flat_map(|series| {
             let of_one = |(deviation, points): &(Deviation, Vec<Point>)| {
                 let name = deviation.name();
@@ -262,7 +262,7 @@ impl Clock {
 
 /// A row of `allan.csv`.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub(in crate::analysis) struct AllanRow {
+pub(crate) struct AllanRow {
     series: Of,
     deviation: &'static str,
     tau_s: f64,

@@ -1,10 +1,10 @@
 //! The clock of a run made by hand: an oscillator of known noise, and a receiver of known error.
 
 use super::*;
-use crate::analysis::expect::theory::clock::PowerLaw;
-use crate::analysis::hand_made::{Draw, PLANTED, RATE_HZ, planted_run, write};
-use crate::analysis::judge;
-use crate::gnss::record::{Fix, TrajectoryRow};
+use crate::expect::theory::clock::PowerLaw;
+use crate::hand_made::{Draw, PLANTED, RATE_HZ, planted_run, write};
+use crate::judge;
+use gnss::record::{Fix, TrajectoryRow};
 use std::fs;
 use std::path::Path;
 

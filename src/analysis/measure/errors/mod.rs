@@ -1,7 +1,7 @@
 //! Estimate minus truth, row by row.
 //!
 //! Observations are joined on (sample, satellite, signal), fixes on the sample. Code errors are
-//! differences of [`crate::gnss::time::Epoch`]s, exact to 1e-16 s; a carrier is compared after one
+//! differences of [`gnss::time::Epoch`]s, exact to 1e-16 s; a carrier is compared after one
 //! constant, a multiple of half a cycle, is taken from each uninterrupted arc. What the receiver
 //! reports where the truth has no row (a satellite that is not there) is counted, not measured.
 
@@ -9,18 +9,18 @@ use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::multiple_access::MultipleAccess;
-use crate::analysis::read::numbers::Pooled;
-use crate::analysis::read::spill_store::{Finder, SpillRow, SpillStore, Words};
-use crate::analysis::read::{Numbers, Run, Table};
-use crate::analysis::statistics::median;
-use crate::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use crate::gnss::record::{Event, EventRow, Observation};
+use crate::error::JudgeError;
+use crate::expect::multiple_access::MultipleAccess;
+use crate::read::numbers::Pooled;
+use crate::read::spill_store::{Finder, SpillRow, SpillStore, Words};
+use crate::read::{Numbers, Run, Table};
+use crate::statistics::median;
+use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::record::{Event, EventRow, Observation};
 
-use crate::gnss::signal::Signal;
+use gnss::signal::Signal;
 
-pub use crate::gnss::signal::Link;
+pub use gnss::signal::Link;
 
 /// Errors of one observation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -444,7 +444,7 @@ fn first_jump(arc: &[SignalError]) -> Option<usize> {
 }
 
 /// [`first_jump`] of carriers in cycles.
-pub(in crate::analysis) fn first_jump_of(carrier: &[f64]) -> Option<usize> {
+pub(crate) fn first_jump_of(carrier: &[f64]) -> Option<usize> {
     (1..carrier.len().saturating_sub(1)).find(|&index| {
         let (before, after) = carrier.split_at(index);
         let (Some(last), Some(next)) = (before.last(), after.first()) else { return false };

@@ -1,14 +1,14 @@
 //! Joins and errors of rows made by hand.
 
 use super::*;
-use crate::analysis::hand_made::{PLANTED, RATE_HZ, planted, planted_run, write};
-use crate::analysis::measure::clock::Clock;
-use crate::analysis::read::Emission;
-use crate::analysis::waveform::{Edge, Sampler, Waveform};
-use crate::analysis::{Summary, judge};
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::synthetic::LONG_BOC;
+use crate::hand_made::{PLANTED, RATE_HZ, planted, planted_run, write};
+use crate::measure::clock::Clock;
+use crate::read::Emission;
+use crate::waveform::{Edge, Sampler, Waveform};
+use crate::{Summary, judge};
+use gnss::gps::l1ca::L1_CA;
+use gnss::satellite::Sv;
+use gnss::signal::synthetic::LONG_BOC;
 
 /// Ten observations a second, locked for five seconds at the first.
 pub fn arc(carrier: &[f64]) -> Vec<SignalError> {

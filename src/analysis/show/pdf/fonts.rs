@@ -5,10 +5,10 @@ use std::ops::Range;
 use ttf_parser::{Face as Parsed, GlyphId};
 
 use super::PdfError;
-use crate::analysis::show::plot::drawing::FONT as REGULAR;
+use crate::show::plot::drawing::FONT as REGULAR;
 
-static BOLD: &[u8] = include_bytes!("../../../../assets/DejaVuSans-Bold-subset.ttf");
-static MONO: &[u8] = include_bytes!("../../../../assets/DejaVuSansMono-subset.ttf");
+static BOLD: &[u8] = include_bytes!("../../assets/DejaVuSans-Bold-subset.ttf");
+static MONO: &[u8] = include_bytes!("../../assets/DejaVuSansMono-subset.ttf");
 
 /// Which font.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use super::fonts::{Face, Fonts};
 use super::{Item, Report, Tone, table};
-use crate::analysis::show::plot::drawing::Drawing;
+use crate::show::plot::drawing::Drawing;
 
 /// A4 in points, and its margins.
 pub(super) const PAGE: (f32, f32) = (595.28, 841.89);

@@ -15,7 +15,7 @@ mod write;
 
 use thiserror::Error;
 
-use crate::analysis::show::plot::drawing::Drawing;
+use crate::show::plot::drawing::Drawing;
 
 /// Why a report could not be made. Each is a fault of the program, not of its data.
 #[derive(Debug, Error)]

@@ -3,7 +3,7 @@
 use super::fonts::{Face, Fonts};
 use super::layout::{LEFT, Mark, PAGE, WIDTH, lay_out};
 use super::*;
-use crate::analysis::show::plot::canvas::{Axis, BLUE, Chart, Mark as Look, ORANGE, Series, WIDTH_PX, compose};
+use crate::show::plot::canvas::{Axis, BLUE, Chart, Mark as Look, ORANGE, Series, WIDTH_PX, compose};
 
 fn drawing(points: i32) -> Drawing {
     let wave = |n: i32| (f64::from(n), libm::sin(f64::from(n) * 0.1));

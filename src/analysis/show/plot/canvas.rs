@@ -10,10 +10,10 @@ use plotters::chart::LabelAreaPosition;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use crate::analysis::error::JudgeError;
-pub use crate::analysis::show::plot::chart::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
-use crate::analysis::show::plot::chart::{LIGHT, drawn};
-pub use crate::analysis::show::plot::drawing::{Area, Drawing, FINE, Failure};
+use crate::error::JudgeError;
+pub use crate::show::plot::chart::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::show::plot::chart::{LIGHT, drawn};
+pub use crate::show::plot::drawing::{Area, Drawing, FINE, Failure};
 
 /// Draws charts, `columns` a row, with one legend below all of them, into a picture of that size: a PNG, or
 /// an SVG where the file is named so.
@@ -30,7 +30,7 @@ pub fn figure(
     let failed = |error: Failure| JudgeError::Plot { path: path.to_owned(), reason: error.to_string() };
     let drawing = compose(size, columns, charts, legend).map_err(failed)?;
     if path.extension().is_some_and(|extension| extension == "svg") {
-        return crate::analysis::show::write::write_whole(path, drawing.svg.as_bytes());
+        return crate::show::write::write_whole(path, drawing.svg.as_bytes());
     }
     drawing.write_png(path, 1.0)
 }

@@ -2,14 +2,14 @@
 
 use plotters::style::RGBColor;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::expect::theory::clock::white_phase;
-use crate::analysis::measure::allan::{Deviation, Point};
-use crate::analysis::measure::clock::{ClockRow, Line, Of};
-use crate::analysis::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
-use crate::analysis::show::plot::chart::{Ends, Shown};
-use crate::analysis::show::plot::judged::Judged;
-use crate::analysis::show::plot::sketch::Sketch;
+use crate::error::JudgeError;
+use crate::expect::theory::clock::white_phase;
+use crate::measure::allan::{Deviation, Point};
+use crate::measure::clock::{ClockRow, Line, Of};
+use crate::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::show::plot::chart::{Ends, Shown};
+use crate::show::plot::judged::Judged;
+use crate::show::plot::sketch::Sketch;
 
 type Points = Vec<(f64, f64)>;
 

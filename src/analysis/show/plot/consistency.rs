@@ -1,11 +1,11 @@
 //! Errors of the fixes within twice the sigma that the receiver states, and the normalised error squared.
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::measure::consistency::{FREEDOM, NormalisedError};
-use crate::analysis::show::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
-use crate::analysis::show::plot::chart::{Ends, Shown};
-use crate::analysis::show::plot::judged::Judged;
-use crate::analysis::show::plot::sketch::Sketch;
+use crate::error::JudgeError;
+use crate::measure::consistency::{FREEDOM, NormalisedError};
+use crate::show::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::show::plot::chart::{Ends, Shown};
+use crate::show::plot::judged::Judged;
+use crate::show::plot::sketch::Sketch;
 
 /// Draws them.
 pub fn consistency(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {

@@ -1,13 +1,13 @@
 //! What the atmosphere truly adds to each satellite's code.
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::read::Emission;
-use crate::analysis::show::plot::canvas::{Axis, COLOURS, Chart, Mark, Series, WIDTH_PX};
-use crate::analysis::show::plot::chart::{Ends, Shown};
-use crate::analysis::show::plot::judged::Judged;
-use crate::analysis::show::plot::sketch::Sketch;
-use crate::gnss::record::SkyRow;
-use crate::gnss::satellite::Sv;
+use crate::error::JudgeError;
+use crate::read::Emission;
+use crate::show::plot::canvas::{Axis, COLOURS, Chart, Mark, Series, WIDTH_PX};
+use crate::show::plot::chart::{Ends, Shown};
+use crate::show::plot::judged::Judged;
+use crate::show::plot::sketch::Sketch;
+use gnss::record::SkyRow;
+use gnss::satellite::Sv;
 
 /// Slant delays over time, satellite by satellite: ionosphere above, troposphere below.
 pub fn delays(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {

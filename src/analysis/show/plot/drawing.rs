@@ -16,7 +16,7 @@ use plotters::style::{FontStyle, register_font};
 use resvg::usvg::fontdb;
 use resvg::{tiny_skia, usvg};
 
-use crate::analysis::error::JudgeError;
+use crate::error::JudgeError;
 
 /// Virtual pixels in one pixel of the picture.
 pub const FINE: i32 = 4;
@@ -30,7 +30,7 @@ pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 pub type Failure = Box<dyn Error>;
 
 /// DejaVu Sans (assets/README.md).
-pub(crate) static FONT: &[u8] = include_bytes!("../../../../assets/DejaVuSans.ttf");
+pub(crate) static FONT: &[u8] = include_bytes!("../../assets/DejaVuSans.ttf");
 
 /// A vector picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -110,7 +110,7 @@ impl Drawing {
     /// Writes that PNG.
     pub(crate) fn write_png(&self, path: &Path, scale: f32) -> Result<(), JudgeError> {
         let failed = |error: Failure| JudgeError::Plot { path: path.to_owned(), reason: error.to_string() };
-        crate::analysis::show::write::write_whole(path, &self.png(scale).map_err(failed)?)
+        crate::show::write::write_whole(path, &self.png(scale).map_err(failed)?)
     }
 }
 

@@ -1,11 +1,11 @@
 //! Errors of observations over elevation, and the multipath combination over time.
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::measure::elevation::{Point, points};
-use crate::analysis::show::plot::canvas::{Axis, Chart, WIDTH_PX};
-use crate::analysis::show::plot::judged::Judged;
-use crate::analysis::show::plot::signals::{Cloud, Frame, See, legend, observed, over_time};
-use crate::analysis::show::plot::sketch::Sketch;
+use crate::error::JudgeError;
+use crate::measure::elevation::{Point, points};
+use crate::show::plot::canvas::{Axis, Chart, WIDTH_PX};
+use crate::show::plot::judged::Judged;
+use crate::show::plot::signals::{Cloud, Frame, See, legend, observed, over_time};
+use crate::show::plot::sketch::Sketch;
 
 /// Draws them.
 pub fn elevation(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {

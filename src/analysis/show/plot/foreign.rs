@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::judge::foreign::Judged;
-use crate::analysis::judge::foreign::measured::ObservationError;
-use crate::analysis::show::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, figure};
-use crate::analysis::statistics::{mean, percentile};
+use crate::error::JudgeError;
+use crate::judge::foreign::Judged;
+use crate::judge::foreign::measured::ObservationError;
+use crate::show::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, figure};
+use crate::statistics::{mean, percentile};
 
 type Points = Vec<(f64, f64)>;
 
@@ -76,7 +76,7 @@ fn observables(path: &Path, judged: &Judged) -> Result<(), JudgeError> {
 
 fn position(path: &Path, judged: &Judged) -> Result<(), JudgeError> {
     let Some(places) = &judged.places else { return Ok(()) };
-    let over = |of: fn(&crate::analysis::judge::foreign::place::FixError) -> f64| -> Points {
+    let over = |of: fn(&crate::judge::foreign::place::FixError) -> f64| -> Points {
         places.rows.iter().map(|row| (row.label_s, of(row))).collect()
     };
     let legend = vec![

@@ -2,13 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::judge::judgement::digits;
-use crate::analysis::judge::summary::{DLL_CHIPS, FLL_HZ, PLL_DEG};
-use crate::analysis::read::Numbers;
-use crate::analysis::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREY, Mark, ORANGE, Series, WIDTH_PX};
-use crate::analysis::show::plot::judged::Judged;
-use crate::analysis::show::plot::sketch::Sketch;
+use crate::error::JudgeError;
+use crate::judge::judgement::digits;
+use crate::judge::summary::{DLL_CHIPS, FLL_HZ, PLL_DEG};
+use crate::read::Numbers;
+use crate::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::show::plot::judged::Judged;
+use crate::show::plot::sketch::Sketch;
 
 /// The errors of one loop, each satellite about its own mean, and the rule for their σ.
 pub(crate) struct Loop {

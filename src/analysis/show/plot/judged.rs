@@ -1,11 +1,11 @@
 //! What pictures and reports are made from.
 
-use crate::analysis::judge::summary::Summary;
-use crate::analysis::measure::clock::Clock;
-use crate::analysis::measure::consistency::Consistency;
-use crate::analysis::measure::errors::Errors;
-use crate::analysis::read::Run;
-use crate::analysis::show::plot::chart::Axis;
+use crate::judge::summary::Summary;
+use crate::measure::clock::Clock;
+use crate::measure::consistency::Consistency;
+use crate::measure::errors::Errors;
+use crate::read::Run;
+use crate::show::plot::chart::Axis;
 
 /// Everything that a picture is drawn from.
 pub(crate) struct Judged<'a> {

@@ -27,7 +27,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use crate::analysis::error::JudgeError;
+use crate::error::JudgeError;
 use canvas::Failure;
 use drawing::Drawing;
 pub(crate) use judged::Judged;

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::show::plot::canvas::WIDTH_PX;
-use crate::analysis::show::plot::judged::Judged;
-use crate::analysis::show::plot::signals::{Frame, legend, observed, of_observations, over_time};
-use crate::analysis::show::plot::sketch::Sketch;
+use crate::error::JudgeError;
+use crate::show::plot::canvas::WIDTH_PX;
+use crate::show::plot::judged::Judged;
+use crate::show::plot::signals::{Frame, legend, observed, of_observations, over_time};
+use crate::show::plot::sketch::Sketch;
 
 /// Code errors over time, and the amplitude of all rays against the direct one.
 pub fn multipath(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {

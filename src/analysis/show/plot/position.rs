@@ -2,16 +2,16 @@
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::measure::errors::PositionError;
-use crate::analysis::measure::spoofing;
-use crate::analysis::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
-use crate::analysis::show::plot::chart::{Ends, Shown};
-use crate::analysis::show::plot::judged::Judged;
-use crate::analysis::show::plot::sketch::Sketch;
-use crate::analysis::statistics::percentile;
-use crate::gnss::earth::Geodetic;
-use crate::gnss::record::Fix;
+use crate::error::JudgeError;
+use crate::measure::errors::PositionError;
+use crate::measure::spoofing;
+use crate::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::show::plot::chart::{Ends, Shown};
+use crate::show::plot::judged::Judged;
+use crate::show::plot::sketch::Sketch;
+use crate::statistics::percentile;
+use gnss::earth::Geodetic;
+use gnss::record::Fix;
 
 type Points = Vec<(f64, f64)>;
 

@@ -1,13 +1,13 @@
 //! Loops and observations over time, satellite by satellite.
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::measure::errors::{Link, SignalError};
-use crate::analysis::show::plot::canvas::{Axis, Chart, Mark, Series, WIDTH_PX};
-use crate::analysis::show::plot::chart::{Ends, Shown};
-use crate::analysis::show::plot::judged::Judged;
-use crate::analysis::show::plot::sketch::Sketch;
-use crate::analysis::statistics::ranked;
-use crate::gnss::record::TrackingRow;
+use crate::error::JudgeError;
+use crate::measure::errors::{Link, SignalError};
+use crate::show::plot::canvas::{Axis, Chart, Mark, Series, WIDTH_PX};
+use crate::show::plot::chart::{Ends, Shown};
+use crate::show::plot::judged::Judged;
+use crate::show::plot::sketch::Sketch;
+use crate::statistics::ranked;
+use gnss::record::TrackingRow;
 
 /// What points are shown to, one after the other.
 pub(super) type See<'a> = &'a mut dyn FnMut(f64, f64);

@@ -3,12 +3,12 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::show::plot::canvas::{Area, FINE, Failure, GREY, WIDTH_PX, anchored};
-use crate::analysis::show::plot::judged::Judged;
-use crate::analysis::show::plot::sketch::Sketch;
-use crate::analysis::statistics::mean;
-use crate::gnss::satellite::{Sv, System};
+use crate::error::JudgeError;
+use crate::show::plot::canvas::{Area, FINE, Failure, GREY, WIDTH_PX, anchored};
+use crate::show::plot::judged::Judged;
+use crate::show::plot::sketch::Sketch;
+use crate::statistics::mean;
+use gnss::satellite::{Sv, System};
 
 const HEIGHT_PX: i32 = 490;
 const CENTRE: (i32, i32) = (290 * FINE, 255 * FINE);

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::read::Run;
-use crate::analysis::show::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
-use crate::analysis::show::plot::judged::Judged;
-use crate::analysis::show::plot::sketch::Sketch;
-use crate::gnss::record::AcquisitionRow;
-use crate::gnss::signal::{Link, Signal};
+use crate::error::JudgeError;
+use crate::read::Run;
+use crate::show::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::show::plot::judged::Judged;
+use crate::show::plot::sketch::Sketch;
+use gnss::record::AcquisitionRow;
+use gnss::signal::{Link, Signal};
 
 /// Measured density and the theory's; nothing without `psd.csv`.
 pub fn psd(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {

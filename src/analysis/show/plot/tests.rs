@@ -4,10 +4,10 @@ use std::fs;
 use std::path::Path;
 
 use super::*;
-use crate::analysis::hand_made::{Draw, RATE_HZ, planted};
-use crate::analysis::judge;
-use crate::analysis::measure::psd::Psd;
-use crate::analysis::show::tables;
+use crate::hand_made::{Draw, RATE_HZ, planted};
+use crate::judge;
+use crate::measure::psd::Psd;
+use crate::show::tables;
 
 #[test]
 fn every_picture_is_a_png_that_is_not_blank_and_its_numbers_are_in_a_table() {

@@ -3,11 +3,11 @@
 
 use serde_json::Value;
 
-use crate::analysis::judge::judgement::number;
-use crate::analysis::judge::schema;
-use crate::analysis::measure::errors::{PULL_IN_S, SLIP_CYCLES};
-use crate::analysis::show::pdf::{Report, Side, Table};
-use crate::analysis::show::plot::Judged;
+use crate::judge::judgement::number;
+use crate::judge::schema;
+use crate::measure::errors::{PULL_IN_S, SLIP_CYCLES};
+use crate::show::pdf::{Report, Side, Table};
+use crate::show::plot::Judged;
 
 /// Adds both.
 pub(super) fn add(report: &mut Report, judged: &Judged<'_>) {

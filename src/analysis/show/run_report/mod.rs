@@ -8,13 +8,13 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::judge::judgement::{Status, number};
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::show::pdf::{Cell, Item, Report, Side, Table, Tone};
-use crate::analysis::show::plot::drawing::Drawing;
-use crate::analysis::show::plot::{Judged, Picture};
-use crate::analysis::show::write::write_whole;
+use crate::error::JudgeError;
+use crate::judge::judgement::{Status, number};
+use crate::judge::verdict::Verdict;
+use crate::show::pdf::{Cell, Item, Report, Side, Table, Tone};
+use crate::show::plot::drawing::Drawing;
+use crate::show::plot::{Judged, Picture};
+use crate::show::write::write_whole;
 
 /// A run's report, complete but for its pictures.
 pub(crate) struct RunReport {

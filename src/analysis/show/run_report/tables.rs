@@ -1,13 +1,13 @@
 //! The tables of a run's report.
 
-use crate::analysis::error::JudgeError;
-use crate::analysis::judge::judgement::number;
-use crate::analysis::measure::errors::Link;
-use crate::analysis::read::Numbers;
-use crate::analysis::show::pdf::{Report, Side, Table};
-use crate::analysis::show::plot::Judged;
-use crate::analysis::statistics::{Spread, Sum};
-use crate::gnss::record::{Event, EventRow};
+use crate::error::JudgeError;
+use crate::judge::judgement::number;
+use crate::measure::errors::Link;
+use crate::read::Numbers;
+use crate::show::pdf::{Report, Side, Table};
+use crate::show::plot::Judged;
+use crate::statistics::{Spread, Sum};
+use gnss::record::{Event, EventRow};
 
 /// Most rows of the table of events.
 const MOST_EVENTS: usize = 30;

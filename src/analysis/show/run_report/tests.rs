@@ -2,8 +2,8 @@
 
 use std::fs;
 
-use crate::analysis::hand_made::planted;
-use crate::analysis::judge;
+use crate::hand_made::planted;
+use crate::judge;
 
 #[test]
 fn the_report_of_a_run_is_the_same_twice_and_has_its_fonts_and_pages() {

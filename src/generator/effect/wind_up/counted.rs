@@ -8,8 +8,8 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Mutex, PoisonError};
 
-use crate::generator::vehicle::grown::Grown;
-use crate::gnss::satellite::Sv;
+use crate::vehicle::grown::Grown;
+use gnss::satellite::Sv;
 
 /// Ticks that are kept of a satellite: some batches.
 const KEPT: usize = 1024;

@@ -1,7 +1,7 @@
 //! Keys of the receiver's hardware, and of a transmitter that plays signals back.
 
-use crate::generator::clock::oscillator::PowerLaw;
-use crate::generator::scenario::schema::{Key, flag, integer, number, numbers, table, text, word, words};
+use crate::clock::oscillator::PowerLaw;
+use crate::scenario::schema::{Key, flag, integer, number, numbers, table, text, word, words};
 
 pub(crate) const FRONT_END: &[Key] = &[
     text(

@@ -7,9 +7,9 @@ pub(crate) mod spoofing_and_jamming;
 pub(crate) mod way;
 
 use super::schema::{Key, flag, foreign, integer, number, one_or_more, table, tables, text, texts, time, word, words};
-use crate::generator::scene::{Arithmetic, CodeEdge, Grade};
-use crate::gnss::facts::{Fixes, Losses, Sizes};
-use crate::gnss::signal::{Layers, SIGNALS};
+use crate::scene::{Arithmetic, CodeEdge, Grade};
+use gnss::facts::{Fixes, Losses, Sizes};
+use gnss::signal::{Layers, SIGNALS};
 
 pub(super) const A_PATH: &str = "a path";
 pub(super) const SATELLITES: &str = "an array of satellites like [\"G01\", \"G12\"]";

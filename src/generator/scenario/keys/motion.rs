@@ -1,7 +1,7 @@
 //! Keys of `[motion]` and `[attitude]`.
 
 use super::A_PATH;
-use crate::generator::scenario::schema::{Key, number, numbers, tables, text, word};
+use crate::scenario::schema::{Key, number, numbers, tables, text, word};
 
 const fn latitude() -> Key {
     number("latitude_deg", -90.0, 90.0, "deg", "geodetic latitude, WGS 84")

@@ -1,10 +1,10 @@
 //! Keys of `[orbits]`, `[sbas]`, `[[satellite_fault]]`, `[[message_fault]]` and `[power]`.
 
 use super::{A_PATH, LONGEST_S, SATELLITES};
-use crate::generator::clock::oscillator::PowerLaw;
-use crate::generator::effect::transmit::Block;
-use crate::generator::scenario::schema::{Key, by_satellite, flag, integer, number, numbers, text, texts, word, words};
-use crate::gnss::signal::SIGNALS;
+use crate::clock::oscillator::PowerLaw;
+use crate::effect::transmit::Block;
+use crate::scenario::schema::{Key, by_satellite, flag, integer, number, numbers, text, texts, word, words};
+use gnss::signal::SIGNALS;
 
 const OFFSET: Key = number("G01", -5.0, 5.0, "m", "of one satellite, by its name");
 const CN0: Key = number("G01", 0.0, 100.0, "dB-Hz", "C/N0 of one satellite, by its name");

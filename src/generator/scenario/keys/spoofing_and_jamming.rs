@@ -2,7 +2,7 @@
 
 use super::motion::{MOTION, PLACE_IF_ANY};
 use super::{A_PATH, LONGEST_S, SATELLITES};
-use crate::generator::scenario::schema::{Key, flag, number, table, text, word, words};
+use crate::scenario::schema::{Key, flag, number, table, text, word, words};
 
 const SWEEP: &[&str] = &["chirp", "fmcw"];
 const FM: &[&str] = &["sine_fm"];

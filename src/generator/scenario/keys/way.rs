@@ -1,7 +1,7 @@
 //! Keys of what lies between satellites and antenna.
 
 use super::{A_PATH, SATELLITES};
-use crate::generator::scenario::schema::{Key, list, number, numbers, text, time, word, words};
+use crate::scenario::schema::{Key, list, number, numbers, text, time, word, words};
 
 const KLOBUCHAR: &[&str] = &["klobuchar"];
 const SHELL: &[&str] = &["constant_tec", "ionex"];

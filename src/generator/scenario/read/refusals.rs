@@ -3,14 +3,16 @@
 use std::fmt::Display;
 use std::ops::Range;
 
-use crate::generator::scenario::ScenarioError;
+use crate::scenario::ScenarioError;
 
 /// Placeholder for the value of an absent key; a text would have quotes.
 pub(super) const ABSENT: &str = "absent";
 
 /// The text of a scenario and where it came from.
-pub(crate) struct Source<'t> {
+pub struct Source<'t> {
+    /// What the text is called in messages.
     pub origin: &'t str,
+    /// The whole text.
     pub text: &'t str,
 }
 
@@ -32,6 +34,7 @@ impl Display for Place {
 }
 
 impl Source<'_> {
+    /// Line and character of a byte of the text.
     pub fn place(&self, byte: usize) -> Place {
         let before = self.text.get(..byte).unwrap_or(self.text);
         let line_start = before.rfind('\n').map_or(0, |i| i + 1);
@@ -55,9 +58,10 @@ impl Source<'_> {
 
 /// Refusals as they are met, each once.
 #[derive(Debug, Default)]
-pub(crate) struct Refusals(Vec<ScenarioError>);
+pub struct Refusals(Vec<ScenarioError>);
 
 impl Refusals {
+    /// Takes in an error, unless one of the same key is there already.
     pub fn add(&mut self, error: ScenarioError) {
         match error {
             ScenarioError::Several(errors) => errors.into_iter().for_each(|error| self.add(error)),

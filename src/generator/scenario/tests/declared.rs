@@ -55,7 +55,7 @@ fn every_mistyped_key_is_refused_at_its_place_with_the_right_one() {
 
 #[test]
 fn every_declared_key_is_read_by_a_reader() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/generator/scenario");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenario");
     let sources = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
     let sources: Vec<String> = sources
         .filter(|path| path.extension().is_some_and(|e| e == "rs") && !path.ends_with("tests.rs"))
@@ -78,7 +78,7 @@ fn an_empty_table_means_what_an_absent_one_means() {
         assert_eq!(empty, absent, "{table}");
     }
     let weather = parse(&format!("{MINIMAL}{STATIC}[troposphere]\nmodel = \"saastamoinen\"\n")).unwrap().troposphere;
-    assert_eq!(weather.unwrap().weather, crate::generator::effect::troposphere::Weather::STANDARD);
+    assert_eq!(weather.unwrap().weather, crate::effect::troposphere::Weather::STANDARD);
 }
 
 #[test]

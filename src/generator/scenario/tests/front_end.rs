@@ -9,7 +9,7 @@ fn of(tables: &str) -> Result<Scenario, String> {
     parse(&format!("{MINIMAL}{STATIC}{tables}")).map_err(|e| e.to_string())
 }
 
-fn composed(tables: &str) -> Result<(Vec<crate::generator::scene::Scene>, Vec<String>), String> {
+fn composed(tables: &str) -> Result<(Vec<crate::scene::Scene>, Vec<String>), String> {
     of(tables)?.compose_all(Path::new("scenarios"), &Overrides::default()).map_err(|e| e.to_string())
 }
 
@@ -29,7 +29,7 @@ fn every_front_end_of_a_list_becomes_the_scene_that_it_is_alone() {
     assert_eq!(both.front_end_names(), ["wide", "narrow"]);
     let (scenes, _) = both.compose_all(Path::new("scenarios"), &Overrides::default()).unwrap();
     let facts = |number: usize| {
-        let scene: &crate::generator::scene::Scene = &scenes[number];
+        let scene: &crate::scene::Scene = &scenes[number];
         (scene.metadata.center_hz, scene.clock.rate.hz(), scene.samples, scene.front_end.len())
     };
     assert_eq!((facts(0), facts(1)), ((1575.42e6, 10e6, 100_000_000, 0), (1575.9e6, 4e6, 40_000_000, 1)));

@@ -1,7 +1,7 @@
 //! What lies between satellites and antenna, as a scenario writes it.
 
 use super::*;
-use crate::gnss::gps::lnav;
+use gnss::gps::lnav;
 
 pub(super) const IONEX: &str = "[ionosphere]\nmodel = \"ionex\"\nfile = \"igrg3380.10i.gz\"\nmap_start = \
                                 2010-12-04T10:00:00\n\
@@ -17,7 +17,7 @@ pub(super) const VIENNA: &str = "[troposphere]\nmodel = \"saastamoinen\"\nmappin
 
 #[test]
 fn what_the_satellites_send_stands_apart_from_what_nature_does() {
-    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
     let sent = "broadcast_alpha = [2e-8, 0, 0, 0]\nbroadcast_beta = [1e5, 0, 0, 0]\n";
     let message = |lines: &str| {
         let text = format!("{MINIMAL}{STATIC}{lines}");
@@ -36,7 +36,7 @@ fn what_the_satellites_send_stands_apart_from_what_nature_does() {
     assert!(truth.contains("IONEX") && truth.contains("bicubic"), "{truth}");
     // 2e-8 in steps of 2^-30.
     assert!((found.unwrap().alpha[0] - 2e-8).abs() < 5e-10);
-    let file = crate::gnss::rinex::embedded().unwrap().klobuchar.unwrap();
+    let file = gnss::rinex::embedded().unwrap().klobuchar.unwrap();
     for lines in [IONEX, TEC] {
         assert!((message(lines).1.unwrap().alpha[0] - file.alpha[0]).abs() < 5e-10);
     }
@@ -44,7 +44,7 @@ fn what_the_satellites_send_stands_apart_from_what_nature_does() {
 
 #[test]
 fn maps_of_another_day_are_refused_unless_the_scene_says_so() {
-    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
     let compose = |lines: &str| {
         let text = format!("{MINIMAL}{STATIC}{lines}");
         let composed = parse(&text).unwrap().compose(&directory, &Overrides::default());

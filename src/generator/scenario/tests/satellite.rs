@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use super::*;
-use crate::generator::message::{self, MessageFault, Slot};
-use crate::gnss::galileo::inav::INAV;
-use crate::gnss::satellite::System;
-use crate::gnss::time::GST;
+use crate::message::{self, MessageFault, Slot};
+use gnss::galileo::inav::INAV;
+use gnss::satellite::System;
+use gnss::time::GST;
 
 /// Every key of the tables.
 pub(super) const FAULTS: &str = "[orbits]\nsp3 = [\"a.sp3\", \"b.sp3.gz\"]\nantenna_offset_m = 0.7\n\
@@ -57,7 +57,7 @@ fn orbits_and_faults_arrive_as_written() {
 fn faults_that_cannot_be_are_refused_with_their_remedy() {
     let refused = |text: &str| match parse(&format!("{MINIMAL}{STATIC}{text}")) {
         Err(error) => error.to_string(),
-        Ok(scenario) => scenario.compose(Path::new("."), &Overrides::default()).err().unwrap().to_string(),
+        Ok(scenario) => scenario.compose(Path::new("../.."), &Overrides::default()).err().unwrap().to_string(),
     };
     let fault = |lines: &str| format!("[[satellite_fault]]\n{lines}\n");
     let message = |lines: &str| format!("[[message_fault]]\nsatellites = [\"G13\"]\n{lines}\n");
@@ -90,7 +90,7 @@ fn orbits_that_do_not_reach_over_the_scene_are_refused_with_their_reach() {
     let composed = |start: &str, tables: &str| {
         let text = replaced(&format!("{MINIMAL}{STATIC}"), "", "start", start) + "\n" + tables;
         let scenario = parse(&text).unwrap();
-        scenario.compose(Path::new("."), &Overrides::default()).map_err(|e| e.to_string())
+        scenario.compose(Path::new("../.."), &Overrides::default()).map_err(|e| e.to_string())
     };
     // 00:00 to 23:45 every 15 minutes: five epochs before the one at the start, five after that at the end.
     let early = composed("2010-07-01T01:00:00", witness).err().unwrap();
@@ -115,7 +115,7 @@ fn of_galileo(fault: &str) -> Result<(Vec<bool>, Vec<bool>), String> {
         "name = \"x\"\nstart = 2020-11-29T12:50:30\nduration_s = 60\nsignals = [\"GPS L1 C/A\", \"Galileo E1\"]\n";
     let text = format!("{scene}{STATIC}\n[[message_fault]]\n{fault}\n");
     let scenario = parse(&text).map_err(|e| e.to_string())?;
-    let (scene, _) = scenario.compose(Path::new("."), &Overrides::default()).map_err(|e| e.to_string())?;
+    let (scene, _) = scenario.compose(Path::new("../.."), &Overrides::default()).map_err(|e| e.to_string())?;
     let sv = Sv { system: System::Galileo, number: 12 };
     let set = scene.catalogue.sent_at(sv, scene.clock.start).unwrap();
     let sender = scene.messages.of(&INAV).unwrap();

@@ -22,9 +22,9 @@ const SHIPPED: [(&str, &str); 16] = [
     ("satellite_faults", include_str!("../../../../scenarios/satellite_faults.toml")),
 ];
 
-fn shipped(name: &str) -> crate::generator::scene::Scene {
+fn shipped(name: &str) -> crate::scene::Scene {
     let (_, text) = SHIPPED.iter().find(|(n, _)| *n == name).unwrap();
-    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
     let (scene, warnings) = Scenario::parse(text, name).unwrap().compose(&directory, &Overrides::default()).unwrap();
     // The one rogue record of that day, and the satellites that say themselves that they are unhealthy.
     assert!(warnings.len() <= 2 && warnings.iter().all(|w| w.contains("left out")), "{name}: {warnings:?}");
@@ -56,7 +56,7 @@ fn the_shipped_motions_do_what_their_comments_say() {
     let rocket = shipped("high_dynamics").trajectory;
     let extremes = rocket.extremes(110.0);
     assert!(extremes.acceleration_mps2 > 20.0 * g && extremes.speed_mps > 700.0, "{extremes:?}");
-    let height_m = |t_s| crate::gnss::earth::Geodetic::from_ecef(&rocket.at(t_s).position_m).height_m;
+    let height_m = |t_s| gnss::earth::Geodetic::from_ecef(&rocket.at(t_s).position_m).height_m;
     assert!(height_m(40.0) < 130.001 && height_m(110.0) > 10_000.0);
     let ride = shipped("trajectory_file").trajectory.extremes(60.0);
     assert!(ride.speed_mps < 4.0 && ride.acceleration_mps2 < 1.0, "{ride:?}");
@@ -72,11 +72,11 @@ fn the_boost_changes_some_satellite_s_doppler_by_about_a_thousand_hertz_a_second
             let t_s = 40.0 + f64::from(k) * 0.1;
             let range = |t_s: f64| {
                 let at = scene.clock.start.plus_s(t_s);
-                let found = crate::generator::sky::emission(&scene.catalogue, sv, at, &scene.trajectory.at(t_s));
+                let found = crate::sky::emission(&scene.catalogue, sv, at, &scene.trajectory.at(t_s));
                 found.unwrap().map_or(f64::NAN, |e| e.sight.range_m)
             };
             let bend = (range(t_s + d) - 2.0 * range(t_s) + range(t_s - d)) / (d * d);
-            fastest = fastest.max((bend / crate::gnss::gps::l1ca::L1_CA.wavelength_m(Sv::gps(1))).abs());
+            fastest = fastest.max((bend / gnss::gps::l1ca::L1_CA.wavelength_m(Sv::gps(1))).abs());
         }
     }
     assert!((950.0..1150.0).contains(&fastest), "{fastest}");
@@ -84,14 +84,14 @@ fn the_boost_changes_some_satellite_s_doppler_by_about_a_thousand_hertz_a_second
 
 #[test]
 fn the_static_scene_sends_its_ionosphere_within_thirty_seconds() {
-    use crate::gnss::gps::lnav::{self, Subframe};
+    use gnss::gps::lnav::{self, Subframe};
     let scene = shipped("static");
     let first_bit = scene.clock.start.plus_s(20.0);
     let ephemeris = scene.catalogue.sent_at(Sv::gps(13), first_bit).unwrap();
     let symbols = scene.messages.of(&lnav::LNAV).unwrap().unit(ephemeris, first_bit).unwrap();
     let subframe = Subframe::decode(&lnav::words(&symbols), 0).unwrap();
     let sent = subframe.klobuchar().unwrap();
-    let file = crate::gnss::rinex::embedded().unwrap().klobuchar.unwrap();
+    let file = gnss::rinex::embedded().unwrap().klobuchar.unwrap();
     for (sent, file) in sent.alpha.iter().zip(file.alpha) {
         // RINEX 2 prints five significant digits; half a step of the finest field is 2^-31 (IS-GPS-200N,
         // table 20-X).

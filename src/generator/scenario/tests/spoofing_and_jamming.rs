@@ -76,8 +76,8 @@ fn behind_a_link_budget_js_counts_from_the_strongest_satellite_at_the_start() {
     let mut found: Vec<(f64, Sv)> = Vec::new();
     for sv in scene.catalogue.satellites() {
         let local = scene.clock.start;
-        if crate::generator::truth::in_view(&scene, sv, local).unwrap() {
-            let seen = crate::generator::truth::seen(&scene, sv, scene.signals[0], local).unwrap().unwrap();
+        if crate::truth::in_view(&scene, sv, local).unwrap() {
+            let seen = crate::truth::seen(&scene, sv, scene.signals[0], local).unwrap().unwrap();
             found.push((10.0 * libm::log10(seen.rays[0].cn0_hz), sv));
         }
     }
@@ -85,7 +85,7 @@ fn behind_a_link_budget_js_counts_from_the_strongest_satellite_at_the_start() {
     assert!(found.len() > 5 && (45.0..53.0).contains(&most.0), "{found:?}");
     let jn0_dbhz = 10.0 * libm::log10(scene.interference[0].jn0_hz);
     assert!((jn0_dbhz - most.0 - 20.0).abs() < 1e-9, "{jn0_dbhz} {most:?}");
-    let levels = crate::generator::levels::Levels::new(&scene).unwrap();
+    let levels = crate::levels::Levels::new(&scene).unwrap();
     assert!(levels.strongest.is_some_and(|(sv, cn0)| sv == most.1 && (cn0 - most.0).abs() < 1e-9));
     assert!(levels.to_string().contains(&format!("J/S 20.0 dB over {}", most.1)), "{levels}");
 }

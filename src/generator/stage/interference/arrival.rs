@@ -7,12 +7,12 @@
 
 use nalgebra::Vector3;
 
-use crate::generator::clock::ReceiverClock;
-use crate::generator::vehicle::Trajectory;
-use crate::gnss::earth::{SPEED_OF_LIGHT_MPS, rotate_earth};
-use crate::gnss::samples::IfMetadata;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::{Rate, SampleClock, tone_turns};
+use crate::clock::ReceiverClock;
+use crate::vehicle::Trajectory;
+use gnss::earth::{SPEED_OF_LIGHT_MPS, rotate_earth};
+use gnss::samples::IfMetadata;
+use gnss::signal::Signal;
+use gnss::time::{Rate, SampleClock, tone_turns};
 
 /// What the receiver does to any wave from its antenna to its samples.
 #[derive(Clone, Debug)]
@@ -198,7 +198,7 @@ mod tests {
     #[test]
     fn a_carrier_follows_the_clock_and_the_mirror() {
         let mut tuning = Tuning {
-            clock: SampleClock { start: crate::gnss::time::Epoch::new(0, 0.0), rate: Rate::from_hz(4e6).unwrap() },
+            clock: SampleClock { start: gnss::time::Epoch::new(0, 0.0), rate: Rate::from_hz(4e6).unwrap() },
             receiver_clock: ReceiverClock::steady(0.0, 0.0),
             center_hz: 1_575.42e6,
             inverted: false,

@@ -13,19 +13,19 @@ use std::sync::Arc;
 
 use arrival::{Path, Repetition, Tuning};
 
-use crate::generator::random::mix;
-use crate::generator::stage::{Block, Stage};
-use crate::generator::switches::{Source, Switches};
-use crate::generator::synth::band::Filter;
-use crate::generator::synth::chips::MARGIN_STEPS;
-use crate::generator::synth::isa::{self, Level};
-use crate::generator::synth::lanes::Buffers;
-use crate::generator::synth::noise::BLOCK_SAMPLES;
-use crate::generator::synth::resample::{Interpolator, Position, draw};
-use crate::generator::synth::tone::{Modulation, Tone};
-use crate::generator::synth::{CODE_ONE, Edge, Run};
-use crate::gnss::facts::Interference;
-use crate::gnss::record::InterferenceRow;
+use crate::random::mix;
+use crate::stage::{Block, Stage};
+use crate::switches::{Source, Switches};
+use crate::synth::band::Filter;
+use crate::synth::chips::MARGIN_STEPS;
+use crate::synth::isa::{self, Level};
+use crate::synth::lanes::Buffers;
+use crate::synth::noise::BLOCK_SAMPLES;
+use crate::synth::resample::{Interpolator, Position, draw};
+use crate::synth::tone::{Modulation, Tone};
+use crate::synth::{CODE_ONE, Edge, Run};
+use gnss::facts::Interference;
+use gnss::record::InterferenceRow;
 
 /// Samples of a run, on an absolute grid.
 const RUN: u64 = BLOCK_SAMPLES as u64;

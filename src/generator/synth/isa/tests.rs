@@ -3,18 +3,18 @@
 //! reach beyond the planes.
 
 use super::*;
-use crate::generator::synth::band::Filter;
-use crate::generator::synth::chips::{CodeTime, MAX_STEP};
-use crate::generator::synth::tone::Modulation;
-use crate::generator::synth::waveform::{Waveform, plain};
-use crate::generator::synth::{CODE_ONE, reference};
-use crate::gnss::beidou::b1c::B1C;
-use crate::gnss::beidou::b2a::B2A;
-use crate::gnss::galileo::e1::E1;
-use crate::gnss::gps::l1c::L1C;
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Layers;
+use crate::synth::band::Filter;
+use crate::synth::chips::{CodeTime, MAX_STEP};
+use crate::synth::tone::Modulation;
+use crate::synth::waveform::{Waveform, plain};
+use crate::synth::{CODE_ONE, reference};
+use gnss::beidou::b1c::B1C;
+use gnss::beidou::b2a::B2A;
+use gnss::galileo::e1::E1;
+use gnss::gps::l1c::L1C;
+use gnss::gps::l1ca::L1_CA;
+use gnss::satellite::Sv;
+use gnss::signal::Layers;
 
 /// Longest length, number of offsets, and a plane that holds both.
 const LENGTHS: usize = 130;
@@ -202,7 +202,7 @@ fn tones_are_their_twins_at_every_length_and_offset() {
         |i, q| {
             for (n, (i, q)) in (0_u64..).zip(i.iter().zip(q)) {
                 let turns = tone.turns.wrapping_add(tone.turns_step.wrapping_mul(n));
-                let (sin, cos) = libm::sincos(crate::generator::synth::radians(turns));
+                let (sin, cos) = libm::sincos(crate::synth::radians(turns));
                 // Sines of 3e-7 and an angle of 2⁻³² turn.
                 assert!((f64::from(*i) - cos).abs().max((f64::from(*q) - sin).abs()) < 4e-7);
             }
@@ -235,7 +235,7 @@ fn waves_are_interpolated_and_turned_as_their_twins_do_at_every_length_and_offse
         |i, q| {
             for (n, (i, q)) in i.iter().zip(q).enumerate() {
                 let turns = carrier.0.wrapping_add(carrier.1.wrapping_mul(n as u64));
-                let (sin, cos) = libm::sincos(crate::generator::synth::radians(turns));
+                let (sin, cos) = libm::sincos(crate::synth::radians(turns));
                 let (wi, wq) = (f64::from(source.0[7 + n]), f64::from(source.1[3 + n]));
                 let (re, im) = (0.5 * (wi * cos - wq * sin), 0.5 * (wi * sin + wq * cos));
                 // Five deviations of the wave at most, times the sines' 3e-7 and three roundings of 6e-8.

@@ -6,7 +6,7 @@
 use nalgebra::Vector3;
 
 use super::{Epoch, Fault, Row};
-use crate::gnss::earth::Geodetic;
+use gnss::earth::Geodetic;
 
 /// One knot.
 const KNOT_MPS: f64 = 1852.0 / 3600.0;

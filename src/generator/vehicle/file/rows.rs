@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 
 use super::{Fault, FileError, LEAST_RADIUS_M, MAX_ROWS, Options};
-use crate::generator::vehicle::Trajectory;
-use crate::generator::vehicle::spline::{self, Row};
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::vehicle::Trajectory;
+use crate::vehicle::spline::{self, Row};
+use gnss::earth::SPEED_OF_LIGHT_MPS;
 
 /// Fastest motion between rows.
 const MAX_SPEED_MPS: f64 = 0.1 * SPEED_OF_LIGHT_MPS;

@@ -117,8 +117,8 @@ fn a_row_that_jumps_is_named_and_not_its_neighbours() {
 
 #[test]
 fn a_written_truth_flies_again_as_it_was() {
-    use crate::generator::vehicle::rocket::Rocket;
-    use crate::gnss::record::TrajectoryRow;
+    use crate::vehicle::rocket::Rocket;
+    use gnss::record::TrajectoryRow;
     let g = 9.806_65;
     let rocket = Rocket {
         pad: Geodetic::from_degrees(26.5, 80.2, 130.0),

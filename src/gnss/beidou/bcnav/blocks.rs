@@ -2,15 +2,15 @@
 //! count from 0, the first bit of a message or subframe (BDS-SIS-ICD-B1C 1.0, BDS-SIS-ICD-B2a 1.0 and
 //! BDS-SIS-ICD-B2b 1.0, section 7; clauses are those of B1C's).
 
-use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::gnss::bits::{Element, Field, element, plain};
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::message::UtcNumbers;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::{BDT_WEEK, Epoch};
+use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
+use crate::bits::{Element, Field, element, plain};
+use crate::broadcast::Ephemeris;
+use crate::message::UtcNumbers;
+use crate::satellite::Sv;
+use crate::time::{BDT_WEEK, Epoch};
 
 /// Step of reference times.
-pub(in crate::gnss::beidou) const STEP_S: i64 = 300;
+pub(in crate::beidou) const STEP_S: i64 = 300;
 /// Semi-major axes from which elements count, of medium orbits and of the others (table 7-5).
 const MEDIUM_AXIS_M: f64 = 27_906_100.0;
 const HIGH_AXIS_M: f64 = 42_162_200.0;
@@ -27,7 +27,7 @@ const HEALTH: &str = "7.14 to 7.17";
 
 /// What messages say.
 #[derive(Clone, Debug)]
-pub(in crate::gnss::beidou) struct Content {
+pub(in crate::beidou) struct Content {
     pub set: Ephemeris,
     /// When the message is sent.
     pub sent: Epoch,
@@ -42,7 +42,7 @@ pub(in crate::gnss::beidou) struct Content {
     pub reserved: f64,
 }
 
-pub(in crate::gnss::beidou) type Of = Element<Content>;
+pub(in crate::beidou) type Of = Element<Content>;
 
 fn steps(at: Epoch) -> f64 {
     at.tow_s() / STEP_S as f64
@@ -62,7 +62,7 @@ fn reference_axis_m(content: &Content) -> f64 {
 }
 
 /// The week of BDT.
-pub(in crate::gnss::beidou) const fn week<const AT: u16>() -> Of {
+pub(in crate::beidou) const fn week<const AT: u16>() -> Of {
     element(
         Field::new("week", const { &[(AT, 13)] }, Whole, 0, TIME),
         |c| (c.sent.week() - BDT_WEEK).rem_euclid(8192) as f64,
@@ -71,7 +71,7 @@ pub(in crate::gnss::beidou) const fn week<const AT: u16>() -> Of {
 }
 
 /// The issue of the clock.
-pub(in crate::gnss::beidou) const fn iodc<const AT: u16>() -> Of {
+pub(in crate::beidou) const fn iodc<const AT: u16>() -> Of {
     element(
         Field::new("iodc", const { &[(AT, 10)] }, Whole, 0, CLOCK),
         |c| f64::from(c.set.iodc),
@@ -80,7 +80,7 @@ pub(in crate::gnss::beidou) const fn iodc<const AT: u16>() -> Of {
 }
 
 /// The issue of the orbit.
-pub(in crate::gnss::beidou) const fn iode<const AT: u16>() -> Of {
+pub(in crate::beidou) const fn iode<const AT: u16>() -> Of {
     element(
         Field::new("iode", const { &[(AT, 8)] }, Whole, 0, ORBIT),
         |c| f64::from(c.set.iode),
@@ -90,7 +90,7 @@ pub(in crate::gnss::beidou) const fn iode<const AT: u16>() -> Of {
 
 /// The first half of the orbit, 203 bits.
 #[rustfmt::skip]
-pub(in crate::gnss::beidou) const fn first_half<const AT: u16>() -> [Of; 9] {
+pub(in crate::beidou) const fn first_half<const AT: u16>() -> [Of; 9] {
     [
         element(Field::new("toe_5min", const { &[(AT, 11)] }, Whole, 0, ORBIT),
             |c| steps(c.set.toe), |c, v| c.set.toe = c.set.toe.nearest_tow(v as i64 * STEP_S)),
@@ -109,7 +109,7 @@ pub(in crate::gnss::beidou) const fn first_half<const AT: u16>() -> [Of; 9] {
 
 /// The second half of the orbit, 222 bits.
 #[rustfmt::skip]
-pub(in crate::gnss::beidou) const fn second_half<const AT: u16>() -> [Of; 10] {
+pub(in crate::beidou) const fn second_half<const AT: u16>() -> [Of; 10] {
     [
         plain!("omega0_rad", const { [(AT, 1), (AT + 1, 32)] }, Turn, -32, ORBIT, set.omega0_rad),
         plain!("i0_rad", const { [(AT + 33, 1), (AT + 34, 32)] }, Semicircles, -32, ORBIT, set.i0_rad),
@@ -126,7 +126,7 @@ pub(in crate::gnss::beidou) const fn second_half<const AT: u16>() -> [Of; 10] {
 
 /// The clock, 69 bits.
 #[rustfmt::skip]
-pub(in crate::gnss::beidou) const fn clock<const AT: u16>() -> [Of; 4] {
+pub(in crate::beidou) const fn clock<const AT: u16>() -> [Of; 4] {
     [
         element(Field::new("toc_5min", const { &[(AT, 11)] }, Whole, 0, CLOCK),
             |c| steps(c.set.toc), |c, v| c.set.toc = c.set.toc.nearest_tow(v as i64 * STEP_S)),
@@ -146,7 +146,7 @@ pub(super) fn signed(place: usize, value: f64) -> f64 {
 
 /// BDGIM's coefficients, 74 bits.
 #[rustfmt::skip]
-pub(in crate::gnss::beidou) const fn electrons<const AT: u16>() -> [Of; 9] {
+pub(in crate::beidou) const fn electrons<const AT: u16>() -> [Of; 9] {
     [
         plain!("alpha_1_tecu", const { [(AT, 10)] }, Unsigned, -3, ELECTRONS, alpha_tecu[0]),
         plain!("alpha_2_tecu", const { [(AT + 10, 8)] }, Signed, -3, ELECTRONS, alpha_tecu[1]),
@@ -163,7 +163,7 @@ pub(in crate::gnss::beidou) const fn electrons<const AT: u16>() -> [Of; 9] {
 
 /// BDT against UTC, 97 bits.
 #[rustfmt::skip]
-pub(in crate::gnss::beidou) const fn utc<const AT: u16>() -> [Of; 9] {
+pub(in crate::beidou) const fn utc<const AT: u16>() -> [Of; 9] {
     [
         plain!("utc_a0_s", const { [(AT, 16)] }, Signed, -35, UTC, utc.a0_s),
         plain!("utc_a1_sps", const { [(AT + 16, 13)] }, Signed, -51, UTC, utc.a1_sps),
@@ -178,7 +178,7 @@ pub(in crate::gnss::beidou) const fn utc<const AT: u16>() -> [Of; 9] {
 }
 
 /// Health of the satellite.
-pub(in crate::gnss::beidou) const fn health<const AT: u16>() -> Of {
+pub(in crate::beidou) const fn health<const AT: u16>() -> Of {
     element(
         Field::new("health", const { &[(AT, 2)] }, Whole, 0, HEALTH),
         |c| f64::from(c.set.health),
@@ -187,17 +187,17 @@ pub(in crate::gnss::beidou) const fn health<const AT: u16>() -> Of {
 }
 
 /// Integrity of the signal: three flags.
-pub(in crate::gnss::beidou) const fn flags<const AT: u16>() -> Of {
+pub(in crate::beidou) const fn flags<const AT: u16>() -> Of {
     plain!("integrity_flags", const { [(AT, 3)] }, Whole, 0, HEALTH, flags)
 }
 
 /// Those of B1C in another signal's message.
-pub(in crate::gnss::beidou) const fn flags_b1c<const AT: u16>() -> Of {
+pub(in crate::beidou) const fn flags_b1c<const AT: u16>() -> Of {
     plain!("integrity_flags_b1c", const { [(AT, 3)] }, Whole, 0, HEALTH, flags_b1c)
 }
 
 /// An index of the signal's accuracy, as it is monitored.
-pub(in crate::gnss::beidou) const fn sismai<const AT: u16>() -> Of {
+pub(in crate::beidou) const fn sismai<const AT: u16>() -> Of {
     element(
         Field::new("sismai", const { &[(AT, 4)] }, Whole, 0, HEALTH),
         |c| f64::from(c.set.ura_index),

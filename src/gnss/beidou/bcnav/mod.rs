@@ -13,16 +13,16 @@
 pub(super) mod blocks;
 pub(super) mod typed;
 
-use crate::gnss::bdgim::Bdgim;
-use crate::gnss::beidou::d1d2::issue;
-use crate::gnss::bits::{Field, FieldError, Store, add_to, integers, quantise_all, read_all};
-use crate::gnss::broadcast::{Ephemeris, PLAIN, SetForm};
-use crate::gnss::exchange::modern;
-use crate::gnss::ionosphere::{Coefficients, Model};
-use crate::gnss::message::{Common, IonosphereForm, Parameters, Raw, RecordLine, UtcNumbers};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
+use crate::bdgim::Bdgim;
+use crate::beidou::d1d2::issue;
+use crate::bits::{Field, FieldError, Store, add_to, integers, quantise_all, read_all};
+use crate::broadcast::{Ephemeris, PLAIN, SetForm};
+use crate::exchange::modern;
+use crate::ionosphere::{Coefficients, Model};
+use crate::message::{Common, IonosphereForm, Parameters, Raw, RecordLine, UtcNumbers};
+use crate::satellite::Sv;
+use crate::signal::Signal;
+use crate::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
 use blocks::{Content, Of, STEP_S, electrons, kind, signed};
 
 /// Fields of BDGIM's coefficients, their places counted from the first of them.

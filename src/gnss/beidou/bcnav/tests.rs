@@ -1,9 +1,9 @@
 //! Error rates in noise of the codes over GF(64) of all three messages.
 
-use crate::gnss::beidou::bcnav1::{CODE_2, CODE_3};
-use crate::gnss::beidou::{bcnav2, bcnav3};
-use crate::gnss::bits::number;
-use crate::gnss::fec::ldpc64::product;
+use crate::beidou::bcnav1::{CODE_2, CODE_3};
+use crate::beidou::{bcnav2, bcnav3};
+use crate::bits::number;
+use crate::fec::ldpc64::product;
 
 #[test]
 fn all_codes_fulfil_their_checks_and_fail_between_shannon_s_limit_and_two_decibels_above_it() {

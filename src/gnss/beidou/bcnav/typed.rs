@@ -10,15 +10,15 @@ use std::sync::LazyLock;
 
 use super::blocks::Content;
 use super::{Tables, blank, electrons_in, integers_in, of_integers, sent_at};
-use crate::gnss::bits::{Field, FieldError, bits_of, read_all, write_all};
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::crc::crc24q;
-use crate::gnss::fec::frames::Frames;
-use crate::gnss::fec::ldpc64::Ldpc64;
-use crate::gnss::message::{Common, Message, Parameters, Raw, Read, Reader, Sender, UtcNumbers};
-use crate::gnss::record::NavigationRow;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
+use crate::bits::{Field, FieldError, bits_of, read_all, write_all};
+use crate::broadcast::Ephemeris;
+use crate::crc::crc24q;
+use crate::fec::frames::Frames;
+use crate::fec::ldpc64::Ldpc64;
+use crate::message::{Common, Message, Parameters, Raw, Read, Reader, Sender, UtcNumbers};
+use crate::record::NavigationRow;
+use crate::satellite::Sv;
+use crate::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
 
 /// Bits of a check, and of a satellite's number.
 const CHECK_BITS: usize = 24;
@@ -29,7 +29,7 @@ const NUMBER_BITS: usize = 6;
 const LEAST_SHARE: f32 = 0.65;
 
 /// How the messages of a kind are made.
-pub(in crate::gnss::beidou) struct Layout {
+pub(in crate::beidou) struct Layout {
     pub message: &'static Message,
     /// First symbols of a message, and how many.
     pub preamble: (u32, usize),
@@ -159,7 +159,7 @@ fn share(bits: impl Iterator<Item = bool>, soft: &[f32]) -> f32 {
 }
 
 /// Makes the messages of satellites.
-pub(in crate::gnss::beidou) struct Messages {
+pub(in crate::beidou) struct Messages {
     pub layout: &'static Layout,
     pub common: Common,
 }
@@ -201,7 +201,7 @@ struct Part {
 
 /// Reads the messages of one satellite.
 #[derive(Clone)]
-pub(in crate::gnss::beidou) struct TypedReader {
+pub(in crate::beidou) struct TypedReader {
     layout: &'static Layout,
     sv: Sv,
     frames: Frames,

@@ -1,10 +1,10 @@
 //! The field tables of B-CNAV1: places count from 0, the first bit of a subframe (BDS-SIS-ICD-B1C 1.0,
 //! figures 6-5 to 6-9, tables 7-2 to 7-7).
 
-use crate::gnss::beidou::bcnav::blocks::{self, Of};
-use crate::gnss::beidou::bcnav::{self, Tables};
-use crate::gnss::bits::Kind::{Signed, Whole};
-use crate::gnss::bits::{Field, element, plain};
+use crate::beidou::bcnav::blocks::{self, Of};
+use crate::beidou::bcnav::{self, Tables};
+use crate::bits::Kind::{Signed, Whole};
+use crate::bits::{Field, element, plain};
 
 const TIME: &str = "7.3";
 const DELAYS: &str = "7.6, table 7-7";

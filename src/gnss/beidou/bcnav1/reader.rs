@@ -4,12 +4,12 @@
 //! check of subframe 2 decides.
 
 use super::{B_CNAV1, Frame, SYMBOLS, SYMBOLS_1, beside_in, decode, elements, likely_time, of_set_in};
-use crate::gnss::beidou::bcnav::electrons_in;
-use crate::gnss::fec::frames::Frames;
-use crate::gnss::message::{Parameters, Read, Reader};
-use crate::gnss::record::NavigationRow;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::beidou::bcnav::electrons_in;
+use crate::fec::frames::Frames;
+use crate::message::{Parameters, Read, Reader};
+use crate::record::NavigationRow;
+use crate::satellite::Sv;
+use crate::time::Epoch;
 
 /// Of what 72 symbols say, the part that a time explains where a frame is tried: 0.89 at an amplitude of √2
 /// standard deviations, near which the codes begin to fail, with 0.05 of scatter; the best of all times among

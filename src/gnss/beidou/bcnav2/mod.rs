@@ -12,17 +12,17 @@
 
 use std::sync::LazyLock;
 
-use crate::gnss::beidou::b1c::B1C;
-use crate::gnss::beidou::b2a::B2A;
-use crate::gnss::beidou::bcnav::blocks::{self, Of};
-use crate::gnss::beidou::bcnav::typed::{Layout, Messages, TypedReader};
-use crate::gnss::beidou::bcnav::{self, Tables, record_lines};
-use crate::gnss::beidou::bcnav1::B_CNAV1_SETS;
-use crate::gnss::bits::Kind::{Signed, Whole};
-use crate::gnss::bits::{Field, FieldError, plain};
-use crate::gnss::broadcast::{Ephemeris, SetForm};
-use crate::gnss::fec::ldpc64::Ldpc64;
-use crate::gnss::message::{Message, Records};
+use crate::beidou::b1c::B1C;
+use crate::beidou::b2a::B2A;
+use crate::beidou::bcnav::blocks::{self, Of};
+use crate::beidou::bcnav::typed::{Layout, Messages, TypedReader};
+use crate::beidou::bcnav::{self, Tables, record_lines};
+use crate::beidou::bcnav1::B_CNAV1_SETS;
+use crate::bits::Kind::{Signed, Whole};
+use crate::bits::{Field, FieldError, plain};
+use crate::broadcast::{Ephemeris, SetForm};
+use crate::fec::ldpc64::Ldpc64;
+use crate::message::{Message, Records};
 
 /// B-CNAV2 as B2a names it.
 pub static B_CNAV2: Message = Message {

@@ -12,16 +12,16 @@
 
 use std::sync::LazyLock;
 
-use crate::gnss::beidou::b2b::{B2B, CARRIER_HZ};
-use crate::gnss::beidou::bcnav::blocks::{self, Of};
-use crate::gnss::beidou::bcnav::typed::{Layout, Messages, TypedReader};
-use crate::gnss::beidou::bcnav::{self, Tables, record_lines_of_b2b};
-use crate::gnss::beidou::d1d2::issue;
-use crate::gnss::bits::Kind::{Signed, Whole};
-use crate::gnss::bits::{Field, FieldError, plain};
-use crate::gnss::broadcast::{Ephemeris, SetForm};
-use crate::gnss::fec::ldpc64::Ldpc64;
-use crate::gnss::message::{Message, Records};
+use crate::beidou::b2b::{B2B, CARRIER_HZ};
+use crate::beidou::bcnav::blocks::{self, Of};
+use crate::beidou::bcnav::typed::{Layout, Messages, TypedReader};
+use crate::beidou::bcnav::{self, Tables, record_lines_of_b2b};
+use crate::beidou::d1d2::issue;
+use crate::bits::Kind::{Signed, Whole};
+use crate::bits::{Field, FieldError, plain};
+use crate::broadcast::{Ephemeris, SetForm};
+use crate::fec::ldpc64::Ldpc64;
+use crate::message::{Message, Records};
 
 /// B-CNAV3 as B2b names it.
 pub static B_CNAV3: Message = Message {

@@ -2,11 +2,11 @@
 //! parities counted, and go on through the subframes of D1, or the pages of D2's subframe 1, that make up a
 //! set (BDS-SIS-ICD-B1I 3.0, 5.2.4 and 5.3.3).
 
-use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::gnss::bits::{Bits, Element, Field, element, plain};
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::time::{BDT_WEEK, Epoch};
+use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
+use crate::bits::{Bits, Element, Field, element, plain};
+use crate::broadcast::Ephemeris;
+use crate::klobuchar::Klobuchar;
+use crate::time::{BDT_WEEK, Epoch};
 
 /// Bits of a subframe.
 pub const SUBFRAME_BITS: usize = 300;

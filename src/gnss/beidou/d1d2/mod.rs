@@ -17,13 +17,13 @@
 mod fields;
 mod reader;
 
-use crate::gnss::bits::{Bits, FieldError, Store, add_to, integers, quantise_all, read_all, write_all};
-use crate::gnss::broadcast::{Ephemeris, PLAIN};
-use crate::gnss::ionosphere::{Coefficients, Model};
-use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::message::{IonosphereForm, Message, Records, Sender};
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::{BDT_WEEK, Epoch, WEEK_S};
+use crate::bits::{Bits, FieldError, Store, add_to, integers, quantise_all, read_all, write_all};
+use crate::broadcast::{Ephemeris, PLAIN};
+use crate::ionosphere::{Coefficients, Model};
+use crate::klobuchar::Klobuchar;
+use crate::message::{IonosphereForm, Message, Records, Sender};
+use crate::satellite::Sv;
+use crate::time::{BDT_WEEK, Epoch, WEEK_S};
 use fields::{D1_PARTS, D1_SET, D1Set, D2_PARTS, D2_SET, D2Set, Orbit};
 pub use fields::{SUBFRAME_BITS, tables};
 pub use reader::D1D2Reader;

@@ -6,11 +6,11 @@ use super::{
     D1_D2, D1_PARTS, D1_SYMBOLS, D2_PAGE, D2_PARTS, D2_SYMBOLS, SUBFRAME_BITS, Subframe, chip, decode, given, id,
     orbit_of, second, sent_at,
 };
-use crate::gnss::bits::Store;
-use crate::gnss::message::{Read, Reader};
-use crate::gnss::record::NavigationRow;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::{Epoch, WEEK_S};
+use crate::bits::Store;
+use crate::message::{Read, Reader};
+use crate::record::NavigationRow;
+use crate::satellite::Sv;
+use crate::time::{Epoch, WEEK_S};
 
 /// Bits over which the place of their edges is sought: half a second of D1, 0.2 s of D2.
 const D1_SOUGHT: u64 = 25;

@@ -12,19 +12,19 @@
 //! follow, in test mode. Those read are reported by header and by pieces of what they encode; parts of longer
 //! messages are not put together, so the Reed-Solomon code over pages is left out.
 //!
-//! [`Convolutional`]: crate::gnss::fec::convolutional::Convolutional
+//! [`Convolutional`]: crate::fec::convolutional::Convolutional
 
 mod reader;
 
-use crate::gnss::bits::Kind::Whole;
-use crate::gnss::bits::{Field, FieldError, Store, bits_of, number};
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::crc::crc24q;
-use crate::gnss::fec::interleaver::Interleaver;
-use crate::gnss::galileo::inav::{INAV, INAV_SETS, code};
-use crate::gnss::ionosphere::Model;
-use crate::gnss::message::{IonosphereForm, Message, Parameters, Sender};
-use crate::gnss::time::Epoch;
+use crate::bits::Kind::Whole;
+use crate::bits::{Field, FieldError, Store, bits_of, number};
+use crate::broadcast::Ephemeris;
+use crate::crc::crc24q;
+use crate::fec::interleaver::Interleaver;
+use crate::galileo::inav::{INAV, INAV_SETS, code};
+use crate::ionosphere::Model;
+use crate::message::{IonosphereForm, Message, Parameters, Sender};
+use crate::time::Epoch;
 pub use reader::CnavReader;
 
 /// C/NAV as E6 names it.

@@ -1,12 +1,12 @@
 //! Finds pages in soft symbols, whichever way up they come, and hands on what they carry.
 
 use super::{CNAV, PAGE_SYMBOLS, PATTERN, PATTERN_SYMBOLS, decode_soft, parameters};
-use crate::gnss::bits::bits_of;
-use crate::gnss::fec::frames::Frames;
-use crate::gnss::message::{Read, Reader};
-use crate::gnss::record::NavigationRow;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::bits::bits_of;
+use crate::fec::frames::Frames;
+use crate::message::{Read, Reader};
+use crate::record::NavigationRow;
+use crate::satellite::Sv;
+use crate::time::Epoch;
 
 /// Wrong symbols of the pattern of a place that is tried all the same: of a page at the least C/N0 that
 /// codes hold one in twenty is wrong.

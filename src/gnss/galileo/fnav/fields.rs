@@ -1,13 +1,13 @@
 //! The field tables of F/NAV: places count from 0, the first bit of a page after its pattern (Galileo OS SIS
 //! ICD 2.1, tables 29 to 35).
 
-use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::gnss::bits::{Element, Field, element, plain};
-use crate::gnss::galileo::inav::GST_WEEK;
-use crate::gnss::galileo::inav::almanac::{Entry, Offset, TOA_STEP_S, Triple};
-use crate::gnss::galileo::inav::fields::{CLOCK, DELAY, IONOSPHERE, MINUTE_S, ORBIT, Orbit, TIME, UTC, Utc, gst_week};
-use crate::gnss::galileo::status::E5A;
-use crate::gnss::time::WEEK_S;
+use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
+use crate::bits::{Element, Field, element, plain};
+use crate::galileo::inav::GST_WEEK;
+use crate::galileo::inav::almanac::{Entry, Offset, TOA_STEP_S, Triple};
+use crate::galileo::inav::fields::{CLOCK, DELAY, IONOSPHERE, MINUTE_S, ORBIT, Orbit, TIME, UTC, Utc, gst_week};
+use crate::galileo::status::E5A;
+use crate::time::WEEK_S;
 
 type Of = Element<Orbit>;
 

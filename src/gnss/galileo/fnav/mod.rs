@@ -6,26 +6,24 @@
 //! almanacs nothing is read. Flags of ionospheric storms are zero. Satellites begin their almanacs at places
 //! of their own; here all begin at the same one.
 //!
-//! [`Convolutional`]: crate::gnss::fec::convolutional::Convolutional
+//! [`Convolutional`]: crate::fec::convolutional::Convolutional
 
 mod fields;
 mod reader;
 
-use crate::gnss::bits::{
-    Element, FieldError, Store, add_to, bits_of, integers, number, quantise_all, read_all, write_all,
-};
-use crate::gnss::broadcast::{Ephemeris, SetForm};
-use crate::gnss::crc::crc24q;
-use crate::gnss::fec::interleaver::Interleaver;
-use crate::gnss::galileo::inav::almanac::{Offset, TRIPLES, Triple, offset_of};
-use crate::gnss::galileo::inav::fields::{Orbit, Utc};
-use crate::gnss::galileo::inav::{GST_WEEK, INAV, INAV_E5B, code};
-use crate::gnss::galileo::status::{self, Band};
-use crate::gnss::ionosphere::{Coefficients, Model};
-use crate::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, Records, Sender};
-use crate::gnss::nequick::NequickG;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::{Epoch, TimePolynomial, WEEK_S};
+use crate::bits::{Element, FieldError, Store, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
+use crate::broadcast::{Ephemeris, SetForm};
+use crate::crc::crc24q;
+use crate::fec::interleaver::Interleaver;
+use crate::galileo::inav::almanac::{Offset, TRIPLES, Triple, offset_of};
+use crate::galileo::inav::fields::{Orbit, Utc};
+use crate::galileo::inav::{GST_WEEK, INAV, INAV_E5B, code};
+use crate::galileo::status::{self, Band};
+use crate::ionosphere::{Coefficients, Model};
+use crate::message::{Common, IonosphereForm, Message, Parameters, Raw, Records, Sender};
+use crate::nequick::NequickG;
+use crate::satellite::Sv;
+use crate::time::{Epoch, TimePolynomial, WEEK_S};
 pub use fields::tables;
 use fields::{PAGE_1, PAGE_2, PAGE_3, PAGE_4, PAGE_4_GPS, PAGE_4_UTC, PAGE_5, PAGE_6};
 pub use reader::FnavReader;

@@ -6,10 +6,10 @@ use super::{
     FNAV, PAGE_SYMBOLS, PAGES_OF_SET, PATTERN, decode_soft, elements, gps_offset, ionosphere, page_type, parameters,
     sent_at, time_of_week,
 };
-use crate::gnss::message::{Parameters, Read, Reader};
-use crate::gnss::record::NavigationRow;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::message::{Parameters, Read, Reader};
+use crate::record::NavigationRow;
+use crate::satellite::Sv;
+use crate::time::Epoch;
 
 /// Pages in a row that fail where they are expected before they are sought elsewhere.
 const FAILURES: u32 = 3;

@@ -3,27 +3,27 @@
 //! Source: Galileo OS SIS ICD 2.1, 5.1.10 (almanac) and 5.1.8 (offset of GPS time). They carry three
 //! satellites a minute, a whole almanac in twelve minutes. Reference orbits: 29 600 km, 56°.
 
-use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::gnss::bits::{Element, Field, element};
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::earth::GPS_PI;
-use crate::gnss::satellite::System;
-use crate::gnss::time::{Epoch, TimePolynomial, WEEK_S};
+use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
+use crate::bits::{Element, Field, element};
+use crate::broadcast::Ephemeris;
+use crate::earth::GPS_PI;
+use crate::satellite::System;
+use crate::time::{Epoch, TimePolynomial, WEEK_S};
 
 use super::fields::GST_WEEK;
-use crate::gnss::galileo::status::{E1B, E5A, E5B};
+use crate::galileo::status::{E1B, E5A, E5B};
 
 /// Semi-major axis from which almanacs and reduced elements count.
 pub(super) const NOMINAL_AXIS_M: f64 = 29_600_000.0;
 /// Inclination from which they count, 56°.
 pub(super) const NOMINAL_INCLINATION_RAD: f64 = 56.0 / 180.0 * GPS_PI;
 /// Step of the almanac's reference time, and its last one inside a week.
-pub(in crate::gnss::galileo) const TOA_STEP_S: i64 = 600;
+pub(in crate::galileo) const TOA_STEP_S: i64 = 600;
 const TOA_LAST_S: i64 = WEEK_S - TOA_STEP_S;
 const HOUR_S: i64 = 3600;
 /// Duration of what carries three satellites, and how many of them there are until all have been sent.
 const TRIPLE_S: i64 = 60;
-pub(in crate::gnss::galileo) const TRIPLES: i64 = 12;
+pub(in crate::galileo) const TRIPLES: i64 = 12;
 const TRIPLE: u8 = 3;
 
 const ALMANAC: &str = "5.1.10, table 71";
@@ -32,7 +32,7 @@ const OFFSET: &str = "5.1.8, table 69";
 
 /// One satellite in the almanac; number 0 for a place without one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(in crate::gnss::galileo) struct Entry {
+pub(in crate::galileo) struct Entry {
     pub number: u8,
     pub delta_sqrt_a_sqrtm: f64,
     pub eccentricity: f64,
@@ -78,7 +78,7 @@ impl Entry {
 
 /// The content of words 7 to 10: three satellites, and the offset of GPS time.
 #[derive(Clone, Debug)]
-pub(in crate::gnss::galileo) struct Triple {
+pub(in crate::galileo) struct Triple {
     pub issue: u8,
     pub toa: Epoch,
     pub entries: [Entry; TRIPLE as usize],
@@ -87,7 +87,7 @@ pub(in crate::gnss::galileo) struct Triple {
 
 /// By how much the system's time is ahead of GPS time, if something is said of it.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::gnss::galileo) struct Offset(pub Option<TimePolynomial>);
+pub(in crate::galileo) struct Offset(pub Option<TimePolynomial>);
 
 impl Triple {
     /// What I/NAV sends in the minute of `start`.
@@ -246,10 +246,7 @@ pub fn gps_offset(word: &u128, near: Epoch) -> Option<TimePolynomial> {
 }
 
 /// The same of the four fields and their integers, by which any message says it.
-pub(in crate::gnss::galileo) fn offset_of(
-    [a0, a1, hours, week]: [(Field, i64); 4],
-    near: Epoch,
-) -> Option<TimePolynomial> {
+pub(in crate::galileo) fn offset_of([a0, a1, hours, week]: [(Field, i64); 4], near: Epoch) -> Option<TimePolynomial> {
     if (a0.1, a1.1, hours.1, week.1) == (-1, -1, 255, 63) {
         return None;
     }

@@ -9,9 +9,9 @@ use super::{
     INAV, INAV_SETS, On, PAGE_S, Pages, SPARE, SUBFRAME_S, adjust, adjustable, alerted, form, ionosphere, of_integers,
     of_issue, opened, quantised, tables,
 };
-use crate::gnss::ionosphere::Model;
-use crate::gnss::message::{IonosphereForm, Message, Records};
-use crate::gnss::time::Epoch;
+use crate::ionosphere::Model;
+use crate::message::{IonosphereForm, Message, Records};
+use crate::time::Epoch;
 
 /// I/NAV as E5b names it. Its sets are those of I/NAV on E1-B.
 pub static INAV_E5B: Message = Message {

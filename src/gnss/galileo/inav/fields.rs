@@ -3,26 +3,26 @@
 
 use super::almanac::{GPS_OFFSET, WORD_7, WORD_8, WORD_9, WORD_10};
 use super::reduced::WORD_16;
-use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::gnss::bits::{Element, Field, element, plain};
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::galileo::status::{E1B, E5B};
-use crate::gnss::message::Common;
-use crate::gnss::time::{Epoch, WEEK_S};
+use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
+use crate::bits::{Element, Field, element, plain};
+use crate::broadcast::Ephemeris;
+use crate::galileo::status::{E1B, E5B};
+use crate::message::Common;
+use crate::time::{Epoch, WEEK_S};
 
 /// Continuous GPS week of week 0 of Galileo's system time (5.1.2).
 pub const GST_WEEK: i64 = 1024;
 
 /// What words 1 to 5 say.
 #[derive(Clone, Debug)]
-pub(in crate::gnss::galileo) struct Orbit {
+pub(in crate::galileo) struct Orbit {
     pub ephemeris: Ephemeris,
     pub nequick: [f64; 3],
 }
 
 /// What word 6 says (5.1.7), and its own time.
 #[derive(Clone, Debug, Default)]
-pub(in crate::gnss::galileo) struct Utc {
+pub(in crate::galileo) struct Utc {
     pub a0_s: f64,
     pub a1_sps: f64,
     pub leap_s: i64,
@@ -52,20 +52,20 @@ impl Utc {
     }
 }
 
-pub(in crate::gnss::galileo) const HOUR_S: i64 = 3600;
-pub(in crate::gnss::galileo) const MINUTE_S: f64 = 60.0;
+pub(in crate::galileo) const HOUR_S: i64 = 3600;
+pub(in crate::galileo) const MINUTE_S: f64 = 60.0;
 
-pub(in crate::gnss::galileo) const ORBIT: &str = "5.1.1, table 57";
-pub(in crate::gnss::galileo) const CLOCK: &str = "5.1.3, table 62";
-pub(in crate::gnss::galileo) const DELAY: &str = "5.1.5, table 64";
-pub(in crate::gnss::galileo) const IONOSPHERE: &str = "5.1.6, table 65";
-pub(in crate::gnss::galileo) const UTC: &str = "5.1.7, table 68";
-pub(in crate::gnss::galileo) const TIME: &str = "5.1.2, table 59";
+pub(in crate::galileo) const ORBIT: &str = "5.1.1, table 57";
+pub(in crate::galileo) const CLOCK: &str = "5.1.3, table 62";
+pub(in crate::galileo) const DELAY: &str = "5.1.5, table 64";
+pub(in crate::galileo) const IONOSPHERE: &str = "5.1.6, table 65";
+pub(in crate::galileo) const UTC: &str = "5.1.7, table 68";
+pub(in crate::galileo) const TIME: &str = "5.1.2, table 59";
 
 type Of = Element<Orbit>;
 
 /// The week as messages count it.
-pub(in crate::gnss::galileo) fn gst_week(at: Epoch) -> f64 {
+pub(in crate::galileo) fn gst_week(at: Epoch) -> f64 {
     (at.week() - GST_WEEK).rem_euclid(4096) as f64
 }
 

@@ -14,21 +14,19 @@ mod reader;
 mod reduced;
 mod redundancy;
 
-use crate::gnss::bits::{
-    Element, FieldError, Store, add_to, bits_of, integers, number, quantise_all, read_all, write_all,
-};
-use crate::gnss::broadcast::{Ephemeris, SetForm};
-use crate::gnss::crc::crc24q;
-use crate::gnss::fec::convolutional::Convolutional;
-use crate::gnss::fec::interleaver::Interleaver;
-use crate::gnss::galileo::cnav::CNAV;
-use crate::gnss::galileo::fnav::FNAV_SETS;
-use crate::gnss::galileo::status::{self, Band};
-use crate::gnss::ionosphere::{Coefficients, Model};
-use crate::gnss::message::{Common, IonosphereForm, Message, Records, Sender};
-use crate::gnss::nequick::NequickG;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::{Epoch, WEEK_S};
+use crate::bits::{Element, FieldError, Store, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
+use crate::broadcast::{Ephemeris, SetForm};
+use crate::crc::crc24q;
+use crate::fec::convolutional::Convolutional;
+use crate::fec::interleaver::Interleaver;
+use crate::galileo::cnav::CNAV;
+use crate::galileo::fnav::FNAV_SETS;
+use crate::galileo::status::{self, Band};
+use crate::ionosphere::{Coefficients, Model};
+use crate::message::{Common, IonosphereForm, Message, Records, Sender};
+use crate::nequick::NequickG;
+use crate::satellite::Sv;
+use crate::time::{Epoch, WEEK_S};
 pub use almanac::gps_offset;
 use almanac::{GPS_OFFSET, Triple, WORD_7, WORD_8, WORD_9, WORD_10};
 pub use e5b::INAV_E5B;

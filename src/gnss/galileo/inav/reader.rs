@@ -7,10 +7,10 @@ use super::{
     INAV, PAGE_SYMBOLS, PART_SYMBOLS, PATTERN, REDUCED, WORDS_OF_SET, decode_any, elements, elements_in_short,
     gps_offset, ionosphere, is_alert, parameters, sent_at, time_of_week, word_of, word_type,
 };
-use crate::gnss::message::{Message, Read, Reader};
-use crate::gnss::record::NavigationRow;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::message::{Message, Read, Reader};
+use crate::record::NavigationRow;
+use crate::satellite::Sv;
+use crate::time::Epoch;
 
 /// Pages in a row that fail where they are expected before they are sought elsewhere.
 const FAILURES: u32 = 5;

@@ -8,12 +8,12 @@
 
 use nalgebra::Vector3;
 
-use crate::gnss::bits::Kind::{Semicircles, Signed, Turn};
-use crate::gnss::bits::{Element, plain, quantise_all};
-use crate::gnss::broadcast::{Constants, Ephemeris, State};
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::bits::Kind::{Semicircles, Signed, Turn};
+use crate::bits::{Element, plain, quantise_all};
+use crate::broadcast::{Constants, Ephemeris, State};
+use crate::earth::SPEED_OF_LIGHT_MPS;
+use crate::satellite::Sv;
+use crate::time::Epoch;
 
 use super::almanac::{NOMINAL_AXIS_M, NOMINAL_INCLINATION_RAD};
 

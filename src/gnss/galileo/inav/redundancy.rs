@@ -5,8 +5,8 @@
 //! in words 1 to 4. Each of words 17 to 20 carries 15 of 60 parity octets, and the two low bits of the issue.
 
 use super::word_type;
-use crate::gnss::bits::Store;
-use crate::gnss::fec::reed_solomon::{PARITY, parity, recovered};
+use crate::bits::Store;
+use crate::fec::reed_solomon::{PARITY, parity, recovered};
 
 /// The words with redundancy, by type.
 pub(super) const REDUNDANT: [u8; 4] = [17, 18, 19, 20];

@@ -1,10 +1,10 @@
 //! The field tables of GLONASS's strings: places count from 0, the first bit sent, which the document numbers
 //! 85 (GLONASS ICD L1, L2 5.1, 4.3.2 and table 4.5). Kilometres are those of the document.
 
-use crate::gnss::bits::Kind::{Magnitude, Whole};
-use crate::gnss::bits::{Bits, Element, Field, element, plain};
-use crate::gnss::broadcast::{Ephemeris, StateVector};
-use crate::gnss::time::Epoch;
+use crate::bits::Kind::{Magnitude, Whole};
+use crate::bits::{Bits, Element, Field, element, plain};
+use crate::broadcast::{Ephemeris, StateVector};
+use crate::time::Epoch;
 
 /// Bits of a string, the first an idle one, the last eight its checks.
 pub const STRING_BITS: usize = 85;

@@ -17,12 +17,12 @@
 mod fields;
 mod reader;
 
-use crate::gnss::bits::{Element, FieldError, Store, add_to, bits_of, integers, quantise_all, read_all, write_all};
-use crate::gnss::broadcast::{Ephemeris, SetForm};
-use crate::gnss::ionosphere::Model;
-use crate::gnss::message::{IonosphereForm, Message, Records, Sender};
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::bits::{Element, FieldError, Store, add_to, bits_of, integers, quantise_all, read_all, write_all};
+use crate::broadcast::{Ephemeris, SetForm};
+use crate::ionosphere::Model;
+use crate::message::{IonosphereForm, Message, Records, Sender};
+use crate::satellite::Sv;
+use crate::time::Epoch;
 pub use fields::{GlonassString, STRING_BITS, tables};
 use fields::{STRING_1, STRING_2, STRING_3, STRING_4, STRING_5, SystemTime, date, midnight};
 pub use reader::GnavReader;

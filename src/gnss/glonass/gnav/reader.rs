@@ -6,11 +6,11 @@ use super::{
     GNAV, GlonassString, MARK_SYMBOLS, STRING_SYMBOLS, STRINGS, alike, decode_soft, elements, frame_began, id,
     parameters, slot,
 };
-use crate::gnss::glonass::fdma::channel;
-use crate::gnss::message::{Read, Reader};
-use crate::gnss::record::NavigationRow;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::glonass::fdma::channel;
+use crate::message::{Read, Reader};
+use crate::record::NavigationRow;
+use crate::satellite::Sv;
+use crate::time::Epoch;
 
 /// Strings in a row that fail where they are expected before they are sought elsewhere.
 const FAILURES: u32 = 3;

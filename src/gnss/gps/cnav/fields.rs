@@ -2,23 +2,23 @@
 //! 20-7, tables 20-I to 20-IX).
 
 use super::Content;
-use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::gnss::bits::{Element, Field, element, plain};
-use crate::gnss::earth::GPS_PI;
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::time::Epoch;
+use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
+use crate::bits::{Element, Field, element, plain};
+use crate::earth::GPS_PI;
+use crate::satellite::{Sv, System};
+use crate::time::Epoch;
 
 /// Semi-major axis from which the elements count (table 20-II; IS-QZSS-PNT-005, 5.4).
-pub(in crate::gnss::gps) fn reference_axis_m(sv: Sv) -> f64 {
+pub(in crate::gps) fn reference_axis_m(sv: Sv) -> f64 {
     match sv.system {
         System::Qzss => planted!("gnss.qzss.axis", 42_164_200.0, 42_164_000.0),
         _ => 26_559_710.0,
     }
 }
 /// Rate of the node likewise.
-pub(in crate::gnss::gps) const REFERENCE_NODE_RADPS: f64 = -2.6e-9 * GPS_PI;
+pub(in crate::gps) const REFERENCE_NODE_RADPS: f64 = -2.6e-9 * GPS_PI;
 /// Step of reference times.
-pub(in crate::gnss::gps) const STEP_S: i64 = 300;
+pub(in crate::gps) const STEP_S: i64 = 300;
 /// Bits of health, by carrier.
 pub(super) const L1: u16 = 1;
 pub(super) const L2: u16 = 2;

@@ -14,18 +14,18 @@ mod fields;
 mod on_l2c;
 mod reader;
 
-use crate::gnss::bits::{Element, FieldError, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
-use crate::gnss::broadcast::{Ephemeris, SetForm};
-use crate::gnss::crc::crc24q;
-use crate::gnss::exchange::modern;
-use crate::gnss::fec::convolutional::Convolutional;
-use crate::gnss::gps::lnav::LNAV;
-use crate::gnss::ionosphere::{Coefficients, Model};
-use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, RecordLine, Records, Sender, UtcNumbers};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, GPST};
+use crate::bits::{Element, FieldError, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
+use crate::broadcast::{Ephemeris, SetForm};
+use crate::crc::crc24q;
+use crate::exchange::modern;
+use crate::fec::convolutional::Convolutional;
+use crate::gps::lnav::LNAV;
+use crate::ionosphere::{Coefficients, Model};
+use crate::klobuchar::Klobuchar;
+use crate::message::{Common, IonosphereForm, Message, Parameters, Raw, RecordLine, Records, Sender, UtcNumbers};
+use crate::satellite::Sv;
+use crate::signal::Signal;
+use crate::time::{Epoch, GPST};
 pub use fields::tables;
 use fields::{CLOCKS, DELAY, HEADER, L1, L2, L5, ORBIT_1, ORBIT_2, TIME};
 pub(super) use fields::{REFERENCE_NODE_RADPS, STEP_S, reference_axis_m};
@@ -178,7 +178,7 @@ fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
 }
 
 /// A sender of one of the messages that are sent as CNAV.
-pub(in crate::gnss) fn sender(common: &Common, message: &'static Message) -> Box<dyn Sender> {
+pub(crate) fn sender(common: &Common, message: &'static Message) -> Box<dyn Sender> {
     Box::new(Messages { common: common.clone(), message })
 }
 

@@ -5,7 +5,7 @@
 
 use super::reader::CnavReader;
 use super::{CNAV, IONOSPHERE, MESSAGE_S, sender, type_at};
-use crate::gnss::message::{IonosphereForm, Message};
+use crate::message::{IonosphereForm, Message};
 
 /// CNAV as L2C names it. Its sets are those of CNAV on L5.
 pub static CNAV_L2C: Message = Message {

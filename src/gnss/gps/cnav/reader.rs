@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use super::{BITS, IONOSPHERE, MESSAGE_S, elements, ionosphere, is_message, message_type, parameters};
-use crate::gnss::bits::number;
-use crate::gnss::fec::running::Running;
-use crate::gnss::message::{Message, Parameters, Read, Reader};
-use crate::gnss::record::NavigationRow;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::{Epoch, WEEK_S};
+use crate::bits::number;
+use crate::fec::running::Running;
+use crate::message::{Message, Parameters, Read, Reader};
+use crate::record::NavigationRow;
+use crate::satellite::Sv;
+use crate::time::{Epoch, WEEK_S};
 
 /// Types whose parameters make up a set.
 const OF_SET: [u8; 3] = [10, 11, 30];

@@ -2,10 +2,10 @@
 //! to 3.5-2, tables 3.5-1 to 3.5-3).
 
 use super::Content;
-use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::gnss::bits::{Element, Field, element, plain};
-use crate::gnss::gps::cnav::{REFERENCE_NODE_RADPS, STEP_S, reference_axis_m};
-use crate::gnss::time::Epoch;
+use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
+use crate::bits::{Element, Field, element, plain};
+use crate::gps::cnav::{REFERENCE_NODE_RADPS, STEP_S, reference_axis_m};
+use crate::time::Epoch;
 
 const TIME: &str = "3.5.3.1 to 3.5.3.4";
 const ORBIT: &str = "3.5.3.6, table 3.5-1";

@@ -4,12 +4,12 @@
 //! subframe 2 decides.
 
 use super::{CNAV2, FRAME, Frame, SYMBOLS, decode, elements, klobuchar, of_set_in};
-use crate::gnss::fec::frames::Frames;
-use crate::gnss::ionosphere::Coefficients;
-use crate::gnss::message::{Parameters, Read, Reader};
-use crate::gnss::record::NavigationRow;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::fec::frames::Frames;
+use crate::ionosphere::Coefficients;
+use crate::message::{Parameters, Read, Reader};
+use crate::record::NavigationRow;
+use crate::satellite::Sv;
+use crate::time::Epoch;
 
 /// Of what 52 symbols say, the part that a time explains where a frame is tried: 0.89 at an amplitude of √2
 /// standard deviations, near which the codes begin to fail, with 0.05 of scatter; the best of all times among

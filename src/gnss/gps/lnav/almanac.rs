@@ -4,12 +4,12 @@
 //! corrections, moved to a common reference time; it is good to a few kilometres for days.
 
 use super::fields::{ALMANAC_PAGE, IONOSPHERE_PAGE, UTC_PAGE};
-use crate::gnss::bits::{FieldError, write_all};
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::earth::GPS_PI;
-use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::time::{Epoch, TimePolynomial, WEEK_S};
+use crate::bits::{FieldError, write_all};
+use crate::broadcast::Ephemeris;
+use crate::earth::GPS_PI;
+use crate::klobuchar::Klobuchar;
+use crate::satellite::{Sv, System};
+use crate::time::{Epoch, TimePolynomial, WEEK_S};
 
 /// The inclination from which the almanac counts, in semicircles (IS-GPS-200N, table 20-VI).
 pub const ALMANAC_INCLINATION_SEMICIRCLES: f64 = 0.30;

@@ -5,10 +5,10 @@
 //! the first of a subframe's 300, parity included.
 
 use super::almanac::{Almanac, Utc};
-use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::gnss::bits::{Element, Field, Store, element, plain};
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::klobuchar::Klobuchar;
+use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
+use crate::bits::{Element, Field, Store, element, plain};
+use crate::broadcast::Ephemeris;
+use crate::klobuchar::Klobuchar;
 
 /// Ten words of 24 data bits; bit 1 is the first of a subframe's 300, parity included.
 impl Store for [u32; 10] {

@@ -10,19 +10,19 @@ mod reader;
 
 use thiserror::Error;
 
-pub use crate::gnss::bits::{Field, FieldError, Kind};
+pub use crate::bits::{Field, FieldError, Kind};
 pub use almanac::{ALMANAC_INCLINATION_SEMICIRCLES, Almanac, LeapEvent, Utc, UtcData};
 pub use fields::tables;
 pub use parity::check_parity;
 pub use reader::LnavReader;
 
-use crate::gnss::bits::{add_to, bits_of, integers, number, quantise_all, read_all, write_all};
-use crate::gnss::broadcast::{Ephemeris, PLAIN, SetForm};
-use crate::gnss::ionosphere::{Coefficients, Model};
-use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::message::{Common, IonosphereForm, Message, Records, Sender};
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::time::{Epoch, WEEK_S};
+use crate::bits::{add_to, bits_of, integers, number, quantise_all, read_all, write_all};
+use crate::broadcast::{Ephemeris, PLAIN, SetForm};
+use crate::ionosphere::{Coefficients, Model};
+use crate::klobuchar::Klobuchar;
+use crate::message::{Common, IonosphereForm, Message, Records, Sender};
+use crate::satellite::{Sv, System};
+use crate::time::{Epoch, WEEK_S};
 use fields::{ALMANAC_PAGE, IONOSPHERE_PAGE, SUBFRAME_1, SUBFRAME_2, SUBFRAME_3, UTC_PAGE};
 
 /// Seconds of a subframe (IS-GPS-200N, 20.3.2).

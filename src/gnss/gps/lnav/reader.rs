@@ -6,11 +6,11 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use super::{PREAMBLE, SUBFRAME_S, Subframe, TOW_COUNTS, check_parity, ephemeris};
-use crate::gnss::ionosphere::Coefficients;
-use crate::gnss::message::{Read, Reader};
-use crate::gnss::record::NavigationRow;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::{Epoch, WEEK_S};
+use crate::ionosphere::Coefficients;
+use crate::message::{Read, Reader};
+use crate::record::NavigationRow;
+use crate::satellite::Sv;
+use crate::time::{Epoch, WEEK_S};
 
 /// Bits of a subframe, of a word, and of the two words that carry preamble and time.
 const SUBFRAME_BITS: u64 = 300;

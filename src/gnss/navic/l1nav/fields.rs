@@ -2,9 +2,9 @@
 //! for L1 1.0, subframe 2 and message type 10 of subframe 3).
 
 use super::Content;
-use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::gnss::bits::{Element, Field, element, plain};
-use crate::gnss::time::Epoch;
+use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
+use crate::bits::{Element, Field, element, plain};
+use crate::time::Epoch;
 
 const TIME: &str = "subframe 2, time and health";
 const ORBIT: &str = "subframe 2, ephemeris parameters";

@@ -3,7 +3,7 @@
 use sha2::{Digest, Sha256};
 
 use super::*;
-use crate::gnss::fec::reliability::is_as_codes_of_its_length;
+use crate::fec::reliability::is_as_codes_of_its_length;
 
 #[test]
 fn both_codes_have_the_printed_matrices_and_fail_between_shannon_s_limit_and_one_decibel_and_a_half_above_it() {

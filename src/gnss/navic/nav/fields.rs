@@ -2,12 +2,12 @@
 //! (IRNSS SIS ICD for SPS 1.1, tables of the subframes and of message types 7, 9, 11 and 26).
 
 use super::NAVIC_WEEK;
-use crate::gnss::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::gnss::bits::{Bits, Element, Field, element, plain};
-use crate::gnss::broadcast::Ephemeris;
-use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::message::Common;
-use crate::gnss::time::Epoch;
+use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
+use crate::bits::{Bits, Element, Field, element, plain};
+use crate::broadcast::Ephemeris;
+use crate::klobuchar::Klobuchar;
+use crate::message::Common;
+use crate::time::Epoch;
 
 /// Bits of a subframe before its check.
 pub const DATA_BITS: usize = 262;

@@ -12,18 +12,18 @@
 mod fields;
 mod reader;
 
-use crate::gnss::bits::{
+use crate::bits::{
     Bits, Element, FieldError, Store, add_to, bits_of, integers, number, quantise_all, read_all, write_all,
 };
-use crate::gnss::broadcast::{Ephemeris, PLAIN};
-use crate::gnss::crc::crc24q;
-use crate::gnss::fec::convolutional::Convolutional;
-use crate::gnss::fec::interleaver::Interleaver;
-use crate::gnss::ionosphere::{Coefficients, Model};
-use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::message::{Common, IonosphereForm, Message, Records, Sender};
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::time::{Epoch, WEEK_S};
+use crate::broadcast::{Ephemeris, PLAIN};
+use crate::crc::crc24q;
+use crate::fec::convolutional::Convolutional;
+use crate::fec::interleaver::Interleaver;
+use crate::ionosphere::{Coefficients, Model};
+use crate::klobuchar::Klobuchar;
+use crate::message::{Common, IonosphereForm, Message, Records, Sender};
+use crate::satellite::{Sv, System};
+use crate::time::{Epoch, WEEK_S};
 use fields::{Almanac, MESSAGE_7, MESSAGE_11, MESSAGE_26, SUBFRAME_1, SUBFRAME_2, Utc};
 pub use fields::{DATA_BITS, Subframe, tables};
 pub use reader::NavReader;

@@ -6,11 +6,11 @@ use super::{
     ELECTRONS, PATTERN, PATTERN_SYMBOLS, SPS_NAV, SUBFRAME_SYMBOLS, Subframe, UTC, began_s, coefficients, decode_soft,
     elements, id, message_type, parameters, sent_at,
 };
-use crate::gnss::bits::bits_of;
-use crate::gnss::message::{Read, Reader};
-use crate::gnss::record::NavigationRow;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
+use crate::bits::bits_of;
+use crate::message::{Read, Reader};
+use crate::record::NavigationRow;
+use crate::satellite::Sv;
+use crate::time::Epoch;
 
 /// Subframes in a row that fail where they are expected before they are sought elsewhere.
 const FAILURES: u32 = 3;

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use super::numbers::{fields, number_of, numbers};
 use super::{FIELD, Form, GALILEO, GALILEO_OLD, Group, HEADER_FIELD, Line, Polynomial, UTC};
-use crate::gnss::bdgim::Bdgim;
-use crate::gnss::klobuchar::Klobuchar;
-use crate::gnss::satellite::System;
+use crate::bdgim::Bdgim;
+use crate::klobuchar::Klobuchar;
+use crate::satellite::System;
 
 impl Form {
     /// Klobuchar's coefficients in a record of version 4.

@@ -2,11 +2,11 @@
 //!
 //! Source: RINEX 3.05, tables A6, A8, A10, A14, A16 and A18; RINEX 4.02, table A9.
 
-use crate::gnss::glonass::fdma::SLOTS;
-use crate::gnss::qzss::satellites::SATELLITES;
-use crate::gnss::satellite::{Sv, System};
-use crate::gnss::sbas::l1::SATELLITES as SBAS_SATELLITES;
-use crate::gnss::time::Epoch;
+use crate::glonass::fdma::SLOTS;
+use crate::qzss::satellites::SATELLITES;
+use crate::satellite::{Sv, System};
+use crate::sbas::l1::SATELLITES as SBAS_SATELLITES;
+use crate::time::Epoch;
 
 /// Fields of a record.
 pub(super) const FIELDS: usize = 31;
@@ -76,7 +76,7 @@ pub(super) const MESSAGES: [(char, &[&str]); 7] = [
 ];
 
 /// A record in form.
-pub(in crate::gnss::rinex) struct Record {
+pub(in crate::rinex) struct Record {
     /// Whether it is one of F/NAV.
     pub is_fnav: bool,
     /// Number of its first line.

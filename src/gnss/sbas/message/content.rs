@@ -6,11 +6,11 @@ use super::DATA_BITS;
 use super::corrections::{
     AGEING, DELAYS, FAST, GRID_MASK, HALF_MOVING, HALF_STEADY, INTEGRITY, MASK, MIXED, VELOCITY_CODE,
 };
-use crate::gnss::augmentation::{
+use crate::augmentation::{
     Content, Degradation, Delays, Fast, GridMask, Half, Integrity, LongTerm, MASKED, Mask, Mixed,
 };
-use crate::gnss::bits::{Element, FieldError, integers, read_all, write_all};
-use crate::gnss::message::Parameters;
+use crate::bits::{Element, FieldError, integers, read_all, write_all};
+use crate::message::Parameters;
 
 /// Bits before a block's content, and those of half of it.
 const HEAD_BITS: usize = 14;

@@ -3,9 +3,9 @@
 //! are there for each satellite of a mask, or each point of a grid, are numbered from 1.
 
 use super::content::{take_word, word};
-use crate::gnss::augmentation::{Degradation, Delays, Fast, GridMask, Integrity, LongTerm, Mask};
-use crate::gnss::bits::Kind::{Signed, Unsigned, Whole};
-use crate::gnss::bits::{Element, Field, element};
+use crate::augmentation::{Degradation, Delays, Fast, GridMask, Integrity, LongTerm, Mask};
+use crate::bits::Kind::{Signed, Unsigned, Whole};
+use crate::bits::{Element, Field, element};
 
 const MASK_CLAUSE: &str = "A.4.4.2";
 const FAST_CLAUSE: &str = "A.4.4.3, figure A-7";

@@ -3,10 +3,10 @@
 //! count them.
 
 use super::NetworkTime;
-use crate::gnss::bits::Kind::{Signed, Whole};
-use crate::gnss::bits::{Element, Field, element, plain};
-use crate::gnss::broadcast::{Ephemeris, StateVector};
-use crate::gnss::time::Epoch;
+use crate::bits::Kind::{Signed, Whole};
+use crate::bits::{Element, Field, element, plain};
+use crate::broadcast::{Ephemeris, StateVector};
+use crate::time::Epoch;
 
 const GEO_CLAUSE: &str = "A.4.4.11, table A-18";
 const TIME_CLAUSE: &str = "A.4.4.15, table A-20";
@@ -22,7 +22,7 @@ const DAY_S: i64 = 86_400;
 type Of = Element<Ephemeris>;
 
 /// Number of the step of the day at which a reference time is.
-pub(in crate::gnss) fn step_of_day(at: Epoch) -> i64 {
+pub(crate) fn step_of_day(at: Epoch) -> i64 {
     at.seconds().rem_euclid(DAY_S) / STEP_S
 }
 

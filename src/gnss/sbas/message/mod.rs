@@ -19,16 +19,16 @@ mod schedule;
 
 use std::sync::Arc;
 
-use crate::gnss::augmentation::{Content, Network};
-use crate::gnss::bits::{FieldError, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
-use crate::gnss::broadcast::{Ephemeris, SetForm};
-use crate::gnss::crc::crc24q;
-use crate::gnss::fec::convolutional::Convolutional;
-use crate::gnss::ionosphere::Model;
-use crate::gnss::message::{IonosphereForm, Message, Parameters, Raw, Records, Sender};
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::Epoch;
-pub(in crate::gnss) use fields::step_of_day;
+use crate::augmentation::{Content, Network};
+use crate::bits::{FieldError, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
+use crate::broadcast::{Ephemeris, SetForm};
+use crate::crc::crc24q;
+use crate::fec::convolutional::Convolutional;
+use crate::ionosphere::Model;
+use crate::message::{IonosphereForm, Message, Parameters, Raw, Records, Sender};
+use crate::satellite::Sv;
+use crate::time::Epoch;
+pub(crate) use fields::step_of_day;
 pub use fields::tables;
 use fields::{GEO, TIME};
 pub use reader::SbasReader;

@@ -2,13 +2,13 @@
 //! from it on by counting, the satellite's place by type 9, and what is said of others from then on.
 
 use super::{BITS, OF_PLACE, OF_TIME, RATE_HZ, SBAS, TIME, elements, is_block, type_of};
-use crate::gnss::augmentation::Content;
-use crate::gnss::bits::integers;
-use crate::gnss::fec::running::Running;
-use crate::gnss::message::{Parameters, Read, Reader};
-use crate::gnss::record::NavigationRow;
-use crate::gnss::satellite::Sv;
-use crate::gnss::time::{Epoch, WEEK_S};
+use crate::augmentation::Content;
+use crate::bits::integers;
+use crate::fec::running::Running;
+use crate::message::{Parameters, Read, Reader};
+use crate::record::NavigationRow;
+use crate::satellite::Sv;
+use crate::time::{Epoch, WEEK_S};
 
 /// Reads the message.
 #[derive(Clone, Debug)]

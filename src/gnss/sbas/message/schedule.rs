@@ -10,12 +10,12 @@
 //! and long-term corrections, 300 s for the grid. Limits: where most of more than 26 satellites have rates, a
 //! long-term correction comes after three minutes; receivers keep it for four.
 
-use crate::gnss::augmentation::accuracy::{DO_NOT_USE, NOT_MONITORED, givei_of};
-use crate::gnss::augmentation::{
+use crate::augmentation::accuracy::{DO_NOT_USE, NOT_MONITORED, givei_of};
+use crate::augmentation::{
     ALARM, Content, DELAY_SLOTS, Degradation, Delays, FAST_SLOTS, Fast, GridMask, Half, Integrity, Known, LongTerm,
     MASKED, MIXED_SLOTS, Mask, Mixed, Network,
 };
-use crate::gnss::time::Epoch;
+use crate::time::Epoch;
 
 /// Seconds of a round, and how many of them are other types' than corrections.
 const ROUND_S: i64 = 6;

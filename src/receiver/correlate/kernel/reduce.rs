@@ -10,7 +10,7 @@ use super::super::single::CHUNK;
 use super::Level;
 
 /// Σ |x|², in sixteen lanes of 64 terms each in `f32`, the rest in `f64`.
-pub(in crate::receiver::correlate) fn power(level: Level, i: &[f32], q: &[f32]) -> f64 {
+pub(in crate::correlate) fn power(level: Level, i: &[f32], q: &[f32]) -> f64 {
     match level {
         Level::Baseline => power_lanes(i, q),
         // SAFETY: a `Level` beyond the baseline is one that was detected.
@@ -46,7 +46,7 @@ fn power_lanes(i: &[f32], q: &[f32]) -> f64 {
 }
 
 /// Σ i² + q² of short integers within ±2048.
-pub(in crate::receiver::correlate) fn fixed_power(level: Level, i: &[i16], q: &[i16]) -> f64 {
+pub(in crate::correlate) fn fixed_power(level: Level, i: &[i16], q: &[i16]) -> f64 {
     match level {
         Level::Baseline => fixed_power_lanes(i, q),
         // SAFETY: a `Level` beyond the baseline is one that was detected.
@@ -83,7 +83,7 @@ type Parts<'a> = [&'a [f64; LANES]; 2];
 /// The sum of sixteen numbers, each turned back by its turn. A loop over lanes within one over taps would be
 /// made into one over taps, with gathered numbers.
 #[inline(always)]
-pub(in crate::receiver::correlate) fn fold(numbers: Parts<'_>, turns: Parts<'_>) -> Complex64 {
+pub(in crate::correlate) fn fold(numbers: Parts<'_>, turns: Parts<'_>) -> Complex64 {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx2") {
         // SAFETY: the processor has AVX2.
@@ -92,7 +92,7 @@ pub(in crate::receiver::correlate) fn fold(numbers: Parts<'_>, turns: Parts<'_>)
     fold_plain(numbers, turns)
 }
 
-pub(in crate::receiver::correlate) fn fold_plain([re, im]: Parts<'_>, [turn_re, turn_im]: Parts<'_>) -> Complex64 {
+pub(in crate::correlate) fn fold_plain([re, im]: Parts<'_>, [turn_re, turn_im]: Parts<'_>) -> Complex64 {
     let (mut turned_re, mut turned_im) = ([0.0; LANES], [0.0; LANES]);
     for k in 0..LANES {
         turned_re[k] = re[k] * turn_re[k] + im[k] * turn_im[k];

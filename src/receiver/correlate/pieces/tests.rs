@@ -1,10 +1,10 @@
 use super::*;
-use crate::gnss::galileo::e1::E1;
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::signal::Layers;
-use crate::gnss::signal::synthetic::{LONG_BOC, MIXED, MULTIPLEXED};
-use crate::receiver::correlate::sums::{RunningSums, Samples};
-use crate::receiver::correlate::{Arithmetic, Edge, Replica, chips_to_units};
+use crate::correlate::sums::{RunningSums, Samples};
+use crate::correlate::{Arithmetic, Edge, Replica, chips_to_units};
+use gnss::galileo::e1::E1;
+use gnss::gps::l1ca::L1_CA;
+use gnss::signal::Layers;
+use gnss::signal::synthetic::{LONG_BOC, MIXED, MULTIPLEXED};
 
 /// With a constant offset.
 fn noise(count: usize, seed: u64) -> Vec<f32> {

@@ -1,9 +1,9 @@
 use super::*;
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::signal::Layers;
-use crate::receiver::correlate::fixed::FixedSamples;
-use crate::receiver::correlate::sums::Samples;
-use crate::receiver::correlate::{Arithmetic, Edge, Replica, chips_to_units};
+use crate::correlate::fixed::FixedSamples;
+use crate::correlate::sums::Samples;
+use crate::correlate::{Arithmetic, Edge, Replica, chips_to_units};
+use gnss::gps::l1ca::L1_CA;
+use gnss::signal::Layers;
 
 const CHIP_HZ: f64 = 1.023e6;
 

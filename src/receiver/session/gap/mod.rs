@@ -14,17 +14,17 @@ use std::collections::VecDeque;
 
 use super::front_end::{FrontEnd, Track};
 use super::shared::{LastFix, Shared};
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::gnss::record::{Event, EventRow, Fix};
-use crate::gnss::signal::{Component, Signal};
-use crate::receiver::gap::scan::{Found, Profile, Scan};
-use crate::receiver::gap::{Edges, Jump, Step, Trend};
-use crate::receiver::lead::lead;
-use crate::receiver::outcome::ReceiveError;
-use crate::receiver::output::{Record, Sink};
-use crate::receiver::source::{Packed, Planes};
-use crate::receiver::track::loops::Rates;
-use crate::receiver::track::{Channel, Glance};
+use crate::gap::scan::{Found, Profile, Scan};
+use crate::gap::{Edges, Jump, Step, Trend};
+use crate::lead::lead;
+use crate::outcome::ReceiveError;
+use crate::output::{Record, Sink};
+use crate::source::{Packed, Planes};
+use crate::track::loops::Rates;
+use crate::track::{Channel, Glance};
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::record::{Event, EventRow, Fix};
+use gnss::signal::{Component, Signal};
 
 mod reseat;
 mod settle;

@@ -3,15 +3,15 @@
 use rayon::prelude::*;
 
 use super::{FrontEnd, LEAST_CHANNELS, Moved, Stage, Units, Watched};
-use crate::gnss::record::EventRow;
-use crate::gnss::signal::{Component, Signal};
-use crate::receiver::gap::scan::{Found, Profile, Scan};
-use crate::receiver::lead::lead;
-use crate::receiver::outcome::ReceiveError;
-use crate::receiver::output::{Record, Sink};
-use crate::receiver::session::WRONG_TIME_FIXES;
-use crate::receiver::source::Packed;
-use crate::receiver::track::Report;
+use crate::gap::scan::{Found, Profile, Scan};
+use crate::lead::lead;
+use crate::outcome::ReceiveError;
+use crate::output::{Record, Sink};
+use crate::session::WRONG_TIME_FIXES;
+use crate::source::Packed;
+use crate::track::Report;
+use gnss::record::EventRow;
+use gnss::signal::{Component, Signal};
 
 /// A scan that finds nothing ends so long after the suspicion.
 const SCAN_S: f64 = 0.4;

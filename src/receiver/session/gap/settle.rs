@@ -2,16 +2,16 @@
 
 use super::reseat::whole_number;
 use super::{FrontEnd, LOOK_S, Moved, Stage, Track, Units};
-use crate::gnss::signal::{Component, Signal};
-use crate::receiver::decode::Decoder;
-use crate::receiver::gap::scan::Found;
-use crate::receiver::gap::{Fit, Step};
-use crate::receiver::lead::lead;
-use crate::receiver::outcome::ReceiveError;
-use crate::receiver::output::Sink;
-use crate::receiver::session::WRONG_TIME_FIXES;
-use crate::receiver::session::shared::Shared;
-use crate::receiver::track::Glance;
+use crate::decode::Decoder;
+use crate::gap::scan::Found;
+use crate::gap::{Fit, Step};
+use crate::lead::lead;
+use crate::outcome::ReceiveError;
+use crate::output::Sink;
+use crate::session::WRONG_TIME_FIXES;
+use crate::session::shared::Shared;
+use crate::track::Glance;
+use gnss::signal::{Component, Signal};
 
 /// The turns of the signs are looked at for so long at least, and at most.
 const TURNS_S: f64 = 0.2;

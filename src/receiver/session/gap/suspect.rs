@@ -4,13 +4,13 @@
 use std::collections::VecDeque;
 
 use super::{FrontEnd, LEAST_CHANNELS, LOOK_S, Moved, Stage, Track, VANISHED_SHARE};
-use crate::gnss::signal::Signal;
-use crate::receiver::gap::scan::{Found, Profile};
-use crate::receiver::gap::{Edges, Step, Trend, common_step, doppler_step, turned_by};
-use crate::receiver::outcome::ReceiveError;
-use crate::receiver::output::Sink;
-use crate::receiver::session::shared::Shared;
-use crate::receiver::track::Glance;
+use crate::gap::scan::{Found, Profile};
+use crate::gap::{Edges, Step, Trend, common_step, doppler_step, turned_by};
+use crate::outcome::ReceiveError;
+use crate::output::Sink;
+use crate::session::shared::Shared;
+use crate::track::Glance;
+use gnss::signal::Signal;
 
 /// Power has vanished below this share of what it was.
 const VANISHED: f64 = 0.25;

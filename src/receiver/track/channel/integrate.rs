@@ -4,10 +4,10 @@
 use num_complex::Complex64;
 
 use super::{Channel, Stage};
-use crate::receiver::correlate::sums::Samples;
-use crate::receiver::correlate::{Nco, Replica, TURN, chips_to_units};
-use crate::receiver::track::side::SidePeaks;
-use crate::receiver::track::{Report, Symbol};
+use crate::correlate::sums::Samples;
+use crate::correlate::{Nco, Replica, TURN, chips_to_units};
+use crate::track::side::SidePeaks;
+use crate::track::{Report, Symbol};
 
 /// Periods over which the power of the samples is averaged.
 const POWER_PERIODS: f64 = 100.0;

@@ -2,11 +2,11 @@
 
 use super::pilot::Data;
 use super::{Channel, Stage};
-use crate::receiver::correlate::sums::Samples;
-use crate::receiver::correlate::{Nco, Replica};
-use crate::receiver::lead::lead;
-use crate::receiver::track::long::LongCode;
-use crate::receiver::track::overlay::{OverlayPhase, OverlaySync};
+use crate::correlate::sums::Samples;
+use crate::correlate::{Nco, Replica};
+use crate::lead::lead;
+use crate::track::long::LongCode;
+use crate::track::overlay::{OverlayPhase, OverlaySync};
 
 impl Channel {
     /// The long code's replica for the running period, once its segment is known and where it is another than

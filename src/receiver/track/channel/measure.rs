@@ -1,9 +1,9 @@
 //! What a channel measures: the state of its replica at a sample.
 
 use super::Channel;
-use crate::gnss::record::TrackingRow;
-use crate::receiver::correlate::{Replica, TURN, units_to_chips};
-use crate::receiver::track::{Measurement, Report};
+use crate::correlate::{Replica, TURN, units_to_chips};
+use crate::track::{Measurement, Report};
+use gnss::record::TrackingRow;
 
 impl Channel {
     /// The replica's state at `tick`, in the running period.

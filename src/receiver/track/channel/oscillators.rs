@@ -1,8 +1,8 @@
 //! A channel's oscillators: where they begin, what they run at, and how many code periods an update has.
 
 use super::Channel;
-use crate::gnss::time::tone_turns;
-use crate::receiver::correlate::{Nco, Replica, TURN, chips_to_units};
+use crate::correlate::{Nco, Replica, TURN, chips_to_units};
+use gnss::time::tone_turns;
 
 /// Places of the code at which the noise is measured, in turn.
 const NOISE_PLACES: usize = 16;

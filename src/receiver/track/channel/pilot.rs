@@ -6,14 +6,14 @@ use num_complex::Complex64;
 
 use super::supervise::pilot_group;
 use super::{Channel, Symbol};
-use crate::gnss::satellite::Sv;
-use crate::gnss::signal::{Component, Signal};
-use crate::receiver::correlate::sums::Samples;
-use crate::receiver::correlate::{Arithmetic, Nco, Replica, TURN, Wave};
-use crate::receiver::lead::beside;
-use crate::receiver::track::TrackingSettings;
-use crate::receiver::track::model::ReplicaModel;
-use crate::receiver::track::overlay::{OverlayPhase, OverlaySync};
+use crate::correlate::sums::Samples;
+use crate::correlate::{Arithmetic, Nco, Replica, TURN, Wave};
+use crate::lead::beside;
+use crate::track::TrackingSettings;
+use crate::track::model::ReplicaModel;
+use crate::track::overlay::{OverlayPhase, OverlaySync};
+use gnss::satellite::Sv;
+use gnss::signal::{Component, Signal};
 
 /// What is read beside a pilot.
 #[derive(Clone, Debug)]

@@ -4,13 +4,13 @@ use num_complex::Complex64;
 
 use super::pilot::Data;
 use super::{Channel, Stage};
-use crate::receiver::correlate::{Nco, Replica, TURN, chips_to_units};
-use crate::receiver::gap::Edges;
-use crate::receiver::track::Report;
-use crate::receiver::track::lock::{LockState, PhaseLock, Rotation, SymbolLock};
-use crate::receiver::track::loops::Rates;
-use crate::receiver::track::overlay::OverlaySync;
-use crate::receiver::track::sync::SymbolSync;
+use crate::correlate::{Nco, Replica, TURN, chips_to_units};
+use crate::gap::Edges;
+use crate::track::Report;
+use crate::track::lock::{LockState, PhaseLock, Rotation, SymbolLock};
+use crate::track::loops::Rates;
+use crate::track::overlay::OverlaySync;
+use crate::track::sync::SymbolSync;
 
 use super::LOCK_PERIODS;
 

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 use super::{Channel, Report};
-use crate::receiver::correlate::{TURN, units_to_chips};
+use crate::correlate::{TURN, units_to_chips};
 
 impl Channel {
     /// Takes prompt and neighbours of a code period, and moves code and carrier where one of these is the

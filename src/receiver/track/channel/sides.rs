@@ -1,8 +1,8 @@
 //! From one side of a sub-carrier to both.
 
 use super::Channel;
-use crate::receiver::correlate::Replica;
-use crate::receiver::lead::BOTH_SIDES;
+use crate::correlate::Replica;
+use crate::lead::BOTH_SIDES;
 
 impl Channel {
     /// Makes the replica ready for the running period: with the segment of a long code, or with both sides of

@@ -3,13 +3,13 @@
 use num_complex::Complex64;
 
 use super::{Channel, LOCK_PERIODS, Stage, WEAK_DBHZ};
-use crate::gnss::record::Event;
-use crate::receiver::correlate::TURN;
-use crate::receiver::track::lock::{LockChange, PhaseLock, Rotation, SymbolLock, is_weak};
-use crate::receiver::track::loops::Rates;
-use crate::receiver::track::pull_in::Batch;
-use crate::receiver::track::sync::SymbolSync;
-use crate::receiver::track::{Report, TrackingSettings};
+use crate::correlate::TURN;
+use crate::track::lock::{LockChange, PhaseLock, Rotation, SymbolLock, is_weak};
+use crate::track::loops::Rates;
+use crate::track::pull_in::Batch;
+use crate::track::sync::SymbolSync;
+use crate::track::{Report, TrackingSettings};
+use gnss::record::Event;
 
 /// A frequency error beyond this, in spite of phase lock, is a false lock: between 0 and the nearest one,
 /// 1/(2·symbol).

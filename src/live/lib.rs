@@ -4,7 +4,7 @@
 //! receiver and keeps step with a simulation in virtual time. Each tick's samples depend on the scene and on
 //! the ticks before it alone.
 
-#![warn(missing_docs)]
+#![cfg(all(feature = "generator", feature = "receiver"))]
 
 pub mod drive;
 pub mod lockstep;

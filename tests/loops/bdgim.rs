@@ -2,7 +2,7 @@
 //! with it and metres off without it.
 //!
 //! Codes are measured as the truth has them, with noise added; messages are sent as symbols and read again.
-#![cfg(all(feature = "planted", feature = "generator", feature = "receiver", feature = "analysis"))]
+#![cfg(all(feature = "generator", feature = "receiver", feature = "analysis"))]
 
 use std::path::Path;
 

@@ -3,15 +3,15 @@
 //! [`run`] composes one generator and one receiver; [`feed`] gives the samples of a generator to anything
 //! that takes them, such as several receivers. While a batch of samples is received, the next one is
 //! generated: two batches are in memory at a time. Results go to sinks on both sides: files
-//! ([`truth::Writer`], [`Output`](crate::receiver::output::Output)), a `Vec` of records, or for the truth
+//! ([`truth::Writer`], [`Output`](receiver::output::Output)), a `Vec` of records, or for the truth
 //! `()`. They do not depend on the number of threads.
 //!
 //! The receiver gets metadata and samples alone; the truth never passes through it.
 //!
 //! ```
-//! use gnss_twin::generator::scenario::Scenario;
-//! use gnss_twin::receiver::output::Record;
-//! use gnss_twin::receiver::settings::Settings;
+//! use generator::scenario::Scenario;
+//! use receiver::output::Record;
+//! use receiver::settings::Settings;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let scenario = r#"
@@ -23,7 +23,7 @@
 //! "#;
 //! let scene = Scenario::from_toml(scenario)?.scene()?;
 //! let mut found: Vec<Record> = Vec::new();
-//! let done = gnss_twin::twin::run(std::slice::from_ref(&scene), &Settings::default(), &mut (), &mut found)?;
+//! let done = twin::run(std::slice::from_ref(&scene), &Settings::default(), &mut (), &mut found)?;
 //! let acquired = |record: &&Record| matches!(record, Record::Acquisition(row) if row.acquired);
 //! assert_eq!(found.iter().filter(acquired).count(), done.outcome.acquired.len());
 //! assert_eq!(done.outcome.acquired, done.generated[0].satellites);
@@ -31,20 +31,20 @@
 //! # }
 //! ```
 
-#![warn(missing_docs)]
+#![cfg(all(feature = "generator", feature = "receiver"))]
 
 use std::time::{Duration, Instant};
 
 use thiserror::Error;
 
-use crate::generator::scene::Scene;
-use crate::generator::stream::{Fronts, GenerateError, Generated, Options, Stream};
-use crate::generator::truth;
-use crate::gnss::samples::IfMetadata;
-use crate::gnss::signal::Signal;
-use crate::receiver::output;
-use crate::receiver::settings::Settings;
-use crate::receiver::{Outcome, ReceiveError, Reception};
+use generator::scene::Scene;
+use generator::stream::{Fronts, GenerateError, Generated, Options, Stream};
+use generator::truth;
+use gnss::samples::IfMetadata;
+use gnss::signal::Signal;
+use receiver::output;
+use receiver::settings::Settings;
+use receiver::{Outcome, ReceiveError, Reception};
 
 /// Why a run of the twin ended early.
 #[derive(Debug, Error)]
@@ -182,10 +182,10 @@ impl<'a> Maker<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generator::Generator;
-    use crate::generator::scenario::Scenario;
-    use crate::gnss::samples::Format;
-    use crate::receiver::Receiver;
+    use generator::Generator;
+    use generator::scenario::Scenario;
+    use gnss::samples::Format;
+    use receiver::Receiver;
 
     fn scene(duration_s: f64) -> Scene {
         let text = format!(

@@ -7,9 +7,9 @@
 //! values from a [`Generator`], or to writers and sinks.
 //!
 //! ```
-//! use gnss_twin::generator::Generator;
-//! use gnss_twin::generator::scenario::Scenario;
-//! use gnss_twin::generator::truth::Record;
+//! use generator::Generator;
+//! use generator::scenario::Scenario;
+//! use generator::truth::Record;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let scenario = r#"
@@ -38,7 +38,8 @@
 //!    [`arrival`], [`truth`], [`error`], [`transmit`], [`mod@stream`];
 //! 5. what is said before a run: [`levels`], [`plan`], [`dynamics`]; and [`scenario`], the scene as written.
 
-#![warn(missing_docs)]
+#[macro_use(planted)]
+extern crate gnss;
 
 pub mod arrival;
 pub mod augmentation;

@@ -1,7 +1,5 @@
 //! Motion that is pushed while samples go out: ticks, their record and its replay, in virtual time and
 //! through the program.
 
-#[path = "live/program.rs"]
 mod program;
-#[path = "live/replay.rs"]
 mod replay;

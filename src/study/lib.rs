@@ -9,7 +9,7 @@
 //! sees receiver, generator and judge at once; none of them sees it.
 //!
 //! ```
-//! use gnss_twin::study::sweep::spec::Study;
+//! use study::sweep::spec::Study;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let text = r#"
@@ -28,8 +28,6 @@
 //! # Ok(())
 //! # }
 //! ```
-
-#![warn(missing_docs)]
 
 pub mod correlation;
 pub mod correlator;

@@ -5,9 +5,9 @@
 //! that this project did not write (`tests/witness`).
 //!
 //! ```
-//! use gnss_twin::gnss::gps::l1ca::L1_CA;
-//! use gnss_twin::gnss::satellite::Sv;
-//! use gnss_twin::gnss::{rinex, time::Epoch};
+//! use gnss::gps::l1ca::L1_CA;
+//! use gnss::satellite::Sv;
+//! use gnss::{rinex, time::Epoch};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // The code of PRN 7, and where its satellite was by what it broadcast.
@@ -22,7 +22,8 @@
 //! # }
 //! ```
 
-#![warn(missing_docs)]
+#[macro_use]
+pub mod plant;
 
 pub mod augmentation;
 pub mod bdgim;
@@ -32,16 +33,13 @@ pub mod broadcast;
 pub mod crc;
 pub mod earth;
 pub mod exchange;
-#[cfg(any(feature = "generator", feature = "analysis"))]
 pub mod facts;
 pub mod fec;
 pub mod galileo;
 pub mod glonass;
 pub mod gps;
-#[cfg(feature = "generator")]
 pub mod inflate;
 pub mod ion;
-#[cfg(feature = "generator")]
 pub mod ionex;
 pub mod ionosphere;
 pub mod klobuchar;
@@ -54,18 +52,14 @@ pub mod place;
 pub mod qzss;
 pub mod record;
 pub mod recording;
-#[cfg(feature = "generator")]
 pub mod rinex;
 pub mod samples;
 pub mod satellite;
 pub mod sbas;
 pub mod sigmf;
 pub mod signal;
-#[cfg(feature = "generator")]
 pub mod sp3;
 pub mod time;
-#[cfg(feature = "generator")]
 pub mod vienna;
-#[cfg(feature = "generator")]
 pub mod vmf3;
 pub mod weil;

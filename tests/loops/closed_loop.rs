@@ -111,7 +111,7 @@ fn without_noise_the_loop_closes_to_centimetres() {
 /// what lies beyond 2 MHz of the carrier is a hundredth of the replica's.
 #[test]
 fn galileo_alone_finds_its_place_to_half_a_metre() {
-    let scene = include_str!("../scenarios/galileo.toml")
+    let scene = include_str!("../../scenarios/galileo.toml")
         .replace("sample_rate_hz = 6.5e6", "sample_rate_hz = 4.1e6")
         .replace("duration_s = 60", "duration_s = 45");
     assert!(scene.contains("4.1e6") && scene.contains("duration_s = 45"));
@@ -132,7 +132,7 @@ fn galileo_alone_finds_its_place_to_half_a_metre() {
 /// and 2 are whole 28 s after the start and the ionosphere, without which there is no fix, 40 s after it.
 #[test]
 fn navic_alone_finds_its_place_by_four_satellites_that_turn_with_the_earth() {
-    let scene = include_str!("../scenarios/navic.toml")
+    let scene = include_str!("../../scenarios/navic.toml")
         .replace("sample_rate_hz = 2.6e6", "sample_rate_hz = 2.1e6")
         .replace("duration_s = 70", "duration_s = 58");
     assert!(scene.contains("2.1e6") && scene.contains("duration_s = 58"));
@@ -169,7 +169,7 @@ fn beidou_alone_finds_its_place_by_both_messages() {
 /// 5 of a frame are whole 15 s after the start. A search finds channels; the message says whose they are.
 #[test]
 fn glonass_alone_finds_its_place_by_carriers_of_their_own_and_state_vectors() {
-    let scene = include_str!("../scenarios/glonass.toml").replace("duration_s = 36", "duration_s = 26");
+    let scene = include_str!("../../scenarios/glonass.toml").replace("duration_s = 36", "duration_s = 26");
     assert!(scene.contains("duration_s = 26"));
     let place = tempfile::tempdir().unwrap();
     let path = place.path().join("glonass.toml");
@@ -186,7 +186,7 @@ fn glonass_alone_finds_its_place_by_carriers_of_their_own_and_state_vectors() {
 /// the parameters that are the ones sent.
 #[test]
 fn galileo_e6_is_told_its_time_by_e1_and_alone_it_is_refused() {
-    let scene = include_str!("../scenarios/galileo_e6.toml")
+    let scene = include_str!("../../scenarios/galileo_e6.toml")
         .replace("sample_rate_hz = 6.5e6", "sample_rate_hz = 4.1e6")
         .replace("duration_s = 60", "duration_s = 40");
     assert!(scene.contains("4.1e6") && scene.contains("duration_s = 40"));
@@ -220,7 +220,7 @@ fn galileo_e6_is_told_its_time_by_e1_and_alone_it_is_refused() {
 /// `GNSS_TWIN_LONG=1`.
 #[test]
 fn galileo_e5_is_one_signal_of_two_sides_and_no_scene_sends_one_of_these_twice() {
-    let scene = include_str!("../scenarios/galileo_e5.toml");
+    let scene = include_str!("../../scenarios/galileo_e5.toml");
     let place = tempfile::tempdir().unwrap();
     let path = place.path().join("twice.toml");
     for side in ["Galileo E5a", "Galileo E5b"] {
@@ -233,7 +233,7 @@ fn galileo_e5_is_one_signal_of_two_sides_and_no_scene_sends_one_of_these_twice()
         let sentence = format!("expected Galileo E5 or {side}, which is a part of it, not both");
         assert!(!plan.status.success() && text.contains(&sentence), "{text}");
     }
-    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+    if !crate::long::is_asked_for() {
         return;
     }
     let summary = run_with(&scenarios().join("galileo_e5.toml"), &["--check".as_ref()]);
@@ -298,7 +298,7 @@ fn l5_alone_finds_its_place_by_cnav_and_the_satellites_that_send_it() {
 /// s after it, 4 s before the bar (`GNSS_TWIN_LONG=1`: codes of 10 ms take long to find).
 #[test]
 fn l1c_alone_finds_its_place_by_cnav_2_and_its_pilot() {
-    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+    if !crate::long::is_asked_for() {
         return;
     }
     let summary = run_with(&scenarios().join("gps_l1c.toml"), &["--check".as_ref()]);
@@ -347,7 +347,7 @@ fn over_palau(changes: &[(&str, &str)]) -> Value {
 /// (`GNSS_TWIN_LONG=1`: codes of 10 ms take long to find).
 #[test]
 fn l1c_of_qzss_alone_finds_its_place_by_cnav_2() {
-    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+    if !crate::long::is_asked_for() {
         return;
     }
     let summary = over_palau(&[("QZSS L1 C/A\"]", "QZSS L1C\"]"), ("rate_hz = 2.6e6", "rate_hz = 5.2e6")]);
@@ -359,7 +359,7 @@ fn l1c_of_qzss_alone_finds_its_place_by_cnav_2() {
 /// horizontally, and averages it (`GNSS_TWIN_LONG=1`: 70 s of 30 million samples a second).
 #[test]
 fn qzss_on_three_bands_finds_its_place_through_an_ionosphere_of_maps() {
-    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+    if !crate::long::is_asked_for() {
         return;
     }
     let summary = run_with(&scenarios().join("qzss_bands.toml"), &["--check".as_ref()]);
@@ -460,7 +460,7 @@ fn a_satellite_that_sbas_says_must_not_be_used_does_not_pull_the_fix() {
 /// before the bar (`GNSS_TWIN_LONG=1`: codes of 10 ms take long to find).
 #[test]
 fn b1c_alone_finds_its_place_by_b_cnav1_and_its_pilot() {
-    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+    if !crate::long::is_asked_for() {
         return;
     }
     let summary = run_with(&scenarios().join("beidou_b1c.toml"), &["--check".as_ref()]);
@@ -476,7 +476,7 @@ fn b1c_alone_finds_its_place_by_b_cnav1_and_its_pilot() {
 /// whole 13 s after the start, 3 s before the bar (`GNSS_TWIN_LONG=1`: twenty million samples a second).
 #[test]
 fn b2a_alone_finds_its_place_by_b_cnav2_and_its_pilot() {
-    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+    if !crate::long::is_asked_for() {
         return;
     }
     let summary = run_with(&scenarios().join("beidou_b2a.toml"), &["--check".as_ref()]);
@@ -496,7 +496,7 @@ fn b2a_alone_finds_its_place_by_b_cnav2_and_its_pilot() {
 /// 150 s.
 fn in_phase_alone(signal: &str, front_end: &str, duration_s: u32) -> Value {
     let duration = format!("duration_s = {duration_s}\n");
-    let scene = include_str!("../scenarios/beidou.toml")
+    let scene = include_str!("../../scenarios/beidou.toml")
         .replace("BeiDou B1I\"]", &format!("{signal}\"]"))
         .replace("sample_rate_hz = 4.1e6", front_end)
         .replace("duration_s = 42\n", &duration);
@@ -543,7 +543,7 @@ fn b2i_alone_finds_its_place_by_the_four_satellites_that_send_it() {
 /// whole after 23 s (`GNSS_TWIN_LONG=1`: twenty million samples a second).
 #[test]
 fn b3i_alone_finds_its_place_to_a_decimetre() {
-    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+    if !crate::long::is_asked_for() {
         return;
     }
     let summary = in_phase_alone("BeiDou B3I", "center_hz = 1268.52e6\nsample_rate_hz = 21.3e6", 42);
@@ -555,7 +555,7 @@ fn b3i_alone_finds_its_place_to_a_decimetre() {
 /// B2b's bars: as B2a's; a set is whole after four messages of a second at most, 3 s before the bar.
 #[test]
 fn b2b_alone_finds_its_place_by_b_cnav3() {
-    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+    if !crate::long::is_asked_for() {
         return;
     }
     let summary = run_with(&scenarios().join("beidou_b2b.toml"), &["--check".as_ref()]);
@@ -571,10 +571,10 @@ fn b2b_alone_finds_its_place_by_b_cnav3() {
 /// which message 30 brings within the four seconds of a set.
 #[test]
 fn b2b_alone_finds_its_place_under_the_ionosphere_that_b_cnav3_brings() {
-    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+    if !crate::long::is_asked_for() {
         return;
     }
-    let scene = include_str!("../scenarios/beidou_b2b.toml");
+    let scene = include_str!("../../scenarios/beidou_b2b.toml");
     let (scene, _) = scene.split_once("[receiver.position]").unwrap();
     let electrons = "bdgim_tecu = [30.875, 0.25, 11.625, 10.375, -12.5, 0.75, 0, 3.125, 1.875]";
     let place = tempfile::tempdir().unwrap();
@@ -593,7 +593,7 @@ fn b2b_alone_finds_its_place_under_the_ionosphere_that_b_cnav3_brings() {
 /// 0.3 m for the ionosphere as two bands show it (`GNSS_TWIN_LONG=1`).
 #[test]
 fn b1c_and_b2a_find_their_place_and_the_ionosphere_through_two_front_ends() {
-    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+    if !crate::long::is_asked_for() {
         return;
     }
     let summary = run_with(&scenarios().join("beidou_bands.toml"), &["--check".as_ref()]);
@@ -609,7 +609,7 @@ fn b1c_and_b2a_find_their_place_and_the_ionosphere_through_two_front_ends() {
 /// ms take long to find (`GNSS_TWIN_LONG=1`).
 #[test]
 fn l2c_alone_finds_its_place_by_cnav_and_the_long_code() {
-    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+    if !crate::long::is_asked_for() {
         return;
     }
     let summary = over_kamakura(
@@ -623,7 +623,7 @@ fn l2c_alone_finds_its_place_by_cnav_and_the_long_code() {
 
 #[test]
 fn real_samples_at_an_if_with_a_mirrored_spectrum_close_the_loop_as_well() {
-    let scene = include_str!("../scenarios/static.toml")
+    let scene = include_str!("../../scenarios/static.toml")
         .replace("sample_rate_hz = 2.6e6", "sample_rate_hz = 5.2e6\nif_hz = 1.3e6\nspectrum_inverted = true")
         .replace("format = \"ci8\"", "format = \"ri8\"")
         .replace("duration_s = 60", "duration_s = 40");
@@ -690,7 +690,7 @@ fn lost_and_doubled_samples_are_counted_and_cost_less_than_a_second_of_fixes() {
     let directory = tempfile::tempdir().unwrap();
     let path = |name: &str| directory.path().join(name);
     let twin = |arguments: &[&str]| run_in(directory.path(), arguments);
-    let scene = include_str!("../scenarios/static.toml").replace("duration_s = 60", "duration_s = 36");
+    let scene = include_str!("../../scenarios/static.toml").replace("duration_s = 60", "duration_s = 36");
     std::fs::write(path("scene.toml"), scene).unwrap();
     twin(&["generate", "scene.toml", "--out", "if.sigmf-data"]);
     let bytes = std::fs::read(path("if.sigmf-data")).unwrap();
@@ -737,7 +737,7 @@ fn lost_and_doubled_samples_are_counted_and_cost_less_than_a_second_of_fixes() {
 fn a_satellite_sent_astray_while_samples_flow_is_left_out_and_the_verdict_knows_why() {
     let directory = tempfile::tempdir().unwrap();
     let path = |name: &str| directory.path().join(name);
-    let scene = include_str!("../scenarios/static.toml")
+    let scene = include_str!("../../scenarios/static.toml")
         .replace("duration_s = 60", "duration_s = 40")
         .replace("kind = \"static\"", "kind = \"pushed\"");
     std::fs::write(path("scene.toml"), scene).unwrap();
@@ -760,7 +760,7 @@ fn a_satellite_sent_astray_while_samples_flow_is_left_out_and_the_verdict_knows_
 fn a_mixer_and_a_clock_that_are_off_cost_neither_accuracy_nor_satellites() {
     // Clock and mixer take six of twelve satellites out of the first search's ±5 kHz, and the mixer parts
     // carrier and code by 2 kHz.
-    let scene = include_str!("../scenarios/static.toml")
+    let scene = include_str!("../../scenarios/static.toml")
         .replace("drift_sps = 5e-8", "drift_sps = 2.5e-6")
         .replace("duration_s = 60", "duration_s = 40")
         .replace("[noise]", "[noise]\n\n[local_oscillator]\noffset_hz = -2000");
@@ -792,7 +792,7 @@ fn a_whole_bit_that_is_lost_or_doubled_is_counted_and_no_fix_errs_by_it() {
     let directory = tempfile::tempdir().unwrap();
     let path = |name: &str| directory.path().join(name);
     let twin = |arguments: &[&str]| run_in(directory.path(), arguments);
-    let scene = include_str!("../scenarios/static.toml").replace("duration_s = 60", "duration_s = 44");
+    let scene = include_str!("../../scenarios/static.toml").replace("duration_s = 60", "duration_s = 44");
     std::fs::write(path("scene.toml"), scene).unwrap();
     twin(&["generate", "scene.toml", "--out", "if.sigmf-data"]);
     let bytes = std::fs::read(path("if.sigmf-data")).unwrap();

@@ -2,7 +2,7 @@
 //! ionosphere in it.
 //!
 //! The second carrier is a synthetic signal at the frequency of L2 with the codes and the message of L1 C/A.
-#![cfg(all(feature = "planted", feature = "generator", feature = "receiver", feature = "analysis"))]
+#![cfg(all(feature = "generator", feature = "receiver", feature = "analysis"))]
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,11 +1,8 @@
 //! Studies as a user meets them: the same table however they are cut, killed, doubled or damaged.
 #![cfg(feature = "cli")]
 
-#[path = "study/export.rs"]
 mod export;
-#[path = "study/refusal.rs"]
 mod refusal;
-#[path = "study/samples.rs"]
 mod samples;
 
 use std::fs;

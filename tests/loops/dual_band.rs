@@ -46,7 +46,7 @@ fn figure(summary: &serde_json::Value, path: &str) -> f64 {
 
 #[test]
 fn two_bands_give_a_place_to_a_metre_and_the_ionosphere_to_three_decimetres() {
-    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+    if !crate::long::is_asked_for() {
         return;
     }
     // Of GPS the bars are the verdict's: codes are noisier than those of Galileo, and two satellites have

@@ -12,7 +12,7 @@ fn the_samples_of_every_shipped_scene_are_the_bytes_that_they_were() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let place = tempfile::tempdir().unwrap();
     let (mut changed, mut scenes) = (Vec::new(), std::collections::BTreeSet::new());
-    for line in include_str!("samples.sha256").lines() {
+    for line in include_str!("../samples.sha256").lines() {
         let words: Vec<&str> = line.split_whitespace().collect();
         let (&[hash, scenario, seek, samples], front_end) = words.split_first_chunk().unwrap();
         let out = place.path().join("samples.sigmf-data");

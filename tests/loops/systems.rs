@@ -4,7 +4,7 @@
 //! The system sends synthetic signal A (4 ms, BOC(1,1), coded data beside a pilot with an overlay) with pages
 //! of I/NAV in a time of its own, 3 s and 40 ns off GPS time. Its orbits are those of GPS satellites with
 //! turned nodes.
-#![cfg(all(feature = "planted", feature = "generator", feature = "receiver", feature = "analysis"))]
+#![cfg(all(feature = "generator", feature = "receiver", feature = "analysis"))]
 
 use std::collections::BTreeSet;
 use std::path::Path;

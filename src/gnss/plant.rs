@@ -7,6 +7,8 @@
 
 /// The value of an expression; while the fault of that name is active, a wrong one.
 #[cfg(not(feature = "planted"))]
+#[doc(hidden)]
+#[macro_export]
 macro_rules! planted {
     ($name:literal, $right:expr, $wrong:expr) => {
         $right
@@ -14,6 +16,8 @@ macro_rules! planted {
 }
 
 #[cfg(feature = "planted")]
+#[doc(hidden)]
+#[macro_export]
 macro_rules! planted {
     ($name:literal, $right:expr, $wrong:expr) => {
         if $crate::plant::active($name) { $wrong } else { $right }

@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::*;
 
 /// One satellite and thermal noise.
-const SCENE: &str = include_str!("../../studies/scenes/one_satellite.toml");
+const SCENE: &str = include_str!("../../../studies/scenes/one_satellite.toml");
 
 const STUDY: &str = r#"
 name = "sampled"
@@ -115,7 +115,7 @@ fn every_figure_that_a_study_may_keep_is_one_of_the_summary() {
 #[test]
 fn a_scene_of_another_system_is_searched_for_its_own_signals() {
     // One satellite of Galileo; the receiver's settings name no signal.
-    let scene = include_str!("../../studies/scenes/boost_galileo.toml");
+    let scene = include_str!("../../../studies/scenes/boost_galileo.toml");
     let (scene, _) = scene.split_once("[receiver.acquisition]").unwrap();
     let here = workplace(
         "name = \"own\"\nlevel = \"samples\"\nscenario = \"one.toml\"\nkeep = [\"satellites.acquired\"]\n\

@@ -12,34 +12,9 @@
 //!
 //! Below all of them lie [`error`], [`statistics`] and [`waveform`], the spectrum and the correlation of a
 //! signal.
-//!
-//! ```
-//! use gnss_twin::generator::{scenario::Scenario, truth};
-//! use gnss_twin::receiver::{output::Output, settings::Settings};
-//! use gnss_twin::{analysis, twin};
-//!
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let scenario = r#"
-//!     name = "judged"
-//!     start = 2010-07-01T08:06:00
-//!     duration_s = 4
-//!     motion = { kind = "static", latitude_deg = 48.1, longitude_deg = 11.6, height_m = 520 }
-//!     noise = {}
-//! "#;
-//! let scene = Scenario::from_toml(scenario)?.scene()?;
-//! let run = tempfile::tempdir()?;
-//! let [truth, rx] = ["truth", "rx"].map(|name| run.path().join(name));
-//! std::fs::create_dir(&truth)?;
-//! std::fs::create_dir(&rx)?;
-//! let (mut truth, mut rx) = (truth::Writer::create(&truth)?, Output::create(&rx)?);
-//! twin::run(std::slice::from_ref(&scene), &Settings::default(), &mut truth, &mut rx)?;
-//! let summary = analysis::assess(run.path(), None)?;
-//! assert_eq!(summary.satellites.false_acquired, 0);
-//! # Ok(())
-//! # }
-//! ```
 
-#![warn(missing_docs)]
+#[macro_use(planted)]
+extern crate gnss;
 
 pub mod error;
 pub mod expect;

@@ -10,9 +10,9 @@
 //! front ends of one clock are one reception ([`Receiver::of_several`], [`receive_several`]).
 //!
 //! ```
-//! use gnss_twin::gnss::samples::{Format, IfMetadata};
-//! use gnss_twin::gnss::time::Rate;
-//! use gnss_twin::receiver::{Receiver, output::Record, settings::Settings};
+//! use gnss::samples::{Format, IfMetadata};
+//! use gnss::time::Rate;
+//! use receiver::{Receiver, output::Record, settings::Settings};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let rate = Rate::from_hz(2.6e6).ok_or("no rate")?;
@@ -35,7 +35,8 @@
 //! [`acquire`], looks · [`track`] · [`decode`] · [`observe`], [`position`] · [`settings`] (of all those) ·
 //! [`diagnosis`], [`output`], outcome · session · run.
 
-#![warn(missing_docs)]
+#[macro_use(planted)]
+extern crate gnss;
 
 pub mod acquire;
 pub mod correlate;

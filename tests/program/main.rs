@@ -1,0 +1,6 @@
+//! The program as a user calls it: the command line, ports, live streams and studies.
+
+mod cli;
+mod live;
+mod ports;
+mod study;
