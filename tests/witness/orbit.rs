@@ -17,11 +17,11 @@ use nalgebra::Vector3;
 
 use super::data::external;
 
-/// A file of the repository's `data/witness`, or of `data` if the program has it too, unpacked.
+/// A file of the repository's `data/witness`, or of `src/gnss/data` if the program has it too, unpacked.
 pub fn shipped(name: &str) -> Vec<u8> {
-    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("data");
-    let own = data.join("witness").join(name);
-    unpacked(&if own.exists() { own } else { data.join(name) })
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let own = root.join("data/witness").join(name);
+    unpacked(&if own.exists() { own } else { root.join("src/gnss/data").join(name) })
 }
 
 /// A file that lies outside of the repository, unpacked; `None` where it is absent.
