@@ -150,7 +150,7 @@ impl Reader {
             Some(b'%') if line.starts_with("%c") && self.scale.is_none() => {
                 self.scale = Some(time_scale(columns(line, 10, 12))?);
             }
-            Some(b'*') => self.epoch = Some(self.scale().map(|scale| epoch(line, scale))??),
+            Some(b'*') => self.epoch = Some(epoch(line, self.scale()?)?),
             Some(b'P') => self.position(line)?,
             _ => {}
         }
@@ -275,6 +275,61 @@ mod tests {
         let galileo = Sv { system: System::Galileo, number: 5 };
         assert_eq!(precise.satellites[&galileo][&begin.seconds()], Sample { broken: false, ..sample });
         assert_eq!(precise.satellites[&Sv::gps(2)][&begin.seconds()].clock_s, None);
+    }
+
+    /// hifitime, which knows the scales by itself, is the witness of the instants.
+    #[test]
+    fn epochs_are_read_in_the_time_of_the_file() {
+        let label = "2020-06-25T00:00:00";
+        for (name, scale) in [
+            ("GPS", hifitime::TimeScale::GPST),
+            ("GAL", hifitime::TimeScale::GST),
+            ("BDT", hifitime::TimeScale::BDT),
+            ("TAI", hifitime::TimeScale::TAI),
+            ("UTC", hifitime::TimeScale::UTC),
+            ("GLO", hifitime::TimeScale::UTC),
+        ] {
+            let text = format!("{HEAD}{BODY}").replacen("cc GPS", &format!("cc {name}"), 1);
+            let (first, _) = read(text.as_bytes(), "x").unwrap().span().unwrap();
+            let there = hifitime::Epoch::from_gregorian_str(&format!("{label} {scale}")).unwrap();
+            let gpst_s = there.to_gpst_seconds();
+            assert!((gpst_s - first.seconds() as f64).abs() < 1e-6, "{name}: {gpst_s} s, {first}");
+        }
+    }
+
+    #[test]
+    fn a_position_that_is_not_known_is_left_out_and_a_clock_that_is_blank_is_none() {
+        let unknown = "PG03      0.000000      0.000000      0.000000     10.571484\n";
+        let blank = "PG04  15402.861499  21607.418873   -992.500669\n";
+        let moved = format!("{:78}M\n", "PG05  15402.861499  21607.418873   -992.500669     10.571484");
+        let text = format!("{HEAD}{BODY}").replace("EOF\n", &format!("{unknown}{blank}{moved}EOF\n"));
+        let precise = read(text.as_bytes(), "x").unwrap();
+        let only = |number| precise.satellites.get(&Sv::gps(number)).map(|all| *all.values().next().unwrap());
+        assert_eq!(only(3), None);
+        assert_eq!(only(4).map(|sample| (sample.clock_s, sample.broken)), Some((None, false)));
+        assert!(only(5).unwrap().broken);
+    }
+
+    #[test]
+    fn damage_is_told_with_its_line_and_what_was_expected() {
+        let whole = format!("{HEAD}{BODY}");
+        for (right, wrong, said) in [
+            (
+                "PG01  15402.861499",
+                "PG01  15402.86x499",
+                "line 5: '15402.86x499' in columns 5 to 18: expected a number",
+            ),
+            ("PG01  15402.861499", "PG01  15402861.499", "line 5: G01 at 2020-06-25T00:00:00"),
+            ("PG01", "PG0x", "line 5: 'G0x': expected a satellite"),
+            ("cc GPS", "cc XYZ", "line 3: scale of time 'XYZ'"),
+            ("*  2020  6 25", "*  2020 13 25", "line 4: '*  2020 13 25"),
+            ("%c M", "%x M", "line 4: an epoch before the line '%c'"),
+            ("*  2020", "/* 2020", "line 5: a position before any epoch"),
+        ] {
+            let hurt = whole.replacen(right, wrong, 1);
+            let error = read(hurt.as_bytes(), "a.sp3").unwrap_err().to_string();
+            assert!(error.contains("a.sp3: damaged SP3 file") && error.contains(said), "{error}");
+        }
     }
 
     #[test]
