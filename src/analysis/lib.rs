@@ -129,6 +129,7 @@ fn measure(read: Run, run: &Path, limits: Option<&Limits>) -> Result<Measured, J
         Some(limits) => verdict.with_user(limits.judge(&serde_json::to_value(&summary).map_err(not_json)?)),
         None => verdict,
     };
+    summary.not_judged.clone_from(&summary.details.verdict.not_judged);
     read.sound()?;
     errors.sound()?;
     Ok(Measured { read, errors, clock, consistency, slips, jitter, summary })

@@ -38,7 +38,7 @@ impl Printed {
     }
 }
 
-/// A verdict: how many figures have which status, and each of those that fail.
+/// A verdict: how many figures have which status, each of those that fail, and what is not judged.
 pub fn verdict(verdict: &Verdict) -> Value {
     let count = |status| verdict.count(status);
     let failed = verdict.rows.iter().filter(|row| row.status == Status::Fail);
@@ -49,5 +49,6 @@ pub fn verdict(verdict: &Verdict) -> Value {
         "marginal": count(Status::Marginal),
         "fail": count(Status::Fail),
         "failed": failed.collect::<Vec<_>>(),
+        "not_judged": verdict.not_judged,
     })
 }

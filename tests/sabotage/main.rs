@@ -1,13 +1,14 @@
 //! The judge judged: results of a sound receiver are damaged, a little and a little more, and the verdict
 //! must pass the one and fail the other.
 //!
-//! Two closed loops are run, one at rest and one in motion. Each kind of damage edits the tables of `rx/` or
-//! the spectrum in a copy and has two sizes: one that an evaluator would still call sound, with which no row
-//! may fail, and one a small factor larger, which must fail by a row that names it. Where no size is sound (a
-//! row twice, a week too many) the smaller one is absent. `GNSS_TWIN_WRITE_SABOTAGE=$PWD/reports/sabotage.md`
-//! makes a run write the table.
+//! Three closed loops are run, one at rest, one in motion, one of two systems. Each kind of damage edits the
+//! tables of `rx/` or the spectrum in a copy and has two sizes: one that an evaluator would still call sound,
+//! with which no row may fail, and one a small factor larger, which must fail by a row that names it. Where
+//! no size is sound (a row twice, a week too many) the smaller one is absent.
+//! `GNSS_TWIN_WRITE_SABOTAGE=$PWD/reports/sabotage.md` makes a run write the table.
 #![cfg(all(feature = "cli", feature = "pdf"))]
 
+mod files;
 mod fixes;
 mod links;
 mod observations;
@@ -38,7 +39,7 @@ pub struct Kind {
 }
 
 fn kinds() -> Vec<Kind> {
-    [fixes::kinds(), observations::kinds(), links::kinds(), tables::kinds(), spectrum::kinds()]
+    [fixes::kinds(), observations::kinds(), links::kinds(), tables::kinds(), spectrum::kinds(), files::kinds()]
         .into_iter()
         .flatten()
         .collect()

@@ -17,6 +17,8 @@ pub enum Scene {
     InMotion,
     /// At rest; the scene says that errors may have any size up to a bound.
     Bounded,
+    /// At rest, GPS and Galileo.
+    TwoSystems,
 }
 
 struct Made {
@@ -60,6 +62,13 @@ pub fn in_motion() -> &'static Path {
     make(&RUN, "motion", &scene.replace("duration_s = 90", "duration_s = 60"))
 }
 
+/// The first fifty seconds of the shipped scene of two systems.
+fn two_systems() -> &'static Path {
+    static RUN: OnceLock<Made> = OnceLock::new();
+    let scene = include_str!("../../scenarios/two_systems.toml");
+    make(&RUN, "two_systems", &scene.replace("duration_s = 60", "duration_s = 50"))
+}
+
 /// Another place, seed and start, without page 18 in time.
 pub fn elsewhere() -> &'static Path {
     static RUN: OnceLock<Made> = OnceLock::new();
@@ -79,6 +88,7 @@ pub struct Rx {
     tables: BTreeMap<&'static str, Table>,
     receiver: Option<serde_json::Value>,
     psd: Option<Table>,
+    texts: BTreeMap<&'static str, String>,
 }
 
 impl Rx {
@@ -87,6 +97,7 @@ impl Rx {
         let from = match scene {
             Scene::AtRest | Scene::Bounded => at_rest(),
             Scene::InMotion => in_motion(),
+            Scene::TwoSystems => two_systems(),
         };
         for name in ["truth", "rx"] {
             fs::create_dir(to.join(name)).unwrap();
@@ -101,13 +112,26 @@ impl Rx {
         for name in ["psd.csv", "speed.json", "scenario.toml"] {
             link(&from.join(name), &to.join(name));
         }
-        Self { from: from.to_owned(), to: to.to_owned(), tables: BTreeMap::new(), receiver: None, psd: None }
+        Self {
+            from: from.to_owned(),
+            to: to.to_owned(),
+            tables: BTreeMap::new(),
+            receiver: None,
+            psd: None,
+            texts: BTreeMap::new(),
+        }
     }
 
     /// A table to edit.
     pub fn table(&mut self, name: &'static str) -> &mut Table {
         let path = self.from.join(format!("rx/{name}.csv"));
         self.tables.entry(name).or_insert_with(|| Table::read(&path))
+    }
+
+    /// A text file to edit.
+    pub fn text(&mut self, name: &'static str) -> &mut String {
+        let path = self.from.join("rx").join(name);
+        self.texts.entry(name).or_insert_with(|| fs::read_to_string(path).unwrap())
     }
 
     /// `receiver.json` to edit.
@@ -141,7 +165,10 @@ impl Rx {
             match (name.strip_suffix(".csv").and_then(|stem| self.tables.get(stem)), &self.receiver) {
                 (Some(table), _) => table.write(&target),
                 (None, Some(receiver)) if name == "receiver.json" => fs::write(&target, receiver.to_string()).unwrap(),
-                _ => link(&entry.path(), &target),
+                _ => match self.texts.get(name.as_str()) {
+                    Some(text) => fs::write(&target, text).unwrap(),
+                    None => link(&entry.path(), &target),
+                },
             }
         }
     }

@@ -42,7 +42,7 @@ fn walk(path: &str, schema: &Value, leaves: &mut Vec<Leaf>) {
         properties.iter().for_each(|(key, schema)| walk(&below(key), schema, leaves));
     } else if let Some(items) = schema.get("prefixItems").and_then(Value::as_array) {
         items.iter().enumerate().for_each(|(index, schema)| walk(&below(&index.to_string()), schema, leaves));
-    } else if let Some(any) = schema.get("additionalProperties").filter(|any| any.is_object()) {
+    } else if let Some(any) = schema.get("additionalProperties").or(schema.get("items")).filter(|any| any.is_object()) {
         walk(&below(ANY), any, leaves);
     } else {
         let text = |key: &str| schema.get(key).and_then(Value::as_str).unwrap_or_default().to_owned();

@@ -68,24 +68,29 @@ impl Verdict {
         }
     }
 
-    /// Rows of `verdict.csv`.
+    /// Rows of `verdict.csv`: those that are judged, then what is not, with the reason in place of a limit's
+    /// origin.
     pub(crate) fn csv_rows(&self) -> impl Iterator<Item = VerdictRow<'_>> {
-        self.rows.iter().map(|row| VerdictRow {
+        let judged = self.rows.iter().map(|row| VerdictRow {
             figure: &row.figure,
             path: row.path.as_deref().unwrap_or(""),
             value: row.value_text(),
             unit: &row.unit,
             limit: row.bound.to_string(),
             margin_share: row.margin,
-            status: row.status,
+            status: Some(row.status),
             source: &row.source,
             why: row.why.join("; "),
-        })
+        });
+        judged.chain(self.not_judged.iter().map(|text| {
+            let (figure, source) = text.split_once(": ").unwrap_or((text, ""));
+            VerdictRow { figure, source, ..VerdictRow::default() }
+        }))
     }
 }
 
 /// One row of `verdict.csv`.
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 pub(crate) struct VerdictRow<'a> {
     figure: &'a str,
     path: &'a str,
@@ -93,7 +98,17 @@ pub(crate) struct VerdictRow<'a> {
     unit: &'a str,
     limit: String,
     margin_share: Option<f64>,
-    status: Status,
+    #[serde(serialize_with = "status_or_none")]
+    status: Option<Status>,
     source: &'a str,
     why: String,
+}
+
+/// A status by its name; none of what is not judged.
+#[expect(clippy::ref_option, reason = "serde calls it")]
+fn status_or_none<S: serde::Serializer>(status: &Option<Status>, to: S) -> Result<S::Ok, S::Error> {
+    match status {
+        Some(status) => status.serialize(to),
+        None => to.serialize_str("not_judged"),
+    }
 }

@@ -91,14 +91,26 @@ impl Common {
 
     /// That of all codes on average, which a clock solved from them has.
     pub fn clock_delay_s(&self) -> f64 {
-        let mut delays_s = self.code_delays_s.values();
-        let first_s = delays_s.next().copied().unwrap_or(0.0);
-        if delays_s.all(|delay_s| *delay_s == first_s) {
+        self.mean_delay_s(|_| true)
+    }
+
+    /// That of the codes of one time scale on average, and by how much one of them may differ from it.
+    pub fn scale_delay_s(&self, scale: &str) -> (f64, f64) {
+        let is_own = |signal: &Signal| signal.time.name == scale;
+        let mean_s = self.mean_delay_s(is_own);
+        let own = self.code_delays_s.iter().filter(|(signal, _)| is_own(signal));
+        (mean_s, own.map(|(_, delay_s)| (delay_s - mean_s).abs()).fold(0.0, f64::max))
+    }
+
+    fn mean_delay_s(&self, counts: impl Fn(&Signal) -> bool) -> f64 {
+        let mut delays_s = self.code_delays_s.iter().filter(|(signal, _)| counts(signal)).map(|(_, delay_s)| *delay_s);
+        let first_s = delays_s.next().unwrap_or(0.0);
+        if delays_s.all(|delay_s| delay_s == first_s) {
             return first_s;
         }
-        let weighted = |(signal, count): (&&'static Signal, &usize)| self.code_delay_s(signal) * *count as f64;
-        let count: usize = self.satellites.values().sum();
-        self.satellites.iter().map(weighted).sum::<f64>() / count.max(1) as f64
+        let own = || self.satellites.iter().filter(|(signal, _)| counts(signal));
+        let count: usize = own().map(|(_, count)| count).sum();
+        own().map(|(signal, count)| self.code_delay_s(signal) * *count as f64).sum::<f64>() / count.max(1) as f64
     }
 
     /// Counts a row of the truth in.

@@ -15,7 +15,7 @@ pub(super) fn missing(path: &Path, remedy: &'static str) -> JudgeError {
 
 /// Gives every row of a CSV file to `take`, with the number of its line; a file without even a header has
 /// none.
-pub(super) fn each<T: DeserializeOwned>(
+pub(crate) fn each<T: DeserializeOwned>(
     path: &Path,
     remedy: &'static str,
     take: impl FnMut(u64, T) -> Result<(), JudgeError>,

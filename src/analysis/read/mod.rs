@@ -25,6 +25,7 @@ pub use common::Common;
 pub(crate) use common::replica_edge;
 pub use emission::{Emission, MeanSignal};
 pub use fault::Fault;
+pub(crate) use files::each;
 pub use fixes::Fixes;
 pub use numbers::Numbers;
 pub use run::{PsdRow, Run, Speed, psd_name};

@@ -8,6 +8,7 @@
 //! (flags 2 to 6) are passed over and counted.
 
 use std::collections::BTreeMap;
+use std::io::BufRead;
 
 use crate::read::fault::Fault;
 use gnss::satellite::Sv;
@@ -57,8 +58,31 @@ pub const LARGEST_BYTES: u64 = 256 << 20;
 
 type Parsed<T> = Result<T, Fault>;
 
-fn fault(line: usize, what: impl Into<String>) -> Fault {
-    Fault { line: line as u64 + 1, what: what.into() }
+/// Lines of a file, numbered from 1.
+struct Lines<R> {
+    input: R,
+    number: u64,
+}
+
+impl<R: BufRead> Lines<R> {
+    /// The next one without its end. Names of stations and agencies come in every encoding; the data are
+    /// ASCII.
+    fn next(&mut self) -> Parsed<Option<String>> {
+        let mut bytes = Vec::new();
+        let read = self.input.read_until(b'\n', &mut bytes);
+        if read.map_err(|error| Fault { line: self.number + 1, what: error.to_string() })? == 0 {
+            return Ok(None);
+        }
+        self.number += 1;
+        let own = if self.number == 1 { bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes) } else { &bytes };
+        let text: String = own.iter().map(|byte| if byte.is_ascii() { char::from(*byte) } else { '?' }).collect();
+        Ok(Some(text.trim_end_matches(['\n', '\r']).to_owned()))
+    }
+
+    /// A fault in the line that was read last.
+    fn fault(&self, what: impl Into<String>) -> Fault {
+        Fault { line: self.number.max(1), what: what.into() }
+    }
 }
 
 /// Columns `from..to` of a line, blanks stripped; a line may end early.
@@ -67,9 +91,27 @@ fn columns(line: &str, from: usize, to: usize) -> &str {
     if from >= to { "" } else { line.get(from..to).unwrap_or("").trim() }
 }
 
-struct Header {
+/// What a file's header says.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Header {
+    /// `PGM` and `REC # / TYPE / VERS`, to say whose file it is.
+    pub receiver: String,
+    /// Whether it says that a clock offset was applied to epoch, code and phase.
+    pub clock_applied: bool,
+    /// Frequency channels of GLONASS satellites.
+    pub channels: BTreeMap<Sv, i8>,
     types: BTreeMap<char, Vec<String>>,
     scales: BTreeMap<(char, String), f64>,
+}
+
+/// A file in reading: one epoch is held.
+pub struct Reader<R> {
+    lines: Lines<R>,
+    /// What the header says.
+    pub header: Header,
+    /// Event records passed over so far.
+    pub events: usize,
+    before: Option<Epoch>,
 }
 
 /// Reads a whole file's text.
@@ -77,200 +119,247 @@ struct Header {
 /// # Errors
 /// The first line that is not as RINEX 3 has it.
 pub fn read(bytes: &[u8]) -> Parsed<Observations> {
-    // Names of stations and agencies come in every encoding; the data are ASCII.
-    let text: String = bytes
-        .strip_prefix(b"\xef\xbb\xbf")
-        .unwrap_or(bytes)
-        .iter()
-        .map(|byte| if byte.is_ascii() { char::from(*byte) } else { '?' })
-        .collect();
-    let lines: Vec<&str> = text.lines().map(|line| line.trim_end_matches('\r')).collect();
-    let mut found = Observations::default();
-    let (header, mut at) = header(&lines, &mut found)?;
-    while at < lines.len() {
-        let line = lines[at];
-        if line.trim().is_empty() {
-            at += 1;
-            continue;
-        }
-        at = epoch(&lines, at, &header, &mut found)?;
+    let mut reader = Reader::new(bytes)?;
+    let mut epochs = Vec::new();
+    while let Some(epoch) = reader.next_epoch()? {
+        epochs.push(epoch);
     }
-    if found.epochs.is_empty() {
-        return Err(fault(lines.len().saturating_sub(1), "no epoch: expected a line that begins with '>'"));
-    }
-    Ok(found)
+    let Header { receiver, clock_applied, .. } = reader.header;
+    Ok(Observations { receiver, epochs, events: reader.events, clock_applied })
 }
 
-fn header(lines: &[&str], found: &mut Observations) -> Parsed<(Header, usize)> {
-    let first = lines.first().copied().unwrap_or("");
-    let label = |line: &str| columns(line, 60, 80).to_owned();
-    if label(first) != "RINEX VERSION / TYPE" {
-        return Err(fault(0, "expected a first line that ends in RINEX VERSION / TYPE"));
+impl<R: BufRead> Reader<R> {
+    /// Reads the header.
+    ///
+    /// # Errors
+    /// The first line that is not as RINEX 3 has it.
+    pub fn new(input: R) -> Parsed<Self> {
+        let mut lines = Lines { input, number: 0 };
+        let header = Header::read(&mut lines)?;
+        Ok(Self { lines, header, events: 0, before: None })
     }
-    let version = columns(first, 0, 9).parse::<f64>().ok().filter(|v| (3.0..5.0).contains(v));
-    if version.is_none() {
-        return Err(fault(0, format!("version '{}': expected 3.00 to 4.02", columns(first, 0, 9))));
+
+    /// The next epoch; none at the end of the file.
+    ///
+    /// # Errors
+    /// The first line that is not as RINEX 3 has it; a file without any epoch.
+    pub fn next_epoch(&mut self) -> Parsed<Option<ObservedEpoch>> {
+        while let Some(line) = self.lines.next()? {
+            if line.trim().is_empty() {
+                continue;
+            }
+            if let Some(found) = self.epoch(&line)? {
+                self.before = Some(found.label);
+                return Ok(Some(found));
+            }
+        }
+        if self.before.is_none() {
+            return Err(self.lines.fault("no epoch: expected a line that begins with '>'"));
+        }
+        Ok(None)
     }
-    if !columns(first, 20, 40).starts_with('O') {
-        return Err(fault(0, format!("file type '{}': expected O, observation data", columns(first, 20, 40))));
+
+    /// The record that begins with a line; none of an event.
+    fn epoch(&mut self, line: &str) -> Parsed<Option<ObservedEpoch>> {
+        let fault = |what: String| Err(self.lines.fault(what));
+        if !line.starts_with('>') {
+            return fault(format!("'{}': expected an epoch, which begins with '>'", cut(line)));
+        }
+        let count_text = columns(line, 32, 35);
+        let Some(count) = count_text.parse::<usize>().ok().filter(|count| *count <= 999) else {
+            return fault(format!("number of satellites '{count_text}': expected 0 to 999"));
+        };
+        let is_event = match columns(line, 31, 32) {
+            "0" | "1" => false,
+            "2" | "3" | "4" | "5" | "6" => true,
+            other => return fault(format!("epoch flag '{other}': expected 0 to 6")),
+        };
+        let label = if is_event { None } else { time(line) };
+        if !is_event {
+            let Some(label) = label else {
+                return fault(format!("time '{}': expected yyyy mm dd hh mm ss.s", columns(line, 2, 29)));
+            };
+            if self.before.is_some_and(|before| label.since(before) <= 0.0) {
+                return fault(format!("epoch {label} does not come after the one before"));
+            }
+        }
+        let mut values: BTreeMap<(Sv, String), Values> = BTreeMap::new();
+        for have in 0..count {
+            let Some(line) = self.lines.next()? else {
+                return Err(self.lines.fault(format!("the file ends after {have} of {count} lines of an epoch")));
+            };
+            if !is_event {
+                self.header.satellite(&line, &mut values).map_err(|what| self.lines.fault(what))?;
+            }
+        }
+        self.events += usize::from(is_event);
+        Ok(label.map(|label| ObservedEpoch { label, values }))
     }
-    let mut header = Header { types: BTreeMap::new(), scales: BTreeMap::new() };
-    let mut wanted: Option<(char, usize)> = None;
-    for (at, line) in lines.iter().enumerate().skip(1) {
-        match label(line).as_str() {
-            "END OF HEADER" => {
-                if header.types.is_empty() {
-                    return Err(fault(at, "the header names no observations: expected SYS / # / OBS TYPES"));
+}
+
+impl Header {
+    fn read<R: BufRead>(lines: &mut Lines<R>) -> Parsed<Self> {
+        let first = lines.next()?.unwrap_or_default();
+        let label = |line: &str| columns(line, 60, 80).to_owned();
+        if label(&first) != "RINEX VERSION / TYPE" {
+            return Err(Fault { line: 1, what: "expected a first line that ends in RINEX VERSION / TYPE".to_owned() });
+        }
+        let version = columns(&first, 0, 9).parse::<f64>().ok().filter(|v| (3.0..5.0).contains(v));
+        if version.is_none() {
+            return Err(lines.fault(format!("version '{}': expected 3.00 to 4.02", columns(&first, 0, 9))));
+        }
+        if !columns(&first, 20, 40).starts_with('O') {
+            let kind = columns(&first, 20, 40);
+            return Err(lines.fault(format!("file type '{kind}': expected O, observation data")));
+        }
+        let mut header = Self::default();
+        let mut wanted: Option<(char, usize)> = None;
+        while let Some(line) = lines.next()? {
+            let told = match label(&line).as_str() {
+                "END OF HEADER" if header.types.is_empty() => {
+                    Err("the header names no observations: expected SYS / # / OBS TYPES".to_owned())
                 }
-                complete(wanted, at)?;
-                return Ok((header, at + 1));
-            }
-            "SYS / # / OBS TYPES" => types(line, at, &mut header, &mut wanted)?,
-            "TIME OF FIRST OBS" => {
-                let system = columns(line, 48, 51);
-                // Seconds of these scales are those of GPS time; BDT is 14 s behind, GLO is UTC.
-                if !["", "GPS", "GAL", "QZS", "IRN"].contains(&system) {
-                    return Err(fault(at, format!("time system '{system}': expected GPS, GAL, QZS or IRN")));
+                "END OF HEADER" => {
+                    complete(wanted).map_err(|what| lines.fault(what))?;
+                    return Ok(header);
                 }
+                "SYS / # / OBS TYPES" => header.types(&line, &mut wanted),
+                "TIME OF FIRST OBS" => time_system(columns(&line, 48, 51)),
+                "SYS / SCALE FACTOR" => header.scale(&line),
+                "GLONASS SLOT / FRQ #" => {
+                    header.channels(&line);
+                    Ok(())
+                }
+                "RCV CLOCK OFFS APPL" => {
+                    header.clock_applied = columns(&line, 0, 6) == "1";
+                    Ok(())
+                }
+                "PGM / RUN BY / DATE" => {
+                    header.receiver = columns(&line, 0, 20).to_owned();
+                    Ok(())
+                }
+                "REC # / TYPE / VERS" => {
+                    let own = format!("{} {}", columns(&line, 20, 40), columns(&line, 40, 60));
+                    header.receiver = own.trim().to_owned();
+                    Ok(())
+                }
+                _ => Ok(()),
+            };
+            told.map_err(|what| lines.fault(what))?;
+        }
+        Err(lines.fault("the header does not end: expected END OF HEADER"))
+    }
+
+    fn types(&mut self, line: &str, wanted: &mut Option<(char, usize)>) -> Result<(), String> {
+        if let Some(system) = line.chars().next().filter(|letter| !letter.is_whitespace()) {
+            complete(*wanted)?;
+            let count = columns(line, 3, 6).parse::<usize>().ok().filter(|count| (1..=200).contains(count));
+            let count = count
+                .ok_or_else(|| format!("number of observation types '{}': expected 1 to 200", columns(line, 3, 6)))?;
+            self.types.insert(system, Vec::new());
+            *wanted = Some((system, count));
+        }
+        let Some((system, missing)) = wanted else {
+            return Err(
+                "observation types continue before they begin: expected a system's letter in column 1".to_owned()
+            );
+        };
+        for code in columns(line, 6, 60).split_whitespace() {
+            if code.len() != 3 || *missing == 0 {
+                return Err(format!("observation type '{code}': expected {missing} more codes of three characters"));
             }
-            "SYS / SCALE FACTOR" => scale(line, at, &mut header)?,
-            "RCV CLOCK OFFS APPL" => found.clock_applied = columns(line, 0, 6) == "1",
-            "PGM / RUN BY / DATE" => found.receiver = columns(line, 0, 20).to_owned(),
-            "REC # / TYPE / VERS" => {
-                found.receiver = format!("{} {}", columns(line, 20, 40), columns(line, 40, 60)).trim().to_owned();
+            self.types.entry(*system).or_default().push(code.to_owned());
+            *missing -= 1;
+        }
+        Ok(())
+    }
+
+    fn scale(&mut self, line: &str) -> Result<(), String> {
+        let system = line.chars().next().unwrap_or(' ');
+        let factor = columns(line, 2, 6).parse::<f64>().ok().filter(|f| [1.0, 10.0, 100.0, 1000.0].contains(f));
+        let factor =
+            factor.ok_or_else(|| format!("scale factor '{}': expected 1, 10, 100 or 1000", columns(line, 2, 6)))?;
+        let named: Vec<String> = columns(line, 10, 60).split_whitespace().map(str::to_owned).collect();
+        let of = if named.is_empty() { self.types.get(&system).cloned().unwrap_or_default() } else { named };
+        self.scales.extend(of.into_iter().map(|code| ((system, code), factor)));
+        Ok(())
+    }
+
+    /// Satellites and channels, eight on a line; others' files have them in other forms, and nothing of a
+    /// foreign file hangs on them.
+    fn channels(&mut self, line: &str) {
+        for from in (4..60).step_by(7) {
+            if let (Ok(sv), Ok(channel)) =
+                (columns(line, from, from + 3).parse(), columns(line, from + 3, from + 6).parse())
+            {
+                self.channels.insert(sv, channel);
             }
-            _ => {}
         }
     }
-    Err(fault(lines.len().saturating_sub(1), "the header does not end: expected END OF HEADER"))
+
+    /// Reads a satellite's line into the values of its epoch.
+    fn satellite(&self, line: &str, all: &mut BTreeMap<(Sv, String), Values>) -> Result<(), String> {
+        // RINEX allows a blank in place of the leading zero.
+        let name = columns(line, 0, 3).replace(' ', "0");
+        let sv: Sv = name.parse().map_err(|error| format!("{error}"))?;
+        let Some(codes) = self.types.get(&sv.system.letter()) else {
+            return Err(format!("satellite {sv}: the header names no observations of its system"));
+        };
+        if all.keys().any(|(other, _)| *other == sv) {
+            return Err(format!("satellite {sv} appears twice in one epoch"));
+        }
+        if line.trim_end().len() > 3 + 16 * codes.len() {
+            return Err(format!("satellite {sv}: more values than the {} that the header names", codes.len()));
+        }
+        for (index, code) in codes.iter().enumerate() {
+            let from = 3 + 16 * index;
+            let text = columns(line, from, from + 14);
+            if text.is_empty() {
+                continue;
+            }
+            let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
+            let value = value.ok_or_else(|| {
+                format!("{sv} {code} = '{text}': expected a number in columns {} to {}", from + 1, from + 14)
+            })?;
+            // A zero means no observation (RINEX 3.05, 6.7).
+            if value == 0.0 {
+                continue;
+            }
+            let value = value / self.scales.get(&(sv.system.letter(), code.clone())).copied().unwrap_or(1.0);
+            let indicator = columns(line, from + 14, from + 15).parse::<u8>().unwrap_or(0);
+            let entry = all.entry((sv, code.get(1..).unwrap_or("").to_owned())).or_default();
+            match code.as_bytes().first() {
+                Some(b'C') => entry.pseudorange_m = Some(value),
+                Some(b'L') => {
+                    entry.carrier_cycles = Some(value);
+                    entry.lost_lock = indicator & 1 != 0;
+                    entry.half_cycle_ambiguous = indicator & 2 != 0;
+                }
+                Some(b'D') => entry.doppler_hz = Some(value),
+                Some(b'S') => entry.cn0_dbhz = Some(value),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Seconds of these scales are those of GPS time; BDT is 14 s behind, GLO is UTC.
+fn time_system(name: &str) -> Result<(), String> {
+    if ["", "GPS", "GAL", "QZS", "IRN"].contains(&name) {
+        return Ok(());
+    }
+    Err(format!("time system '{name}': expected GPS, GAL, QZS or IRN"))
 }
 
 /// That a system's list of types is as long as it said.
-fn complete(wanted: Option<(char, usize)>, at: usize) -> Parsed<()> {
+fn complete(wanted: Option<(char, usize)>) -> Result<(), String> {
     match wanted {
         Some((system, missing)) if missing > 0 => {
-            Err(fault(at, format!("{missing} observation types of system {system} are missing before this line")))
+            Err(format!("{missing} observation types of system {system} are missing before this line"))
         }
         _ => Ok(()),
     }
-}
-
-fn types(line: &str, at: usize, header: &mut Header, wanted: &mut Option<(char, usize)>) -> Parsed<()> {
-    if let Some(system) = line.chars().next().filter(|letter| !letter.is_whitespace()) {
-        complete(*wanted, at)?;
-        let count = columns(line, 3, 6).parse::<usize>().ok().filter(|count| (1..=200).contains(count));
-        let count = count.ok_or_else(|| {
-            fault(at, format!("number of observation types '{}': expected 1 to 200", columns(line, 3, 6)))
-        })?;
-        header.types.insert(system, Vec::new());
-        *wanted = Some((system, count));
-    }
-    let Some((system, missing)) = wanted else {
-        return Err(fault(at, "observation types continue before they begin: expected a system's letter in column 1"));
-    };
-    for code in columns(line, 6, 60).split_whitespace() {
-        if code.len() != 3 || *missing == 0 {
-            return Err(fault(
-                at,
-                format!("observation type '{code}': expected {missing} more codes of three characters"),
-            ));
-        }
-        header.types.entry(*system).or_default().push(code.to_owned());
-        *missing -= 1;
-    }
-    Ok(())
-}
-
-fn scale(line: &str, at: usize, header: &mut Header) -> Parsed<()> {
-    let system = line.chars().next().unwrap_or(' ');
-    let factor = columns(line, 2, 6).parse::<f64>().ok().filter(|f| [1.0, 10.0, 100.0, 1000.0].contains(f));
-    let factor = factor
-        .ok_or_else(|| fault(at, format!("scale factor '{}': expected 1, 10, 100 or 1000", columns(line, 2, 6))))?;
-    let named: Vec<String> = columns(line, 10, 60).split_whitespace().map(str::to_owned).collect();
-    let of = if named.is_empty() { header.types.get(&system).cloned().unwrap_or_default() } else { named };
-    header.scales.extend(of.into_iter().map(|code| ((system, code), factor)));
-    Ok(())
-}
-
-/// Reads the record that begins at line `at`; returns the line after it.
-fn epoch(lines: &[&str], at: usize, header: &Header, found: &mut Observations) -> Parsed<usize> {
-    let line = lines[at];
-    if !line.starts_with('>') {
-        return Err(fault(at, format!("'{}': expected an epoch, which begins with '>'", cut(line))));
-    }
-    let flag = columns(line, 31, 32);
-    let count_text = columns(line, 32, 35);
-    let count = count_text.parse::<usize>().ok().filter(|count| *count <= 999);
-    let count = count.ok_or_else(|| fault(at, format!("number of satellites '{count_text}': expected 0 to 999")))?;
-    let next = at + 1 + count;
-    if next > lines.len() {
-        let have = lines.len() - at - 1;
-        return Err(fault(lines.len() - 1, format!("the file ends after {have} of {count} lines of an epoch")));
-    }
-    match flag {
-        "0" | "1" => {}
-        "2" | "3" | "4" | "5" | "6" => {
-            found.events += 1;
-            return Ok(next);
-        }
-        other => return Err(fault(at, format!("epoch flag '{other}': expected 0 to 6"))),
-    }
-    let label = time(line)
-        .ok_or_else(|| fault(at, format!("time '{}': expected yyyy mm dd hh mm ss.s", columns(line, 2, 29))))?;
-    if found.epochs.last().is_some_and(|before| label.since(before.label) <= 0.0) {
-        return Err(fault(at, format!("epoch {label} does not come after the one before")));
-    }
-    let mut values: BTreeMap<(Sv, String), Values> = BTreeMap::new();
-    for (at, line) in lines.iter().enumerate().take(next).skip(at + 1) {
-        satellite(line, at, header, &mut values)?;
-    }
-    found.epochs.push(ObservedEpoch { label, values });
-    Ok(next)
-}
-
-fn satellite(line: &str, at: usize, header: &Header, all: &mut BTreeMap<(Sv, String), Values>) -> Parsed<()> {
-    // RINEX allows a blank in place of the leading zero.
-    let name = columns(line, 0, 3).replace(' ', "0");
-    let sv: Sv = name.parse().map_err(|error| fault(at, format!("{error}")))?;
-    let Some(codes) = header.types.get(&sv.system.letter()) else {
-        return Err(fault(at, format!("satellite {sv}: the header names no observations of its system")));
-    };
-    if all.keys().any(|(other, _)| *other == sv) {
-        return Err(fault(at, format!("satellite {sv} appears twice in one epoch")));
-    }
-    if line.trim_end().len() > 3 + 16 * codes.len() {
-        return Err(fault(at, format!("satellite {sv}: more values than the {} that the header names", codes.len())));
-    }
-    for (index, code) in codes.iter().enumerate() {
-        let from = 3 + 16 * index;
-        let text = columns(line, from, from + 14);
-        if text.is_empty() {
-            continue;
-        }
-        let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
-        let value = value.ok_or_else(|| {
-            fault(at, format!("{sv} {code} = '{text}': expected a number in columns {} to {}", from + 1, from + 14))
-        })?;
-        // A zero means no observation (RINEX 3.05, 6.7).
-        if value == 0.0 {
-            continue;
-        }
-        let value = value / header.scales.get(&(sv.system.letter(), code.clone())).copied().unwrap_or(1.0);
-        let indicator = columns(line, from + 14, from + 15).parse::<u8>().unwrap_or(0);
-        let entry = all.entry((sv, code.get(1..).unwrap_or("").to_owned())).or_default();
-        match code.as_bytes().first() {
-            Some(b'C') => entry.pseudorange_m = Some(value),
-            Some(b'L') => {
-                entry.carrier_cycles = Some(value);
-                entry.lost_lock = indicator & 1 != 0;
-                entry.half_cycle_ambiguous = indicator & 2 != 0;
-            }
-            Some(b'D') => entry.doppler_hz = Some(value),
-            Some(b'S') => entry.cn0_dbhz = Some(value),
-            _ => {}
-        }
-    }
-    Ok(())
 }
 
 /// The time of an epoch line, which the file's header says is GPS time.

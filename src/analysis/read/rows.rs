@@ -1,7 +1,7 @@
 //! How the rows of a run's long tables are put into a [`super::spill_store::SpillStore`].
 
 use crate::read::spill_store::{SpillRow, Words};
-use gnss::record::{IonosphereRow, Observation, RayRow, SkyRow, TrackingRow, TrajectoryRow};
+use gnss::record::{ClockRow, IonosphereRow, Observation, RayRow, SkyRow, TrackingRow, TrajectoryRow};
 use gnss::satellite::Sv;
 use gnss::signal::Link;
 
@@ -117,6 +117,19 @@ impl SpillRow<Sv> for IonosphereRow {
 
     fn take(sv: Sv, words: &mut Words<'_>) -> Self {
         Self { sv, sample: words.word(), delay_m: words.number(), sigma_m: words.number() }
+    }
+}
+
+impl SpillRow<&'static str> for ClockRow {
+    const WORDS: usize = 3;
+
+    fn put(&self, words: &mut Vec<u64>) {
+        words.extend([self.sample, self.clock_bias_s.to_bits(), self.sigma_clock_m.to_bits()]);
+    }
+
+    fn take(scale: &'static str, words: &mut Words<'_>) -> Self {
+        let (sample, clock_bias_s) = (words.word(), words.number());
+        Self { sample, time_scale: scale.to_owned(), clock_bias_s, sigma_clock_m: words.number() }
     }
 }
 

@@ -5,7 +5,7 @@
 //! satellite, those with a row an epoch to spilled tables; shorter ones stay in memory.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -22,11 +22,12 @@ use crate::statistics::{mean, median};
 use crate::waveform::Sampler;
 use gnss::facts::{FrontEndFacts, SceneFacts};
 use gnss::record::{
-    AcquisitionRow, EventRow, Fix, InterferenceRow, IonosphereRow, LineRow, NavigationRow, Observation, RayRow, SkyRow,
-    TrackingRow, TrajectoryRow,
+    AcquisitionRow, ClockRow, EventRow, Fix, InterferenceRow, IonosphereRow, LineRow, NavigationRow, Observation,
+    RayRow, SkyRow, TrackingRow, TrajectoryRow,
 };
 use gnss::satellite::Sv;
 use gnss::signal::{Link, Signal};
+use gnss::time::TimeScale;
 
 /// How fast the stages ran: `speed.json`, and the section of the summary.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -101,6 +102,8 @@ pub struct Run {
     /// Signals that a search cannot tell from one of the truth, on the same carrier with the same code, by
     /// whose name they count: until its message says who a satellite is, a receiver takes either name.
     pub alike: BTreeMap<Link, Sv>,
+    /// Where the receiver's tables lie; none of a truth alone.
+    pub rx: Option<PathBuf>,
     /// The receiver's observations.
     pub observations: SpillStore<Link, Observation>,
     /// The receiver's fixes.
@@ -115,6 +118,8 @@ pub struct Run {
     pub front_ends: BTreeMap<&'static Signal, usize>,
     /// The ionosphere that it measured with two bands; none without.
     pub ionosphere: SpillStore<Sv, IonosphereRow>,
+    /// Its clock against each time scale, by the scales' names; none of a receiver of GPS time alone.
+    pub clocks: SpillStore<&'static str, ClockRow>,
     /// Parameters as it decoded them.
     pub navigation: Vec<NavigationRow>,
     /// What happened to its channels.
@@ -161,6 +166,7 @@ impl Run {
     /// share a truth.
     pub fn read_parts(run: &Path, truth: &Path, rx: &Path) -> Result<Self, JudgeError> {
         let mut read = Self::read_truth_by(truth, run)?;
+        read.rx = Some(rx.to_owned());
         read.scene_json = json(&truth.join("scene.json"))?.unwrap_or(Value::Null);
         read.scenario = text(&run.join("scenario.toml"))?;
         match each(&truth.join("rays.csv"), "", |_, row: RayRow| read.rays.push(row.link(), &row)) {
@@ -189,6 +195,18 @@ impl Run {
         })?;
         read.update_s = updates.median();
         match each(&rx.join("ionosphere.csv"), "", |_, row: IonosphereRow| read.ionosphere.push(row.sv, &row)) {
+            Ok(()) | Err(JudgeError::Missing { .. }) => {}
+            Err(error) => return Err(error),
+        }
+        let clocks = rx.join("clocks.csv");
+        let clock = |line, row: ClockRow| {
+            let Some(scale) = TimeScale::find(&row.time_scale) else {
+                let what = format!("time_scale = {}: expected one such as GPST, GST, BDT or GLONASST", row.time_scale);
+                return Err(JudgeError::Line { path: clocks.clone(), line, what });
+            };
+            read.clocks.push(scale.name, &row)
+        };
+        match each(&clocks, "", clock) {
             Ok(()) | Err(JudgeError::Missing { .. }) => {}
             Err(error) => return Err(error),
         }
@@ -300,6 +318,7 @@ impl Run {
             interference: optional(&truth.join("interference.csv"))?,
             claimed: Table::new(directory),
             alike: BTreeMap::new(),
+            rx: None,
             observations: SpillStore::new(directory),
             fixes: Fixes::new(directory),
             acquisition: Vec::new(),
@@ -307,6 +326,7 @@ impl Run {
             update_s: None,
             front_ends: BTreeMap::new(),
             ionosphere: SpillStore::new(directory),
+            clocks: SpillStore::new(directory),
             navigation: Vec::new(),
             events: Vec::new(),
             lines: None,

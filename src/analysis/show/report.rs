@@ -186,7 +186,7 @@ impl fmt::Display for Verdict {
             writeln!(f, "{word:<14}{} {value} {}, limit {}: {margin}", row.figure, row.unit, row.bound)?;
             row.why.iter().try_for_each(|line| writeln!(f, "{:<14}  {line}", ""))?;
         }
-        Ok(())
+        self.not_judged.iter().try_for_each(|text| writeln!(f, "{:<14}{text}", "not judged"))
     }
 }
 

@@ -184,6 +184,22 @@ pub struct Expected {
     pub rate_allowed: Vector4<f64>,
 }
 
+/// What is expected of one more clock of a fix: by how much its time scale lies behind that of the fix, as
+/// the receiver's biases have it.
+#[derive(Clone, Copy, Debug)]
+pub struct Offset {
+    /// Which of [`Scene::scales`].
+    pub scale: usize,
+    /// Known bias, metres.
+    pub bias_m: f64,
+    /// What may come on top of it in either direction, metres.
+    pub allowed_m: f64,
+    /// Standard deviation of all that may vary, metres.
+    pub sigma_m: f64,
+    /// Standard deviation that should be stated of the clock itself, metres.
+    pub stated_m: f64,
+}
+
 /// Share by which computed biases may be wrong: weights differ with the measured C/N0.
 const BIAS_SHARE: f64 = 0.1;
 /// Share of the true troposphere by which a standard atmosphere errs: 5 % or 12 cm at the zenith, the spread
@@ -191,14 +207,14 @@ const BIAS_SHARE: f64 = 0.1;
 const TROPOSPHERE_SHARE: f64 = 0.05;
 
 /// Shows `see` the expectations of all fixes that have a truth and enough satellites, in the order of their
-/// samples: each with its fix and the true place.
+/// samples: each with its fix, the true place, and what is expected of clocks beyond the first.
 ///
 /// # Errors
 /// [`JudgeError::Read`] where spilled rows cannot be read, and those of `see`.
 pub fn expected(
     scene: &Scene<'_>,
     errors: &Errors,
-    mut see: impl FnMut(Fix, TrajectoryRow, Expected) -> Result<(), JudgeError>,
+    mut see: impl FnMut(Fix, TrajectoryRow, Expected, &[Offset]) -> Result<(), JudgeError>,
 ) -> Result<(), JudgeError> {
     let choice = (scene.choices.combined, scene.choices.model_sigma_m);
     let mut links = Vec::new();
@@ -218,8 +234,8 @@ pub fn expected(
         let exact = scene.choices.ionosphere_error_share == 0.0 && sent;
         let combined = fix.ionosphere == IonosphereModel::Combined;
         let corrected = exact || combined || scene.choices.ionosphere.is_none();
-        if let (Some(place), Some(expected)) = (place, one(fix.sample, &sums, corrected)) {
-            see(fix, place, expected)?;
+        if let (Some(place), Some((expected, offsets))) = (place, one(fix.sample, &sums, corrected)) {
+            see(fix, place, expected, &offsets)?;
         }
     }
     Ok(())
@@ -244,39 +260,53 @@ fn combined(first: &Forecast, second: &Forecast) -> Forecast {
     }
 }
 
-fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<Expected> {
+fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<(Expected, Vec<Offset>)> {
     if sums.most < 4 {
         return None;
     }
     // Clocks without ranges are not estimated.
     let places: Vec<usize> = (0..sums.bias.len()).filter(|place| sums.plain[(*place, *place)] > 0.0).collect();
-    let inverse =
-        |matrix: &DMatrix<f64>| Some(Cholesky::new(matrix.select_rows(&places).select_columns(&places))?.inverse());
-    // Of all clocks the first is the fix's.
-    let of = |matrix: &DMatrix<f64>| matrix.fixed_view::<4, 4>(0, 0).into_owned();
-    let geometry = sums.plain.select_rows(&places).select_columns(&places).symmetric_eigenvalues();
+    let selected = |matrix: &DMatrix<f64>| matrix.select_rows(&places).select_columns(&places);
+    let inverse = |matrix: &DMatrix<f64>| Some(Cholesky::new(selected(matrix))?.inverse());
+    let geometry = selected(&sums.plain).symmetric_eigenvalues();
     let whole = inverse(&sums.normal)?;
-    let solved = |right: &DVector<f64>| (&whole * right.select_rows(&places)).fixed_rows::<4>(0).into_owned();
-    let stated = if corrected { of(&whole) } else { of(&inverse(&sums.loose)?) };
-    let thermal = of(&(&whole * sums.noise.select_rows(&places).select_columns(&places) * &whole));
+    let solved = |right: &DVector<f64>| &whole * right.select_rows(&places);
+    let stated = if corrected { whole.clone() } else { inverse(&sums.loose)? };
+    let thermal = &whole * selected(&sums.noise) * &whole;
     let bias = solved(&sums.bias);
-    let weather = TROPOSPHERE_SHARE * solved(&sums.troposphere).abs();
+    let (ionosphere, stepping) = (solved(&sums.ionosphere), solved(&sums.stepping));
+    let weather = TROPOSPHERE_SHARE * solved(&sums.troposphere);
     // Where the ionosphere is missing its whole effect may be there, or parts of it if it is estimated.
     let (centre, missing, noise) = if corrected {
-        (bias, Vector4::zeros(), thermal)
+        let none = DVector::zeros(bias.len());
+        (bias, [none.clone(), none], &thermal)
     } else {
-        (Vector4::zeros(), bias.abs() + solved(&sums.ionosphere).abs(), stated)
+        (DVector::zeros(bias.len()), [bias, ionosphere], &stated)
     };
+    let allowed = |of: &dyn Fn(&DVector<f64>) -> f64| {
+        let sizes = [&weather, &missing[0], &missing[1], &stepping].map(|vector| of(vector).abs());
+        sizes.iter().sum::<f64>() + BIAS_SHARE * of(&centre).abs()
+    };
+    let offset = |place: usize| Offset {
+        scale: places[place] - 3,
+        bias_m: centre[place] - centre[3],
+        allowed_m: allowed(&|vector| vector[place] - vector[3]),
+        sigma_m: (noise[(place, place)] + noise[(3, 3)] - 2.0 * noise[(place, 3)]).max(0.0).sqrt(),
+        stated_m: stated[(place, place)].sqrt(),
+    };
+    let offsets = (4..places.len()).map(offset).collect();
+    // Of all clocks the first is the fix's.
+    let of = |matrix: &DMatrix<f64>| matrix.fixed_view::<4, 4>(0, 0).into_owned();
     let rates = Cholesky::new(sums.rate_normal)?.inverse();
-    Some(Expected {
+    let expected = Expected {
         sample,
         satellites: (sums.least, sums.most),
         blameless: if sums.faulty || !corrected { 0 } else { sums.blameless },
-        bias: centre,
-        allowed: weather + missing + solved(&sums.stepping).abs() + BIAS_SHARE * centre.abs(),
-        noise,
-        thermal,
-        stated,
+        bias: centre.fixed_rows::<4>(0).into_owned(),
+        allowed: Vector4::from_fn(|axis, _| allowed(&|vector| vector[axis])),
+        noise: of(noise),
+        thermal: of(&thermal),
+        stated: of(&stated),
         dilution: of(&inverse(&sums.plain)?),
         condition: (geometry.max() / geometry.min()).sqrt(),
         corrected,
@@ -285,7 +315,8 @@ fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<Expected> {
         memory_s: sums.memory_s,
         rate_noise: rates * sums.rate_noise * rates,
         rate_allowed: 2.0 * (rates * sums.rate_bias).abs(),
-    })
+    };
+    Some((expected, offsets))
 }
 
 impl Expected {

@@ -3,11 +3,13 @@
 //! A value may be right and its row still not be what a receiver wrote: doubled, out of order, repeated,
 //! missing, of another time. `tables` looks at rows of one table, `clocks` at what several columns say of
 //! time, `acquisition` at searches against truth and events, `claims` at messages, events and `receiver.json`
-//! against the tables. Each finding is a count or a measure with its limit and where it was first found.
+//! against the tables, `files` at what is written for people and other programs. Each finding is a count or a
+//! measure with its limit and where it was first found.
 
 mod acquisition;
 mod claims;
 mod clocks;
+mod files;
 mod tables;
 
 use crate::error::JudgeError;
@@ -67,5 +69,6 @@ pub fn findings(run: &Run, errors: &Errors) -> Result<Vec<Finding>, JudgeError> 
     all.extend(clocks::findings(run)?);
     all.extend(acquisition::findings(run)?);
     all.extend(claims::findings(run)?);
+    all.extend(files::findings(run)?);
     Ok(all)
 }

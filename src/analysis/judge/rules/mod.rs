@@ -15,6 +15,7 @@ mod losses;
 mod motion;
 mod position;
 mod reception;
+mod scales;
 mod spectrum;
 mod tables;
 #[cfg(test)]

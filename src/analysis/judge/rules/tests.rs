@@ -215,7 +215,8 @@ fn the_verdict_names_what_was_planted_and_a_user_s_limits_come_first() {
     assert_eq!(status("unexpected losses of lock"), Some(Status::Pass));
     assert_eq!(verdict.status(), Status::Fail);
     let table = fs::read_to_string(run.path().join("verdict.csv")).unwrap();
-    assert_eq!(table.lines().count(), 1 + verdict.rows.len());
+    assert_eq!(table.lines().count(), 1 + verdict.rows.len() + verdict.not_judged.len());
+    assert_eq!(table.matches(",not_judged,").count(), verdict.not_judged.len(), "{table}");
 }
 
 #[test]

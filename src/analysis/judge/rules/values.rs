@@ -33,7 +33,7 @@ use gnss::signal::Link;
 pub(super) const THEORY: f64 = 1.2;
 /// Factor within which a stated sigma lies about the expected one: 1 dB of C/N0 (1.12) and 12 % of theory and
 /// smoothing.
-const SIGMA: f64 = 1.25;
+pub(super) const SIGMA: f64 = 1.25;
 /// How far dilutions and condition may be from the true geometry's: elevations seen from a fix metres away.
 const GEOMETRY: f64 = 2e-3;
 /// Weights of 1 dB of C/N0, as a factor.
@@ -89,7 +89,7 @@ impl Verdict {
             self.not_judged.push("fixes against theory: the receiver names no settings".to_owned());
             return self.position(run, summary);
         };
-        let all = cases(&scene, errors)?;
+        let (all, scales) = cases(&scene, errors)?;
         let mut memory_s = 0.0_f64;
         all.each(|case| memory_s = memory_s.max(case.expected.memory_s))?;
         let bounded = Bounded { run, memory_s };
@@ -111,7 +111,8 @@ impl Verdict {
         if fading > 0 {
             self.not_judged.push(format!("velocity of {fading} fixes in which a signal fades by {FADE_DB} dB"));
         }
-        self.kinds(run, &scene.choices, &cases)?;
+        let slow = self.kinds(run, &scene.choices, &cases)?;
+        self.scales(run, &scales, &bounded, slow)?;
         self.sigmas(&cases)?;
         self.geometry(&cases)?;
         self.consistency(summary, &cases)
@@ -317,8 +318,8 @@ impl Verdict {
         Ok(())
     }
 
-    /// The five kinds of error.
-    fn kinds(&mut self, run: &Run, choices: &Choices, cases: &Table<Case>) -> Result<(), JudgeError> {
+    /// The five kinds of error; gives the number of independent fixes.
+    fn kinds(&mut self, run: &Run, choices: &Choices, cases: &Table<Case>) -> Result<f64, JudgeError> {
         let motion = Motion::new(run, choices)?;
         let allowed_mps = motion.allowed_mps();
         let oscillator_mps = oscillator_mps(run, choices);
@@ -375,7 +376,8 @@ impl Verdict {
             rate("clock drift", "", 1, &drift),
         ];
         all.iter().try_for_each(|kind| self.kind(kind, cases))?;
-        motion.sound()
+        motion.sound()?;
+        Ok(slow)
     }
 }
 
@@ -386,13 +388,14 @@ fn threshold(freedom: u32, alarm: f64) -> Option<f64> {
 
 /// When errors of fixes are judged: not while the scene expects any, and not while smoothing remembers that
 /// time.
-struct Bounded<'a> {
+pub(super) struct Bounded<'a> {
     run: &'a Run,
     memory_s: f64,
 }
 
 impl Bounded<'_> {
-    fn holds(&self, time_s: f64) -> bool {
+    /// Whether errors are judged at a time.
+    pub(super) fn holds(&self, time_s: f64) -> bool {
         self.run.scene.expect.bounded_since(time_s, self.memory_s)
     }
 }

@@ -71,6 +71,8 @@ pub struct Summary {
     /// The ionosphere that two bands showed; absent without a satellite that has them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ionosphere: Option<Ionosphere>,
+    /// Figures that the verdict does not judge, each with the reason.
+    pub not_judged: Vec<String>,
     /// How fast the stages ran.
     pub speed: Speed,
     /// Whether there was interference.
@@ -338,6 +340,7 @@ impl Summary {
             spoofing: Spoofing::of(run)?,
             ionosphere: Ionosphere::of(run)?,
             jammed: !run.scene.interference.is_empty(),
+            not_judged: Vec::new(),
             speed: run.speed,
             details,
         })

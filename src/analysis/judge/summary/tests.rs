@@ -65,7 +65,7 @@ fn the_keys_of_the_summary_are_a_contract() {
     assert_eq!(
         keys(&value),
         "scene seed duration_s sample_rate_hz fidelity satellites position clock observables tracking signals \
-         navigation psd speed"
+         navigation psd not_judged speed"
     );
     for (section, expected) in [
         ("satellites", "in_view acquired used false_acquired"),

@@ -1,0 +1,375 @@
+//! What people and other programs read of a run, against the tables that are judged: geographic columns of
+//! `fixes.csv`, `observations.rnx`, `fixes.nmea`.
+//!
+//! The files go through the readers for other receivers' results, one epoch at a time, so that memory stays
+//! flat. Differences are judged by what would mislead a user: a place by the fix's own sigma, a measurement
+//! by what noise makes of it. Limits: the formats round less than that; a carrier's constant is free, so that
+//! carriers are compared by what they grow from epoch to epoch; tracks for maps and `navigation.rnx` are not
+//! read.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufRead, BufReader, ErrorKind};
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::{Finding, Found};
+use crate::error::JudgeError;
+use crate::read::nmea::{self, PlaceFix};
+use crate::read::rinex_obs::{ObservedEpoch, Reader};
+use crate::read::{Fault, Run, each};
+use crate::statistics::larger;
+use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::record::{Fix, Observation};
+use gnss::satellite::{Sv, System};
+use gnss::time::Epoch;
+
+/// A time as written: NMEA rounds to a millisecond.
+const TIME_S: f64 = 2e-3;
+/// Code noise of a weak satellite; a millisecond of time is 300 km.
+const CODE_M: f64 = 1.0;
+/// A tenth of the half cycle that a slip is at the least.
+const CARRIER_CYCLES: f64 = 0.05;
+const DOPPLER_HZ: f64 = 1.0;
+/// Half a step of the digit for strength (RINEX 3.05, table 9).
+const CN0_DB: f64 = 3.0;
+const SPEED_MPS: f64 = 0.5;
+/// Share of a table's rows that a file may lack, or have elsewhere: a row that somebody mended misleads
+/// nobody.
+const ODD_PERCENT: f64 = 1.0;
+/// Values that RINEX cannot hold are blank, and a zero says that there is none.
+const RINEX_VALUES: std::ops::RangeInclusive<f64> = 1e-3..=999_999_999.0;
+
+pub(super) fn findings(run: &Run) -> Result<Vec<Finding>, JudgeError> {
+    let Some(rx) = &run.rx else { return Ok(Vec::new()) };
+    let mut all = geographic(&rx.join("fixes.csv"))?;
+    if let Some(file) = opened(&rx.join("observations.rnx"))? {
+        all.extend(observations(run, &rx.join("observations.csv"), file)?);
+    }
+    if let Some(file) = opened(&rx.join("fixes.nmea"))? {
+        all.extend(sentences(run, file, &rx.join("fixes.nmea"))?);
+    }
+    Ok(all)
+}
+
+fn opened(path: &Path) -> Result<Option<BufReader<File>>, JudgeError> {
+    match File::open(path) {
+        Ok(file) => Ok(Some(BufReader::with_capacity(1 << 16, file))),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(JudgeError::Read { path: path.to_owned(), source }),
+    }
+}
+
+/// A row of `fixes.csv` with the columns that say its place and time once more.
+#[derive(Deserialize)]
+struct Placed {
+    gps_s: i64,
+    gps_fraction_s: f64,
+    x_m: f64,
+    y_m: f64,
+    z_m: f64,
+    sigma_east_m: f64,
+    sigma_north_m: f64,
+    sigma_up_m: f64,
+    #[serde(default)]
+    latitude_deg: Option<f64>,
+    #[serde(default)]
+    longitude_deg: Option<f64>,
+    #[serde(default)]
+    height_m: Option<f64>,
+    #[serde(default)]
+    utc: Option<String>,
+}
+
+impl Placed {
+    /// Distance between both places, in sigmas of the fix.
+    fn departure(&self) -> Option<f64> {
+        let place = Geodetic::from_degrees(self.latitude_deg?, self.longitude_deg?, self.height_m?);
+        let apart_m = (place.to_ecef() - nalgebra::Vector3::new(self.x_m, self.y_m, self.z_m)).norm();
+        Some(apart_m / nalgebra::Vector3::new(self.sigma_east_m, self.sigma_north_m, self.sigma_up_m).norm())
+    }
+
+    /// Difference of both times, seconds; a text that is no time is endlessly far.
+    fn late_s(&self) -> Option<f64> {
+        let (own, text) = (Epoch::new(self.gps_s, self.gps_fraction_s), self.utc.as_ref()?);
+        if *text == own.to_utc_text() {
+            return Some(0.0);
+        }
+        Some(Epoch::parse(text).map_or(f64::INFINITY, |utc| utc.since(own).abs()))
+    }
+}
+
+fn geographic(path: &Path) -> Result<Vec<Finding>, JudgeError> {
+    let (mut placed, mut elsewhere, mut late_s) = (0_usize, 0_usize, None);
+    each(path, "", |_, row: Placed| {
+        if let Some(departure) = row.departure() {
+            placed += 1;
+            elsewhere += usize::from(departure > 1.0);
+        }
+        late_s = row.late_s().map_or(late_s, |new| larger(late_s, new));
+        Ok(())
+    })?;
+    let mut found = Vec::new();
+    if placed > 0 {
+        let figure = "fixes whose latitude, longitude and height are another place than x, y and z";
+        let source = "the same place twice, within the fix's own sigma";
+        found.push(Finding::most(figure, percent(elsewhere, placed), "%", ODD_PERCENT, source));
+    }
+    if let Some(late_s) = late_s {
+        let source = "the same time twice, with the leap seconds of its day";
+        found.push(Finding::most("UTC of fixes against GPS time, largest difference", late_s, "s", TIME_S, source));
+    }
+    Ok(found)
+}
+
+fn percent(part: usize, whole: usize) -> f64 {
+    100.0 * part as f64 / whole.max(1) as f64
+}
+
+/// Differences between a file and a table.
+#[derive(Default)]
+struct Compared {
+    code_m: f64,
+    carrier_cycles: f64,
+    doppler_hz: f64,
+    cn0_db: f64,
+    /// Rows of the table, and those of them that the file lacks.
+    rows: usize,
+    lacking: Found,
+    /// Losses of lock that are flagged wrongly, channels that are not the truth's, lines that are none.
+    flags: Found,
+    channels: Found,
+    damaged: Found,
+}
+
+/// A file beside the table that it was written from.
+struct Beside {
+    reader: Reader<BufReader<File>>,
+    epoch: Option<ObservedEpoch>,
+    rows: Vec<Observation>,
+    /// Of each signal the row before with its reading, and the carrier as the file has it.
+    before: BTreeMap<(Sv, &'static str), (Observation, Epoch, Option<f64>)>,
+    compared: Compared,
+}
+
+impl Beside {
+    fn advance(&mut self) {
+        self.epoch = self.reader.next_epoch().unwrap_or_else(|fault| {
+            self.compared.damaged.add(|| in_words("observations.rnx", &fault));
+            None
+        });
+    }
+
+    fn take(&mut self, row: Observation) {
+        if self.rows.first().is_some_and(|first| first.sample != row.sample) {
+            self.compare();
+        }
+        self.rows.push(row);
+    }
+
+    /// Compares the rows of an epoch with those of the file that bear its time.
+    fn compare(&mut self) {
+        let rows = std::mem::take(&mut self.rows);
+        let Some(first) = rows.first() else { return };
+        let reading = first.sent().plus_s(first.pseudorange_m / SPEED_OF_LIGHT_MPS);
+        while self.epoch.as_ref().is_some_and(|epoch| reading.since(epoch.label) > TIME_S) {
+            self.advance();
+        }
+        let epoch = self.epoch.as_ref().filter(|epoch| epoch.label.since(reading).abs() <= TIME_S);
+        let compared = &mut self.compared;
+        let mut seen: Vec<(Sv, &str)> = Vec::new();
+        for row in rows {
+            let key = (row.sv, row.signal.rinex);
+            // A band and attribute that two signals share has one column.
+            if seen.contains(&key) {
+                continue;
+            }
+            seen.push(key);
+            compared.rows += 1;
+            let found = epoch.and_then(|epoch| epoch.values.get(&(row.sv, row.signal.rinex.to_owned())));
+            let Some(values) = found else {
+                compared.lacking.add(|| format!("{} {} at sample {}", row.sv, row.signal.name, row.sample));
+                continue;
+            };
+            let apart = |value: Option<f64>, own: f64| match value {
+                Some(value) => (value - own).abs(),
+                None if RINEX_VALUES.contains(&own.abs()) => f64::INFINITY,
+                None => 0.0,
+            };
+            compared.code_m = compared.code_m.max(apart(values.pseudorange_m, row.pseudorange_m));
+            compared.doppler_hz = compared.doppler_hz.max(apart(values.doppler_hz, row.doppler_hz));
+            compared.cn0_db = compared.cn0_db.max(apart(values.cn0_dbhz, row.cn0_dbhz));
+            if let Some((old, then, old_cycles)) = self.before.get(&key) {
+                let own = row.carrier_cycles - old.carrier_cycles;
+                if let Some((new, old)) = values.carrier_cycles.zip(*old_cycles) {
+                    compared.carrier_cycles = compared.carrier_cycles.max((new - old - own).abs());
+                }
+                let younger_s = reading.since(*then) - row.locked_s;
+                // Of the same age it may be either.
+                if younger_s.abs() > TIME_S && values.lost_lock != (younger_s > 0.0) {
+                    compared.flags.add(|| format!("{} {} at sample {}", row.sv, row.signal.name, row.sample));
+                }
+            }
+            self.before.insert(key, (row, reading, values.carrier_cycles));
+        }
+    }
+}
+
+fn in_words(file: &str, fault: &Fault) -> String {
+    format!("{file}, line {}: {}", fault.line, fault.what)
+}
+
+fn observations(run: &Run, table: &Path, file: BufReader<File>) -> Result<Vec<Finding>, JudgeError> {
+    let mut compared = Compared::default();
+    match Reader::new(file) {
+        Ok(reader) => {
+            compared.channels = channels(run, &reader.header.channels);
+            let mut beside = Beside { reader, epoch: None, rows: Vec::new(), before: BTreeMap::new(), compared };
+            if !run.observations.is_empty() {
+                beside.advance();
+            }
+            each(table, "", |_, row: Observation| {
+                beside.take(row);
+                Ok(())
+            })?;
+            beside.compare();
+            compared = beside.compared;
+        }
+        Err(fault) => compared.damaged.add(|| in_words("observations.rnx", &fault)),
+    }
+    let lacking = percent(compared.lacking.count, compared.rows);
+    let source = compared.lacking.first.map_or("each row of the table".to_owned(), |first| format!("without: {first}"));
+    let same = "the same value, rounded to a thousandth";
+    Ok(vec![
+        Finding::none("lines of observations.rnx that cannot be read", compared.damaged, "RINEX 3.05"),
+        Finding::most("observations that observations.rnx lacks", lacking, "%", ODD_PERCENT, &source),
+        Finding::most("pseudoranges of observations.rnx, largest difference", compared.code_m, "m", CODE_M, same),
+        Finding::most(
+            "carriers of observations.rnx, largest difference of an interval",
+            compared.carrier_cycles,
+            "cycles",
+            CARRIER_CYCLES,
+            same,
+        ),
+        Finding::most("Dopplers of observations.rnx, largest difference", compared.doppler_hz, "Hz", DOPPLER_HZ, same),
+        Finding::most("C/N0 of observations.rnx, largest difference", compared.cn0_db, "dB", CN0_DB, same),
+        Finding::none(
+            "losses of lock flagged wrongly in observations.rnx",
+            compared.flags,
+            "a lock younger than the interval is a new one",
+        ),
+        Finding::none("channels of GLONASS wrong in observations.rnx", compared.channels, "those of the truth"),
+    ])
+}
+
+/// Channels that the header has otherwise than the truth, or not at all.
+fn channels(run: &Run, header: &BTreeMap<Sv, i8>) -> Found {
+    let mut found = Found::default();
+    for link in run.observations.keys().filter(|link| link.sv.system == System::Glonass) {
+        let known = run.truth.keys().find(|own| own.sv == link.sv).and_then(|own| own.channel());
+        if known.is_some() && header.get(&link.sv) != known.as_ref() {
+            found.add(|| format!("{}: {:?} where the truth has {known:?}", link.sv, header.get(&link.sv)));
+        }
+    }
+    found
+}
+
+/// Differences between sentences and fixes.
+struct Sentences<'r> {
+    fixes: Box<dyn Iterator<Item = Result<Fix, JudgeError>> + 'r>,
+    fix: Option<Fix>,
+    fixes_found: usize,
+    elsewhere: usize,
+    speed_mps: f64,
+    damaged: Found,
+}
+
+impl Sentences<'_> {
+    fn advance(&mut self) -> Result<(), JudgeError> {
+        self.fix = self.fixes.next().transpose()?;
+        Ok(())
+    }
+
+    /// Takes the lines of an epoch that end before a line of that number.
+    fn take(&mut self, text: &[u8], end: u64) -> Result<(), JudgeError> {
+        if text.is_empty() {
+            return Ok(());
+        }
+        let begin = end - text.split_inclusive(|byte| *byte == b'\n').count() as u64;
+        match nmea::read(text, "") {
+            Ok(places) => places.fixes.iter().try_for_each(|place| self.compare(place)),
+            Err(fault) => {
+                self.damaged.add(|| in_words("fixes.nmea", &Fault { line: begin + fault.line, ..fault }));
+                Ok(())
+            }
+        }
+    }
+
+    fn compare(&mut self, place: &PlaceFix) -> Result<(), JudgeError> {
+        while self.fix.as_ref().is_some_and(|fix| place.label.since(fix.time()) > TIME_S) {
+            self.advance()?;
+        }
+        let Some(fix) = self.fix.as_ref().filter(|fix| fix.time().since(place.label).abs() <= TIME_S) else {
+            return Ok(());
+        };
+        self.fixes_found += 1;
+        let sigma_m = nalgebra::Vector3::new(fix.sigma_east_m, fix.sigma_north_m, fix.sigma_up_m).norm();
+        self.elsewhere += usize::from((place.position_m - fix.position_m()).norm() > sigma_m);
+        if let Some((ground_mps, course_rad)) = place.ground_mps_rad {
+            let enu = Geodetic::from_ecef(&fix.position_m()).ecef_to_enu() * fix.velocity_mps();
+            let (east, north) = libm::sincos(course_rad);
+            let apart_mps = libm::hypot(ground_mps * east - enu.x, ground_mps * north - enu.y);
+            // A hundredth of a degree is what a course is written to.
+            self.speed_mps = self.speed_mps.max(apart_mps - ground_mps * 0.01_f64.to_radians());
+        }
+        self.advance()
+    }
+}
+
+fn sentences(run: &Run, mut file: BufReader<File>, path: &Path) -> Result<Vec<Finding>, JudgeError> {
+    let mut all = Sentences {
+        fixes: Box::new(run.fixes.cursor()),
+        fix: None,
+        fixes_found: 0,
+        elsewhere: 0,
+        speed_mps: 0.0,
+        damaged: Found::default(),
+    };
+    all.advance()?;
+    let (mut own, mut line, mut number) = (Vec::new(), Vec::new(), 0);
+    loop {
+        line.clear();
+        let read = file.read_until(b'\n', &mut line);
+        if read.map_err(|source| JudgeError::Read { path: path.to_owned(), source })? == 0 {
+            break;
+        }
+        // The sentences of an epoch begin with its place.
+        if line.get(3..6) == Some(b"GGA") {
+            all.take(&own, number)?;
+            own.clear();
+        }
+        own.append(&mut line);
+        number += 1;
+    }
+    all.take(&own, number)?;
+    let lacking = percent(run.fixes.len().saturating_sub(all.fixes_found), run.fixes.len());
+    Ok(vec![
+        Finding::none("sentences of fixes.nmea that cannot be read", all.damaged, "NMEA 0183"),
+        Finding::most("fixes that fixes.nmea lacks", lacking, "%", ODD_PERCENT, "each fix, at its own time"),
+        Finding::most(
+            "fixes that have another place in fixes.nmea",
+            percent(all.elsewhere, all.fixes_found),
+            "%",
+            ODD_PERCENT,
+            "the same place, within the fix's own sigma",
+        ),
+        Finding::most(
+            "velocity over ground of fixes.nmea, largest difference",
+            all.speed_mps,
+            "m/s",
+            SPEED_MPS,
+            "the same velocity",
+        ),
+    ])
+}
