@@ -8,6 +8,7 @@
 //! `GNSS_TWIN_WRITE_SABOTAGE=$PWD/reports/sabotage.md` makes a run write the table.
 #![cfg(all(feature = "cli", feature = "pdf"))]
 
+mod excused;
 mod files;
 mod fixes;
 mod links;
@@ -39,10 +40,18 @@ pub struct Kind {
 }
 
 fn kinds() -> Vec<Kind> {
-    [fixes::kinds(), observations::kinds(), links::kinds(), tables::kinds(), spectrum::kinds(), files::kinds()]
-        .into_iter()
-        .flatten()
-        .collect()
+    [
+        fixes::kinds(),
+        observations::kinds(),
+        links::kinds(),
+        tables::kinds(),
+        spectrum::kinds(),
+        files::kinds(),
+        excused::kinds(),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 /// Rows that fail of a scene's results, damaged so.

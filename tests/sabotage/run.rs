@@ -89,6 +89,9 @@ pub struct Rx {
     receiver: Option<serde_json::Value>,
     psd: Option<Table>,
     texts: BTreeMap<&'static str, String>,
+    /// Whether files that say the tables' values once more are left out: what is tolerable of a table is far
+    /// from them.
+    alone: bool,
 }
 
 impl Rx {
@@ -113,6 +116,7 @@ impl Rx {
             link(&from.join(name), &to.join(name));
         }
         Self {
+            alone: scene == Scene::Bounded,
             from: from.to_owned(),
             to: to.to_owned(),
             tables: BTreeMap::new(),
@@ -162,6 +166,9 @@ impl Rx {
             let entry = entry.unwrap();
             let target = self.to.join("rx").join(entry.file_name());
             let name = entry.file_name().into_string().unwrap();
+            if self.alone && ["observations.rnx", "fixes.nmea"].contains(&name.as_str()) {
+                continue;
+            }
             match (name.strip_suffix(".csv").and_then(|stem| self.tables.get(stem)), &self.receiver) {
                 (Some(table), _) => table.write(&target),
                 (None, Some(receiver)) if name == "receiver.json" => fs::write(&target, receiver.to_string()).unwrap(),

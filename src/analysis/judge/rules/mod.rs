@@ -7,6 +7,7 @@
 
 mod availability;
 mod cases;
+mod excused;
 mod foreign;
 mod hints;
 mod interference;
@@ -52,6 +53,7 @@ impl Verdict {
         verdict.within(&run.scene.expect, places.into_iter());
         verdict.tracking(run, summary);
         verdict.links(run, errors, summary)?;
+        verdict.excused(run, errors)?;
         verdict.losses(run, &receiver, slips)?;
         verdict.reception(summary);
         verdict.cn0(run, summary);

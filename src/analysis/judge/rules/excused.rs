@@ -1,0 +1,124 @@
+//! What stays judged where a scene expects errors of any size.
+//!
+//! Reflections shift a code by their excess and half a chip at the most, and a carrier by what the user moves
+//! towards their mirrors; a spoofer moves both to the place that it claims. Nothing turns a Doppler's sign.
+//! The 95th percentile of each satellite's errors stays below that. Limits: satellites with a fault of their
+//! own are left out, as their ranges may go anywhere.
+
+use crate::error::JudgeError;
+use crate::judge::judgement::Bound;
+use crate::judge::verdict::Verdict;
+use crate::measure::errors::Errors;
+use crate::read::{Numbers, Run};
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::signal::Link;
+
+/// What noise, fades and the pull-in of a loop leave of a Doppler.
+const LOOP_HZ: f64 = 50.0;
+/// The same of a velocity: a fifth of a metre a second for each hertz.
+const LOOP_MPS: f64 = 10.0;
+
+/// How far the scene lets a receiver's signals lie from the true ones.
+#[derive(Default)]
+struct Reach {
+    /// Most that a mirror or a spoofer changes a range's rate by.
+    rate_mps: f64,
+    /// Most that a spoofer's place is away.
+    place_m: f64,
+}
+
+impl Reach {
+    fn of(run: &Run) -> Result<Self, JudgeError> {
+        let mut reach = Self::default();
+        let mut truth = run.trajectory.finder()?;
+        run.trajectory.each(|row| reach.rate_mps = reach.rate_mps.max(2.0 * row.velocity_mps().norm()))?;
+        let mut beside_mps = 0.0_f64;
+        run.claimed.each(|row| {
+            if let Some(own) = truth.get(row.sample) {
+                reach.place_m = reach.place_m.max((row.position_m() - own.position_m()).norm());
+                beside_mps = beside_mps.max((row.velocity_mps() - own.velocity_mps()).norm());
+            }
+        })?;
+        reach.rate_mps += beside_mps;
+        Ok(reach)
+    }
+}
+
+/// A satellite's value beside its limit.
+struct Worst {
+    name: String,
+    value: f64,
+    limit: f64,
+}
+
+impl Worst {
+    fn nearer(old: Option<Self>, new: Self) -> Option<Self> {
+        match old {
+            Some(old) if old.value / old.limit >= new.value / new.limit => Some(old),
+            _ => Some(new),
+        }
+    }
+}
+
+impl Verdict {
+    /// Rows of observations in the times of which the scene expects errors of any size.
+    pub(super) fn excused(&mut self, run: &Run, errors: &Errors) -> Result<(), JudgeError> {
+        let reach = Reach::of(run)?;
+        let at_fault = |link: &Link| {
+            let own = |satellites: &Option<Vec<_>>| satellites.as_ref().is_none_or(|list| list.contains(&link.sv));
+            run.scene.faults.iter().any(|fault| own(&fault.satellites))
+        };
+        let (mut code, mut doppler): (Option<Worst>, Option<Worst>) = (None, None);
+        for link in errors.signals.keys().filter(|link| !at_fault(link)) {
+            let (mut codes, mut dopplers) =
+                (Numbers::new(errors.positions.directory()), Numbers::new(errors.positions.directory()));
+            for row in errors.signals.cursor(link) {
+                let row = row?;
+                if !run.scene.expect.bounded(row.time_s) {
+                    codes.push(row.code_m.abs())?;
+                    dopplers.push(row.doppler_hz.abs())?;
+                }
+            }
+            let Some((code_m, doppler_hz)) = codes.percentile(0.95)?.zip(dopplers.percentile(0.95)?) else { continue };
+            let mut excess_m = 0.0_f64;
+            run.rays.each(link, |ray| excess_m = excess_m.max(ray.excess_m))?;
+            let rates_hz = link.signal.components.iter().map(|component| component.chip_rate_hz);
+            let chip_m = SPEED_OF_LIGHT_MPS / rates_hz.fold(f64::INFINITY, f64::min);
+            let limit = 0.5 * chip_m + excess_m + reach.place_m;
+            code = Worst::nearer(code, Worst { name: run.name(link), value: code_m, limit });
+            let limit = LOOP_HZ + reach.rate_mps / link.wavelength_m();
+            doppler = Worst::nearer(doppler, Worst { name: run.name(link), value: doppler_hz, limit });
+        }
+        self.excused_velocity(run, errors, &reach)?;
+        for (figure, unit, worst, source) in [
+            ("code error where any is expected, 95 %", "m", code, "half a chip, reflections and the spoofer's place"),
+            (
+                "Doppler error where any is expected, 95 %",
+                "Hz",
+                doppler,
+                "a loop's pull-in, mirrors and the spoofer's motion",
+            ),
+        ] {
+            let Some(worst) = worst else { continue };
+            let source = format!("{source}; {} is nearest to its limit or beyond", worst.name);
+            self.judge(figure, "", worst.value, unit, Bound::Max(worst.limit), &source);
+        }
+        Ok(())
+    }
+
+    fn excused_velocity(&mut self, run: &Run, errors: &Errors, reach: &Reach) -> Result<(), JudgeError> {
+        let mut velocities = Numbers::new(errors.positions.directory());
+        for row in errors.positions.cursor() {
+            let row = row?;
+            if !run.scene.expect.bounded(row.time_s) {
+                velocities.push(row.velocity_enu_mps.norm())?;
+            }
+        }
+        if let Some(velocity_mps) = velocities.percentile(0.95)? {
+            let bound = Bound::Max(LOOP_MPS + reach.rate_mps);
+            let source = "a loop's pull-in, mirrors and the spoofer's motion";
+            self.judge("velocity error where any is expected, 95 %", "", velocity_mps, "m/s", bound, source);
+        }
+        Ok(())
+    }
+}
