@@ -26,7 +26,7 @@ use gnss::record::{
     RayRow, SkyRow, TrackingRow, TrajectoryRow,
 };
 use gnss::satellite::Sv;
-use gnss::signal::{Link, Signal};
+use gnss::signal::{Link, Signal, all};
 use gnss::time::TimeScale;
 
 /// How fast the stages ran: `speed.json`, and the section of the summary.
@@ -200,7 +200,9 @@ impl Run {
         }
         let clocks = rx.join("clocks.csv");
         let clock = |line, row: ClockRow| {
-            let Some(scale) = TimeScale::find(&row.time_scale) else {
+            // A signal that was added may bring a time of its own.
+            let added = || all().into_iter().map(|signal| signal.time).find(|scale| scale.name == row.time_scale);
+            let Some(scale) = TimeScale::find(&row.time_scale).or_else(added) else {
                 let what = format!("time_scale = {}: expected one such as GPST, GST, BDT or GLONASST", row.time_scale);
                 return Err(JudgeError::Line { path: clocks.clone(), line, what });
             };
