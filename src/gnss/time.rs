@@ -36,11 +36,6 @@ pub struct TimeScale {
 }
 
 impl TimeScale {
-    /// The scale of that name.
-    pub fn find(name: &str) -> Option<&'static Self> {
-        [&GPST, &GST, &IRNSST, &QZSST, &BDT, &GLONASST, &UTC].into_iter().find(|scale| scale.name == name)
-    }
-
     /// What this scale's clock shows at an instant, as an [`Epoch`] whose week and seconds are the scale's
     /// own.
     pub fn label(&self, at: Epoch) -> Epoch {

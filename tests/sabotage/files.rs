@@ -40,15 +40,22 @@ fn columns() -> Vec<Kind> {
     ]
 }
 
-/// Adds to a column of F14.3 in all satellites' lines.
-fn add(text: &mut String, from: usize, by: f64) {
-    let line = |line: &str| match line.get(from..from + 14).and_then(|value| value.trim().parse::<f64>().ok()) {
-        Some(value) if line.starts_with('G') && !line.contains("OBS") && !line.contains("PHASE") => {
-            format!("{}{:14.3}{}\n", &line[..from], value + by, &line[from + 14..])
-        }
+/// Changes the lines of GPS satellites behind the header of an observation file.
+fn lines(text: &mut String, change: impl Fn(&str) -> Option<String>) {
+    let (header, body) = text.split_once("END OF HEADER\n").unwrap();
+    let line = |line: &str| match change(line) {
+        Some(changed) if line.starts_with('G') => changed + "\n",
         _ => format!("{line}\n"),
     };
-    *text = text.lines().map(line).collect();
+    *text = format!("{header}END OF HEADER\n{}", body.lines().map(line).collect::<String>());
+}
+
+/// Changes a column of F14.3 in all satellites' lines.
+fn column(text: &mut String, from: usize, of: impl Fn(f64) -> f64) {
+    lines(text, |line| {
+        let value = line.get(from..from + 14)?.trim().parse().ok()?;
+        Some(format!("{}{:14.3}{}", &line[..from], of(value), &line[from + 14..]))
+    });
 }
 
 fn rinex() -> Vec<Kind> {
@@ -61,38 +68,23 @@ fn rinex() -> Vec<Kind> {
     const CARRIERS: [&str; 1] = ["carriers of observations.rnx, largest difference of an interval"];
     vec![
         kind!("pseudoranges of RINEX", "m", Some(0.01), 1000.0, &CODE, AtRest, |rx, m| {
-            add(rx.text("observations.rnx"), 3, m);
+            column(rx.text("observations.rnx"), 3, |value| value + m);
         }),
         kind!("Dopplers of RINEX", "Hz", Some(0.01), 5.0, &DOPPLER, AtRest, |rx, hz| {
-            add(rx.text("observations.rnx"), 35, hz);
+            column(rx.text("observations.rnx"), 35, |value| value + hz);
         }),
         kind!("C/N0 of RINEX", "dB", Some(0.05), 8.0, &CN0, AtRest, |rx, db| {
-            add(rx.text("observations.rnx"), 51, db);
+            column(rx.text("observations.rnx"), 51, |value| value + db);
         }),
-        // Every second digit behind the point: what one epoch has and the next has not.
         kind!("carriers of RINEX that turn back", "", None, 1.0, &CARRIERS, AtRest, |rx, _| {
-            let text = rx.text("observations.rnx");
-            let line = |line: &str| match line.get(19..33).and_then(|value| value.trim().parse::<f64>().ok()) {
-                Some(value) if line.starts_with('G') && !line.contains("OBS") => {
-                    format!("{}{:14.3}{}\n", &line[..19], -value, &line[33..])
-                }
-                _ => format!("{line}\n"),
-            };
-            *text = text.lines().map(line).collect();
+            column(rx.text("observations.rnx"), 19, |value| -value);
         }),
         kind!("RINEX an hour late", "h", Some(0.0), 1.0, &LACKS, AtRest, |rx, hours| {
             let text = rx.text("observations.rnx");
             *text = text.replace("> 2010 07 01 08", &format!("> 2010 07 01 {:02}", 8 + hours as u32));
         }),
         kind!("every lock of RINEX lost", "", None, 1.0, &FLAGS, AtRest, |rx, _| {
-            let text = rx.text("observations.rnx");
-            let line = |line: &str| match line.get(33..34) {
-                Some(" ") if line.starts_with('G') && line.len() > 60 && !line.contains("OBS") => {
-                    format!("{}1{}\n", &line[..33], &line[34..])
-                }
-                _ => format!("{line}\n"),
-            };
-            *text = text.lines().map(line).collect();
+            lines(rx.text("observations.rnx"), |line| Some(format!("{}1{}", line.get(..33)?, line.get(34..)?)));
         }),
         kind!("a satellite too many in an epoch's count", "", None, 1.0, &LINES, AtRest, |rx, _| {
             let text = rx.text("observations.rnx");
@@ -161,7 +153,7 @@ fn scales() -> Vec<Kind> {
             "m",
             Some(0.05),
             1.0,
-            &["time of GST against that of the fix, mean error", "time of GST against that of the fix, largest error"],
+            &["GST offset error, mean", "GST offset error, largest"],
             TwoSystems,
             ahead
         ),
@@ -170,7 +162,7 @@ fn scales() -> Vec<Kind> {
             "of 1",
             Some(1.1),
             1.5,
-            &["sigma of the clock by GST over the expected one, largest"],
+            &["GST clock sigma over the expected one, largest"],
             TwoSystems,
             |rx, factor| rx.table("clocks").map("sigma_clock_m", |_, value| factor * value)
         ),

@@ -78,19 +78,29 @@ impl Verdict {
             unit: &row.unit,
             limit: row.bound.to_string(),
             margin_share: row.margin,
-            status: Some(row.status),
+            status: Outcome::Judged(row.status),
             source: &row.source,
             why: row.why.join("; "),
         });
         judged.chain(self.not_judged.iter().map(|text| {
             let (figure, source) = text.split_once(": ").unwrap_or((text, ""));
-            VerdictRow { figure, source, ..VerdictRow::default() }
+            let (path, value, unit, limit, why) = ("", String::new(), "", String::new(), String::new());
+            VerdictRow { figure, path, value, unit, limit, margin_share: None, status: Outcome::NotJudged, source, why }
         }))
     }
 }
 
+/// `status` in `verdict.csv`.
+#[derive(Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Outcome {
+    NotJudged,
+    #[serde(untagged)]
+    Judged(Status),
+}
+
 /// One row of `verdict.csv`.
-#[derive(Default, Serialize)]
+#[derive(Serialize)]
 pub(crate) struct VerdictRow<'a> {
     figure: &'a str,
     path: &'a str,
@@ -98,17 +108,7 @@ pub(crate) struct VerdictRow<'a> {
     unit: &'a str,
     limit: String,
     margin_share: Option<f64>,
-    #[serde(serialize_with = "status_or_none")]
-    status: Option<Status>,
+    status: Outcome,
     source: &'a str,
     why: String,
-}
-
-/// A status by its name; none of what is not judged.
-#[expect(clippy::ref_option, reason = "serde calls it")]
-fn status_or_none<S: serde::Serializer>(status: &Option<Status>, to: S) -> Result<S::Ok, S::Error> {
-    match status {
-        Some(status) => status.serialize(to),
-        None => to.serialize_str("not_judged"),
-    }
 }

@@ -23,6 +23,17 @@ pub(crate) fn each<T: DeserializeOwned>(
     each_of(fs::File::open(path).map_err(|source| open_error(path, remedy, source))?, path, take)
 }
 
+/// The same of a file that a run may lack.
+pub(super) fn each_of_any<T: DeserializeOwned>(
+    path: &Path,
+    take: impl FnMut(u64, T) -> Result<(), JudgeError>,
+) -> Result<(), JudgeError> {
+    match each(path, "", take) {
+        Err(JudgeError::Missing { .. }) => Ok(()),
+        other => other,
+    }
+}
+
 fn each_of<T: DeserializeOwned>(
     input: impl io::Read,
     path: &Path,
@@ -87,10 +98,12 @@ pub(super) fn believable(path: &Path, line: u64, seconds: i64) -> Result<(), Jud
 
 /// All rows of a CSV file that a run may lack.
 pub(super) fn optional<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, JudgeError> {
-    match rows(path, "") {
-        Err(JudgeError::Missing { .. }) => Ok(Vec::new()),
-        other => other,
-    }
+    let mut rows = Vec::new();
+    each_of_any(path, |_, row| {
+        rows.push(row);
+        Ok(())
+    })?;
+    Ok(rows)
 }
 
 fn open_error(path: &Path, remedy: &'static str, source: io::Error) -> JudgeError {

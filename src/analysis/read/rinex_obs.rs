@@ -74,9 +74,13 @@ impl<R: BufRead> Lines<R> {
             return Ok(None);
         }
         self.number += 1;
-        let own = if self.number == 1 { bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes) } else { &bytes };
-        let text: String = own.iter().map(|byte| if byte.is_ascii() { char::from(*byte) } else { '?' }).collect();
-        Ok(Some(text.trim_end_matches(['\n', '\r']).to_owned()))
+        if self.number == 1 && bytes.starts_with(b"\xef\xbb\xbf") {
+            bytes.drain(..3);
+        }
+        bytes.iter_mut().filter(|byte| !byte.is_ascii()).for_each(|byte| *byte = b'?');
+        let mut text = String::from_utf8(bytes).unwrap_or_default();
+        text.truncate(text.trim_end_matches(['\n', '\r']).len());
+        Ok(Some(text))
     }
 
     /// A fault in the line that was read last.
@@ -325,7 +329,11 @@ impl Header {
             if value == 0.0 {
                 continue;
             }
-            let value = value / self.scales.get(&(sv.system.letter(), code.clone())).copied().unwrap_or(1.0);
+            let value = if self.scales.is_empty() {
+                value
+            } else {
+                value / self.scales.get(&(sv.system.letter(), code.clone())).copied().unwrap_or(1.0)
+            };
             let indicator = columns(line, from + 14, from + 15).parse::<u8>().unwrap_or(0);
             let entry = all.entry((sv, code.get(1..).unwrap_or("").to_owned())).or_default();
             match code.as_bytes().first() {

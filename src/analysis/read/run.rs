@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use super::common::Common;
 use super::emission::{self, Emission, MeanSignal};
-use super::files::{believable, each, json, missing, optional, rows, text};
+use super::files::{believable, each, each_of_any, json, missing, optional, rows, text};
 use crate::error::JudgeError;
 use crate::read::fixes::Fixes;
 use crate::read::levels::{LevelFinder, Levels};
@@ -27,7 +27,6 @@ use gnss::record::{
 };
 use gnss::satellite::Sv;
 use gnss::signal::{Link, Signal, all};
-use gnss::time::TimeScale;
 
 /// How fast the stages ran: `speed.json`, and the section of the summary.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -169,15 +168,9 @@ impl Run {
         read.rx = Some(rx.to_owned());
         read.scene_json = json(&truth.join("scene.json"))?.unwrap_or(Value::Null);
         read.scenario = text(&run.join("scenario.toml"))?;
-        match each(&truth.join("rays.csv"), "", |_, row: RayRow| read.rays.push(row.link(), &row)) {
-            Ok(()) | Err(JudgeError::Missing { .. }) => {}
-            Err(error) => return Err(error),
-        }
+        each_of_any(&truth.join("rays.csv"), |_, row: RayRow| read.rays.push(row.link(), &row))?;
         read.truth_navigation = rows(&truth.join("navigation.csv"), TRUTH)?;
-        match each(&truth.join("claimed.csv"), "", |_, row: TrajectoryRow| read.claimed.push(row)) {
-            Ok(()) | Err(JudgeError::Missing { .. }) => {}
-            Err(error) => return Err(error),
-        }
+        each_of_any(&truth.join("claimed.csv"), |_, row: TrajectoryRow| read.claimed.push(row))?;
         read.observations = observations(&rx.join("observations.csv"), RECEIVER, run, |_| Ok(()))?;
         let fixes = rx.join("fixes.csv");
         each(&fixes, RECEIVER, |line, row: Fix| {
@@ -194,24 +187,17 @@ impl Run {
             read.tracking.push(row.link(), &row)
         })?;
         read.update_s = updates.median();
-        match each(&rx.join("ionosphere.csv"), "", |_, row: IonosphereRow| read.ionosphere.push(row.sv, &row)) {
-            Ok(()) | Err(JudgeError::Missing { .. }) => {}
-            Err(error) => return Err(error),
-        }
+        each_of_any(&rx.join("ionosphere.csv"), |_, row: IonosphereRow| read.ionosphere.push(row.sv, &row))?;
         let clocks = rx.join("clocks.csv");
-        let clock = |line, row: ClockRow| {
-            // A signal that was added may bring a time of its own.
-            let added = || all().into_iter().map(|signal| signal.time).find(|scale| scale.name == row.time_scale);
-            let Some(scale) = TimeScale::find(&row.time_scale).or_else(added) else {
+        each_of_any(&clocks, |line, row: ClockRow| {
+            // A signal that a program adds may bring a time of its own.
+            let scale = all().into_iter().map(|signal| signal.time.name).find(|name| *name == row.time_scale);
+            let scale = scale.ok_or_else(|| {
                 let what = format!("time_scale = {}: expected one such as GPST, GST, BDT or GLONASST", row.time_scale);
-                return Err(JudgeError::Line { path: clocks.clone(), line, what });
-            };
-            read.clocks.push(scale.name, &row)
-        };
-        match each(&clocks, "", clock) {
-            Ok(()) | Err(JudgeError::Missing { .. }) => {}
-            Err(error) => return Err(error),
-        }
+                JudgeError::Line { path: clocks.clone(), line, what }
+            })?;
+            read.clocks.push(scale, &row)
+        })?;
         read.navigation = rows(&rx.join("navigation.csv"), RECEIVER)?;
         read.events = rows(&rx.join("events.csv"), RECEIVER)?;
         read.events.iter_mut().for_each(|row| row.sv = named(&read.alike, row.link()));

@@ -153,7 +153,13 @@ impl Expect {
         self.at(time_s).find_map(|terms| terms.errors) != Some(Sizes::Any)
     }
 
-    /// The same of what remembers `memory_s` of the past.
+    /// Whether errors are judged at all times.
+    pub fn always_bounded(&self) -> bool {
+        let all = self.whole.iter().chain(self.intervals.iter().map(|interval| &interval.terms));
+        all.filter_map(|terms| terms.errors).all(|sizes| sizes != Sizes::Any)
+    }
+
+    /// Whether errors of what remembers `memory_s` of the past are to be judged at a time.
     pub fn bounded_since(&self, time_s: f64, memory_s: f64) -> bool {
         let within = |interval: &&Interval| (interval.from_s..interval.to_s + memory_s).contains(&time_s);
         let any = |interval: &Interval| interval.terms.errors == Some(Sizes::Any);

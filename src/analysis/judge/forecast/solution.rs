@@ -368,6 +368,11 @@ impl Expected {
         }
     }
 
+    /// Whether that many satellites are all that should be used.
+    pub fn is_whole(&self, satellites: u32) -> bool {
+        (self.satellites.0..=self.satellites.1).contains(&satellites)
+    }
+
     /// Longest axis of the horizontal noise.
     pub fn flat_sigma_m(&self) -> f64 {
         largest_axis(&self.noise)

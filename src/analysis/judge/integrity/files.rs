@@ -23,6 +23,7 @@ use crate::statistics::larger;
 use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use gnss::record::{Fix, Observation};
 use gnss::satellite::{Sv, System};
+use gnss::signal::Link;
 use gnss::time::Epoch;
 
 /// A time as written: NMEA rounds to a millisecond.
@@ -45,7 +46,7 @@ pub(super) fn findings(run: &Run) -> Result<Vec<Finding>, JudgeError> {
     let Some(rx) = &run.rx else { return Ok(Vec::new()) };
     let mut all = geographic(&rx.join("fixes.csv"))?;
     if let Some(file) = opened(&rx.join("observations.rnx"))? {
-        all.extend(observations(run, &rx.join("observations.csv"), file)?);
+        all.extend(observations(run, file)?);
     }
     if let Some(file) = opened(&rx.join("fixes.nmea"))? {
         all.extend(sentences(run, file, &rx.join("fixes.nmea"))?);
@@ -147,9 +148,8 @@ struct Compared {
 struct Beside {
     reader: Reader<BufReader<File>>,
     epoch: Option<ObservedEpoch>,
-    rows: Vec<Observation>,
-    /// Of each signal the row before with its reading, and the carrier as the file has it.
-    before: BTreeMap<(Sv, &'static str), (Observation, Epoch, Option<f64>)>,
+    /// Of each signal the reading before, and the carrier as the table and the file have it, cycles.
+    before: BTreeMap<(Sv, &'static str), (Epoch, f64, Option<f64>)>,
     compared: Compared,
 }
 
@@ -161,16 +161,8 @@ impl Beside {
         });
     }
 
-    fn take(&mut self, row: Observation) {
-        if self.rows.first().is_some_and(|first| first.sample != row.sample) {
-            self.compare();
-        }
-        self.rows.push(row);
-    }
-
     /// Compares the rows of an epoch with those of the file that bear its time.
-    fn compare(&mut self) {
-        let rows = std::mem::take(&mut self.rows);
+    fn compare(&mut self, rows: &[Observation]) {
         let Some(first) = rows.first() else { return };
         let reading = first.sent().plus_s(first.pseudorange_m / SPEED_OF_LIGHT_MPS);
         while self.epoch.as_ref().is_some_and(|epoch| reading.since(epoch.label) > TIME_S) {
@@ -200,18 +192,18 @@ impl Beside {
             compared.code_m = compared.code_m.max(apart(values.pseudorange_m, row.pseudorange_m));
             compared.doppler_hz = compared.doppler_hz.max(apart(values.doppler_hz, row.doppler_hz));
             compared.cn0_db = compared.cn0_db.max(apart(values.cn0_dbhz, row.cn0_dbhz));
-            if let Some((old, then, old_cycles)) = self.before.get(&key) {
-                let own = row.carrier_cycles - old.carrier_cycles;
-                if let Some((new, old)) = values.carrier_cycles.zip(*old_cycles) {
-                    compared.carrier_cycles = compared.carrier_cycles.max((new - old - own).abs());
+            let cycles = (reading, row.carrier_cycles, values.carrier_cycles);
+            if let Some((then, old, filed)) = self.before.insert(key, cycles) {
+                if let Some((new_filed, filed)) = values.carrier_cycles.zip(filed) {
+                    let grown = row.carrier_cycles - old;
+                    compared.carrier_cycles = compared.carrier_cycles.max((new_filed - filed - grown).abs());
                 }
-                let younger_s = reading.since(*then) - row.locked_s;
+                let younger_s = reading.since(then) - row.locked_s;
                 // Of the same age it may be either.
                 if younger_s.abs() > TIME_S && values.lost_lock != (younger_s > 0.0) {
                     compared.flags.add(|| format!("{} {} at sample {}", row.sv, row.signal.name, row.sample));
                 }
             }
-            self.before.insert(key, (row, reading, values.carrier_cycles));
         }
     }
 }
@@ -220,20 +212,36 @@ fn in_words(file: &str, fault: &Fault) -> String {
     format!("{file}, line {}: {}", fault.line, fault.what)
 }
 
-fn observations(run: &Run, table: &Path, file: BufReader<File>) -> Result<Vec<Finding>, JudgeError> {
+/// Shows `see` the observations of all signals, epoch by epoch.
+fn epochs(run: &Run, mut see: impl FnMut(&[Observation])) -> Result<(), JudgeError> {
+    let mut signals: Vec<_> = run.observations.keys().map(|link| run.observations.cursor(link).peekable()).collect();
+    let mut rows = Vec::new();
+    loop {
+        // A row that cannot be read comes first, and ends it.
+        let sample = |row: &Result<Observation, JudgeError>| row.as_ref().map_or(0, |row| row.sample);
+        let Some(next) = signals.iter_mut().filter_map(|rows| rows.peek().map(sample)).min() else { return Ok(()) };
+        for signal in &mut signals {
+            while let Some(row) = signal.next_if(|row| sample(row) <= next) {
+                rows.push(row?);
+            }
+        }
+        see(&rows);
+        rows.clear();
+    }
+}
+
+fn observations(run: &Run, file: BufReader<File>) -> Result<Vec<Finding>, JudgeError> {
     let mut compared = Compared::default();
     match Reader::new(file) {
         Ok(reader) => {
-            compared.channels = channels(run, &reader.header.channels);
-            let mut beside = Beside { reader, epoch: None, rows: Vec::new(), before: BTreeMap::new(), compared };
+            let links = run.observations.keys().filter(|link| link.sv.system == System::Glonass);
+            let truth: Vec<Link> = run.truth.keys().collect();
+            compared.channels = channels(links, &truth, &reader.header.channels);
+            let mut beside = Beside { reader, epoch: None, before: BTreeMap::new(), compared };
             if !run.observations.is_empty() {
                 beside.advance();
             }
-            each(table, "", |_, row: Observation| {
-                beside.take(row);
-                Ok(())
-            })?;
-            beside.compare();
+            epochs(run, |rows| beside.compare(rows))?;
             compared = beside.compared;
         }
         Err(fault) => compared.damaged.add(|| in_words("observations.rnx", &fault)),
@@ -263,11 +271,11 @@ fn observations(run: &Run, table: &Path, file: BufReader<File>) -> Result<Vec<Fi
     ])
 }
 
-/// Channels that the header has otherwise than the truth, or not at all.
-fn channels(run: &Run, header: &BTreeMap<Sv, i8>) -> Found {
+/// Channels of observed satellites that the header has otherwise than the truth, or not at all.
+fn channels(observed: impl Iterator<Item = Link>, truth: &[Link], header: &BTreeMap<Sv, i8>) -> Found {
     let mut found = Found::default();
-    for link in run.observations.keys().filter(|link| link.sv.system == System::Glonass) {
-        let known = run.truth.keys().find(|own| own.sv == link.sv).and_then(|own| own.channel());
+    for link in observed {
+        let known = truth.iter().find(|own| own.sv == link.sv).and_then(|own| own.channel());
         if known.is_some() && header.get(&link.sv) != known.as_ref() {
             found.add(|| format!("{}: {:?} where the truth has {known:?}", link.sv, header.get(&link.sv)));
         }
@@ -372,4 +380,28 @@ fn sentences(run: &Run, mut file: BufReader<File>, path: &Path) -> Result<Vec<Fi
             "the same velocity",
         ),
     ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gnss::signal::Signal;
+
+    #[test]
+    fn a_channel_that_is_not_the_truth_s_or_not_there_is_found() {
+        let signal = Signal::find("GLONASS G1").unwrap();
+        let links: Vec<Link> = signal.satellites().take(3).map(|sv| signal.link(sv)).collect();
+        // RINEX 3.05, table A2: the header's line with the channels of Kosmos satellites R01 to R03 of 2020.
+        let line = |channels: [i8; 3]| {
+            let own = format!("  3 R01 {:2} R02 {:2} R03 {:2} ", channels[0], channels[1], channels[2]);
+            let mut text = format!("{:60}RINEX VERSION / TYPE\n", "     3.05           OBSERVATION DATA    R");
+            text += &format!("{own:60}GLONASS SLOT / FRQ #\n{:60}SYS / # / OBS TYPES\n", "R    1 C1C");
+            text += &format!("{:60}END OF HEADER\n", "");
+            Reader::new(text.as_bytes()).unwrap().header.channels
+        };
+        let count = |header: &BTreeMap<Sv, i8>| channels(links.iter().copied(), &links, header).count;
+        assert_eq!(count(&line([1, -4, 5])), 0);
+        assert_eq!(count(&line([1, 4, 5])), 1);
+        assert_eq!(count(&BTreeMap::new()), 3);
+    }
 }

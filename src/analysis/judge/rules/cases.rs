@@ -3,15 +3,15 @@
 
 use nalgebra::{Matrix3, Matrix4, Vector3};
 
+use super::scales::{Clocks, Scales};
 use crate::error::JudgeError;
 use crate::judge::forecast::ranges::Scene;
-use crate::judge::forecast::solution::{Expected, Offset, expected};
+use crate::judge::forecast::solution::{Expected, expected};
 use crate::measure::errors::{Errors, PositionError};
 use crate::read::Table;
-use crate::read::spill_store::{Finder, SpillRow, SpillStore, Words};
+use crate::read::spill_store::{SpillRow, Words};
 use gnss::earth::SPEED_OF_LIGHT_MPS;
-use gnss::record::{ClockRow, Fix};
-use gnss::time::GPST;
+use gnss::record::Fix;
 
 /// A fix, its error and what was expected of it.
 #[derive(Clone)]
@@ -90,105 +90,6 @@ impl SpillRow<()> for Case {
     }
 }
 
-/// What a fix's clock says against one more time scale.
-#[derive(Clone, Copy)]
-pub(super) struct ScaleCase {
-    pub sample: u64,
-    /// The offset between the scales as the receiver has it, less the true one and less known biases.
-    pub error_m: f64,
-    /// Standard deviation of it in theory, and what may come on top.
-    pub sigma_m: f64,
-    pub allowed_m: f64,
-    /// The stated sigma of the clock over the one that should be stated; none where that is not known.
-    pub sigma_ratio: Option<f64>,
-}
-
-impl SpillRow<&'static str> for ScaleCase {
-    const WORDS: usize = 5;
-
-    fn put(&self, words: &mut Vec<u64>) {
-        words.push(self.sample);
-        let ratio = self.sigma_ratio.unwrap_or(f64::NAN);
-        words.extend([self.error_m, self.sigma_m, self.allowed_m, ratio].map(f64::to_bits));
-    }
-
-    fn take(_: &'static str, words: &mut Words<'_>) -> Self {
-        let sample = words.word();
-        let [error_m, sigma_m, allowed_m, ratio] = std::array::from_fn(|_| words.number());
-        Self { sample, error_m, sigma_m, allowed_m, sigma_ratio: Some(ratio).filter(|ratio| !ratio.is_nan()) }
-    }
-}
-
-/// What `clocks.csv` says of a run's fixes.
-pub(super) struct Scales {
-    /// By the names of time scales other than the fix's own.
-    pub cases: SpillStore<&'static str, ScaleCase>,
-    /// Rows of `clocks.csv` that fixes should have and do not, and the first sample without.
-    pub missing: (usize, Option<u64>),
-    /// Largest difference of a row of the fix's own scale from what the fix says, in sigmas of the fix.
-    pub own: f64,
-    /// Fixes looked at.
-    pub fixes: usize,
-}
-
-/// Rows of `clocks.csv` by scale.
-struct Clocks<'r>(Vec<(&'static str, Finder<'r, &'static str, ClockRow>)>);
-
-impl Clocks<'_> {
-    fn get(&mut self, scale: &str, sample: u64) -> Option<ClockRow> {
-        self.0.iter_mut().find(|(name, _)| *name == scale)?.1.get(sample)
-    }
-
-    fn count(&mut self, sample: u64) -> usize {
-        self.0.iter_mut().filter_map(|(_, rows)| rows.get(sample)).count()
-    }
-}
-
-impl Scales {
-    /// Takes what a fix's rows say.
-    fn take(
-        &mut self,
-        scene: &Scene<'_>,
-        clocks: &mut Clocks<'_>,
-        fix: &Fix,
-        (expected, offsets): (&Expected, &[Offset]),
-    ) -> Result<(), JudgeError> {
-        let due = fix.clocks.map_or(1, |count| count as usize);
-        if due == 1 && fix.time_scale == GPST.name {
-            return Ok(());
-        }
-        self.fixes += 1;
-        if clocks.count(fix.sample) != due {
-            self.missing.0 += 1;
-            self.missing.1.get_or_insert(fix.sample);
-        }
-        let Some(own) = clocks.get(&fix.time_scale, fix.sample) else { return Ok(()) };
-        let own_m = SPEED_OF_LIGHT_MPS * (own.clock_bias_s - fix.clock_bias_s);
-        self.own = self.own.max(own_m.abs() / fix.sigma_clock_m);
-        let (least, most) = expected.satellites;
-        let known = expected.corrected && expected.steady && (least..=most).contains(&fix.satellites);
-        let facts = &scene.run.scene;
-        let (delay_s, spread_s) = scene.run.common.scale_delay_s(&fix.time_scale);
-        for offset in offsets {
-            let Some(scale) = scene.scales.get(offset.scale).copied() else { continue };
-            let Some(row) = clocks.get(scale, fix.sample) else { continue };
-            let (other_s, other_spread_s) = scene.run.common.scale_delay_s(scale);
-            // A scale that is ahead has the smaller bias, one whose codes are delayed more the larger.
-            let true_s = facts.ahead_s(&fix.time_scale) - facts.ahead_s(scale) + other_s - delay_s;
-            let stated_s = row.clock_bias_s - own.clock_bias_s;
-            let case = ScaleCase {
-                sample: fix.sample,
-                error_m: SPEED_OF_LIGHT_MPS * (stated_s - true_s) - offset.bias_m,
-                sigma_m: offset.sigma_m,
-                allowed_m: offset.allowed_m + SPEED_OF_LIGHT_MPS * (spread_s + other_spread_s),
-                sigma_ratio: known.then_some(row.sigma_clock_m / offset.stated_m),
-            };
-            self.cases.push(scale, &case)?;
-        }
-        Ok(())
-    }
-}
-
 /// All fixes that have an error and of which something is expected, and what their clocks say of time scales.
 ///
 /// # Errors
@@ -196,10 +97,7 @@ impl Scales {
 pub(super) fn cases(scene: &Scene<'_>, errors: &Errors) -> Result<(Table<Case>, Scales), JudgeError> {
     let run = scene.run;
     let mut cases = Table::new(errors.positions.directory());
-    let mut scales =
-        Scales { cases: SpillStore::new(errors.positions.directory()), missing: (0, None), own: 0.0, fixes: 0 };
-    let finder = |scale| Ok((scale, run.clocks.finder(scale)?));
-    let mut clocks = Clocks(run.clocks.keys().map(finder).collect::<Result<_, JudgeError>>()?);
+    let (mut scales, mut clocks) = (Scales::default(), Clocks::of(run)?);
     let mut errors_at = errors.positions.finder()?;
     let wavelength_m = run.mean_wavelength_m();
     expected(scene, errors, |fix, place, expected, offsets| {
@@ -218,8 +116,7 @@ pub(super) fn cases(scene: &Scene<'_>, errors: &Errors) -> Result<(Table<Case>, 
 impl Case {
     /// Whether the satellites of the fix are those that were expected, all of them sure.
     pub fn is_whole(&self) -> bool {
-        let (least, most) = self.expected.satellites;
-        (least..=most).contains(&self.fix.satellites)
+        self.expected.is_whole(self.fix.satellites)
     }
 
     pub fn geometry_departure(&self) -> f64 {

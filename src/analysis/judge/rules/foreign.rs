@@ -9,8 +9,8 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::availability::Came;
+use super::kind::THEORY;
 use super::tracking::ONE_BIT_LOSS_DB;
-use super::values::THEORY;
 use crate::error::JudgeError;
 use crate::expect::due::receiver::Receiver;
 use crate::expect::due::{Due, Expectations, Observed};

@@ -11,6 +11,7 @@ mod excused;
 mod foreign;
 mod hints;
 mod interference;
+mod kind;
 mod links;
 mod losses;
 mod motion;

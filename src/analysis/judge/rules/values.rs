@@ -1,9 +1,7 @@
 //! Errors of the fixes and what is stated of them, against what theory expects of a sound receiver
 //! ([`crate::expect`]).
 //!
-//! Each kind of error has three rows: its mean, its 95th percentile, and the largest against the limit of its
-//! own epoch. Limits are quantiles of theory's σ for a stated probability of a false alarm, widened by what
-//! theory itself may err, with known biases taken out. Stated sigmas lie within a factor of the ones that
+//! Each kind of error has three rows ([`super::kind`]). Stated sigmas lie within a factor of the ones that
 //! follow from settings, true C/N0 and geometry, on both sides.
 
 use std::collections::BTreeMap;
@@ -11,12 +9,13 @@ use std::collections::BTreeMap;
 use nalgebra::{Vector3, Vector4};
 
 use super::cases::{Case, Stated, cases};
+use super::kind::{Kind, SIGMA, THEORY, Value};
 use super::motion::Motion;
 use super::reception::is_augmented;
 use crate::error::JudgeError;
 use crate::expect::due::satellite::FADE_DB;
 use crate::expect::loops::Theory;
-use crate::expect::quantile::{largest, mean_square};
+use crate::expect::quantile::mean_square;
 use crate::judge::forecast::ranges::{Choices, Scene};
 use crate::judge::forecast::solution::{Expected, largest_axis};
 use crate::judge::judgement::Bound;
@@ -28,12 +27,6 @@ use crate::statistics::{Sum, larger};
 use gnss::record::{Event, Fix};
 use gnss::signal::Link;
 
-/// By how much theory's σ may be too small: 1 dB of C/N0 (1.12), and 7 % between the linear loop and a real
-/// one.
-pub(super) const THEORY: f64 = 1.2;
-/// Factor within which a stated sigma lies about the expected one: 1 dB of C/N0 (1.12) and 12 % of theory and
-/// smoothing.
-pub(super) const SIGMA: f64 = 1.25;
 /// How far dilutions and condition may be from the true geometry's: elevations seen from a fix metres away.
 const GEOMETRY: f64 = 2e-3;
 /// Weights of 1 dB of C/N0, as a factor.
@@ -50,34 +43,6 @@ const RETURN_S: f64 = 20.0;
 
 /// A stated sigma over the expected one.
 type Ratio = fn(&Stated, &Expected) -> f64;
-/// The value of a case, where it counts.
-type Of<'a> = &'a dyn Fn(&Case) -> Option<Value>;
-
-/// One kind of error.
-struct Kind<'a> {
-    name: &'a str,
-    path: &'a str,
-    unit: &'a str,
-    axes: u32,
-    /// Independent values among them.
-    independent: f64,
-    /// Value of a case, where it counts.
-    of: Of<'a>,
-}
-
-/// An error less its known bias, theory's σ along its longest axis, and what may come on top.
-struct Value {
-    time_s: f64,
-    error: Vector3<f64>,
-    sigma: f64,
-    allowed: f64,
-}
-
-impl Value {
-    fn limit(&self, factor: f64) -> f64 {
-        factor * THEORY * self.sigma + self.allowed
-    }
-}
 
 impl Verdict {
     /// Rows of position, velocity and clock.
@@ -105,6 +70,7 @@ impl Verdict {
             self.not_judged.push(format!("sizes of the errors of {excused} fixes: the scene expects any"));
         }
         if cases.is_empty() {
+            self.scales(run, &scales, &bounded, 1.0)?;
             self.sigmas(&all)?;
             return self.geometry(&all);
         }
@@ -121,52 +87,6 @@ impl Verdict {
         self.geometry(&all)?;
         all.sound()?;
         self.consistency(summary, &cases)
-    }
-
-    fn kind(&mut self, kind: &Kind<'_>, cases: &Table<Case>) -> Result<(), JudgeError> {
-        let Kind { name, path, unit, axes, .. } = *kind;
-        let (mut lengths, mut limits) = (Numbers::new(cases.directory()), Numbers::new(cases.directory()));
-        let mut sum: Vector3<f64> = Vector3::zeros();
-        // As sums of iterators begin.
-        let (mut squares, mut allowed) = (-0.0, -0.0);
-        for case in cases.cursor() {
-            let Some(value) = (kind.of)(&case?) else { continue };
-            lengths.push(value.error.norm())?;
-            // More than a twentieth beyond a limit has twenty times the probability of one beyond, at most
-            // (Markov).
-            limits.push(value.limit(largest(axes, 20)))?;
-            sum += value.error;
-            squares += value.sigma * value.sigma;
-            allowed += value.allowed;
-        }
-        if lengths.is_empty() {
-            return Ok(());
-        }
-        let count = lengths.len() as f64;
-        let limit = largest(axes, 1) * THEORY * (squares / count / kind.independent).sqrt() + allowed / count;
-        let source = format!("theory of C/N0, geometry and loops; {:.0} independent", kind.independent);
-        self.judge(&format!("{name} error, mean"), "", sum.norm() / count, unit, Bound::Max(limit), &source);
-        if let Some(limit) = limits.percentile(0.95)? {
-            let (value, source) = (lengths.percentile(0.95)?, "theory of C/N0, geometry and loops");
-            self.judge(&format!("{name} error, 95 %"), path, value, unit, Bound::Max(limit), source);
-        }
-        let factor = largest(axes, lengths.len());
-        let over = |value: &Value| value.error.norm() / value.limit(factor);
-        let mut worst: Option<Value> = None;
-        cases.each(|case| {
-            let new = (kind.of)(&case);
-            let farther = |new: &Value| worst.as_ref().is_none_or(|old| over(old).total_cmp(&over(new)).is_le());
-            if let Some(new) = new.filter(farther) {
-                worst = Some(new);
-            }
-        })?;
-        if let Some(worst) = worst {
-            let source =
-                format!("theory at {:.1} s, where it is nearest to its limit or farthest beyond", worst.time_s);
-            let bound = Bound::Max(worst.limit(factor));
-            self.judge(&format!("{name} error, largest"), "", worst.error.norm(), unit, bound, &source);
-        }
-        Ok(())
     }
 
     /// Stated sigmas against those that settings, C/N0 and geometry make.
@@ -196,12 +116,7 @@ impl Verdict {
             self.not_judged.push("sigmas: no fix whose ionosphere, satellites and C/N0 are known".to_owned());
             return Ok(());
         }
-        let source = "1 dB of C/N0, and 12 % of theory and smoothing";
-        for ((name, _), (low, high)) in rows.into_iter().zip(ends) {
-            let figure = |end: &str| format!("{name} sigma over the expected one, {end}");
-            self.judge(&figure("largest"), "", high, "of 1", Bound::Max(SIGMA), source);
-            self.judge(&figure("smallest"), "", low, "of 1", Bound::Min(1.0 / SIGMA), source);
-        }
+        rows.into_iter().zip(ends).for_each(|((name, _), ends)| self.sigma_ends(name, ends));
         Ok(())
     }
 
@@ -373,11 +288,11 @@ impl Verdict {
         };
         let metres = |name, path, axes, of| Kind { name, path, unit: "m", axes, independent: slow, of };
         let rate = |name, path, axes, of| Kind { name, path, unit: "m/s", axes, independent: fast, of };
-        let all: [Kind<'_>; 5] = [
-            metres("horizontal", "position.horizontal_p95_m", 2, &horizontal as Of<'_>),
+        let all: [Kind<'_, Case>; 5] = [
+            metres("horizontal", "position.horizontal_p95_m", 2, &horizontal as &dyn Fn(&Case) -> Option<Value>),
             metres("vertical", "position.vertical_p95_m", 1, &vertical),
             metres("clock", "", 1, &clock),
-            rate("velocity", "position.velocity_p95_mps", 3, &velocity as Of<'_>),
+            rate("velocity", "position.velocity_p95_mps", 3, &velocity as &dyn Fn(&Case) -> Option<Value>),
             rate("clock drift", "", 1, &drift),
         ];
         all.iter().try_for_each(|kind| self.kind(kind, cases))?;
