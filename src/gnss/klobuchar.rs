@@ -32,6 +32,14 @@ pub struct Klobuchar {
     pub beta: [f64; 4],
 }
 
+/// Coefficients of a nominal ionosphere, for where none are known yet: even in magnetic latitude, with a
+/// period of 100 000 s.
+///
+/// The mean of what GPS satellites broadcast on seven days: 2005-04-02, 2010-07-01, 2020-11-29, 2021-09-22,
+/// 2022-01-01, 2023-03-12 and 2024-04-01. Their amplitudes at the magnetic equator are 11, 5, 15, 8, 12, 33
+/// and 26 ns.
+pub const NOMINAL: Klobuchar = Klobuchar { alpha: [1.6e-8, 0.0, -6.0e-8, 0.0], beta: [1.0e5, 0.0, 0.0, 0.0] };
+
 /// The model's intermediate quantities along one line of sight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bulge {

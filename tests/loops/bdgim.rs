@@ -103,7 +103,8 @@ fn fixes(
     (sets, sent): &(Sets, Option<Coefficients>),
 ) -> (Vector3<f64>, f64, IonosphereModel) {
     let chip_m = SPEED_OF_LIGHT_MPS / signal.components[0].chip_rate_hz;
-    let noise = CodeNoise { chip_m, shape: CodeShape::triangle(0.5), bandwidth_hz: 0.5, integration_s: 0.004 };
+    let noise =
+        CodeNoise { chip_m, share: 1.0, shape: CodeShape::triangle(0.5), bandwidth_hz: 0.5, integration_s: 0.004 };
     let settings = PositionSettings {
         smoothing_s: 0.0,
         // Without a correction slant delays fit no position: their misfit counts as the model's then.

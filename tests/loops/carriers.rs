@@ -204,7 +204,13 @@ fn fixes_from_two_carriers_have_the_covariance_that_they_state() {
     let scene = &scenes[0];
     let sets: Sets =
         (first.iter()).filter_map(|row| scene.catalogue.sent_at(row.sv, scene.clock.start).cloned()).collect();
-    let noise = CodeNoise { chip_m: 293.05, shape: CodeShape::triangle(0.5), bandwidth_hz: 0.5, integration_s: 0.004 };
+    let noise = CodeNoise {
+        chip_m: 293.05,
+        share: 1.0,
+        shape: CodeShape::triangle(0.5),
+        bandwidth_hz: 0.5,
+        integration_s: 0.004,
+    };
     let mut settings = settings("combined").position;
     settings.smoothing_s = 0.0;
     let (mut state, mut squares, trials) = (5, 0.0, 400);

@@ -31,6 +31,11 @@ fn add(rx: &mut Rx, columns: [&str; 3], of: impl Fn(usize, usize) -> Vector3<f64
     }
 }
 
+/// Moves all places by metres east, north and up.
+pub fn move_by(rx: &mut Rx, enu_m: [f64; 3]) {
+    add(rx, PLACE, |_, _| Vector3::from(enu_m));
+}
+
 fn scale(rx: &mut Rx, columns: &[&str], factor: f64) {
     columns.iter().for_each(|column| rx.table("fixes").map(column, |_, value| factor * value));
 }

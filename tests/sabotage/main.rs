@@ -1,13 +1,15 @@
 //! The judge judged: results of a sound receiver are damaged, a little and a little more, and the verdict
 //! must pass the one and fail the other.
 //!
-//! Three closed loops are run, one at rest, one in motion, one of two systems. Each kind of damage edits the
+//! Five closed loops are run: at rest, in motion, of two systems, of two bands, and without the ionosphere's
+//! parameters. Each kind of damage edits the
 //! tables of `rx/` or the spectrum in a copy and has two sizes: one that an evaluator would still call sound,
 //! with which no row may fail, and one a small factor larger, which must fail by a row that names it. Where
 //! no size is sound (a row twice, a week too many) the smaller one is absent.
 //! `GNSS_TWIN_WRITE_SABOTAGE=$PWD/reports/sabotage.md` makes a run write the table.
 #![cfg(all(feature = "cli", feature = "pdf"))]
 
+mod early;
 mod excused;
 mod files;
 mod fixes;
@@ -48,6 +50,7 @@ fn kinds() -> Vec<Kind> {
         spectrum::kinds(),
         files::kinds(),
         excused::kinds(),
+        early::kinds(),
     ]
     .into_iter()
     .flatten()

@@ -19,6 +19,10 @@ pub enum Scene {
     Bounded,
     /// At rest, GPS and Galileo.
     TwoSystems,
+    /// At rest, NavIC on L5 and L1.
+    TwoBands,
+    /// At rest elsewhere, before the ionosphere's parameters come.
+    Early,
 }
 
 struct Made {
@@ -69,6 +73,14 @@ fn two_systems() -> &'static Path {
     make(&RUN, "two_systems", &scene.replace("duration_s = 60", "duration_s = 50"))
 }
 
+/// The first fifty seconds of the shipped scene of NavIC's two bands.
+fn two_bands() -> &'static Path {
+    static RUN: OnceLock<Made> = OnceLock::new();
+    let scene = include_str!("../../scenarios/navic_two_bands.toml");
+    let beside = concat!("file = \"", env!("CARGO_MANIFEST_DIR"), "/scenarios/navic_");
+    make(&RUN, "two_bands", &scene.replace("duration_s = 70", "duration_s = 50").replace("file = \"navic_", beside))
+}
+
 /// Another place, seed and start, without page 18 in time.
 pub fn elsewhere() -> &'static Path {
     static RUN: OnceLock<Made> = OnceLock::new();
@@ -101,6 +113,8 @@ impl Rx {
             Scene::AtRest | Scene::Bounded => at_rest(),
             Scene::InMotion => in_motion(),
             Scene::TwoSystems => two_systems(),
+            Scene::TwoBands => two_bands(),
+            Scene::Early => elsewhere(),
         };
         for name in ["truth", "rx"] {
             fs::create_dir(to.join(name)).unwrap();

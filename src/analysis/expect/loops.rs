@@ -295,6 +295,11 @@ impl Theory {
         })
     }
 
+    /// Standard deviation of the code that the loop gives, by thermal noise, metres.
+    pub fn code_noise_m(&self, cn0_hz: f64) -> f64 {
+        self.chip_m * self.noise(Loop::Dll, cn0_hz, &Places::default()).1
+    }
+
     /// Distance of early and late, in chips.
     pub fn spacing_chips(&self) -> f64 {
         self.settings.spacing_chips

@@ -19,7 +19,7 @@ use crate::track::loops::CodeShape;
 use gnss::augmentation::Content;
 use gnss::earth::Geodetic;
 use gnss::ionosphere::{Coefficients, Model, NAVIC_HZ};
-use gnss::klobuchar::L1_HZ;
+use gnss::klobuchar::{L1_HZ, NOMINAL};
 use gnss::record::{ClockRow, Fix, IonosphereModel, IonosphereRow, Observation, SightRow};
 use gnss::satellite::Sv;
 use gnss::signal::Signal;
@@ -44,7 +44,7 @@ pub mod troposphere;
 use augmentation::Augmentation;
 use electrons::Electrons;
 pub use exclusion::{Consistent, chi_square_threshold, consistent, without_faults};
-use ionosphere::{DelayError, Delays, NOMINAL, NOMINAL_ERROR};
+use ionosphere::{DelayError, Delays, NOMINAL_ERROR};
 use least_squares::{COORDINATES, Corrections, Ionosphere, LARGEST_CONDITION, Range, SPACE_M, freedom, scales};
 use records::{clocks, fix, sights};
 use reduced::InShort;
@@ -191,6 +191,8 @@ impl Default for PositionSettings {
 pub struct CodeNoise {
     /// Length of a chip.
     pub chip_m: f64,
+    /// Share of the signal's power that the loop follows: a pilot's, less what its replica does not have.
+    pub share: f64,
     /// The correlation that early and late meet: averaging replicas round it and correlate its noise.
     pub shape: CodeShape,
     /// Bandwidth of the code loop.
@@ -203,12 +205,13 @@ pub struct CodeNoise {
 pub type Noises = Vec<(&'static Signal, CodeNoise)>;
 
 impl CodeNoise {
-    /// Standard deviation of a non-coherent early-minus-late loop.
+    /// Standard deviation of a non-coherent early-minus-late loop, metres, of a signal of `cn0_hz`.
     ///
-    /// B·(1−ρ)/(2·C/N0·a′²)·(1 + (1+ρ)/(2·T·C/N0·a²)) with height a, slope a′ and noise correlation ρ of
+    /// With C the power that the loop follows: B·(1−ρ)/(2·C/N0·a′²)·(1 + (1+ρ)/(2·T·C/N0·a²)) with height a, slope a′ and noise correlation ρ of
     /// early and late; on a triangle that is Kaplan and Hegarty's equation 5.23 (2nd ed.), first branch.
     pub fn sigma_m(&self, cn0_hz: f64) -> f64 {
         let CodeShape { value, slope, common } = self.shape;
+        let cn0_hz = self.share * cn0_hz;
         let squaring = 1.0 + (1.0 + common) / (2.0 * self.integration_s * cn0_hz * value * value);
         let spread = (1.0 - common) / (slope * slope);
         self.chip_m * (self.bandwidth_hz * spread / (2.0 * cn0_hz) * squaring).sqrt()

@@ -57,8 +57,13 @@ mod tests {
     fn elements_in_short_serve_for_ten_minutes_until_the_whole_set_does_and_only_if_wanted() {
         let all = rinex::embedded_two_systems().unwrap().ephemerides;
         let set = all.into_iter().find(|set| set.sv.system == System::Galileo && set.is_healthy()).unwrap();
-        let noise =
-            CodeNoise { chip_m: 293.0, shape: CodeShape::triangle(0.5), bandwidth_hz: 1.0, integration_s: 4e-3 };
+        let noise = CodeNoise {
+            chip_m: 293.0,
+            share: 1.0,
+            shape: CodeShape::triangle(0.5),
+            bandwidth_hz: 1.0,
+            integration_s: 4e-3,
+        };
         let solver = |reduced_elements: bool| {
             let settings = PositionSettings { reduced_elements, ..PositionSettings::default() };
             Solver::new(&settings, vec![(&E1, noise)], Rate::from_hz(1e6).unwrap())

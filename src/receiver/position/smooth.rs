@@ -20,7 +20,8 @@ use gnss::time::Rate;
 
 /// A gap longer than this breaks the carrier.
 const LONGEST_GAP_S: f64 = 1.05;
-/// Code and carrier that part by this much in one interval are broken.
+/// A signal's code and carrier that part by this much in one interval are broken; of a combination by as many
+/// times more as its noise is.
 const LARGEST_JUMP_M: f64 = 30.0;
 
 /// A smoothed pseudorange.
@@ -59,6 +60,8 @@ struct Input {
     /// By how much the carrier's Doppler exceeds the code's, and the metres a second of each hertz of it.
     offset_hz: f64,
     metres_per_hz: f64,
+    /// By how much noise is larger than that of one signal.
+    gain: f64,
 }
 
 /// Filters of all satellites.
@@ -115,6 +118,7 @@ impl Smoother {
             locked_s: observation.locked_s,
             offset_hz: self.carrier_offset_hz(observation.signal),
             metres_per_hz: wavelength_m,
+            gain: 1.0,
         })
     }
 
@@ -131,6 +135,7 @@ impl Smoother {
             // Of the combination, a hertz of which is counted as a metre a second.
             offset_hz: pair.sum(parted_mps(pair.first), parted_mps(pair.second)),
             metres_per_hz: 1.0,
+            gain: pair.sigma(1.0, 1.0),
         })
     }
 
@@ -146,6 +151,7 @@ impl Smoother {
             locked_s: pair.locked_s(),
             offset_hz: -pair.dispersed(parted_mps(pair.second) - parted_mps(pair.first)),
             metres_per_hz: 1.0,
+            gain: pair.dispersed(std::f64::consts::SQRT_2).abs(),
         })
     }
 
@@ -174,7 +180,8 @@ impl Smoother {
         let whole = passed_s > 0.0
             && passed_s <= LONGEST_GAP_S
             && new.locked_s > old.locked_s
-            && (new.pseudorange_m - predicted_m - input.offset_hz * parted_m_per_hz).abs() < LARGEST_JUMP_M;
+            && (new.pseudorange_m - predicted_m - input.offset_hz * parted_m_per_hz).abs()
+                < LARGEST_JUMP_M * input.gain.max(1.0);
         if !whole || self.window_s <= 0.0 {
             return None;
         }

@@ -1,12 +1,12 @@
 use nalgebra::{Vector3, Vector4};
 
-use super::ionosphere::{DelayError, Delays, NOMINAL, NOMINAL_ERROR};
+use super::ionosphere::{DelayError, Delays, NOMINAL_ERROR};
 use super::least_squares::{Corrections, Ionosphere, Range, position};
 use super::{NoFix, chi_square_threshold, consistent};
 use gnss::broadcast::{ClockState, State};
 use gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, rotate_earth};
 use gnss::gps::l1ca::L1_CA;
-use gnss::klobuchar::L1_HZ;
+use gnss::klobuchar::{L1_HZ, NOMINAL};
 use gnss::satellite::Sv;
 use gnss::time::{Epoch, GPST};
 

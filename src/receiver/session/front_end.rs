@@ -337,15 +337,16 @@ pub(super) fn noise(signal: &'static Signal, metadata: &IfMetadata, settings: &S
     let component = lead(signal);
     let tracking = component.map_or(settings.tracking.clone(), |component| settings.tracking.fitted(component));
     let (chip_rate_hz, period_s) = component.map_or((1.0, 1.0), |c| (c.chip_rate_hz, c.period_s()));
+    let both = component.and_then(|component| other_side(component, signal));
+    let model = component.and_then(|component| {
+        let made = if both.is_some() { ReplicaModel::of_both_sides } else { ReplicaModel::new };
+        made(&tracking, component, metadata.rate.hz())
+    });
+    let power_share: f64 = component.into_iter().chain(both).map(|one| one.power_share).sum();
     CodeNoise {
         chip_m: SPEED_OF_LIGHT_MPS / chip_rate_hz,
-        shape: component
-            .and_then(|c| {
-                let made =
-                    if other_side(c, signal).is_some() { ReplicaModel::of_both_sides } else { ReplicaModel::new };
-                made(&tracking, c, metadata.rate.hz())
-            })
-            .map_or(CodeShape::triangle(tracking.spacing_chips), |model| model.shape),
+        share: power_share * model.as_ref().map_or(1.0, |model| model.efficiency),
+        shape: model.map_or(CodeShape::triangle(tracking.spacing_chips), |model| model.shape),
         bandwidth_hz: tracking.dll_bandwidth_hz,
         integration_s: period_s * f64::from(tracking.integration),
     }

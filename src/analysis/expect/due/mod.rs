@@ -32,7 +32,7 @@ use satellite::{Excuse, Required, SatelliteEpoch, Scene};
 use timetable::Timetable;
 
 /// Dilution up to which satellites must give a fix.
-const LARGEST_PDOP: f64 = 20.0;
+pub const LARGEST_PDOP: f64 = 20.0;
 /// Satellites that carry on a fix before the time at which one is due.
 const ENOUGH: u32 = 5;
 /// Height from which on a receiver's mask does not count.
@@ -56,7 +56,8 @@ pub struct Due {
 }
 
 impl Due {
-    fn add(&mut self, azimuth_rad: f64, elevation_rad: f64) {
+    /// Adds a satellite that must be used, by its direction.
+    pub fn add(&mut self, azimuth_rad: f64, elevation_rad: f64) {
         let ((sin_a, cos_a), (sin_e, cos_e)) = (libm::sincos(azimuth_rad), libm::sincos(elevation_rad));
         let h = [cos_e * sin_a, cos_e * cos_a, sin_e, 1.0];
         let pairs = (0..4).flat_map(|i| (i..4).map(move |j| (i, j)));

@@ -11,6 +11,7 @@ use std::iter::Peekable;
 
 use nalgebra::Vector3;
 
+use super::air::{Air, Sight};
 use crate::error::JudgeError;
 use crate::expect::due::satellite::{FADE_DB, is_stepping};
 use crate::expect::loops::{Places, Theory, update_s};
@@ -27,7 +28,7 @@ use crate::read::spill_store::{Cursor, Finder};
 use crate::waveform::Edge;
 use gnss::broadcast::Ephemeris;
 use gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, rotate_earth};
-use gnss::ionosphere::{Coefficients, Model};
+use gnss::ionosphere::Model;
 use gnss::message::Message as Form;
 use gnss::record::{Event, Fix, IonosphereModel, Observation, SkyRow, TrajectoryRow};
 use gnss::satellite::Sv;
@@ -100,8 +101,6 @@ fn updates_s(run: &Run) -> Option<BTreeMap<&'static Signal, f64>> {
 
 /// Space: no horizon, and models that are as good in every direction.
 const SPACE_M: f64 = 1e5;
-/// The ionosphere of Klobuchar's model and of BDGIM ends here.
-const IONOSPHERE_TOP_M: f64 = 1e6;
 /// Error of a range by elements in short, whose steps are 4.5 m of clock and 22 m across the line of sight,
 /// of which a fifth shows at the most; and by a group delay that they lack.
 const IN_SHORT_M: f64 = 2.2;
@@ -131,8 +130,8 @@ pub struct Forecast {
     pub bias_m: f64,
     /// Whether the satellite's clock has jumped so lately that the range is anywhere up to that bias.
     pub stepping: bool,
-    /// What not correcting the ionosphere adds to it, metres.
-    pub ionosphere_m: f64,
+    /// What the receiver takes the ionosphere for.
+    pub air: Air,
     /// What the true troposphere delays, for the share that a model of it errs by.
     pub troposphere_m: f64,
     /// Variance of thermal noise, m².
@@ -222,7 +221,7 @@ impl<'r> Scene<'r> {
     }
 
     /// Whether a fix at that sample may use the signal of the satellite, by its messages.
-    fn usable(&self, link: Link, sample: u64) -> bool {
+    pub(in crate::judge) fn usable(&self, link: Link, sample: u64) -> bool {
         let mut own = self.known.iter().filter(|((sv, _), _)| *sv == link.sv).map(|(_, known)| known);
         let known = own.any(|(since, message)| *since <= sample && (message.sets.serves)(link.signal));
         let last = self.health.get(&link).and_then(|all| all.iter().rev().find(|(since, _)| *since <= sample));
@@ -261,7 +260,7 @@ impl<'r> Scene<'r> {
         theory: &Theory,
         row: &SignalError,
         (true_row, sky): (&Observation, &SkyRow),
-        place: &TrajectoryRow,
+        (model, place): (IonosphereModel, &TrajectoryRow),
     ) -> Option<(Forecast, f64)> {
         let user = Geodetic::from_ecef(&place.position_m());
         let in_space = user.height_m >= SPACE_M;
@@ -273,25 +272,15 @@ impl<'r> Scene<'r> {
         let look = Look { azimuth_rad: sky.azimuth_deg.to_radians(), elevation_rad };
         let (satellite_m, computed_m) = computed_m(ephemeris, true_row, place)?;
         let carrier_hz = true_row.link().carrier_hz();
-        let sent = self.choices.ionosphere.and_then(|model| self.message.ionosphere(model));
-        let is_formula = |own: &Coefficients| own.model() != Model::NequickG;
-        let reached = |own: &&Coefficients| !is_formula(own) || user.height_m <= IONOSPHERE_TOP_M;
-        let ionosphere_m = match sent.filter(reached) {
-            // A correction of what the scene does not have is an error, not an expectation.
-            Some(model) if sky.ionosphere_m != 0.0 => {
-                SPEED_OF_LIGHT_MPS * model.delay_s((user, look), &satellite_m, place.time(), carrier_hz)
-            }
-            _ => 0.0,
-        };
+        let sight = Sight { user, look, satellite_m: &satellite_m, at: place.time(), carrier_hz, sky };
+        let air = Air::of(self, model, &sight);
         let clock_m = SPEED_OF_LIGHT_MPS * place.clock_bias_s;
         let true_m = true_row.pseudorange_m - clock_m;
         let phase_m = true_row.link().wavelength_m() * true_row.carrier_cycles - clock_m - computed_m;
         // What the system's time is ahead of GPS time goes into its own clock.
         let ahead_m = SPEED_OF_LIGHT_MPS * self.run.scene.ahead_s(true_row.signal.time.name);
-        let cost_db = self.stated.front_end_db(true_row.signal);
-        let lacks_db = self.stated.cost_db(true_row.link(), row.cn0_effective_dbhz - cost_db);
-        let cn0_hz = libm::pow(10.0, (row.cn0_effective_dbhz - cost_db) / 10.0);
-        let (_, code) = theory.noise(Loop::Dll, cn0_hz, &Places::default());
+        let (cn0_hz, steady) = self.strength(row, true_row.link());
+        let noise_m = theory.code_noise_m(cn0_hz);
         let (_, rate_hz) = theory.noise(Loop::Fll, cn0_hz, &Places::default());
         let (sin, cos) = libm::sincos(elevation_rad);
         let (east, north) = libm::sincos(look.azimuth_rad);
@@ -301,16 +290,16 @@ impl<'r> Scene<'r> {
             carrier_hz,
             sight: Vector3::new(east * cos, north * cos, sin),
             stepping: is_stepping(&self.run.scene.faults, true_row.sv, row.time_s),
-            bias_m: true_m + ahead_m - computed_m - ionosphere_m - sky.troposphere_m,
-            ionosphere_m,
+            bias_m: true_m + ahead_m - computed_m - air.delay_m - sky.troposphere_m,
+            air,
             troposphere_m: sky.troposphere_m,
-            noise_m2: (code * theory.chip_m) * (code * theory.chip_m),
+            noise_m2: noise_m * noise_m,
             other_m2: self.edge_m2(true_row),
             memory_s: 0.0,
             rate_sigma_mps: rate_hz * true_row.link().wavelength_m(),
             rate_bias_mps: 0.0,
             cn0_hz,
-            steady: (row.cn0_dbhz - row.cn0_effective_dbhz + cost_db + lacks_db).abs() <= CN0_DB,
+            steady,
             fading: false,
             slant: if in_space { 1.0 } else { 1.0 / sin.max(0.05) },
             near_mask: !in_space && elevation_rad < self.choices.mask_rad + MASK_SLACK_RAD,
@@ -324,12 +313,25 @@ impl<'r> Scene<'r> {
         if self.whole.get(&sv).is_some_and(|since| *since <= sample) { 0.0 } else { IN_SHORT_M * IN_SHORT_M }
     }
 
+    /// C/N0 that the scene allows, hertz; and whether the receiver found that.
+    pub(super) fn strength(&self, row: &SignalError, link: Link) -> (f64, bool) {
+        let cost_db = self.stated.front_end_db(link.signal);
+        let lacks_db = self.stated.cost_db(link, row.cn0_effective_dbhz - cost_db);
+        let steady = (row.cn0_dbhz - row.cn0_effective_dbhz + cost_db + lacks_db).abs() <= CN0_DB;
+        (libm::pow(10.0, (row.cn0_effective_dbhz - cost_db) / 10.0), steady)
+    }
+
+    /// Error that chip edges leave of a code at rest, root mean square.
+    pub(super) fn edges_m(&self, signal: &'static Signal) -> f64 {
+        self.edges_m.get(signal).copied().unwrap_or(0.0)
+    }
+
     /// Variance that chip edges between samples leave: a code that moves by whole samples within the
     /// smoothing averages it.
     fn edge_m2(&self, row: &Observation) -> f64 {
         let rate_hz = self.run.rate_hz(row.signal);
         let patterns = (row.doppler_hz / row.link().carrier_hz() * rate_hz).abs() * self.choices.smoothing_s.max(1.0);
-        let left_m = self.edges_m.get(row.signal).copied().unwrap_or(0.0) / (1.0 + 2.0 * patterns);
+        let left_m = self.edges_m(row.signal) / (1.0 + 2.0 * patterns);
         left_m * left_m
     }
 }
@@ -394,7 +396,9 @@ impl Ranges<'_, '_> {
         let Some(place) = place.filter(|_| row.sample == fix.sample && scene.usable(link, row.sample)) else {
             return Ok(None);
         };
-        let Some((one, phase_m)) = scene.one(theory, row, (&true_row, &sky), place) else { return Ok(None) };
+        let Some((one, phase_m)) = scene.one(theory, row, (&true_row, &sky), (fix.ionosphere, place)) else {
+            return Ok(None);
+        };
         let bounced_m = MULTIPATH_SHARE * bounced.value_m;
         Ok(Some(Forecast {
             // A fix with one clock brought all ranges to its time.

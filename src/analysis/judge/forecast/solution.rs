@@ -12,6 +12,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Matrix4, Vector4};
 
+use super::air::Air;
 use super::ranges::{Forecast, Scene};
 use crate::error::JudgeError;
 use crate::measure::errors::Errors;
@@ -32,8 +33,6 @@ struct Sums {
     unsteady: bool,
     fading: bool,
     normal: DMatrix<f64>,
-    /// The same where the ionosphere is not known yet.
-    loose: DMatrix<f64>,
     plain: DMatrix<f64>,
     noise: DMatrix<f64>,
     bias: DVector<f64>,
@@ -47,20 +46,20 @@ struct Sums {
     memory_s: f64,
 }
 
-/// A zenith's ionosphere before its parameters are known, one sigma: the order of a day's mean at solar
-/// maximum.
-const IONOSPHERE_SIGMA_M: f64 = 5.0;
 /// Standard deviations from which on a bias is a fault that the residuals may show.
 const FAULT: f64 = 3.0;
 /// Carriers nearer to each other than this share are no two bands.
 const SAME_BAND: f64 = 0.05;
-/// A thin shell's slant is at most 3.2.
-const SHELL: f64 = 0.948;
+/// Errors of the ionosphere that a fix estimates.
+const COMMON: usize = 3;
 
 impl Sums {
     /// No ranges yet, of as many time scales.
     fn new(scales: usize) -> Self {
-        let (matrix, vector) = (DMatrix::zeros(3 + scales, 3 + scales), DVector::zeros(3 + scales));
+        let unknowns = 3 + scales + COMMON;
+        let (matrix, vector) = (DMatrix::zeros(unknowns, unknowns), DVector::zeros(unknowns));
+        let mut prior = matrix.clone();
+        prior.view_mut((3 + scales, 3 + scales), (COMMON, COMMON)).fill_with_identity();
         Self {
             least: 0,
             most: 0,
@@ -69,8 +68,7 @@ impl Sums {
             faulty: false,
             unsteady: false,
             fading: false,
-            normal: matrix.clone(),
-            loose: matrix.clone(),
+            normal: prior,
             plain: matrix.clone(),
             noise: matrix,
             bias: vector.clone(),
@@ -111,13 +109,16 @@ impl Sums {
 
     fn add(&mut self, range: &Forecast, model_sigma_m: f64) {
         let mut row = DVector::zeros(self.bias.len());
+        let common = row.len() - COMMON;
         row.fixed_rows_mut::<3>(0).copy_from(&-range.sight);
+        row.fixed_rows_mut::<COMMON>(common).copy_from(&range.air.common_m);
         if let Some(slot) = row.get_mut(3 + range.clock) {
             *slot = 1.0;
         }
         let model_m = model_sigma_m * range.slant;
-        let variance = range.noise_m2 + model_m * model_m;
-        self.faulty |= range.other_m2 >= variance || range.bias_m.abs() >= FAULT * variance.sqrt();
+        let variance = range.noise_m2 + model_m * model_m + range.air.own_m2;
+        let spread_m2 = variance + range.air.common_m.norm_squared();
+        self.faulty |= range.other_m2 >= variance || range.bias_m.abs() >= FAULT * spread_m2.sqrt();
         if range.excluded {
             self.blameless += 1;
             return;
@@ -125,15 +126,12 @@ impl Sums {
         self.unsteady |= !range.steady;
         self.fading |= range.fading;
         let weight = 1.0 / variance;
-        let cosine2 = SHELL * SHELL * (1.0 - range.sight.z * range.sight.z);
-        let shell_m2 = IONOSPHERE_SIGMA_M * IONOSPHERE_SIGMA_M / (1.0 - cosine2);
         self.normal.ger(weight, &row, &row, 1.0);
-        self.loose.ger(1.0 / (variance + shell_m2), &row, &row, 1.0);
         self.plain.ger(1.0, &row, &row, 1.0);
         self.noise.ger(weight * weight * (range.noise_m2 + range.other_m2), &row, &row, 1.0);
         let bias = if range.stepping { &mut self.stepping } else { &mut self.bias };
         bias.axpy(weight * range.bias_m, &row, 1.0);
-        self.ionosphere.axpy(weight * range.ionosphere_m, &row, 1.0);
+        self.ionosphere.axpy(weight * range.air.delay_m, &row, 1.0);
         self.troposphere.axpy(weight * range.troposphere_m, &row, 1.0);
         // All systems' times run alike: one drift.
         let row = Vector4::new(-range.sight.x, -range.sight.y, -range.sight.z, 1.0);
@@ -169,8 +167,7 @@ pub struct Expected {
     pub dilution: Matrix4<f64>,
     /// Ratio of the extreme singular values of the geometry, all clocks counted.
     pub condition: f64,
-    /// Whether the fix says that the message's ionosphere corrects it without an error of its own, or needs
-    /// none.
+    /// Whether it is known what corrects its ionosphere.
     pub corrected: bool,
     /// Whether every satellite's C/N0 was measured as it is: what is stated follows from it.
     pub steady: bool,
@@ -229,11 +226,7 @@ pub fn expected(
             ranges.of_fix(&fix, place.as_ref(), |range| sums.take(range, choice))?;
         }
         sums.finish(choice);
-        let models = [IonosphereModel::Broadcast, IonosphereModel::NequickG, IonosphereModel::Bdgim];
-        let sent = models.contains(&fix.ionosphere);
-        let exact = scene.choices.ionosphere_error_share == 0.0 && sent;
-        let combined = fix.ionosphere == IonosphereModel::Combined;
-        let corrected = exact || combined || scene.choices.ionosphere.is_none();
+        let corrected = fix.ionosphere != IonosphereModel::Grid;
         if let (Some(place), Some((expected, offsets))) = (place, one(fix.sample, &sums, corrected)) {
             see(fix, place, expected, &offsets)?;
         }
@@ -248,8 +241,8 @@ fn combined(first: &Forecast, second: &Forecast) -> Forecast {
     let b = 1.0 - a;
     Forecast {
         // Without the model's correction, which combined ranges do not get.
-        bias_m: a * (first.bias_m + first.ionosphere_m) + b * (second.bias_m + second.ionosphere_m),
-        ionosphere_m: 0.0,
+        bias_m: a * (first.bias_m + first.air.delay_m) + b * (second.bias_m + second.air.delay_m),
+        air: Air::default(),
         noise_m2: a * a * first.noise_m2 + b * b * second.noise_m2,
         other_m2: a * a * first.other_m2 + b * b * second.other_m2,
         memory_s: first.memory_s.max(second.memory_s),
@@ -265,18 +258,20 @@ fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<(Expected, Vec<Offse
         return None;
     }
     // Clocks without ranges are not estimated.
-    let places: Vec<usize> = (0..sums.bias.len()).filter(|place| sums.plain[(*place, *place)] > 0.0).collect();
-    let selected = |matrix: &DMatrix<f64>| matrix.select_rows(&places).select_columns(&places);
-    let inverse = |matrix: &DMatrix<f64>| Some(Cholesky::new(selected(matrix))?.inverse());
-    let geometry = selected(&sums.plain).symmetric_eigenvalues();
-    let whole = inverse(&sums.normal)?;
-    let solved = |right: &DVector<f64>| &whole * right.select_rows(&places);
-    let stated = if corrected { whole.clone() } else { inverse(&sums.loose)? };
-    let thermal = &whole * selected(&sums.noise) * &whole;
+    let common = sums.bias.len() - COMMON;
+    let places: Vec<usize> = (0..common).filter(|place| sums.plain[(*place, *place)] > 0.0).collect();
+    let with_common: Vec<usize> = places.iter().copied().chain(common..sums.bias.len()).collect();
+    let selected = |matrix: &DMatrix<f64>, places: &[usize]| matrix.select_rows(places).select_columns(places);
+    let plain = selected(&sums.plain, &places);
+    let geometry = plain.symmetric_eigenvalues();
+    let whole = Cholesky::new(selected(&sums.normal, &with_common))?.inverse();
+    let solved = |right: &DVector<f64>| &whole * right.select_rows(&with_common);
+    let thermal = &whole * selected(&sums.noise, &with_common) * &whole;
+    let stated = whole.clone();
     let bias = solved(&sums.bias);
     let (ionosphere, stepping) = (solved(&sums.ionosphere), solved(&sums.stepping));
     let weather = TROPOSPHERE_SHARE * solved(&sums.troposphere);
-    // Where the ionosphere is missing its whole effect may be there, or parts of it if it is estimated.
+    // A grid may leave any part of the ionosphere.
     let (centre, missing, noise) = if corrected {
         let none = DVector::zeros(bias.len());
         (bias, [none.clone(), none], &thermal)
@@ -307,7 +302,7 @@ fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<(Expected, Vec<Offse
         noise: of(noise),
         thermal: of(&thermal),
         stated: of(&stated),
-        dilution: of(&inverse(&sums.plain)?),
+        dilution: of(&Cholesky::new(plain)?.inverse()),
         condition: (geometry.max() / geometry.min()).sqrt(),
         corrected,
         steady: !sums.unsteady,
@@ -401,7 +396,7 @@ mod tests {
             sight: Vector3::new(0.6, 0.0, 0.8),
             bias_m: 0.0,
             stepping: false,
-            ionosphere_m: 0.0,
+            air: Air::default(),
             troposphere_m: 0.0,
             noise_m2: 1.0,
             other_m2: 0.0,

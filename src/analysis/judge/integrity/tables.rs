@@ -1,7 +1,8 @@
 //! Rows of one table: doubled, out of order, repeated, missing within a lock, without a truth.
 //!
-//! Limits: two rows of a satellite count as doubled at the same sample, whatever else they say; a row repeats
-//! the one before where every measured value is the same to the last bit.
+//! Limits: two rows of a satellite count as doubled at the same sample, whatever else they say. A row repeats
+//! the one before where all measured values are the same to the last bit, or where one is that noise has
+//! changed in a tenth of a second: what is frozen is not measured.
 
 use std::collections::HashSet;
 
@@ -14,6 +15,40 @@ use gnss::record::{Event, Fix, Observation, TrackingRow};
 
 /// Steps beyond this many usual ones are gaps.
 const GAP: f64 = 1.5;
+
+/// Time in which every loop has been updated, and every value of it with noise.
+const RENEWED_S: f64 = 0.095;
+
+/// Whether measured values repeat, row after row.
+struct Repeats<const N: usize> {
+    renewed: Option<u64>,
+    before: Option<[u64; N]>,
+    last: Option<(u64, [u64; N])>,
+}
+
+impl<const N: usize> Repeats<N> {
+    /// `run` tells whether there is noise, and how many samples renew every value.
+    fn of(run: &Run) -> Self {
+        let renewed = (RENEWED_S * run.scene.sample_rate_hz) as u64;
+        Self { renewed: run.scene.noise.then_some(renewed), before: None, last: None }
+    }
+
+    /// Whether the values at a sample are those of before.
+    fn take(&mut self, sample: u64, values: [f64; N]) -> bool {
+        let values = values.map(f64::to_bits);
+        let all = self.before.replace(values) == Some(values);
+        let Some(renewed) = self.renewed else { return all };
+        let Some((since, old)) = self.last else {
+            self.last = Some((sample, values));
+            return all;
+        };
+        if sample.saturating_sub(since) < renewed {
+            return all;
+        }
+        self.last = Some((sample, values));
+        all || old.iter().zip(&values).any(|(old, new)| old == new)
+    }
+}
 
 /// What is looked for in every table.
 #[derive(Default)]
@@ -59,10 +94,8 @@ pub(super) fn findings(run: &Run, errors: &Errors) -> Result<Vec<Finding>, Judge
 }
 
 fn observations(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError> {
-    let values = |row: &Observation| {
-        [row.sent_fraction_s, row.pseudorange_m, row.carrier_cycles, row.doppler_hz, row.cn0_dbhz].map(f64::to_bits)
-    };
-    let key = run.name(link);
+    let values = |row: &Observation| [row.pseudorange_m, row.carrier_cycles, row.doppler_hz, row.cn0_dbhz];
+    let (key, mut repeats) = (run.name(link), Repeats::of(run));
     let (mut steps, mut before) = (Vec::new(), None);
     run.observations.each(link, |row| {
         steps.extend(before.replace(row.sample).map(|before| row.sample as f64 - before as f64));
@@ -71,12 +104,12 @@ fn observations(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError
     drop(steps);
     let mut before: Option<Observation> = None;
     run.observations.each(link, |row| {
+        if repeats.take(row.sample, values(&row)) {
+            rows.repeated.add(|| format!("observation of {key} at sample {}", row.sample));
+        }
         let Some(old) = before.replace(row.clone()) else { return };
         let step = row.sample as f64 - old.sample as f64;
         rows.order("observation of", &key, old.sample, row.sample);
-        if values(&old) == values(&row) {
-            rows.repeated.add(|| format!("observation of {key} at sample {}", row.sample));
-        }
         let locked = row.locked_s - old.locked_s;
         // The lock is as old as before and the time that passed: it went on.
         if step > GAP * usual
@@ -127,19 +160,16 @@ fn tracking(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError> {
 }
 
 fn fixes(run: &Run, rows: &mut Rows) -> Result<(), JudgeError> {
-    let values = |fix: &Fix| {
-        [fix.x_m, fix.y_m, fix.z_m, fix.vx_mps, fix.vy_mps, fix.vz_mps, fix.clock_bias_s, fix.clock_drift]
-            .map(f64::to_bits)
-    };
-    let mut before: Option<Fix> = None;
+    let values =
+        |fix: &Fix| [fix.x_m, fix.y_m, fix.z_m, fix.vx_mps, fix.vy_mps, fix.vz_mps, fix.clock_bias_s, fix.clock_drift];
+    let (mut before, mut repeats): (Option<u64>, _) = (None, Repeats::of(run));
     run.fixes.each(|fix| {
-        if let Some(old) = &before {
-            rows.order("fix", "", old.sample, fix.sample);
-            if values(old) == values(&fix) {
-                rows.repeated.add(|| format!("fix at sample {}", fix.sample));
-            }
+        if let Some(old) = before.replace(fix.sample) {
+            rows.order("fix", "", old, fix.sample);
         }
-        before = Some(fix);
+        if repeats.take(fix.sample, values(&fix)) {
+            rows.repeated.add(|| format!("fix at sample {}", fix.sample));
+        }
     })
 }
 

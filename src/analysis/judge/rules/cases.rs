@@ -146,34 +146,47 @@ impl Case {
         pairs.map(|(stated, expected)| (artanh(stated) - artanh(expected)).abs()).fold(0.0, f64::max)
     }
 
-    /// A third of the normalised error squared that theory expects, biases at their largest.
-    pub fn expected_square(&self) -> Option<f64> {
-        let most = (self.expected.bias.abs() + self.expected.allowed).fixed_rows::<3>(0).into_owned();
-        Some(self.share(&self.expected.noise)? + self.weight()?.quadratic(most))
-    }
-
-    /// The same without any bias, and without what a run draws once: an ionosphere may be as the nominal one.
-    pub fn least_square(&self) -> Option<f64> {
-        self.share(&self.expected.thermal)
-    }
-
-    /// A third of the normalised error squared that errors of this covariance have.
-    fn share(&self, noise: &Matrix4<f64>) -> Option<f64> {
-        let noise: Matrix3<f64> = noise.fixed_view::<3, 3>(0, 0).into_owned();
-        Some((self.weight()?.0 * noise).trace() / 3.0)
-    }
-
-    fn weight(&self) -> Option<Weight> {
-        let stated: Matrix3<f64> = self.expected.stated.fixed_view::<3, 3>(0, 0).into_owned();
-        Some(Weight(stated.try_inverse()?))
+    /// The fix's error in units of the covariance that it states, beside what theory expects of that; `None`
+    /// where no covariance is stated.
+    pub fn normalised(&self) -> Option<Normalised> {
+        let weight = self.fix.covariance().try_inverse()?;
+        let quadratic = |vector: Vector3<f64>| (vector.transpose() * weight * vector).x;
+        // What should be stated is the measure of what theory expects.
+        let due: Matrix3<f64> = self.expected.stated.fixed_view::<3, 3>(0, 0).into_owned();
+        let due = due.try_inverse()?;
+        let bias = (self.expected.bias.abs() + self.expected.allowed).fixed_rows::<3>(0).into_owned();
+        let signs = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
+        let biases = signs.map(|(n, u)| bias.component_mul(&Vector3::new(1.0, n, u)));
+        let largest = biases.iter().map(|bias| (bias.transpose() * due * bias).x).fold(0.0, f64::max);
+        let shares = |noise: &Matrix4<f64>| due * noise.fixed_view::<3, 3>(0, 0);
+        let (noise, thermal) = (shares(&self.expected.noise), shares(&self.expected.thermal));
+        let trace = noise.trace();
+        Some(Normalised {
+            square: quadratic(self.error.enu_m),
+            most: trace + largest,
+            least: thermal.trace(),
+            freedom: if trace > 0.0 { trace * trace / (noise * noise).trace() } else { 1.0 },
+        })
     }
 }
 
-/// Inverse of a covariance.
-struct Weight(Matrix3<f64>);
-
-impl Weight {
-    fn quadratic(&self, vector: Vector3<f64>) -> f64 {
-        (vector.transpose() * self.0 * vector).x / 3.0
+impl Stated {
+    /// Of east, north and up, m².
+    fn covariance(&self) -> Matrix3<f64> {
+        let [e, n, u] = [self.sigma_east_m, self.sigma_north_m, self.sigma_up_m];
+        let [en, eu, nu] = self.correlations;
+        Matrix3::new(e * e, en * e * n, eu * e * u, en * e * n, n * n, nu * n * u, eu * e * u, nu * n * u, u * u)
     }
+}
+
+/// A normalised error squared, whose mean is 3 where the covariance is that of the errors.
+pub(super) struct Normalised {
+    pub square: f64,
+    /// The mean that theory expects, biases at their largest.
+    pub most: f64,
+    /// The same without any bias, and without what a run draws once: an ionosphere may be as the nominal one.
+    pub least: f64,
+    /// Degrees of freedom of a chi-square with the spread that theory expects: fewer than three where most of
+    /// the noise lies along one axis (Satterthwaite).
+    pub freedom: f64,
 }

@@ -1,5 +1,5 @@
 //! One kind of error in three rows: its mean, its 95th percentile, and the largest against the limit of its
-//! own epoch; and a stated sigma in two.
+//! own epoch; in a fourth, whether it has the noise that nobody can avoid; and a stated sigma in two.
 //!
 //! Limits are quantiles of theory's σ for a stated probability of a false alarm, widened by what theory
 //! itself may err, with known biases taken out.
@@ -7,7 +7,7 @@
 use nalgebra::Vector3;
 
 use crate::error::JudgeError;
-use crate::expect::quantile::largest;
+use crate::expect::quantile::{largest, mean_square};
 use crate::judge::judgement::Bound;
 use crate::judge::verdict::Verdict;
 use crate::read::spill_store::SpillRow;
@@ -20,6 +20,9 @@ pub(super) const THEORY: f64 = 1.2;
 /// smoothing.
 pub(super) const SIGMA: f64 = 1.25;
 
+/// Independent values from which on their mean square has a lower limit that says something: half of theory's.
+const ENOUGH: f64 = 100.0;
+
 /// One kind of error of the rows `C`.
 pub(super) struct Kind<'a, C> {
     pub name: &'a str,
@@ -29,6 +32,8 @@ pub(super) struct Kind<'a, C> {
     pub axes: u32,
     /// Independent values among them.
     pub independent: f64,
+    /// Whether it is of noise that must be there: what is smaller than theory was not measured.
+    pub must_scatter: bool,
     /// Value of a row, where it counts.
     pub of: &'a dyn Fn(&C) -> Option<Value>,
 }
@@ -78,6 +83,18 @@ impl Verdict {
         let limit = largest(axes, 1) * THEORY * (squares / count / kind.independent).sqrt() + allowed / count;
         let source = format!("theory of C/N0, geometry and loops; {:.0} independent", kind.independent);
         self.judge(&format!("{name} error, mean"), "", sum.norm() / count, unit, Bound::Max(limit), &source);
+        if kind.must_scatter && kind.independent >= ENOUGH {
+            let least = (mean_square(kind.independent).0 * squares / count).sqrt() / THEORY;
+            let value = lengths.rms()?;
+            self.judge(
+                &format!("{name} error, rms"),
+                "",
+                value,
+                unit,
+                Bound::Min(least),
+                "as much noise as theory has",
+            );
+        }
         if let Some(limit) = limits.percentile(0.95)? {
             let (value, source) = (lengths.percentile(0.95)?, "theory of C/N0, geometry and loops");
             self.judge(&format!("{name} error, 95 %"), path, value, unit, Bound::Max(limit), source);

@@ -7,6 +7,7 @@
 
 mod availability;
 mod cases;
+mod dispersion;
 mod excused;
 mod foreign;
 mod hints;
@@ -15,6 +16,7 @@ mod kind;
 mod links;
 mod losses;
 mod motion;
+mod own_fixes;
 mod position;
 mod reception;
 mod scales;
@@ -49,6 +51,7 @@ impl Verdict {
         let receiver = expected.receiver.clone();
         // They have a row an epoch.
         drop(expected);
+        verdict.own_fixes(run, &receiver)?;
         verdict.values(run, errors, summary)?;
         let places = errors.positions.map(|error| (error.time_s, error.enu_m.norm()))?;
         verdict.within(&run.scene.expect, places.into_iter());

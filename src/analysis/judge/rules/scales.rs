@@ -150,7 +150,10 @@ impl Verdict {
                 bounded.holds(time_s).then_some(Value { time_s, error, sigma: case.sigma_m, allowed: case.allowed_m })
             };
             let name = format!("{scale} offset");
-            self.kind(&Kind { name: &name, path: "", unit: "m", axes: 1, independent, of: &value }, cases)?;
+            self.kind(
+                &Kind { name: &name, path: "", unit: "m", axes: 1, independent, must_scatter: false, of: &value },
+                cases,
+            )?;
             let mut ends: Option<(f64, f64)> = None;
             cases.each(|case| {
                 if let Some(ratio) = case.sigma_ratio {

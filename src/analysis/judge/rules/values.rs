@@ -34,9 +34,6 @@ const DECIBEL: f64 = 1.259;
 /// Share of fixes that may leave out a satellite without cause: a residual test of probability 1e-3 whose
 /// errors last.
 const BLAMELESS_SHARE: f64 = 0.05;
-/// Independent fixes from which on a mean normalised error squared says something: below, a factor of three
-/// of sigma is within its band.
-const ENOUGH: f64 = 5.0;
 /// A satellite found again after a loss is used before its half cycle is known, and observed after: two
 /// subframes, and the lock.
 const RETURN_S: f64 = 20.0;
@@ -58,6 +55,7 @@ impl Verdict {
         let mut memory_s = 0.0_f64;
         all.each(|case| memory_s = memory_s.max(case.expected.memory_s))?;
         let bounded = Bounded { run, memory_s };
+        self.dispersion(&scene, errors, &bounded)?;
         let mut cases = Table::new(all.directory());
         for case in all.cursor() {
             let case = case?;
@@ -86,7 +84,7 @@ impl Verdict {
         self.sigmas(&all)?;
         self.geometry(&all)?;
         all.sound()?;
-        self.consistency(summary, &cases)
+        self.consistency(&cases, slow, cases.len() == all.len())
     }
 
     /// Stated sigmas against those that settings, C/N0 and geometry make.
@@ -208,33 +206,28 @@ impl Verdict {
         Ok(())
     }
 
-    /// Normalised errors squared against the ones that theory expects of the stated covariance.
-    fn consistency(&mut self, summary: &Summary, cases: &Table<Case>) -> Result<(), JudgeError> {
-        let position = &summary.position;
-        let (Some(nees), Some(independent)) = (position.nees_mean, position.nees_independent) else { return Ok(()) };
-        if independent < ENOUGH {
-            let reason = format!(
-                "consistency (mean normalised error squared {nees:.2}): too short to say, {independent:.1} \
-                 independent fixes"
-            );
-            self.not_judged.push(reason);
-            return Ok(());
-        }
+    /// Normalised errors squared against the ones that theory expects of the stated covariance; `slow`
+    /// independent fixes.
+    fn consistency(&mut self, cases: &Table<Case>, slow: f64, is_whole: bool) -> Result<(), JudgeError> {
+        let [mut square, mut most, mut least, mut freedom] = [Sum::default(); 4];
+        cases.each(|case| {
+            let Some(expected) = case.normalised() else { return };
+            square.add(expected.square);
+            most.add(expected.most);
+            least.add(expected.least);
+            freedom.add(expected.freedom);
+        })?;
+        let means = (square.mean(), most.mean(), least.mean(), freedom.mean());
+        let (Some(square), Some(most), Some(least), Some(freedom)) = means else { return Ok(()) };
         // A receiver that counts with errors which the scene does not have is no worse for it: what it should
         // state is the measure.
-        let (mut scaled, mut least) = (Sum::default(), Sum::default());
-        cases.each(|case| {
-            case.expected_square().into_iter().for_each(|square| scaled.add(square));
-            case.least_square().into_iter().for_each(|square| least.add(square));
-        })?;
-        let (Some(high), Some(low)) = (scaled.mean(), least.mean()) else { return Ok(()) };
-        let (below, above) = mean_square(3.0 * independent);
-        let limits = (3.0 * below * low.min(1.0) / (THEORY * THEORY), 3.0 * above * high.max(1.0) * THEORY * THEORY);
-        let source =
-            format!("chi-square of {independent:.0} independent fixes, and what the stated covariance should be");
+        let (below, above) = mean_square(freedom * slow);
+        let limits = (below * least.min(3.0) / (THEORY * THEORY), above * most.max(3.0) * THEORY * THEORY);
+        let source = format!("chi-square of {slow:.0} independent fixes, and what the stated covariance should be");
         let figure = "mean normalised error squared";
-        self.judge(&format!("{figure}, optimistic"), "position.nees_mean", nees, "", Bound::Max(limits.1), &source);
-        self.judge(&format!("{figure}, pessimistic"), "", nees, "", Bound::Min(limits.0), &source);
+        let path = if is_whole { "position.nees_mean" } else { "" };
+        self.judge(&format!("{figure}, optimistic"), path, square, "", Bound::Max(limits.1), &source);
+        self.judge(&format!("{figure}, pessimistic"), "", square, "", Bound::Min(limits.0), &source);
         Ok(())
     }
 
@@ -286,8 +279,10 @@ impl Verdict {
             let allowed = of(&e.rate_allowed, 3) + allowed_mps(case.sample);
             value(case, error, libm::hypot(e.rate_noise.m44.sqrt(), oscillator_mps), allowed)
         };
-        let metres = |name, path, axes, of| Kind { name, path, unit: "m", axes, independent: slow, of };
-        let rate = |name, path, axes, of| Kind { name, path, unit: "m/s", axes, independent: fast, of };
+        let must_scatter = run.scene.noise;
+        let metres =
+            |name, path, axes, of| Kind { name, path, unit: "m", axes, independent: slow, must_scatter: false, of };
+        let rate = |name, path, axes, of| Kind { name, path, unit: "m/s", axes, independent: fast, must_scatter, of };
         let all: [Kind<'_, Case>; 5] = [
             metres("horizontal", "position.horizontal_p95_m", 2, &horizontal as &dyn Fn(&Case) -> Option<Value>),
             metres("vertical", "position.vertical_p95_m", 1, &vertical),
