@@ -12,7 +12,7 @@ use crate::broadcast::{Ephemeris, StateVector, status_of_record};
 use crate::galileo::fnav::FNAV_SETS;
 use crate::galileo::inav::{INAV_SETS, sisa_index};
 use crate::glonass::fdma::channel;
-use crate::glonass::gnav::GNAV_SETS;
+use crate::glonass::gnav::{GNAV_SETS, STRING_3_UNHEALTHY};
 use crate::gps::lnav::LNAV_SETS;
 use crate::qzss::lnav;
 use crate::satellite::System;
@@ -145,7 +145,8 @@ fn glonass(record: &Record) -> Result<Ephemeris, String> {
     // Not known to earlier versions, and to receivers of one band.
     let later_s = record.get("deltaTau").filter(|seconds| seconds.abs() < 1e-6).unwrap_or(0.0);
     let accuracy = record.get("accuracyIndex").filter(|index| (0.0..15.0).contains(index)).unwrap_or(15.0);
-    let unhealthy = record.get("healthFlags").map_or(0, |flags| flags as u16 & 1);
+    // Its other bits say what the almanac says, which is not sent here.
+    let unhealthy = record.get("healthFlags").map_or(0, |flags| flags as u16 >> STRING_3_UNHEALTHY & 1);
     Ok(Ephemeris {
         form: &GNAV_SETS,
         transmitted: toe.plus_s(late_s),
