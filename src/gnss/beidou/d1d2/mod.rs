@@ -63,7 +63,7 @@ pub static D1_D2: Message = Message {
         }
         let mut orbit = Orbit::blank(sv, near);
         read_all(&D1_SET, &set, &mut orbit);
-        orbit.set()
+        Some(orbit.set())
     },
     parameters: |symbols| parameters(symbols).map(|found| (true, found)),
     reader: |sv| Box::new(D1D2Reader::new(sv)),
@@ -122,10 +122,10 @@ impl Orbit {
         Self { ephemeris: Ephemeris::blank(sv, near), klobuchar: Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] } }
     }
 
-    /// The set, numbered; `None` where clock and orbit refer to different times.
-    fn set(mut self) -> Option<Ephemeris> {
+    /// The set, numbered.
+    fn set(mut self) -> Ephemeris {
         self.ephemeris.iode = issue(self.ephemeris.toe.tow_s());
-        (self.ephemeris.toe == self.ephemeris.toc).then_some(self.ephemeris)
+        self.ephemeris
     }
 }
 
@@ -151,7 +151,6 @@ impl Sender for Frames {
             let expected = "a multiple of 30 s of BDT";
             return Err(FieldError::Start { message: D1_D2.name, start_s: start.tow_s(), expected });
         }
-        check(ephemeris)?;
         let on_air = Ephemeris { transmitted: start, ..ephemeris.clone() };
         let klobuchar = self.klobuchar.unwrap_or(Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] });
         let orbit = Orbit { ephemeris: on_air, klobuchar };
@@ -309,21 +308,11 @@ fn parameters(symbols: &[bool]) -> Option<Vec<(&'static str, i64)>> {
     Some(integers(&D2_SET, &D2Set::joined(parts.iter().map(|part| &part.0))))
 }
 
-/// Nothing but equal reference times shows a receiver that the parts of a set belong together.
-fn check(ephemeris: &Ephemeris) -> Result<(), FieldError> {
-    if ephemeris.toe == ephemeris.toc {
-        Ok(())
-    } else {
-        Err(FieldError::References { toe_s: ephemeris.toe.tow_s(), toc_s: ephemeris.toc.tow_s() })
-    }
-}
-
 /// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays. Times are BDT's.
 ///
 /// # Errors
 /// A value that the message cannot carry.
 pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    check(ephemeris)?;
     let mut orbit = Orbit { ephemeris: ephemeris.clone(), ..Orbit::blank(ephemeris.sv, ephemeris.toe) };
     quantise_all(&D1_SET, &mut orbit)?;
     Ok(orbit.ephemeris)
