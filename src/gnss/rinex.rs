@@ -175,8 +175,8 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
             }
         }
     }
-    // Converters join the orbit of a new set of BeiDou to the clock of the one before, for the message has no mark
-    // of a set.
+    // Converters join the orbit of a new set of BeiDou to the clock of the one before, for the message has no
+    // mark of a set.
     let whole: BTreeSet<(Sv, i64)> =
         found.iter().filter(|(_, set)| set.toe == set.toc).map(|(_, set)| (set.sv, set.toe.seconds())).collect();
     found.retain(|(line, set)| {

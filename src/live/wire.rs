@@ -5,10 +5,10 @@
 //! follow (0 velocity, 1 and acceleration, 2 and jerk). Then the time in milliseconds since the start, the
 //! place and its derivatives, ECEF in metres, each with its angles' in 6 and 8; at the end a name, a 32-bit
 //! length before it. Angles are yaw, pitch and roll of nose, right and down against north, east and down, in
-//! radians, and their derivatives in 8. Everything else is lines, one or more: `t x y z` with velocity, acceleration and
-//! jerk where known (seconds, metres, ECEF) and `ypr` with the angles and their rates where known, a sentence
-//! of NMEA (`nmea`), or an event. Limits: the order of angles in 8 is as its vendor's clients send it, by
-//! description and not seen on a wire; of their derivatives the first is used.
+//! radians, and their derivatives in 8. Everything else is lines, one or more: `t x y z` with velocity,
+//! acceleration and jerk where known (seconds, metres, ECEF) and `ypr` with the angles and their rates where
+//! known, a sentence of NMEA (`nmea`), or an event. Limits: the order of angles in 8 is as its vendor's
+//! clients send it, by description and not seen on a wire; of their derivatives the first is used.
 
 mod nmea;
 
@@ -129,8 +129,8 @@ impl Reader {
     }
 }
 
-/// The messages of a datagram: itself where it is binary, else its lines but for blank ones, of which it has one
-/// where it is empty.
+/// The messages of a datagram: itself where it is binary, else its lines but for blank ones, of which it has
+/// one where it is empty.
 pub fn pieces(datagram: &[u8]) -> impl Iterator<Item = &[u8]> {
     let is_binary = datagram.first().is_some_and(|kind| (1..=8).contains(kind));
     let ends = move |byte: &u8| !is_binary && (*byte == b'\n' || *byte == b'\r');

@@ -426,9 +426,10 @@ fn a_file_of_version_2_is_read_to_the_same_sets() {
     );
 }
 
-/// Records of 2026-03-09 as a merged broadcast file of version 4.02 has them (BRD400DLR of that day; facts): one
-/// of a satellite in service, of which the almanac says that it is healthy, one of such a satellite whose
-/// converter did not know the almanac, and one of a satellite that calls itself ill, though its almanac does not.
+/// Records of 2026-03-09 as a merged broadcast file of version 4.02 has them (BRD400DLR of that day; facts):
+/// one of a satellite in service, of which the almanac says that it is healthy, one of such a satellite whose
+/// converter did not know the almanac, and one of a satellite that calls itself ill, though its almanac does
+/// not.
 const FLAGGED: &str = "     4.02           NAVIGATION DATA     M                   RINEX VERSION / TYPE
     18                                                      LEAP SECONDS
                                                             END OF HEADER
@@ -457,7 +458,8 @@ fn health_flags_of_real_records_of_newer_versions_are_three_facts_of_which_one_i
     let read = |text: &str| rinex::read(text.as_bytes(), "flags").unwrap().ephemerides;
     let healthy: Vec<bool> = read(FLAGGED).iter().map(Ephemeris::is_healthy).collect();
     assert_eq!(healthy, [true, true, false]);
-    // Only bit 2 of them is the satellite's own (RINEX 3.05, table A10): with B_n = 0, values 4 to 7 alone are ill.
+    // Only bit 2 of them is the satellite's own (RINEX 3.05, table A10): with B_n = 0, values 4 to 7 alone
+    // are ill.
     let flags = |of: u32| FLAGGED.replacen(" 2.000000000000e+00 3.000000000000e+00", &flagged(of), 1);
     let ill: Vec<u32> = (0..8).filter(|of| !read(&flags(*of))[0].is_healthy()).collect();
     assert_eq!(ill, [4, 5, 6, 7]);

@@ -193,8 +193,8 @@ fn galileo_ahead(scenario: &Scenario, navigation: &Navigation) -> Option<TimePol
     given.or(navigation.galileo)
 }
 
-/// GPS time against UTC as the file has it; the whole seconds and their change as this program knows them, where
-/// the file does not.
+/// GPS time against UTC as the file has it; the whole seconds and their change as this program knows them,
+/// where the file does not.
 pub(super) fn utc(scenario: &Scenario, navigation: &Navigation) -> UtcData {
     let now_s = scenario.start.leap_seconds();
     let leap_s = navigation.leap_seconds.unwrap_or(now_s);
@@ -247,7 +247,8 @@ fn klobuchar_navic(scenario: &Scenario, navigation: &Navigation) -> Option<Klobu
     own.or(of_gps.or(navigation.klobuchar).map(|model| model.bulge_on(NAVIC_HZ)))
 }
 
-/// Why no ephemeris fits: the time of the scene at which none is sent, and the nearest spans in which some are.
+/// Why no ephemeris fits: the time of the scene at which none is sent, and the nearest spans in which some
+/// are.
 fn outside(catalogue: &Catalogue, system: System, scenario: &Scenario, end: Epoch) -> String {
     let spans = catalogue.sending(system);
     let is_within = |at: Epoch| spans.iter().any(|(from, until)| *from <= at && at < *until);

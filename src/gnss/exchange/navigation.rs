@@ -5,8 +5,7 @@ use std::io::{self, Write};
 
 use super::offset::offsets;
 use super::{Version, calendar, header_line, opening};
-use crate::broadcast::{Ephemeris, StateVector, status_of_record};
-use crate::glonass::gnav::STRING_3_UNHEALTHY;
+use crate::broadcast::{Ephemeris, STRING_3_UNHEALTHY, StateVector, status_of_record};
 use crate::ionosphere::{Coefficients, Model};
 use crate::message::{Message, Raw, RecordLine, Records};
 use crate::record::NavigationRow;

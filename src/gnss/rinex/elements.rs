@@ -8,11 +8,11 @@ use nalgebra::Vector3;
 
 use super::columns::Record;
 use crate::beidou::d1d2::issue;
-use crate::broadcast::{Ephemeris, StateVector, status_of_record};
+use crate::broadcast::{Ephemeris, STRING_3_UNHEALTHY, StateVector, status_of_record};
 use crate::galileo::fnav::FNAV_SETS;
 use crate::galileo::inav::{INAV_SETS, sisa_index};
 use crate::glonass::fdma::channel;
-use crate::glonass::gnav::{GNAV_SETS, STRING_3_UNHEALTHY};
+use crate::glonass::gnav::GNAV_SETS;
 use crate::gps::lnav::LNAV_SETS;
 use crate::qzss::lnav;
 use crate::satellite::System;
@@ -92,8 +92,8 @@ pub(super) fn ephemeris(record: &Record) -> Result<Ephemeris, String> {
     }
 }
 
-/// How far apart the reference times of BeiDou's orbit and clock may be: as long as a set is used. Of 2218 records
-/// of two days three have them an hour apart.
+/// How far apart the reference times of BeiDou's orbit and clock may be: as long as a set is used. Of 2218
+/// records of two days three have them an hour apart.
 const REFERENCES_S: f64 = 4.0 * 3600.0;
 
 /// The rest of a set of BeiDou, by its own time (BDS-SIS-ICD-B1I 3.0, tables 5-6 and 5-8; RINEX 3.05, table

@@ -156,8 +156,8 @@ impl D1D2Reader {
         let (orbit, content) = orbit_of(self.sv, &parts, sent);
         let klobuchar = orbit.klobuchar;
         let set = orbit.set();
-        // Equal reference times show that clock and orbit belong together, and else that one frame has both, for
-        // sets change between frames.
+        // Equal reference times show that clock and orbit belong together, and else that one frame has both,
+        // for sets change between frames.
         let frame_of = |part: &Subframe| i64::from(second(part)) / UNIT_S;
         if set.toe != set.toc && parts.iter().any(|part| frame_of(part) != frame_of(first)) {
             return;
@@ -228,8 +228,8 @@ mod tests {
     use crate::rinex;
     use crate::time::{BDT, Epoch};
 
-    /// Records of C06 of 2026-03-09 as a merged broadcast file has them (BRD400DLR of that day; facts): a set with an
-    /// orbit an hour after its clock, and the set of that later hour.
+    /// Records of C06 of 2026-03-09 as a merged broadcast file has them (BRD400DLR of that day; facts): a set
+    /// with an orbit an hour after its clock, and the set of that later hour.
     const RECORDS: &str = "     4.02           NAVIGATION DATA     M                   RINEX VERSION / TYPE
                                                             END OF HEADER
 > EPH C06 D1
@@ -280,12 +280,14 @@ C06 2026 03 09 11 00 00-5.751254502684e-05-2.089706185870e-11-1.355252715607e-18
         let [set] = file.ephemerides.as_slice() else { panic!("{file:?}") };
         let label = |at: Epoch| BDT.label(at).tow_s();
         assert_eq!((label(set.toc), label(set.toe)), (122_400.0, 126_000.0));
-        // Where bits begin is found in the first half second, so that the first frame lacks its first subframe.
+        // Where bits begin is found in the first half second, so that the first frame lacks its first
+        // subframe.
         let sets = read(&[(0, set), (30, set)]);
         let [back] = sets.as_slice() else { panic!("{sets:?}") };
         assert_eq!((back.toc, back.toe), (set.toc, set.toe));
         assert!((back.af0_s - set.af0_s).abs() < 1e-15 && (back.m0_rad - set.m0_rad).abs() < 1e-11);
-        // Two sets that follow one another are not joined: the first frame has the orbit, the next one the clock.
+        // Two sets that follow one another are not joined: the first frame has the orbit, the next one the
+        // clock.
         let whole = Ephemeris { toc: set.toe, ..set.clone() };
         assert!(read(&[(0, &whole), (30, set)]).iter().all(|back| back.toc == set.toc));
         // Beside the set of that hour the record is one that a converter joined.

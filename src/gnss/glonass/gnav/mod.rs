@@ -80,10 +80,6 @@ const BETWEEN_HZ: f64 = 1.4e9;
 /// Bits of [`Ephemeris::health`] that the user regards, and of them the flag l.
 const UNHEALTHY: u16 = 0b1100;
 const UNHEALTHY_OF_STRING_3: u16 = 3;
-/// Bit of the flag l of string 3, 1 where the satellite is unhealthy, among the health flags of a record. Bit 1
-/// says whether the almanac's health is known, and bit 0 is that health, 1 where it is good (RINEX 3.05, table
-/// A10).
-pub const STRING_3_UNHEALTHY: u16 = 2;
 /// Seconds of a string and of a frame, and strings of it.
 const STRING_S: i64 = 2;
 const FRAME_S: i64 = 30;
@@ -353,7 +349,8 @@ mod tests {
                 let symbols = sender.unit(&set, near.plus_s(f64::from(2 * (number - 1)))).unwrap();
                 let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
                 let string = decode_soft(&soft).unwrap();
-                // Numbered from the last bit on, bit 65 of string 3 and bit 9 of the others (ICD 5.1, table 4.6).
+                // Numbered from the last bit on, bit 65 of string 3 and bit 9 of the others (ICD 5.1, table
+                // 4.6).
                 let bit = |number: usize| string.0[STRING_BITS - number];
                 let said = match number {
                     3 => Some(bit(65)),
