@@ -67,6 +67,14 @@ pub enum NavigationError {
         /// Name of the file.
         name: String,
     },
+    /// A file that is packed otherwise than by gzip.
+    #[error("{name}: {error}")]
+    Packed {
+        /// Name of the file.
+        name: String,
+        /// What packed it.
+        error: InflateError,
+    },
     /// A file that cannot be decompressed.
     #[error("{name}: damaged gzip data ({detail}): expected a RINEX navigation file, plain or gzip")]
     Gzip {
@@ -280,6 +288,7 @@ fn polynomial(line: columns::Polynomial, anchor: Epoch, allowed: &Allowed) -> Re
 fn unpack(bytes: &[u8], name: &str) -> Result<Vec<u8>, NavigationError> {
     inflate(bytes, LARGEST_BYTES).map_err(|error| match error {
         InflateError::TooLarge(_) => NavigationError::TooLarge { name: name.to_owned() },
+        error @ InflateError::Packed(_) => NavigationError::Packed { name: name.to_owned(), error },
         InflateError::Damaged(detail) => NavigationError::Gzip { name: name.to_owned(), detail },
     })
 }
