@@ -32,6 +32,7 @@ pub use reader::D1D2Reader;
 pub static D1_D2: Message = Message {
     name: "D1/D2",
     symbol_s: 0.001,
+    bit: |sv| if sv.is_geostationary() { &[1; D2_SYMBOLS] } else { &NEUMAN_HOFMAN_SIGNS },
     unit_s: UNIT_S,
     set_s: UNIT_S,
     first_s: 0,
@@ -102,6 +103,18 @@ const D2_PAGE: (u16, u8) = (42, 4);
 
 /// The Neuman-Hofman code (5.1.1): 0000 0100 1101 0100 1110, first chip in the highest of twenty bits.
 const NEUMAN_HOFMAN: u32 = 0b0000_0100_1101_0100_1110;
+
+/// The same as signs, +1 for a logical 0.
+const NEUMAN_HOFMAN_SIGNS: [i8; D1_SYMBOLS] = {
+    let (mut signs, mut place) = ([1; D1_SYMBOLS], 0);
+    while place < D1_SYMBOLS {
+        if NEUMAN_HOFMAN >> (D1_SYMBOLS - 1 - place) & 1 == 1 {
+            signs[place] = -1;
+        }
+        place += 1;
+    }
+    signs
+};
 
 /// A subframe without its interleaving.
 pub type Subframe = Bits<SUBFRAME_BITS>;

@@ -31,6 +31,7 @@ pub use reader::GnavReader;
 pub static GNAV: Message = Message {
     name: "GNAV",
     symbol_s: 0.01,
+    bit: |_| &[1],
     unit_s: STRING_S,
     set_s: STRING_S,
     first_s: 0,
