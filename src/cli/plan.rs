@@ -16,6 +16,8 @@ use crate::generator::plan::{Plan, Together};
 use crate::generator::scenario::Overrides;
 use crate::generator::scene::Scene;
 use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
+use crate::receiver::followed::Followed;
+use crate::receiver::settings::Settings;
 use crate::receiver::track::TrackingSettings;
 use crate::study::demand::{self, Answer, Demand};
 
@@ -53,6 +55,8 @@ struct Loops<'s> {
     settings: &'s TrackingSettings,
     /// Period of the code, and wavelength of the carrier.
     signal: (f64, f64),
+    /// Times of an update, the least of them where satellites differ.
+    updates_s: (f64, Option<f64>),
     rows: Vec<(LineOfSight, Demand, Answer)>,
 }
 
@@ -69,7 +73,12 @@ impl<'s> Loops<'s> {
             (line, demand, demand::answer(settings, signal, &demand))
         };
         let lines = lines_of_sight(scene).map_err(CliError::input)?;
-        Ok(Self { settings, signal, rows: lines.into_iter().map(row).collect() })
+        let all = Settings { tracking: settings.clone(), ..Settings::default() };
+        let updates_s = first.and_then(|signal| Followed::of(signal, &all)).map_or_else(
+            || (period_s * f64::from(settings.integration), None),
+            |followed| (followed.integration_s, followed.least_integration_s),
+        );
+        Ok(Self { settings, signal, updates_s, rows: lines.into_iter().map(row).collect() })
     }
 
     /// The one with the least left of its limit, but for those that are too weak at rest.
@@ -80,8 +89,10 @@ impl<'s> Loops<'s> {
 
     fn text(&self) -> String {
         let TrackingSettings { pll_order, pll_bandwidth_hz, .. } = self.settings;
-        let update_ms = 1e3 * self.signal.0 * f64::from(self.settings.integration);
-        let mut out = format!("loops      carrier, order {pll_order}, {pll_bandwidth_hz} Hz, {update_ms} ms: ");
+        let (update_s, least_s) = self.updates_s;
+        let least = least_s.map_or_else(String::new, |s| format!(" ({} ms where bits are shorter)", 1e3 * s));
+        let update = format!("{} ms{least}", 1e3 * update_s);
+        let mut out = format!("loops      carrier, order {pll_order}, {pll_bandwidth_hz} Hz, {update}: ");
         let Some((line, _, answer)) = self.tightest() else {
             return out + "no satellite that it would follow at rest\n";
         };

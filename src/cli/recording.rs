@@ -136,7 +136,8 @@ fn data(path: &Path, description: Description) -> Result<Found, CliError> {
 fn of_pair(arguments: &args::Receive) -> Result<Found, CliError> {
     let (data_path, meta_path) = pair(&arguments.file);
     if !present(&meta_path).map_err(|error| CliError::read(shown(&meta_path), &error))? {
-        // Flags that are missing are said before a file that is.
+        // A file that is missing is said before flags that are, and these before a pipe is opened.
+        std::fs::metadata(&data_path).map_err(|error| CliError::read(shown(&data_path), &error))?;
         metadata(arguments, Description::default())?;
         return data(&data_path, Description::default());
     }

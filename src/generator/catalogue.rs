@@ -158,6 +158,28 @@ impl Catalogue {
         std::iter::once(before).chain(gaps).filter(concerns).collect()
     }
 
+    /// When some satellite of a system sends a set, in order of time: no two of the spans touch.
+    pub fn sending(&self, system: System) -> Vec<(Epoch, Epoch)> {
+        let own = self.satellites.iter().filter(|(sv, _)| sv.system == system).map(|(_, timeline)| timeline);
+        let on_air = own.flat_map(|timeline| {
+            let pairs = timeline.spans.windows(2).filter_map(|pair| match pair {
+                [span, next] if span.set.is_some() => Some((span.from, next.from)),
+                _ => None,
+            });
+            pairs.collect::<Vec<_>>()
+        });
+        let mut all: Vec<(Epoch, Epoch)> = on_air.collect();
+        all.sort_by(|a, b| a.0.since(b.0).total_cmp(&0.0));
+        all.dedup_by(|later, earlier| {
+            let touch = later.0 <= earlier.1;
+            if touch && later.1 > earlier.1 {
+                earlier.1 = later.1;
+            }
+            touch
+        });
+        all
+    }
+
     /// Whether what reaches an antenna from `from` to `to` has an orbit and was sent without a break. `false`
     /// may be too cautious within a second of either end.
     pub fn sent_throughout(&self, sv: Sv, from: Epoch, to: Epoch) -> bool {

@@ -19,7 +19,7 @@ mod kepler;
 mod vector;
 
 pub use error::OrbitError;
-pub use form::{PLAIN, SetForm, status_of_record};
+pub use form::{PLAIN, STRING_3_UNHEALTHY, SetForm, status_of_record};
 pub use kepler::solve_kepler;
 use kepler::wrap;
 pub use vector::StateVector;

@@ -5,6 +5,16 @@ use std::io::Read;
 use thiserror::Error;
 
 const MAGIC: [u8; 2] = [0x1f, 0x8b];
+/// First bytes of what other programs pack.
+const OTHERS: [(&[u8], &str); 7] = [
+    (b"\x1f\x9d", "compress (.Z)"),
+    (b"PK\x03\x04", "zip"),
+    (b"BZh", "bzip2"),
+    (b"\xfd7zXZ\0", "xz"),
+    (b"\x28\xb5\x2f\xfd", "zstd"),
+    (b"7z\xbc\xaf\x27\x1c", "7-Zip"),
+    (b"Rar!", "RAR"),
+];
 
 /// Why bytes do not unpack.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -12,6 +22,9 @@ pub enum InflateError {
     /// More bytes than allowed, which are these.
     #[error("more than {0} bytes after decompression")]
     TooLarge(u64),
+    /// Packed in another way, which is this one.
+    #[error("packed by {0}, which is not read: expected the plain file, or one packed by gzip")]
+    Packed(&'static str),
     /// Data that are no gzip, with what was wrong.
     #[error("damaged gzip data ({0})")]
     Damaged(String),
@@ -22,6 +35,9 @@ pub enum InflateError {
 /// # Errors
 /// [`InflateError`].
 pub fn inflate(bytes: &[u8], largest: u64) -> Result<Vec<u8>, InflateError> {
+    if let Some((_, program)) = OTHERS.iter().find(|(magic, _)| bytes.starts_with(magic)) {
+        return Err(InflateError::Packed(program));
+    }
     let mut plain = Vec::new();
     if bytes.starts_with(&MAGIC) {
         flate2::read::MultiGzDecoder::new(bytes)
@@ -34,4 +50,20 @@ pub fn inflate(bytes: &[u8], largest: u64) -> Result<Vec<u8>, InflateError> {
         return Err(InflateError::TooLarge(largest));
     }
     if plain.len() as u64 > largest { Err(InflateError::TooLarge(largest)) } else { Ok(plain) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_other_programs_pack_is_refused_by_their_names() {
+        // The first bytes of "hello" by compress, zip and xz.
+        let z = b"\x1f\x9d\x90\x68\xca\xb0\x61\xf3\x06";
+        for (bytes, name) in [(&z[..], "compress (.Z)"), (b"PK\x03\x04\x0a\0", "zip"), (b"\xfd7zXZ\0\0\x04", "xz")] {
+            let refusal = inflate(bytes, 100).unwrap_err().to_string();
+            assert!(refusal.contains(name) && refusal.contains("expected the plain file"), "{refusal}");
+        }
+        assert_eq!(inflate(b"PKU zip", 100), Ok(b"PKU zip".to_vec()));
+    }
 }

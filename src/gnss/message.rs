@@ -27,6 +27,9 @@ pub struct Message {
     pub name: &'static str,
     /// Duration of a symbol: whole periods of the code that it modulates.
     pub symbol_s: f64,
+    /// Signs of the symbols that make a bit of a satellite, one after another; one sign where symbols are not
+    /// of a known code.
+    pub bit: fn(Sv) -> &'static [i8],
     /// Duration of a unit, which is encoded in one piece, and when in the week the first one begins.
     pub unit_s: i64,
     /// Seconds, from one multiple of them to the next, in which all units are of one set: whole units.

@@ -23,7 +23,7 @@ use crate::broadcast::Ephemeris;
 use crate::gps::lnav::LeapEvent;
 use crate::inflate::{InflateError, inflate};
 use crate::klobuchar::Klobuchar;
-use crate::satellite::Sv;
+use crate::satellite::{Sv, System};
 use crate::time::{Epoch, TimePolynomial, WEEK_S};
 
 /// Largest file that is read, in bytes after decompression.
@@ -66,6 +66,14 @@ pub enum NavigationError {
     TooLarge {
         /// Name of the file.
         name: String,
+    },
+    /// A file that is packed otherwise than by gzip.
+    #[error("{name}: {error}")]
+    Packed {
+        /// Name of the file.
+        name: String,
+        /// What packed it.
+        error: InflateError,
     },
     /// A file that cannot be decompressed.
     #[error("{name}: damaged gzip data ({detail}): expected a RINEX navigation file, plain or gzip")]
@@ -175,15 +183,28 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
             }
         }
     }
+    // Converters join the orbit of a new set of BeiDou to the clock of the one before, for the message has no
+    // mark of a set.
+    let whole: BTreeSet<(Sv, i64)> =
+        found.iter().filter(|(_, set)| set.toe == set.toc).map(|(_, set)| (set.sv, set.toe.seconds())).collect();
+    found.retain(|(line, set)| {
+        let is_joined = set.sv.system == System::BeiDou && set.toe != set.toc;
+        let is_astray = is_joined && whole.contains(&(set.sv, set.toe.seconds()));
+        if is_astray {
+            let what = format!("the orbit of {} with an older clock: another record has both", set.toe);
+            navigation.skipped.push(format!("line {line} ({} {}): {what}", set.sv, set.toc));
+        }
+        !is_astray
+    });
     // Of sets of one time the one that was sent last goes first, and stays.
     found.sort_by(|(line, a), (other, b)| {
-        let of_time = (a.sv, a.toc.seconds()).cmp(&(b.sv, b.toc.seconds()));
+        let of_time = (a.sv, a.toc.seconds(), a.toe.seconds()).cmp(&(b.sv, b.toc.seconds(), b.toe.seconds()));
         let newer = b.transmitted.since(a.transmitted).total_cmp(&0.0);
         of_time.then(a.toc.fraction().total_cmp(&b.toc.fraction())).then(newer).then(other.cmp(line))
     });
     for (line, set) in found {
         match navigation.ephemerides.last() {
-            Some(kept) if (kept.sv, kept.toc) == (set.sv, set.toc) => {
+            Some(kept) if (kept.sv, kept.toc, kept.toe) == (set.sv, set.toc, set.toe) => {
                 if *kept != set {
                     let what = "another record of the same time, sent later or further down, replaces it";
                     navigation.skipped.push(format!("line {line} ({} {}): {what}", set.sv, set.toc));
@@ -267,6 +288,7 @@ fn polynomial(line: columns::Polynomial, anchor: Epoch, allowed: &Allowed) -> Re
 fn unpack(bytes: &[u8], name: &str) -> Result<Vec<u8>, NavigationError> {
     inflate(bytes, LARGEST_BYTES).map_err(|error| match error {
         InflateError::TooLarge(_) => NavigationError::TooLarge { name: name.to_owned() },
+        error @ InflateError::Packed(_) => NavigationError::Packed { name: name.to_owned(), error },
         InflateError::Damaged(detail) => NavigationError::Gzip { name: name.to_owned(), detail },
     })
 }

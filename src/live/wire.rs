@@ -5,10 +5,10 @@
 //! follow (0 velocity, 1 and acceleration, 2 and jerk). Then the time in milliseconds since the start, the
 //! place and its derivatives, ECEF in metres, each with its angles' in 6 and 8; at the end a name, a 32-bit
 //! length before it. Angles are yaw, pitch and roll of nose, right and down against north, east and down, in
-//! radians, and their derivatives in 8. Everything else is a line: `t x y z` with velocity, acceleration and
-//! jerk where known (seconds, metres, ECEF) and `ypr` with the angles and their rates where known, a sentence
-//! of NMEA (`nmea`), or an event. Limits: the order of angles in 8 is as its vendor's clients send it, by
-//! description and not seen on a wire; of their derivatives the first is used.
+//! radians, and their derivatives in 8. Everything else is lines, one or more: `t x y z` with velocity,
+//! acceleration and jerk where known (seconds, metres, ECEF) and `ypr` with the angles and their rates where
+//! known, a sentence of NMEA (`nmea`), or an event. Limits: the order of angles in 8 is as its vendor's
+//! clients send it, by description and not seen on a wire; of their derivatives the first is used.
 
 mod nmea;
 
@@ -20,8 +20,10 @@ use generator::vehicle::joining::Push;
 use generator::vehicle::turn::PushedTurn;
 use gnss::time::Epoch;
 
-/// Bytes of a datagram or a line at most.
+/// Bytes of a binary message or a line at most.
 pub const MOST_BYTES: usize = 512;
+/// Bytes of a datagram at most: what an epoch of NMEA fills, and more than a frame of Ethernet holds.
+pub const MOST_DATAGRAM_BYTES: usize = 4096;
 
 /// The word before angles.
 const TURNED: &str = "ypr";
@@ -92,7 +94,7 @@ impl Reader {
         Self { nmea: nmea::Reader::new(start, height_m) }
     }
 
-    /// Reads a datagram.
+    /// Reads a message of a datagram, one of its [`pieces`].
     ///
     /// # Errors
     /// What is wrong with it.
@@ -125,6 +127,16 @@ impl Reader {
             _ => state(text),
         }
     }
+}
+
+/// The messages of a datagram: itself where it is binary, else its lines but for blank ones, of which it has
+/// one where it is empty.
+pub fn pieces(datagram: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let is_binary = datagram.first().is_some_and(|kind| (1..=8).contains(kind));
+    let ends = move |byte: &u8| !is_binary && (*byte == b'\n' || *byte == b'\r');
+    let is_blank = |line: &[u8]| line.iter().all(u8::is_ascii_whitespace);
+    let nothing = is_blank(datagram);
+    datagram.split(ends).filter(move |line| nothing || !is_blank(line)).take(if nothing { 1 } else { usize::MAX })
 }
 
 fn binary(kind: u8, rest: &[u8]) -> Result<Message, WireError> {
@@ -300,6 +312,17 @@ mod tests {
         assert!((push.t_s - 5.0).abs() < 1e-6, "{push:?}");
         assert!((gnss::earth::Geodetic::from_ecef(&push.position_m).height_m - 520.0).abs() < 1e-6);
         assert!(matches!(read(&format!("${body}*{:02X}", sum ^ 1)), Err(WireError::Nmea(_))));
+    }
+
+    #[test]
+    fn a_datagram_of_lines_is_one_message_a_line_and_a_binary_one_is_whole() {
+        let lines = |bytes: &'static [u8]| pieces(bytes).collect::<Vec<_>>();
+        assert_eq!(lines(b"$GPRMC,1\r\n$GPGGA,2\r\n"), [&b"$GPRMC,1"[..], b"$GPGGA,2"]);
+        assert_eq!(lines(b"1 2 3 4\n\n5 6 7 8"), [&b"1 2 3 4"[..], b"5 6 7 8"]);
+        assert_eq!((lines(b"bye"), lines(b""), lines(b"\r\n")), (vec![&b"bye"[..]], vec![&b""[..]], vec![&b""[..]]));
+        // 10 and 13 are bytes of numbers there.
+        let binary = packet(5, None, &[10.0, 13.0, 1.0, 2.0], Some(b"\n\r"));
+        assert_eq!(pieces(&binary).collect::<Vec<_>>(), [binary.as_slice()]);
     }
 
     #[test]

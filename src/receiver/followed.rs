@@ -4,6 +4,9 @@ use serde::Serialize;
 
 use crate::lead::{lead, other_side};
 use crate::settings::Settings;
+use crate::track::closed::Mode;
+use crate::track::{TrackingSettings, pilot_group};
+use gnss::satellite::Sv;
 use gnss::signal::{Component, Layer, Layers, Signal};
 
 /// How a signal is followed, as `receiver.json` says it.
@@ -21,8 +24,12 @@ pub struct Followed {
     pub other_side: Option<usize>,
     /// Distance of early and late, fitted to the layer's pulse.
     pub spacing_chips: f64,
-    /// Time of a loop's update.
+    /// Time of a loop's update once symbols are known: as long as set, in whole parts of what is sent with
+    /// one sign.
     pub integration_s: f64,
+    /// The same of satellites whose message has shorter bits, where there are such.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub least_integration_s: Option<f64>,
     /// One-sided noise bandwidth of the phase loop, as far as such updates allow.
     pub pll_bandwidth_hz: f64,
     /// The same of the code loop.
@@ -41,15 +48,60 @@ impl Followed {
             Layers::Whole => None,
         };
         let fitted = settings.tracking.fitted(leading);
+        let updates = signal.satellites().map(|sv| updated_s(leading, sv, &fitted));
+        let [least_s, most_s] = updates.fold([f64::MAX, 0.0_f64], |[least, most], s| [least.min(s), most.max(s)]);
         Some(Self {
             signal: signal.name,
             component: at(leading)?,
             layer,
             other_side: other_side(leading, signal).and_then(at),
             spacing_chips: fitted.spacing_chips,
-            integration_s: leading.period_s() * f64::from(fitted.integration),
+            integration_s: most_s,
+            least_integration_s: (least_s < most_s).then_some(least_s),
             pll_bandwidth_hz: fitted.pll_bandwidth_hz,
             dll_bandwidth_hz: fitted.dll_bandwidth_hz,
         })
+    }
+}
+
+/// Time of an update of the loops that follow a component of a satellite by settings that are fitted to it.
+fn updated_s(leading: &Component, sv: Sv, fitted: &TrackingSettings) -> f64 {
+    let periods = match leading.message {
+        Some(message) if leading.overlay.periods() <= 1 => {
+            let symbol = leading.periods_per_symbol().unwrap_or(1);
+            if symbol == 1 { (message.bit)(sv).len() as u32 } else { symbol }
+        }
+        _ => pilot_group(leading.period_s()),
+    };
+    leading.period_s() * f64::from(Mode::Phase.periods_per_update(fitted, periods))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gnss::signal::SIGNALS;
+
+    #[test]
+    fn updates_are_as_long_as_set_where_signs_last_so_long() {
+        let settings = Settings::default();
+        let of = |name: &str| {
+            let signal = SIGNALS.iter().find(|signal| signal.name == name).unwrap();
+            let found = Followed::of(signal, &settings).unwrap();
+            (1e3 * found.integration_s, found.least_integration_s.map(|s| 1e3 * s))
+        };
+        assert_eq!(settings.tracking.integration, 4);
+        // Bits of 20 ms; D1's of 20 ms and D2's of 2; chips of 10 ms; symbols of 1 ms; pilots of 4 and of 10
+        // ms.
+        for (name, expected) in [
+            ("GPS L1 C/A", (4.0, None)),
+            ("BeiDou B1I", (4.0, Some(2.0))),
+            ("BeiDou B3I", (4.0, Some(2.0))),
+            ("GLONASS G1", (2.0, None)),
+            ("BeiDou B2b", (1.0, None)),
+            ("Galileo E1", (4.0, None)),
+            ("GPS L1C", (10.0, None)),
+        ] {
+            assert_eq!(of(name), expected, "{name}");
+        }
     }
 }

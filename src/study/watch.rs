@@ -21,7 +21,7 @@ impl Watch {
     /// Locked, as a channel is that has just found its symbols, of `group` code periods each.
     pub(super) fn new(period_s: f64, group: u32) -> Self {
         Self {
-            symbol_lock: SymbolLock::locked(),
+            symbol_lock: SymbolLock::locked(period_s * f64::from(group)),
             state: LockState::locked(0),
             period_s,
             symbol_s: period_s * f64::from(group),

@@ -6,6 +6,7 @@ use gnss_twin::gnss::bits::bits_of;
 use gnss_twin::gnss::broadcast::Ephemeris;
 use gnss_twin::gnss::glonass::fdma::{G1, G2};
 use gnss_twin::gnss::glonass::gnav::{self, GNAV, GlonassString, STRING_BITS};
+use gnss_twin::gnss::inflate;
 use gnss_twin::gnss::message::{Common, Read, Reader};
 use gnss_twin::gnss::rinex;
 use gnss_twin::gnss::samples::{Format, IfMetadata};
@@ -423,6 +424,85 @@ fn a_file_of_version_2_is_read_to_the_same_sets() {
         "{:?}",
         found.skipped
     );
+}
+
+/// Records of 2026-03-09 as a merged broadcast file of version 4.02 has them (BRD400DLR of that day; facts):
+/// one of a satellite in service, of which the almanac says that it is healthy, one of such a satellite whose
+/// converter did not know the almanac, and one of a satellite that calls itself ill, though its almanac does
+/// not.
+const FLAGGED: &str = "     4.02           NAVIGATION DATA     M                   RINEX VERSION / TYPE
+    18                                                      LEAP SECONDS
+                                                            END OF HEADER
+> EPH R01 FDMA
+R01 2026 03 09 11 45 00 1.611839979887e-04 9.094947017729e-13 1.278000000000e+05
+    -1.079660742188e+04 4.647731781006e-02 0.000000000000e+00 0.000000000000e+00
+    -7.694267578125e+02-3.162310600281e+00 9.313225746155e-10 1.000000000000e+00
+     2.310497656250e+04-8.194923400879e-02-1.862645149231e-09 0.000000000000e+00
+     2.470000000000e+02 9.313225746155e-09 2.000000000000e+00 3.000000000000e+00
+> EPH R12 FDMA
+R12 2026 03 09 06 15 00 6.623193621635e-05 9.094947017729e-13 1.080260000000e+05
+    -6.476883300781e+03-3.634729385376e-01-1.862645149231e-09 0.000000000000e+00
+     2.319700830078e+04 1.101830482483e+00 1.862645149231e-09-1.000000000000e+00
+     8.436123046875e+03-3.315770149231e+00 0.000000000000e+00 0.000000000000e+00
+     2.510000000000e+02 7.450580596924e-09 1.000000000000e+00 0.000000000000e+00
+> EPH R17 FDMA
+R17 2026 03 09 00 45 00 2.765050157905e-04 2.728484105319e-12 8.820000000000e+04
+     6.322560546875e+03 1.776590347290e+00-9.313225746155e-10 1.000000000000e+00
+    -1.682183398438e+04-1.732812881470e+00 0.000000000000e+00 4.000000000000e+00
+     1.808955517578e+04-2.236171722412e+00 0.000000000000e+00 0.000000000000e+00
+     1.830000000000e+02 0.000000000000e+00 3.000000000000e+00 3.000000000000e+00
+";
+
+#[test]
+fn health_flags_of_real_records_of_newer_versions_are_three_facts_of_which_one_is_of_the_satellite() {
+    let read = |text: &str| rinex::read(text.as_bytes(), "flags").unwrap().ephemerides;
+    let healthy: Vec<bool> = read(FLAGGED).iter().map(Ephemeris::is_healthy).collect();
+    assert_eq!(healthy, [true, true, false]);
+    // Only bit 2 of them is the satellite's own (RINEX 3.05, table A10): with B_n = 0, values 4 to 7 alone
+    // are ill.
+    let flags = |of: u32| FLAGGED.replacen(" 2.000000000000e+00 3.000000000000e+00", &flagged(of), 1);
+    let ill: Vec<u32> = (0..8).filter(|of| !read(&flags(*of))[0].is_healthy()).collect();
+    assert_eq!(ill, [4, 5, 6, 7]);
+}
+
+/// Index of accuracy and health flags as they end a record.
+fn flagged(flags: u32) -> String {
+    format!(" 2.000000000000e+00 {flags}.000000000000e+00")
+}
+
+#[test]
+fn satellites_of_whole_real_files_are_healthy_by_two_columns_of_their_records() {
+    let files = [
+        ("multi-gnss/BRD400DLR_S_20260680000_01D_MN.rnx.gz", 4.02),
+        ("nav/BRD400DLR_S_20230710000_01D_MN.rnx.gz", 4.00),
+        ("navbits/233h_rnx.nav.gz", 4.02),
+        ("lnav/046r_rnx.nav", 4.02),
+        ("day177-2020/ESBC00DNK_R_20201770000_01D_MN.rnx.gz", 3.05),
+    ];
+    for (name, version) in files {
+        let Some(path) = external(name) else { return };
+        let bytes = std::fs::read(path).unwrap();
+        let sets = rinex::read(&bytes, name).unwrap().ephemerides;
+        let text = String::from_utf8(inflate::inflate(&bytes, 1 << 26).unwrap()).unwrap();
+        assert_eq!(text[..9].trim().parse::<f64>().unwrap(), version, "{name}");
+        let lines: Vec<&str> = text.lines().collect();
+        let mut said: BTreeMap<(String, String), Vec<bool>> = BTreeMap::new();
+        for record in lines.windows(5).filter(|five| five[0].starts_with('R') && five[0].as_bytes()[3] == b' ') {
+            let last = |line: &str| line.get(61..).unwrap_or("").trim().parse::<f64>().unwrap_or(0.0);
+            let (b, flags) = (last(record[1]), last(record[4]) as u32);
+            let key = (record[0][..3].to_owned(), record[0][4..23].to_owned());
+            said.entry(key).or_default().push(b == 0.0 && flags < 4);
+        }
+        let mut count = [0, 0];
+        for set in sets.iter().filter(|set| set.sv.system == System::Glonass) {
+            let time = UTC.label(set.toc).to_string()[..19].replace(['-', 'T', ':'], " ");
+            let own = &said[&(set.sv.to_string(), time)];
+            assert!(own.contains(&set.is_healthy()), "{name} {} {}: {own:?}", set.sv, set.toc);
+            count[usize::from(set.is_healthy())] += 1;
+        }
+        println!("{name}: {count:?} unhealthy and healthy sets of GLONASS");
+        assert!(count[1] > 25 && count[1] > 5 * count[0], "{name}: {count:?}");
+    }
 }
 
 /// Searches an antenna recording for all channels of a band.

@@ -76,11 +76,12 @@ pub struct Handed {
 }
 
 /// What came in and was not used.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Intake {
     pub messages: u64,
-    /// No message, by its length or contents.
+    /// No message, by its length or contents, and what the first of them was.
     pub malformed: u64,
+    pub first_malformed: Option<String>,
     /// From another sender than the first.
     pub strangers: u64,
     /// Too many at once.
@@ -188,6 +189,7 @@ impl Made {
                 "refused": self.refused,
                 "last_refusal": self.last_refusal,
                 "malformed": intake.malformed,
+                "first_malformed": intake.first_malformed,
                 "strangers": intake.strangers,
                 "dropped": intake.dropped,
                 "attitudes": self.attitudes,

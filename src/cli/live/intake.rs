@@ -15,10 +15,12 @@ use super::account::Intake;
 use crate::cli::address::{listen, listen_address};
 use crate::cli::error::CliError;
 use crate::cli::scenario;
-use crate::live::wire::{MOST_BYTES, Message, Reader, WireError};
+use crate::live::wire::{MOST_BYTES, MOST_DATAGRAM_BYTES, Message, Reader, WireError, pieces};
 
 /// Messages that wait for the next tick at most; older ones give way.
 const MOST_WAITING: usize = 4096;
+/// Bytes that are shown of a message that is none.
+const SHOWN_BYTES: usize = 82;
 /// Stack of the thread.
 const STACK_BYTES: usize = 1 << 18;
 
@@ -65,15 +67,22 @@ impl Inbox {
         let mut inside = self.inside();
         messages.clear();
         messages.extend(inside.messages.drain(..));
-        inside.intake
+        inside.intake.clone()
     }
 
-    /// Takes what came, or why it is no message.
-    fn take<E>(&self, came: Result<Message, E>) {
+    /// Takes what came in some bytes, or why it is no message; the first of these goes to the screen.
+    fn take(&self, bytes: &[u8], came: Result<Message, WireError>) {
         let mut inside = self.inside();
         inside.intake.messages += 1;
         match came {
-            Err(_) => inside.intake.malformed += 1,
+            Err(error) => {
+                inside.intake.malformed += 1;
+                if inside.intake.first_malformed.is_none() {
+                    let what = format!("'{}': {error}", shown(bytes));
+                    scenario::warn(&format!("motion: the first message that is none: {what}"));
+                    inside.intake.first_malformed = Some(what);
+                }
+            }
             Ok(message) => {
                 if inside.messages.len() >= MOST_WAITING {
                     inside.messages.pop_front();
@@ -116,7 +125,7 @@ pub fn begin(origin: Origin, reader: Reader) -> Result<Arc<Inbox>, CliError> {
 
 fn datagrams(socket: &UdpSocket, inbox: &Inbox, fresh: &Reader) {
     let mut reader = fresh.clone();
-    let mut buffer = [0; MOST_BYTES + 1];
+    let mut buffer = [0; MOST_DATAGRAM_BYTES + 1];
     let mut known: Option<SocketAddr> = None;
     loop {
         // A failed receive is one of an earlier answer on this socket; there are none.
@@ -127,12 +136,28 @@ fn datagrams(socket: &UdpSocket, inbox: &Inbox, fresh: &Reader) {
             inside.intake.strangers += 1;
             continue;
         }
-        let came = reader.datagram(buffer.get(..length).unwrap_or_default());
-        if came == Ok(Message::Bye) {
-            (known, reader) = (None, fresh.clone());
+        let bytes = buffer.get(..length).unwrap_or_default();
+        if length > MOST_DATAGRAM_BYTES {
+            inbox.take(bytes, Err(WireError::Long));
+            continue;
         }
-        inbox.take(came);
+        for piece in pieces(bytes) {
+            let came = reader.datagram(piece);
+            let ends = came == Ok(Message::Bye);
+            inbox.take(piece, came);
+            if ends {
+                (known, reader) = (None, fresh.clone());
+                break;
+            }
+        }
     }
+}
+
+/// The beginning of some bytes as text; what does not print is escaped.
+fn shown(bytes: &[u8]) -> String {
+    let line = bytes.trim_ascii();
+    let begun = line.get(..SHOWN_BYTES).unwrap_or(line).escape_ascii().to_string();
+    if line.len() > SHOWN_BYTES { begun + "…" } else { begun }
 }
 
 fn clients(listener: &TcpListener, inbox: &Inbox, fresh: &Reader) {
@@ -154,7 +179,7 @@ fn lines(mut input: impl BufRead, inbox: &Inbox, mut reader: Reader) {
             Ok(_) => {}
         }
         if line.len() > MOST_BYTES && !line.ends_with(b"\n") {
-            inbox.take(Err(WireError::Long));
+            inbox.take(&line, Err(WireError::Long));
             loop {
                 line.clear();
                 match input.by_ref().take(MOST_BYTES as u64).read_until(b'\n', &mut line) {
@@ -169,7 +194,7 @@ fn lines(mut input: impl BufRead, inbox: &Inbox, mut reader: Reader) {
         if text == Ok("") {
             continue;
         }
-        inbox.take(text.map_err(|_| WireError::NotText).and_then(|text| reader.line(text)));
+        inbox.take(&line, text.map_err(|_| WireError::NotText).and_then(|text| reader.line(text)));
     }
 }
 
@@ -191,6 +216,34 @@ mod tests {
             messages.as_slice(),
             [(_, Message::Push(..)), (_, Message::Hello), (_, Message::Push(last))] if last.t_s == 5.0
         ));
+    }
+
+    #[test]
+    fn a_datagram_of_two_sentences_is_two_messages_and_the_first_that_is_none_is_quoted() {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let (address, inbox) = (socket.local_addr().unwrap(), Arc::new(Inbox::default()));
+        let own = Arc::clone(&inbox);
+        let reader = Reader::new(Epoch::parse("2010-07-01T08:06:00").unwrap(), 0.0);
+        thread::spawn(move || datagrams(&socket, &own, &reader));
+        let sentence = |body: &str| format!("${body}*{:02X}\r\n", body.bytes().fold(0, |sum, byte| sum ^ byte));
+        let rmc = sentence("GPRMC,080550.00,A,4806.0000,N,01136.0000,E,10.0,60.0,010710,,");
+        let gga = sentence("GPGGA,080550.00,4806.0000,N,01136.0000,E,1,08,1.0,473.0,M,47.0,M,,");
+        let other = UdpSocket::bind("127.0.0.1:0").unwrap();
+        for text in [rmc + &gga, "1 2\u{7}\n9 8 x 7".to_owned(), "5 6 7 8\nbye".to_owned()] {
+            other.send_to(text.as_bytes(), address).unwrap();
+        }
+        let (mut all, mut messages) = (Vec::new(), Vec::new());
+        let intake = loop {
+            let intake = inbox.drain(&mut messages);
+            all.append(&mut messages);
+            if all.iter().any(|(_, message)| *message == Message::Bye) {
+                break intake;
+            }
+            thread::yield_now();
+        };
+        assert_eq!((intake.messages, intake.malformed, all.len()), (6, 2, 4));
+        let quoted = intake.first_malformed.unwrap();
+        assert!(quoted.starts_with(r"'1 2\x07': ") && quoted.contains("expected"), "{quoted}");
     }
 
     #[test]

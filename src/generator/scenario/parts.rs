@@ -12,14 +12,17 @@ use crate::ray::Effect;
 use crate::vehicle::Trajectory;
 use gnss::bdgim::Bdgim;
 use gnss::broadcast::Ephemeris;
-use gnss::gps::lnav::UtcData;
+use gnss::gps::lnav::{LeapEvent, UtcData};
 use gnss::ionosphere::NAVIC_HZ;
 use gnss::klobuchar::Klobuchar;
 use gnss::message::Common;
 use gnss::rinex::{self, Navigation};
 use gnss::satellite::{Sv, System};
-use gnss::time::TimePolynomial;
+use gnss::time::{Epoch, TimePolynomial, WEEK_S};
 
+/// How long before a change of UTC's whole seconds it is announced, and sent: about half a year (IERS,
+/// Bulletin C, which comes out in January and July).
+const ANNOUNCED_S: f64 = 26.0 * WEEK_S as f64;
 /// Warnings of one kind that are listed in full.
 const LISTED: usize = 4;
 
@@ -32,7 +35,7 @@ pub(super) struct Sky {
 }
 
 /// The navigation files that the scenario names, or the embedded one. What is not an ephemeris is taken from
-/// the first file that has it.
+/// the file of the scene's day, or else from the nearest that has it, whatever their order in the list.
 pub(super) fn navigation(
     scenario: &Scenario,
     directory: &Path,
@@ -40,10 +43,14 @@ pub(super) fn navigation(
     warnings: &mut Vec<String>,
 ) -> Result<Navigation, ScenarioError> {
     let refuse = |e: rinex::NavigationError| scenario.conflict("navigation.file", e.to_string());
-    let mut navigation = if scenario.navigation.is_empty() { embedded(scenario)? } else { Navigation::default() };
+    let mut files = if scenario.navigation.is_empty() { vec![embedded(scenario)?] } else { Vec::new() };
     for path in &scenario.navigation {
         let bytes = scenario.load("navigation.file", directory, path, overrides)?;
-        let found = rinex::read(&bytes, &path.display().to_string()).map_err(refuse)?;
+        files.push(rinex::read(&bytes, &path.display().to_string()).map_err(refuse)?);
+    }
+    files.sort_by(|a, b| far_s(a, scenario.start).total_cmp(&far_s(b, scenario.start)));
+    let mut navigation = Navigation::default();
+    for found in files {
         let Navigation {
             ephemerides,
             klobuchar,
@@ -64,8 +71,10 @@ pub(super) fn navigation(
         navigation.bdgim = navigation.bdgim.or(bdgim);
         navigation.nequick = navigation.nequick.or(nequick);
         navigation.galileo = navigation.galileo.or(galileo);
-        navigation.leap_seconds = navigation.leap_seconds.or(leap_seconds);
-        navigation.leap_event = navigation.leap_event.or(leap_event);
+        // The number belongs to the change: that of another file may be of after it.
+        if navigation.leap_seconds.is_none() {
+            (navigation.leap_seconds, navigation.leap_event) = (leap_seconds, leap_event);
+        }
         navigation.utc = navigation.utc.or(utc);
         navigation.skipped.extend(skipped);
     }
@@ -73,6 +82,14 @@ pub(super) fn navigation(
     // Merged files have more systems than the scene.
     navigation.ephemerides.retain(|set| systems(scenario).any(|system| system == set.sv.system));
     Ok(navigation)
+}
+
+/// How far a file is from a time: the middle one of the reference times of its sets, for a day's file begins
+/// and ends with a few of its neighbours'.
+fn far_s(file: &Navigation, at: Epoch) -> f64 {
+    let mut times: Vec<i64> = file.ephemerides.iter().map(|set| set.toe.seconds()).collect();
+    times.sort_unstable();
+    times.get(times.len() / 2).map_or(f64::INFINITY, |middle| at.since(Epoch::new(*middle, 0.0)).abs())
 }
 
 /// The systems of a scene's signals, each once or more.
@@ -96,7 +113,11 @@ pub(super) fn sky(
     end_s: f64,
     warnings: &mut Vec<String>,
 ) -> Result<Sky, ScenarioError> {
-    let (mut catalogue, rogues) = Catalogue::new(navigation.ephemerides.clone());
+    let (sets, astray): (Vec<&Ephemeris>, Vec<_>) =
+        navigation.ephemerides.iter().partition(|set| unsendable(scenario, set).is_none());
+    let astray: Vec<String> = astray.into_iter().filter_map(|set| unsendable(scenario, set)).collect();
+    summarise(warnings, &astray, "ephemerides left out");
+    let (mut catalogue, rogues) = Catalogue::new(sets.into_iter().cloned().collect());
     summarise(warnings, &rogues, "ephemerides left out");
     let (start, end) = (scenario.start, scenario.start.plus_s(end_s));
     let sends = |system: System, at| {
@@ -105,7 +126,7 @@ pub(super) fn sky(
     let mut silent: Vec<System> = systems(scenario).filter(|s| !sends(*s, start) || !sends(*s, end)).collect();
     silent.dedup();
     for &system in &silent {
-        let reason = outside(&navigation.ephemerides, system, scenario);
+        let reason = outside(&catalogue, system, scenario, end);
         if systems(scenario).all(|other| silent.contains(&other)) {
             return Err(scenario.conflict("start", reason));
         }
@@ -150,27 +171,49 @@ pub(super) fn sky(
     Ok(Sky { catalogue, common, excluded })
 }
 
+/// Why a message of the scene cannot carry a set; `None` where all can.
+fn unsendable(scenario: &Scenario, set: &Ephemeris) -> Option<String> {
+    let own = scenario.signals.iter().filter(|signal| signal.system == set.sv.system);
+    let mut sent = own.flat_map(|signal| signal.components.iter().filter_map(|c| Some((signal.time, c.message?))));
+    sent.find_map(|(time, message)| {
+        let form = (message.form)(set);
+        // Messages count reference times by their system's clock, those that round them by GPS time.
+        let labelled = form.clone().timed(|at| time.label(at));
+        let error = (message.quantised)(&form).err().and((message.quantised)(&labelled).err())?;
+        Some(format!(
+            "{}: left out the set of reference time {}: {} cannot carry it: {error}",
+            set.sv, set.toe, message.name
+        ))
+    })
+}
+
 /// Galileo's time against GPS time: as the scene gives it, or else as the file does.
 fn galileo_ahead(scenario: &Scenario, navigation: &Navigation) -> Option<TimePolynomial> {
     let given = scenario.galileo_ahead_s.map(|a0_s| TimePolynomial { a0_s, a1_sps: 0.0, reference: scenario.start });
     given.or(navigation.galileo)
 }
 
+/// GPS time against UTC as the file has it; the whole seconds and their change as this program knows them,
+/// where the file does not.
+pub(super) fn utc(scenario: &Scenario, navigation: &Navigation) -> UtcData {
+    let now_s = scenario.start.leap_seconds();
+    let leap_s = navigation.leap_seconds.unwrap_or(now_s);
+    // A file of before a change still has the number of then, and such a message says when it changed.
+    let from = scenario.start.plus_s(if leap_s < now_s { -ANNOUNCED_S } else { 0.0 });
+    let event = navigation.leap_event.or_else(|| LeapEvent::first(from, scenario.start.plus_s(ANNOUNCED_S)));
+    UtcData { leap_s, polynomial: navigation.utc, event }
+}
+
 /// What the satellites send about the ionosphere is what the scenario gives, or what the file says.
 fn common(scenario: &Scenario, navigation: &Navigation, almanac: Vec<Ephemeris>) -> Common {
     let given = scenario.ionosphere.as_ref().and_then(Ionosphere::sent);
-    let utc = UtcData {
-        leap_s: navigation.leap_seconds.unwrap_or_else(|| scenario.start.leap_seconds()),
-        polynomial: navigation.utc,
-        event: navigation.leap_event,
-    };
     Common {
         klobuchar: given.or(navigation.klobuchar),
         klobuchar_navic: klobuchar_navic(scenario, navigation),
         klobuchar_beidou: navigation.klobuchar_beidou,
         bdgim: bdgim(scenario, navigation),
         nequick: scenario.ionosphere.as_ref().and_then(Ionosphere::sent_nequick).or(navigation.nequick),
-        utc,
+        utc: utc(scenario, navigation),
         galileo: galileo_ahead(scenario, navigation),
         almanac,
         reference: Some(scenario.start),
@@ -204,19 +247,23 @@ fn klobuchar_navic(scenario: &Scenario, navigation: &Navigation) -> Option<Klobu
     own.or(of_gps.or(navigation.klobuchar).map(|model| model.bulge_on(NAVIC_HZ)))
 }
 
-/// Why no ephemeris fits: the span of the file against that of the scene.
-fn outside(ephemerides: &[Ephemeris], system: System, scenario: &Scenario) -> String {
-    let ephemerides: Vec<&Ephemeris> = ephemerides.iter().filter(|set| set.sv.system == system).collect();
-    let reach = |e: &Ephemeris, sign: f64| e.toe.plus_s(sign * 0.5 * e.fit_interval_s());
-    let first = ephemerides.iter().map(|e| reach(e, -1.0)).min_by(|a, b| a.since(*b).total_cmp(&0.0));
-    let last = ephemerides.iter().map(|e| reach(e, 1.0)).max_by(|a, b| a.since(*b).total_cmp(&0.0));
-    let text = |at: Option<gnss::time::Epoch>| at.map_or_else(|| "nowhere".to_owned(), |at| at.to_string());
+/// Why no ephemeris fits: the time of the scene at which none is sent, and the nearest spans in which some
+/// are.
+fn outside(catalogue: &Catalogue, system: System, scenario: &Scenario, end: Epoch) -> String {
+    let spans = catalogue.sending(system);
+    let is_within = |at: Epoch| spans.iter().any(|(from, until)| *from <= at && at < *until);
+    let (what, at) = if is_within(scenario.start) { ("end", end) } else { ("start", scenario.start) };
+    let before = spans.iter().rev().find(|(_, until)| *until <= at);
+    let after = spans.iter().find(|(_, until)| *until > at);
+    let near = before.into_iter().chain(after).map(|(from, until)| format!("{from} to {until}")).collect::<Vec<_>>();
+    let expected = match near.as_slice() {
+        [] => return format!("the navigation file has no ephemeris of {system}: expected one of that system"),
+        near => near.join(" or "),
+    };
     format!(
-        "{} and {} s from then on: no {system} ephemeris of the navigation file fits; expected a scene within {} to {}",
-        scenario.start,
-        scenario.duration_s,
-        text(first),
-        text(last)
+        "no {system} ephemeris of the navigation file fits at {at}, the {what} of the scene of {} s: expected a scene \
+         within {expected}",
+        scenario.duration_s
     )
 }
 

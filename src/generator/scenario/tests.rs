@@ -1,5 +1,6 @@
 mod declared;
 mod front_end;
+mod navigation;
 mod propagation;
 mod satellite;
 mod shipped;
@@ -335,7 +336,7 @@ fn a_scene_outside_its_navigation_file_is_refused_with_the_file_s_span() {
     let error = warnings(&replaced(&base, "", "start", "2010-07-05T00:00:00")).unwrap_err();
     assert!(error.contains("expected a scene within 2010-06-30T22:") && error.contains("2010-07-02T0"), "{error}");
     let error = warnings(&replaced(&base, "", "duration_s", "200000")).unwrap_err();
-    assert!(error.contains("200000 s from then on"), "{error}");
+    assert!(error.contains("the end of the scene of 200000 s"), "{error}");
     let error =
         warnings(&replaced(&replaced(&full(), "", "duration_s", "2678400"), "front_end", "sample_rate_hz", "60e6"));
     // 2 678 400 s at 60 Msps.

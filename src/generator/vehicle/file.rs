@@ -3,8 +3,8 @@
 //! CSV columns, in any order: time as `time_s` (since the scene's start) or `gps_s` with an optional
 //! `gps_fraction_s`; position as `x_m,y_m,z_m` (ECEF) or `latitude_deg,longitude_deg,height_m`; velocity, if
 //! known, as `vx_mps,vy_mps,vz_mps` (ECEF) or `east_mps,north_mps,up_mps`. `#` begins a comment. NMEA heights
-//! become ellipsoidal by the sentence's own geoid separation. A file is read row by row and refused at the
-//! first bad one.
+//! become ellipsoidal by the sentence's own geoid separation, and what a logger puts before a sentence is
+//! passed over. A file is read row by row and refused at the first bad one.
 
 mod nmea;
 mod rows;
@@ -85,6 +85,14 @@ pub enum Fault {
     Separator {
         /// The one that is there.
         separator: char,
+    },
+    /// A file of another kind.
+    #[error("{what}: expected {expected}")]
+    Foreign {
+        /// What it seems to be.
+        what: &'static str,
+        /// What is expected, and how to come to it.
+        expected: &'static str,
     },
     /// A column that is missing.
     #[error("no column for {what}: expected {expected}; found {found}")]
@@ -217,6 +225,9 @@ impl Columns {
     fn new(header: &csv::StringRecord) -> Result<Self, Fault> {
         let names: Vec<String> =
             header.iter().map(|name| name.trim().trim_start_matches('\u{feff}').trim().to_owned()).collect();
+        if let Some(fault) = foreign(header) {
+            return Err(fault);
+        }
         if let [only] = names.as_slice()
             && let Some(separator) = only.chars().find(|c| [';', '\t', '|'].contains(c))
         {
@@ -290,6 +301,24 @@ impl Columns {
         };
         Ok(Row { t_s, position_m, velocity_mps })
     }
+}
+
+/// What a first line says of a file that is no table with a header.
+fn foreign(first: &csv::StringRecord) -> Option<Fault> {
+    let line = first.get(0).unwrap_or_default().trim().trim_start_matches('\u{feff}');
+    if line.contains("$G") || line.starts_with('$') {
+        let expected = "a table with a header, or format = \"nmea\" for such a file";
+        return Some(Fault::Foreign { what: "sentences of NMEA", expected });
+    }
+    if line.starts_with('<') {
+        let expected = "a table of CSV or sentences of NMEA, which converters such as gpsbabel make of KML and GPX";
+        return Some(Fault::Foreign { what: "XML", expected });
+    }
+    let is_number = |field: &str| field.trim().parse::<f64>().is_ok();
+    (first.len() > 1 && first.iter().all(is_number)).then_some(Fault::Foreign {
+        what: "numbers in the first line",
+        expected: "a header before them that names the columns, like time_s,latitude_deg,longitude_deg,height_m",
+    })
 }
 
 /// Bytes that end in an error where a row is too long: one that nothing ends, or whose quotes nothing closes.
@@ -376,6 +405,7 @@ pub fn read_nmea(input: impl Read, file: &str, options: &Options) -> Result<(Tra
     let mut input = BufReader::new(input.take(MAX_BYTES + 1));
     let mut rows = Rows::new(options);
     let (mut bytes, mut line, mut without_fix, mut total) = (Vec::new(), 0, 0, 0);
+    let (mut sentences, mut of_rmc) = (0_usize, 0_usize);
     loop {
         bytes.clear();
         line += 1;
@@ -387,7 +417,11 @@ pub fn read_nmea(input: impl Read, file: &str, options: &Options) -> Result<(Tra
             return Err(error(line, Fault::TooLong));
         }
         let text = std::str::from_utf8(&bytes).map_err(|_| error(line, Fault::NotText))?.trim();
-        if text.starts_with('$') && text.get(3..7) == Some("GGA,") {
+        // Loggers put a time of their own before a sentence.
+        let Some(text) = text.find('$').and_then(|at| text.get(at..)) else { continue };
+        sentences += 1;
+        of_rmc += usize::from(text.get(3..7) == Some("RMC,"));
+        if text.get(3..7) == Some("GGA,") {
             let before_s = rows.last_s();
             match gga(text, options.start, before_s).map_err(|f| error(line, f))? {
                 Some(row) => rows.push(line, row).map_err(|f| error(line, f))?,
@@ -395,7 +429,14 @@ pub fn read_nmea(input: impl Read, file: &str, options: &Options) -> Result<(Tra
             }
         }
     }
-    Ok((rows.finish(file)?, without_fix))
+    let what = match (rows.last_s(), sentences, of_rmc) {
+        (Some(_), ..) => return Ok((rows.finish(file)?, without_fix)),
+        (None, ..) if without_fix > 0 => "no GGA sentence with a fix",
+        (None, 0, _) => "no sentence of NMEA",
+        (None, _, 0) => "no GGA sentence",
+        (None, ..) => "RMC sentences, which have no height, and none of GGA",
+    };
+    Err(error(line, Fault::Foreign { what, expected: "GGA sentences with a fix, two at least" }))
 }
 
 #[cfg(test)]

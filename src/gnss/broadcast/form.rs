@@ -61,6 +61,11 @@ impl PartialEq for SetForm {
     }
 }
 
+/// Bit of GLONASS's flag l of string 3, 1 where the satellite is unhealthy, among the health flags of a
+/// record. Bit 1 says whether the almanac's health is known, and bit 0 is that health, 1 where it is good
+/// (RINEX 3.05, table A10).
+pub const STRING_3_UNHEALTHY: u16 = 2;
+
 /// Galileo's data validity and health in the order of a set, of RINEX's: E1-B in bits 0 to 2, E5a in 3 to 5,
 /// E5b in 6 to 8; and the other way, for it exchanges the last two.
 pub fn status_of_record(health: u16) -> u16 {

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use super::offset::offsets;
 use super::{Version, calendar, header_line, opening};
-use crate::broadcast::{Ephemeris, StateVector, status_of_record};
+use crate::broadcast::{Ephemeris, STRING_3_UNHEALTHY, StateVector, status_of_record};
 use crate::ionosphere::{Coefficients, Model};
 use crate::message::{Message, Raw, RecordLine, Records};
 use crate::record::NavigationRow;
@@ -214,7 +214,7 @@ fn vector_record(set: &Ephemeris, vector: &StateVector, channel: Option<i8>) -> 
         axis(0, unhealthy(2)),
         axis(1, channel),
         axis(2, f64::from(set.aodo)),
-        [0.0, set.tgd_s, f64::from(set.ura_index), unhealthy(3)],
+        [0.0, set.tgd_s, f64::from(set.ura_index), unhealthy(3) * f64::from(1 << STRING_3_UNHEALTHY)],
     ];
     let [year, month, day, hour, minute, second] = calendar(UTC.label(set.toc));
     let clock = values(&[set.af0_s, set.af1_sps, UTC.label(set.transmitted).tow_s()]);
@@ -353,7 +353,7 @@ mod tests {
     use crate::galileo::e5::{E5A, E5B};
     use crate::galileo::fnav::FNAV;
     use crate::galileo::inav::{INAV, INAV_E5B};
-    use crate::glonass::fdma::channel;
+    use crate::glonass::fdma::{G1, channel};
     use crate::glonass::gnav::GNAV;
     use crate::gps;
     use crate::gps::cnav::CNAV;
@@ -367,7 +367,7 @@ mod tests {
     use crate::navic::sps::L5;
     use crate::rinex;
     use crate::sbas::message::SBAS;
-    use crate::time::{TimePolynomial, WEEK_S};
+    use crate::time::{GLONASST, TimePolynomial, WEEK_S};
 
     const NAVIC: &[u8] = include_bytes!("../../../scenarios/navic_2026-03-09_10h_12h.rnx");
     const QZSS: &[u8] = include_bytes!("../../../scenarios/qzss_2023-03-12_02h_04h.rnx");
@@ -470,6 +470,33 @@ mod tests {
             let Some((of_set, parameters)) = (message.parameters)(&symbols) else { continue };
             let issue = if of_set { u32::from(set.iode) } else { 0 };
             NavigationRow::each(set.sv, message.name, issue, parameters).for_each(|row| sets.take(&row));
+        }
+    }
+
+    #[test]
+    fn records_of_glonass_say_a_frame_of_their_half_hour_and_the_flag_of_string_3_in_its_own_bit() {
+        let both = rinex::embedded_two_systems().unwrap().ephemerides;
+        let set = both.iter().find(|set| set.vector.is_some() && set.is_healthy()).unwrap();
+        for (health, flags) in [(0, 0.0), (0b1000, 4.0)] {
+            let (sender, own) = ((GNAV.sender)(&Common::default()).unwrap(), Ephemeris { health, ..set.clone() });
+            let own = own.timed(|at| GLONASST.label(at));
+            let mut sets = NavigationSets::default();
+            let frame = own.toe.seconds();
+            for start in (0..10).step_by(2) {
+                let symbols = sender.unit(&own, Epoch::new(frame + start, 0.0)).unwrap();
+                let (_, parameters) = (GNAV.parameters)(&symbols).unwrap();
+                NavigationRow::each(set.sv, GNAV.name, u32::from(own.iode), parameters).for_each(|row| sets.take(&row));
+            }
+            // Read within the half hour, and long before and after it.
+            for (read_s, sent_s) in [(0.0, 0.0), (46.5, 30.0), (-7000.0, -900.0), (7000.0, 870.0)] {
+                let mut bytes = Vec::new();
+                sets.write(&mut bytes, Version::Three, &[&G1], set.toe.plus_s(read_s)).unwrap();
+                let text = String::from_utf8(bytes).unwrap();
+                let lines: Vec<&str> = text.lines().rev().take(5).collect();
+                let number = |line: &str, from: usize| line[from..from + 19].trim().parse::<f64>().unwrap();
+                assert_eq!(number(lines[4], 61), UTC.label(set.toe).tow_s() + sent_s, "{text}");
+                assert_eq!((number(lines[0], 61), number(lines[3], 61)), (flags, 0.0), "{text}");
+            }
         }
     }
 

@@ -163,15 +163,23 @@ impl<W: Write> ObservationFile<W> {
             "TIME OF FIRST OBS",
         );
         text += &channels(&self.signals, self.version);
-        // Carriers of the signals' own: none is shifted against another. RINEX 4 asks for no such line.
+        // Phases are those of a band's reference signal. RINEX 4 asks for no such line.
         for signal in self.signals.iter().filter(|_| self.version == Version::Three) {
-            let one = format!("{} L{}", signal.system.letter(), signal.rinex);
+            let one = format!("{} L{} {}", signal.system.letter(), signal.rinex, shift(signal));
             text += &header_line(&one, "SYS / PHASE SHIFT");
         }
         text += &header_line("", "END OF HEADER");
         self.begun = true;
         self.writer.write_all(text.as_bytes())
     }
+}
+
+/// What was added to a signal's phases, in cycles, so that they are those of the signal that a band refers to
+/// (RINEX 3.05, tables A2 and A23); blank where nothing was. The pilot's are measured where there is one.
+fn shift(signal: &Signal) -> String {
+    let pilot = signal.components.iter().find(|component| component.message.is_none());
+    let cycles = pilot.or(signal.components.first()).map_or(0.0, |component| component.phase_cycles);
+    if cycles == 0.0 { String::new() } else { format!("{cycles:8.5}") }
 }
 
 /// Lines for satellites that divide a band: the channel of each, and by how much codes are aligned with
@@ -254,6 +262,8 @@ mod tests {
                 && header.contains("\nE    4 C1C"),
             "{header}"
         );
+        // Table A23: E1-B and L1 C/A are what their bands refer to, and E1-C has half a cycle.
+        assert!(header.contains("\nG L1C     ") && header.contains("\nE L1C  0.50000     "), "{header}");
         let lines: Vec<&str> = body.lines().collect();
         // 20 ns before a whole second: the label is the second, and its clock less ahead.
         assert_eq!(lines[0], "> 2010 07 01 08 06 19.0000000  0  2       0.001000020000");

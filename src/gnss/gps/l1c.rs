@@ -4,9 +4,9 @@
 //! Source: IS-GPS-800J, 3.2.2.1 (codes), 3.3 (modulation: both in phase, a quarter and three quarters of
 //! the power), tables 3.2-2 and 3.2-3 (Weil indices, insertion points and overlays). A code is a Weil
 //! code into which seven chips are put; overlay and message begin together, every 18 s of the week.
-//! Limits: phase against L1 C/A, which lags by a quarter of a cycle, counts for receivers that follow
-//! both as one; here every signal has a phase of its own. Numbers beyond 63 are those of other systems,
-//! of which 193 to 202 of QZSS are here (table 6.3-1): their overlays are the sum of two registers.
+//! L1C has the phase of P(Y), which L1 C/A lags by a quarter of a cycle (IS-GPS-200N, 3.3.1.5.1; RINEX 3.05,
+//! table A23). Numbers beyond 63 are those of other systems, of which 193 to 202 of QZSS are here (table
+//! 6.3-1): their overlays are the sum of two registers.
 
 use std::sync::LazyLock;
 
@@ -22,6 +22,10 @@ pub const CODE_CHIPS: u32 = 10_230;
 /// Chips of an overlay, one a code period.
 pub const OVERLAY_CHIPS: u32 = 1800;
 
+/// Phase of both components against L1 C/A. An antenna's recording has 0.243 to 0.253 cycles between pilot
+/// and C/A, modulo half a cycle, of J02, J03, J07, G04 and G18.
+const AHEAD_OF_CA_CYCLES: f64 = 0.25;
+
 /// The signal: L1C-P, and L1C-D with CNAV-2.
 pub static L1C: Signal = Signal {
     name: "GPS L1C",
@@ -35,7 +39,7 @@ pub static L1C: Signal = Signal {
     components: &[
         Component {
             power_share: 0.75,
-            phase_cycles: 0.0,
+            phase_cycles: AHEAD_OF_CA_CYCLES,
             chip_rate_hz: 1.023e6,
             code_chips: CODE_CHIPS,
             code: |number| code(Code::Pilot, gps(number)?),
@@ -45,7 +49,7 @@ pub static L1C: Signal = Signal {
         },
         Component {
             power_share: 0.25,
-            phase_cycles: 0.0,
+            phase_cycles: AHEAD_OF_CA_CYCLES,
             chip_rate_hz: 1.023e6,
             code_chips: CODE_CHIPS,
             code: |number| code(Code::Data, gps(number)?),

@@ -1,8 +1,9 @@
 //! QZSS L1C: the signal of GPS, a pilot in TMBOC under an overlay and data in BOC(1,1) with CNAV-2, with
 //! codes of PRN 193 to 202.
 //!
-//! Source: IS-QZSS-PNT-005, 3.1 and 3.2.2. Data and pilot are in phase, as those of J02 and J03 are in a
-//! recording. Limits: of J01, of Block I, the phase may be another.
+//! Source: IS-QZSS-PNT-005, 3.1 and 3.2.2. Data and pilot are in phase, and a quarter of a cycle ahead of L1
+//! C/A as those of GPS, as J02, J03 and J07 have them in a recording. Limits: of J01, of Block I, the phase
+//! may be another.
 
 use crate::gps::l1c::{self, Code, OVERLAY_CHIPS, code, overlay};
 use crate::qzss::civil::CNAV2;

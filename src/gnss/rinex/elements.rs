@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 
 use super::columns::Record;
 use crate::beidou::d1d2::issue;
-use crate::broadcast::{Ephemeris, StateVector, status_of_record};
+use crate::broadcast::{Ephemeris, STRING_3_UNHEALTHY, StateVector, status_of_record};
 use crate::galileo::fnav::FNAV_SETS;
 use crate::galileo::inav::{INAV_SETS, sisa_index};
 use crate::glonass::fdma::channel;
@@ -92,12 +92,16 @@ pub(super) fn ephemeris(record: &Record) -> Result<Ephemeris, String> {
     }
 }
 
+/// How far apart the reference times of BeiDou's orbit and clock may be: as long as a set is used. Of 2218
+/// records of two days three have them an hour apart.
+const REFERENCES_S: f64 = 4.0 * 3600.0;
+
 /// The rest of a set of BeiDou, by its own time (BDS-SIS-ICD-B1I 3.0, tables 5-6 and 5-8; RINEX 3.05, table
 /// A14).
 fn beidou(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
     let both = |name, most: f64| field(record, name, -most, most);
-    if common.toe != common.toc {
-        return Err(format!("toe = {}: expected the record's epoch, {}", common.toe, common.toc));
+    if common.toe.since(common.toc).abs() > REFERENCES_S {
+        return Err(format!("toe = {}: expected within 4 h of the record's epoch, {}", common.toe, common.toc));
     }
     Ok(Ephemeris {
         transmitted: transmitted(record, common.toe, common.toe),
@@ -145,7 +149,8 @@ fn glonass(record: &Record) -> Result<Ephemeris, String> {
     // Not known to earlier versions, and to receivers of one band.
     let later_s = record.get("deltaTau").filter(|seconds| seconds.abs() < 1e-6).unwrap_or(0.0);
     let accuracy = record.get("accuracyIndex").filter(|index| (0.0..15.0).contains(index)).unwrap_or(15.0);
-    let unhealthy = record.get("healthFlags").map_or(0, |flags| flags as u16 & 1);
+    // Its other bits say what the almanac says, which is not sent here.
+    let unhealthy = record.get("healthFlags").map_or(0, |flags| flags as u16 >> STRING_3_UNHEALTHY & 1);
     Ok(Ephemeris {
         form: &GNAV_SETS,
         transmitted: toe.plus_s(late_s),

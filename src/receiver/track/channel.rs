@@ -10,8 +10,10 @@
 
 use num_complex::Complex64;
 
+use super::bits::BitSync;
 use super::closed::{Loops, Mode, Update};
 use super::cn0::Cn0;
+use super::halves::Halves;
 use super::lock::{LockState, PhaseLock, Rotation, SymbolLock};
 use super::long::LongCode;
 use super::loops::CodeShape;
@@ -129,6 +131,10 @@ pub struct Channel {
     /// Code periods a symbol, or those summed where there are none; 1 while an overlay is unknown.
     group: u32,
     has_symbols: bool,
+    /// Of symbols of one period that are a bit's by known signs, and at which periods bits begin, once that
+    /// is known: `group` has those of a bit then.
+    bits: Option<BitSync>,
+    bit_begin: Option<u64>,
     overlay: Option<OverlaySync>,
     overlay_phase: Option<OverlayPhase>,
     data: Option<Data>,
@@ -179,6 +185,9 @@ pub struct Channel {
     previous_sum: Option<Complex64>,
     symbol: (Complex64, u32),
     rotation: Rotation,
+    /// The same within code periods, and whether it has shown no false lock since the last pull-in.
+    halves: Halves,
+    is_true: bool,
     power: Option<f64>,
     cn0: Cn0,
     phase_lock: PhaseLock,
@@ -250,6 +259,11 @@ impl Channel {
             data: component
                 .filter(|_| overlay.is_some())
                 .and_then(|c| Data::beside(c, (hit.signal, hit.sv), settings, rates)),
+            bits: message
+                .map(|message| (message.bit)(hit.sv))
+                .filter(|signs| signs.len() > 1 && has_symbols && group == 1)
+                .map(BitSync::new),
+            bit_begin: None,
             overlay,
             overlay_phase: None,
             long: component.and_then(|c| LongCode::beside(c, hit.signal, hit.sv.number, settings.replica)),
@@ -291,6 +305,8 @@ impl Channel {
             previous_sum: None,
             symbol: (Complex64::ZERO, 0),
             rotation: Rotation::default(),
+            halves: Halves::default(),
+            is_true: false,
             power: None,
             cn0: if has_symbols && group == 1 {
                 Cn0::of_single_periods(period_s, settings.cn0_average_s)
@@ -298,7 +314,7 @@ impl Channel {
                 Cn0::new(if has_symbols { group } else { 1 }, period_s, settings.cn0_average_s)
             },
             phase_lock: PhaseLock::new(LOCK_PERIODS),
-            symbol_lock: SymbolLock::new(),
+            symbol_lock: SymbolLock::new(period_s * f64::from(group)),
             sync: SymbolSync::new(group),
             pending: None,
             lock: LockState::default(),

@@ -62,8 +62,10 @@ impl Mean {
     }
 }
 
-/// Symbols over which phase lock is averaged once they are known.
+/// Symbols over which phase lock is averaged once they are known, and for how long at least: six of a
+/// millisecond at 36 dB-Hz scatter by a quarter of their mean.
 const LOCK_SYMBOLS: f64 = 6.0;
+const LOCK_S: f64 = 0.12;
 /// Symbols whose mean phase is 60° or more away are taken for a slip.
 const SLIP_COSINE: f64 = -0.5;
 /// Energy over noise density of the symbols that decide on a slip: 6.5° of thermal noise. One symbol has it
@@ -113,21 +115,15 @@ pub struct SymbolLock {
     last: VecDeque<[f64; 2]>,
 }
 
-impl Default for SymbolLock {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl SymbolLock {
-    /// Nothing is known.
-    pub fn new() -> Self {
-        Self { mean: Mean::new(LOCK_SYMBOLS), last: VecDeque::new() }
+    /// Nothing is known of symbols of that duration.
+    pub fn new(symbol_s: f64) -> Self {
+        Self { mean: Mean::new(LOCK_SYMBOLS.max(LOCK_S / symbol_s)), last: VecDeque::new() }
     }
 
     /// The lock that was just shown by other means is the first of the mean.
-    pub fn locked() -> Self {
-        let mut lock = Self::new();
+    pub fn locked(symbol_s: f64) -> Self {
+        let mut lock = Self::new(symbol_s);
         lock.mean.add([1.0, 1.0]);
         lock
     }
@@ -311,7 +307,7 @@ mod tests {
         for dbhz in [25.0, 27.0, 30.0, 35.0, 45.0] {
             let energy = 0.02 * libm::pow(10.0, dbhz / 10.0);
             let mut normal = Normal::new(3);
-            let (mut lock, mut sum, mut slips) = (SymbolLock::new(), 0.0, 0);
+            let (mut lock, mut sum, mut slips) = (SymbolLock::new(0.02), 0.0, 0);
             const SYMBOLS: u32 = 20_000;
             for _ in 0..SYMBOLS {
                 let symbol = prompt(&mut normal, (2.0 * energy).sqrt());
@@ -333,7 +329,7 @@ mod tests {
         for dbhz in [25.0, 30.0, 33.0, 45.0] {
             let energy = 0.02 * libm::pow(10.0, dbhz / 10.0);
             let mut normal = Normal::new(4);
-            let mut lock = SymbolLock::locked();
+            let mut lock = SymbolLock::locked(0.02);
             for _ in 0..50 {
                 lock.add(prompt(&mut normal, (2.0 * energy).sqrt()), Some(energy));
             }
@@ -421,7 +417,7 @@ mod tests {
 
     #[test]
     fn nothing_gives_finite_numbers() {
-        let (mut lock, mut symbols) = (PhaseLock::new(10.0), SymbolLock::new());
+        let (mut lock, mut symbols) = (PhaseLock::new(10.0), SymbolLock::new(0.02));
         for _ in 0..200 {
             lock.add(Complex64::ZERO, 2.0);
             assert!(!symbols.add(Complex64::ZERO, Some(0.0)));

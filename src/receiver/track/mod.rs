@@ -8,11 +8,13 @@
 
 use gnss::record::{Event, TrackingRow};
 
+mod bits;
 mod channel;
 pub mod closed;
 pub mod cn0;
 #[cfg(test)]
 mod ensemble_tests;
+mod halves;
 pub mod lock;
 mod long;
 pub mod loops;

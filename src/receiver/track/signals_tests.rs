@@ -288,3 +288,97 @@ fn every_synthetic_signal_is_followed_with_the_phase_of_the_whole_signal() {
         assert_eq!(found.channel.link(), sky.link);
     }
 }
+
+/// A period's half cycle beside the carrier, 1/(2T), where sums of periods with signs of their own have side
+/// lobes.
+#[test]
+fn no_channel_stays_locked_beside_its_carrier_where_each_period_has_a_sign_of_its_own() {
+    use gnss::beidou::b2b::B2B;
+    use gnss::beidou::in_phase::{B1I, B3I};
+    use gnss::galileo::e1::E1;
+    use gnss::gps::l1c::L1C;
+    use gnss::satellite::System;
+    let all: [(&'static Signal, System, u8, f64); 6] = [
+        (&B1I, System::BeiDou, 20, 5e6),
+        (&B1I, System::BeiDou, 2, 5e6),
+        (&B3I, System::BeiDou, 20, 21e6),
+        (&B2B, System::BeiDou, 20, 21e6),
+        (&E1, System::Galileo, 11, 5e6),
+        (&L1C, System::Gps, 4, 5e6),
+    ];
+    for (signal, system, number, rate_hz) in all {
+        let link = signal.link(Sv { system, number });
+        let component = lead(signal).unwrap();
+        for (cn0_dbhz, side) in [(44.0, 1.0), (44.0, -1.0), (38.0, 1.0)] {
+            let mut stream = Stream::new(link, rate_hz, 17);
+            (stream.doppler_hz, stream.cn0_dbhz, stream.sent_s) = (1234.0, cn0_dbhz, 0.0123);
+            stream.send_symbols();
+            let doppler_hz = stream.doppler_hz + side * 0.5 / component.period_s();
+            let chips = stream.chips(0.0).rem_euclid(f64::from(component.code_chips));
+            let (sv, code_phase_chips) = (link.sv, chips);
+            let hit = Acquired { sv, signal, sample: 0, code_phase_chips, doppler_hz, cn0_dbhz };
+            let mut channel = Channel::start(&hit, &stream.metadata(), &TrackingSettings::default());
+            let (mut report, length) = (Report::default(), (0.02 * rate_hz) as usize);
+            for _ in 0..150 {
+                let block = stream.block(length);
+                channel.advance(&block, &[], &mut report);
+            }
+            let events: Vec<_> = report.events.iter().map(|(n, event)| (*n as f64 / rate_hz, *event)).collect();
+            let off_hz = channel.doppler_hz() - stream.doppler_hz;
+            println!("{link} {cn0_dbhz} dB-Hz {side:+}: {off_hz:+.1} Hz, {events:?}");
+            // Three seconds after its start: locked, and nowhere near the other side of a quarter.
+            assert!(channel.is_settled() && off_hz.abs() < 0.05 / component.period_s(), "{link}: {off_hz} {events:?}");
+        }
+    }
+}
+
+#[test]
+fn integrations_are_as_long_as_set_under_the_code_of_bits_and_nothing_looks_like_a_slip_at_36_dbhz() {
+    use gnss::beidou::d1d2::D1_D2;
+    use gnss::beidou::in_phase::B1I;
+    use gnss::record::Event;
+    use gnss::satellite::System;
+    // D1 has bits of 20 ms under a code, D2 of 2 ms.
+    for (number, integration_s) in [(20, 4e-3), (2, 2e-3)] {
+        let link = B1I.link(Sv { system: System::BeiDou, number });
+        let signs = (D1_D2.bit)(link.sv);
+        for seed in 1..=4 {
+            let mut stream = Stream::new(link, 5e6, seed);
+            (stream.doppler_hz, stream.cn0_dbhz, stream.sent_s) = (-1234.0, 36.0, 0.0123 + 1e-3 * seed as f64);
+            stream.send_bits(signs);
+            let code_phase_chips = stream.chips(0.0).rem_euclid(2046.0);
+            let hit = Acquired {
+                sv: link.sv,
+                signal: &B1I,
+                sample: 0,
+                code_phase_chips,
+                doppler_hz: stream.doppler_hz + 20.0,
+                cn0_dbhz: 36.0,
+            };
+            let mut channel = Channel::start(&hit, &stream.metadata(), &TrackingSettings::default());
+            let (mut report, length) = (Report::default(), 100_000);
+            for _ in 0..250 {
+                let block = stream.block(length);
+                let last = block.first + length as u64 - 1;
+                channel.advance(&block, &[last], &mut report);
+            }
+            let events: Vec<Event> = report.events.iter().map(|(_, event)| *event).collect();
+            println!("{link}: {events:?}");
+            assert_eq!(events.iter().filter(|event| **event == Event::CycleSlip).count(), 0, "{link} {events:?}");
+            assert_eq!(report.rows.last().unwrap().integration_s, integration_s, "{link}");
+            // Every symbol comes out once, in order and as it was sent, the same way up: one in 430 is wrong.
+            let numbers: Vec<u64> = report.symbols.iter().map(|symbol| symbol.first_period).collect();
+            assert!(numbers.len() > 3000 && numbers.windows(2).all(|two| two[1] == two[0] + 1), "{link}");
+            let first = (stream.sent_s / 1e-3).floor() as i64;
+            let late = report.symbols.iter().filter(|symbol| symbol.end > 10_000_000);
+            let alike = late.map(|found| {
+                let (number, length) = (first + found.first_period as i64, signs.len() as i64);
+                let sign = f64::from(signs[number.rem_euclid(length) as usize]);
+                f64::from(found.soft.signum()) == sign * symbol(number.div_euclid(length))
+            });
+            let alike: Vec<bool> = alike.collect();
+            let share = alike.iter().filter(|alike| **alike).count() as f64 / alike.len() as f64;
+            assert!(!(0.01..0.99).contains(&share), "{link}: {share}");
+        }
+    }
+}

@@ -205,6 +205,13 @@ impl Stream {
         }
     }
 
+    /// Sends random bits under a code of a symbol a code period.
+    pub fn send_bits(&mut self, signs: &[i8]) {
+        for integral in &mut self.components {
+            (integral.overlay, integral.symbol_periods) = (signs.to_vec(), Some(signs.len() as i64));
+        }
+    }
+
     /// Adds the components' means over `sum.len()` samples from number `first` on.
     fn waveform(&self, first: u64, sum: &mut [Complex64]) {
         let dilation = 1.0 + self.doppler_hz / self.link.carrier_hz();

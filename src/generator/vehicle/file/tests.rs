@@ -71,6 +71,15 @@ fn each_damage_is_refused_at_its_line_with_its_reason() {
         assert!(error.line == line && message.contains(reason), "{text:?}: {message}");
         assert!(message.starts_with("ride.csv: line "));
     }
+    for (text, reason) in [
+        ("$GPGGA,100015.00,2630.0,N,08012.0,E,1,08,1.0,130,M,0,M,,*00\n", "format = \"nmea\""),
+        ("[10:00:15.1] $GPRMC,100015.00,A\n", "format = \"nmea\""),
+        ("<?xml version=\"1.0\"?>\n<kml>\n", "XML: expected a table of CSV or sentences of NMEA"),
+        ("0,26.5,80.2,130\n1,26.5,80.2,130\n", "a header before them that names the columns"),
+    ] {
+        let message = csv(text).unwrap_err().to_string();
+        assert!(message.starts_with("ride.csv: line 1: ") && message.contains(reason), "{text:?}: {message}");
+    }
     let error = read_csv(&b"time_s,x_m,y_m,z_m\n0,\xff,0,0\n"[..], "ride.csv", &options()).unwrap_err();
     assert!(matches!(error.fault, Fault::NotText), "{error}");
 }
@@ -190,6 +199,15 @@ fn gga_gives_ellipsoidal_height_and_crosses_midnight() {
 }
 
 #[test]
+fn what_a_logger_puts_before_a_sentence_is_passed_over() {
+    let body = |second: u32| sentence(&format!("GPGGA,1000{second:02},2630.0,N,08012.0,E,1,08,0.9,100.0,M,-30.0,M,,"));
+    let plain = format!("{}{}", body(0), body(1));
+    let stamped = format!("2010-07-01 10:00:00.123 {}[1277978401.2] {}\n", body(0), body(1));
+    let [one, other] = [plain, stamped].map(|text| read_nmea(text.as_bytes(), "ride.log", &options()).unwrap().0);
+    assert_eq!((one.span_s(), one.at(-14.5)), (other.span_s(), other.at(-14.5)));
+}
+
+#[test]
 fn damaged_gga_is_refused_with_its_reason() {
     let good = sentence("GPGGA,100000,2630.0,N,08012.0,E,1,08,0.9,100.0,M,-30.0,M,,");
     for (text, reason) in [
@@ -199,7 +217,10 @@ fn damaged_gga_is_refused_with_its_reason() {
         (sentence("GPGGA,250000,2630.0,N,08012.0,E,1,08,0.9,100.0,M,-30.0,M,,"), "hhmmss"),
         (sentence("GPGGA,100000,9930.0,N,08012.0,E,1,08,0.9,100.0,M,-30.0,M,,"), "position"),
         (sentence("GPGGA,100000,2630.0,N"), "12 fields"),
-        ("nothing here\n".to_owned(), "at least 2"),
+        ("nothing here\n".to_owned(), "no sentence of NMEA: expected GGA"),
+        (sentence("GPRMC,100000,A,2630.0,N,08012.0,E,1.0,60.0,010710,,"), "RMC sentences, which have no height"),
+        (sentence("GPGGA,100000,2630.0,N,08012.0,E,0,08,0.9,100.0,M,-30.0,M,,"), "no GGA sentence with a fix"),
+        (sentence("GPGSV,1,1,00"), "no GGA sentence: expected"),
     ] {
         let error = read_nmea(text.as_bytes(), "ride.nmea", &options()).unwrap_err().to_string();
         assert!(error.contains(reason), "{text}: {error}");

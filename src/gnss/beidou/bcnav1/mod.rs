@@ -40,6 +40,7 @@ pub use reader::BCnav1Reader;
 pub static B_CNAV1: Message = Message {
     name: "B-CNAV1",
     symbol_s: 0.01,
+    bit: |_| &[1],
     unit_s: FRAME_S,
     set_s: FRAME_S,
     first_s: 0,

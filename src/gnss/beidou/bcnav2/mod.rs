@@ -28,6 +28,7 @@ use crate::message::{Message, Records};
 pub static B_CNAV2: Message = Message {
     name: "B-CNAV2",
     symbol_s: 0.005,
+    bit: |_| &[1],
     unit_s: MESSAGE_S,
     set_s: MESSAGE_S * ORDER.len() as i64,
     first_s: 0,

@@ -27,6 +27,7 @@ use crate::message::{Message, Records};
 pub static B_CNAV3: Message = Message {
     name: "B-CNAV3",
     symbol_s: 0.001,
+    bit: |_| &[1],
     unit_s: MESSAGE_S,
     set_s: MESSAGE_S * ORDER.len() as i64,
     first_s: 0,

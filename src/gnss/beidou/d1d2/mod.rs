@@ -32,6 +32,7 @@ pub use reader::D1D2Reader;
 pub static D1_D2: Message = Message {
     name: "D1/D2",
     symbol_s: 0.001,
+    bit: |sv| if sv.is_geostationary() { &[1; D2_SYMBOLS] } else { &NEUMAN_HOFMAN_SIGNS },
     unit_s: UNIT_S,
     set_s: UNIT_S,
     first_s: 0,
@@ -63,7 +64,7 @@ pub static D1_D2: Message = Message {
         }
         let mut orbit = Orbit::blank(sv, near);
         read_all(&D1_SET, &set, &mut orbit);
-        orbit.set()
+        Some(orbit.set())
     },
     parameters: |symbols| parameters(symbols).map(|found| (true, found)),
     reader: |sv| Box::new(D1D2Reader::new(sv)),
@@ -103,6 +104,18 @@ const D2_PAGE: (u16, u8) = (42, 4);
 /// The Neuman-Hofman code (5.1.1): 0000 0100 1101 0100 1110, first chip in the highest of twenty bits.
 const NEUMAN_HOFMAN: u32 = 0b0000_0100_1101_0100_1110;
 
+/// The same as signs, +1 for a logical 0.
+const NEUMAN_HOFMAN_SIGNS: [i8; D1_SYMBOLS] = {
+    let (mut signs, mut place) = ([1; D1_SYMBOLS], 0);
+    while place < D1_SYMBOLS {
+        if NEUMAN_HOFMAN >> (D1_SYMBOLS - 1 - place) & 1 == 1 {
+            signs[place] = -1;
+        }
+        place += 1;
+    }
+    signs
+};
+
 /// A subframe without its interleaving.
 pub type Subframe = Bits<SUBFRAME_BITS>;
 
@@ -122,10 +135,10 @@ impl Orbit {
         Self { ephemeris: Ephemeris::blank(sv, near), klobuchar: Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] } }
     }
 
-    /// The set, numbered; `None` where clock and orbit refer to different times.
-    fn set(mut self) -> Option<Ephemeris> {
+    /// The set, numbered.
+    fn set(mut self) -> Ephemeris {
         self.ephemeris.iode = issue(self.ephemeris.toe.tow_s());
-        (self.ephemeris.toe == self.ephemeris.toc).then_some(self.ephemeris)
+        self.ephemeris
     }
 }
 
@@ -151,7 +164,6 @@ impl Sender for Frames {
             let expected = "a multiple of 30 s of BDT";
             return Err(FieldError::Start { message: D1_D2.name, start_s: start.tow_s(), expected });
         }
-        check(ephemeris)?;
         let on_air = Ephemeris { transmitted: start, ..ephemeris.clone() };
         let klobuchar = self.klobuchar.unwrap_or(Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] });
         let orbit = Orbit { ephemeris: on_air, klobuchar };
@@ -309,21 +321,11 @@ fn parameters(symbols: &[bool]) -> Option<Vec<(&'static str, i64)>> {
     Some(integers(&D2_SET, &D2Set::joined(parts.iter().map(|part| &part.0))))
 }
 
-/// Nothing but equal reference times shows a receiver that the parts of a set belong together.
-fn check(ephemeris: &Ephemeris) -> Result<(), FieldError> {
-    if ephemeris.toe == ephemeris.toc {
-        Ok(())
-    } else {
-        Err(FieldError::References { toe_s: ephemeris.toe.tow_s(), toc_s: ephemeris.toc.tow_s() })
-    }
-}
-
 /// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays. Times are BDT's.
 ///
 /// # Errors
 /// A value that the message cannot carry.
 pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    check(ephemeris)?;
     let mut orbit = Orbit { ephemeris: ephemeris.clone(), ..Orbit::blank(ephemeris.sv, ephemeris.toe) };
     quantise_all(&D1_SET, &mut orbit)?;
     Ok(orbit.ephemeris)

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use super::{
-    D1_D2, D1_PARTS, D1_SYMBOLS, D2_PAGE, D2_PARTS, D2_SYMBOLS, SUBFRAME_BITS, Subframe, chip, decode, given, id,
-    orbit_of, second, sent_at,
+    D1_D2, D1_PARTS, D1_SYMBOLS, D2_PAGE, D2_PARTS, D2_SYMBOLS, SUBFRAME_BITS, Subframe, UNIT_S, chip, decode, given,
+    id, orbit_of, second, sent_at,
 };
 use crate::bits::Store;
 use crate::message::{Read, Reader};
@@ -155,7 +155,13 @@ impl D1D2Reader {
         let sent = sent_at(first, self.is_d2(), near);
         let (orbit, content) = orbit_of(self.sv, &parts, sent);
         let klobuchar = orbit.klobuchar;
-        let Some(set) = orbit.set() else { return };
+        let set = orbit.set();
+        // Equal reference times show that clock and orbit belong together, and else that one frame has both,
+        // for sets change between frames.
+        let frame_of = |part: &Subframe| i64::from(second(part)) / UNIT_S;
+        if set.toe != set.toc && parts.iter().any(|part| frame_of(part) != frame_of(first)) {
+            return;
+        }
         // A set is sent from its reference time on: an older part is of the one before.
         let toe_s = set.toe.tow_whole_s();
         let is_later = |part: &Subframe| {
@@ -211,5 +217,86 @@ impl Reader for D1D2Reader {
 
     fn missing(&self) -> Vec<u8> {
         (1..=self.wanted()).filter(|part| !self.parts.contains_key(part)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::beidou::d1d2::D1_D2;
+    use crate::broadcast::Ephemeris;
+    use crate::message::{Common, Read};
+    use crate::rinex;
+    use crate::time::{BDT, Epoch};
+
+    /// Records of C06 of 2026-03-09 as a merged broadcast file has them (BRD400DLR of that day; facts): a set
+    /// with an orbit an hour after its clock, and the set of that later hour.
+    const RECORDS: &str = "     4.02           NAVIGATION DATA     M                   RINEX VERSION / TYPE
+                                                            END OF HEADER
+> EPH C06 D1
+C06 2026 03 09 10 00 00-5.743734072894e-05-2.088729189609e-11-1.355252715607e-18
+     3.000000000000e+00-1.409218750000e+02 1.514348792991e-09 9.606621144502e-01
+    -4.454515874386e-06 5.344783887267e-03 1.278659328818e-05 6.493863193512e+03
+     1.260000000000e+05 1.532025635242e-07-3.182743444897e-02 1.429580152035e-07
+     9.484289784224e-01-1.596562500000e+02-2.480283272977e+00-1.989368579472e-09
+    -3.828730910582e-10 0.000000000000e+00 1.053000000000e+03 0.000000000000e+00
+     2.000000000000e+00 0.000000000000e+00 8.400000000000e-09-1.400000000000e-09
+     1.259700000000e+05 2.000000000000e+00
+";
+    const LATER: &str = "\
+> EPH C06 D1
+C06 2026 03 09 11 00 00-5.751254502684e-05-2.089706185870e-11-1.355252715607e-18
+     4.000000000000e+00-1.409218750000e+02 1.514348792991e-09 9.606621144502e-01
+    -4.454515874386e-06 5.344783887267e-03 1.278659328818e-05 6.493863193512e+03
+     1.260000000000e+05 1.532025635242e-07-3.182743444897e-02 1.429580152035e-07
+     9.484289784224e-01-1.596562500000e+02-2.480283272977e+00-1.989368579472e-09
+    -3.828730910582e-10 0.000000000000e+00 1.053000000000e+03 0.000000000000e+00
+     2.000000000000e+00 0.000000000000e+00 8.400000000000e-09-1.400000000000e-09
+     1.260000000000e+05 2.000000000000e+00
+";
+
+    /// What is read of frames, each with its set, in seconds after the orbit's reference time of the first.
+    fn read(frames: &[(i64, &Ephemeris)]) -> Vec<Ephemeris> {
+        let first = frames[0].1;
+        let (sender, mut reader) = ((D1_D2.sender)(&Common::default()).unwrap(), (D1_D2.reader)(first.sv));
+        let mut sets = Vec::new();
+        for (late_s, set) in frames {
+            let own = (*set).clone().timed(|at| BDT.label(at));
+            let start = BDT.label(first.toe).plus_s(*late_s as f64);
+            for symbol in sender.unit(&own, start).unwrap() {
+                let news = reader.take(if symbol { -1.0 } else { 1.0 }, start);
+                sets.extend(news.into_iter().filter_map(|read| match read {
+                    Read::Ephemeris(set) => Some(set.timed(|label| BDT.instant(label))),
+                    _ => None,
+                }));
+            }
+        }
+        sets
+    }
+
+    #[test]
+    fn a_set_whose_clock_is_older_than_its_orbit_is_kept_sent_and_read_where_one_frame_has_both() {
+        let file = rinex::read(RECORDS.as_bytes(), "C06").unwrap();
+        assert!(file.skipped.is_empty(), "{:?}", file.skipped);
+        let [set] = file.ephemerides.as_slice() else { panic!("{file:?}") };
+        let label = |at: Epoch| BDT.label(at).tow_s();
+        assert_eq!((label(set.toc), label(set.toe)), (122_400.0, 126_000.0));
+        // Where bits begin is found in the first half second, so that the first frame lacks its first
+        // subframe.
+        let sets = read(&[(0, set), (30, set)]);
+        let [back] = sets.as_slice() else { panic!("{sets:?}") };
+        assert_eq!((back.toc, back.toe), (set.toc, set.toe));
+        assert!((back.af0_s - set.af0_s).abs() < 1e-15 && (back.m0_rad - set.m0_rad).abs() < 1e-11);
+        // Two sets that follow one another are not joined: the first frame has the orbit, the next one the
+        // clock.
+        let whole = Ephemeris { toc: set.toe, ..set.clone() };
+        assert!(read(&[(0, &whole), (30, set)]).iter().all(|back| back.toc == set.toc));
+        // Beside the set of that hour the record is one that a converter joined.
+        let file = rinex::read(format!("{RECORDS}{LATER}").as_bytes(), "C06").unwrap();
+        assert_eq!(file.ephemerides.iter().map(|set| label(set.toc)).collect::<Vec<_>>(), [126_000.0]);
+        assert!(file.skipped[0].contains("with an older clock"), "{:?}", file.skipped);
+        // A clock of another day is none of the orbit's.
+        let astray = RECORDS.replace("2026 03 09 10 00 00", "2026 03 08 10 00 00");
+        let error = rinex::read(astray.as_bytes(), "C06").unwrap_err().to_string();
+        assert!(error.contains("expected within 4 h of the record's epoch"), "{error}");
     }
 }

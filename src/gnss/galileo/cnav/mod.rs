@@ -31,6 +31,7 @@ pub use reader::CnavReader;
 pub static CNAV: Message = Message {
     name: "C/NAV",
     symbol_s: 0.001,
+    bit: |_| &[1],
     unit_s: PAGE_S,
     set_s: PAGE_S,
     first_s: 0,

@@ -32,6 +32,7 @@ pub use reader::FnavReader;
 pub static FNAV: Message = Message {
     name: "F/NAV",
     symbol_s: 0.02,
+    bit: |_| &[1],
     unit_s: PAGE_S,
     set_s: PAGE_S,
     first_s: 0,

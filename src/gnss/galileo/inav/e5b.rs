@@ -17,6 +17,7 @@ use crate::time::Epoch;
 pub static INAV_E5B: Message = Message {
     name: "I/NAV on E5b",
     symbol_s: INAV.symbol_s,
+    bit: |_| &[1],
     unit_s: PAGE_S,
     set_s: PAGE_S,
     first_s: 0,

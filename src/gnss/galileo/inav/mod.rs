@@ -41,6 +41,7 @@ pub use redundancy::redundancy;
 pub static INAV: Message = Message {
     name: "I/NAV",
     symbol_s: 0.004,
+    bit: |_| &[1],
     unit_s: PAGE_S,
     set_s: PAGE_S,
     // The even part begins at an odd second on E1-B (4.3.2.2).

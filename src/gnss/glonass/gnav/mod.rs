@@ -31,6 +31,7 @@ pub use reader::GnavReader;
 pub static GNAV: Message = Message {
     name: "GNAV",
     symbol_s: 0.01,
+    bit: |_| &[1],
     unit_s: STRING_S,
     set_s: STRING_S,
     first_s: 0,
@@ -77,8 +78,9 @@ pub static GNAV_SETS: SetForm = SetForm {
 
 /// A frequency between G1 and G2.
 const BETWEEN_HZ: f64 = 1.4e9;
-/// Bits of [`Ephemeris::health`] that the user regards.
+/// Bits of [`Ephemeris::health`] that the user regards, and of them the flag l.
 const UNHEALTHY: u16 = 0b1100;
+const UNHEALTHY_OF_STRING_3: u16 = 3;
 /// Seconds of a string and of a frame, and strings of it.
 const STRING_S: i64 = 2;
 const FRAME_S: i64 = 30;
@@ -106,6 +108,8 @@ const FIVE: (u16, u8) = (5, 1);
 const KIND: (u16, u8) = (75, 2);
 const DAY: (u16, u8) = (59, 11);
 const SLOT: (u16, u8) = (70, 5);
+/// The flag l of string 3 once more, in strings 5, 7, 9, 11, 13 and 15 (4.4, l_n).
+const UNHEALTHY_AGAIN: (u16, u8) = (76, 1);
 /// Thirty minutes between sets, a GLONASS-M satellite.
 const HALF_AN_HOUR: u32 = 1;
 const MODERNISED: u32 = 1;
@@ -165,6 +169,10 @@ impl Sender for Strings {
                 write_all(&STRING_5, &system, &mut string)?;
             }
             _ => {}
+        }
+        if number % 2 == 1 && number >= 5 {
+            let unhealthy = ephemeris.health >> UNHEALTHY_OF_STRING_3 & 1;
+            string.set_piece(UNHEALTHY_AGAIN, u32::from(unhealthy));
         }
         string.set_piece(ID, u32::from(number));
         Ok(encode(&string))
@@ -239,7 +247,7 @@ fn of_set() -> [&'static [Element<Ephemeris>]; 4] {
     [&STRING_1, &STRING_2, &STRING_3, &STRING_4]
 }
 
-/// The elements that raw integers give, as if they had been sent at `near`.
+/// The elements that raw integers give, as if they had been sent in the frame nearest to `near`.
 fn of_integers(sv: Sv, raw: &dyn Fn(&str) -> Option<i64>, near: Epoch) -> Option<Ephemeris> {
     let mut found = Ephemeris { form: &GNAV_SETS, ..Ephemeris::blank(sv, near) };
     for table in of_set() {
@@ -249,7 +257,11 @@ fn of_integers(sv: Sv, raw: &dyn Fn(&str) -> Option<i64>, near: Epoch) -> Option
         }
         read_all(table, &string, &mut found);
     }
-    Some(found)
+    // Sent in a frame of the set's own half hour.
+    let half_s = 0.5 * found.fit_interval_s();
+    let late_s = near.since(found.toe).clamp(-half_s, half_s - FRAME_S as f64);
+    let sent = found.toe.plus_s(late_s).seconds().div_euclid(FRAME_S) * FRAME_S;
+    Some(Ephemeris { transmitted: Epoch::new(sent, 0.0), ..found })
 }
 
 /// The elements in strings 1 to 4, of which the first was sent at `sent`.
@@ -316,4 +328,38 @@ pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
 /// How many of the last symbols of a string are those of the time mark.
 fn alike(mark: impl Iterator<Item = f32>) -> usize {
     mark.zip(bits_of(u128::from(MARK), MARK_SYMBOLS)).filter(|(soft, one)| (*soft < 0.0) == *one).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::message::Common;
+    use crate::satellite::System;
+
+    #[test]
+    fn all_odd_strings_from_the_fifth_on_repeat_the_flag_of_the_third() {
+        let near = Epoch::parse("2023-09-19T11:45:00").unwrap();
+        let sender = (GNAV.sender)(&Common::default()).unwrap();
+        for health in [0, 0b1000] {
+            let set = Ephemeris {
+                form: &GNAV_SETS,
+                health,
+                ..Ephemeris::blank(Sv { system: System::Glonass, number: 5 }, near)
+            };
+            for number in 1..=15 {
+                let symbols = sender.unit(&set, near.plus_s(f64::from(2 * (number - 1)))).unwrap();
+                let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
+                let string = decode_soft(&soft).unwrap();
+                // Numbered from the last bit on, bit 65 of string 3 and bit 9 of the others (ICD 5.1, table
+                // 4.6).
+                let bit = |number: usize| string.0[STRING_BITS - number];
+                let said = match number {
+                    3 => Some(bit(65)),
+                    5 | 7 | 9 | 11 | 13 | 15 => Some(bit(9)),
+                    _ => None,
+                };
+                assert!(said.is_none_or(|ill| ill == (health != 0)), "string {number}");
+            }
+        }
+    }
 }

@@ -36,6 +36,7 @@ pub use reader::CnavReader;
 pub static CNAV: Message = Message {
     name: "CNAV",
     symbol_s: 0.01,
+    bit: |_| &[1],
     unit_s: MESSAGE_S,
     set_s: MESSAGE_S,
     first_s: 0,

@@ -11,6 +11,7 @@ use crate::message::{IonosphereForm, Message};
 pub static CNAV_L2C: Message = Message {
     name: "CNAV on L2C",
     symbol_s: 2.0 * CNAV.symbol_s,
+    bit: |_| &[1],
     unit_s: MESSAGE_S * 2,
     set_s: MESSAGE_S * 2,
     sender: |common| Ok(sender(common, &CNAV_L2C)),

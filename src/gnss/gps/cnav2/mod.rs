@@ -39,6 +39,7 @@ pub use reader::Cnav2Reader;
 pub static CNAV2: Message = Message {
     name: "CNAV-2",
     symbol_s: 0.01,
+    bit: |_| &[1],
     unit_s: FRAME_S,
     set_s: FRAME_S,
     first_s: 0,

@@ -15,6 +15,7 @@ use crate::time::{Epoch, TimePolynomial, WEEK_S};
 pub const ALMANAC_INCLINATION_SEMICIRCLES: f64 = 0.30;
 /// Step of an almanac's reference time (IS-GPS-200N, table 20-VI).
 const TOA_STEP_S: i64 = 4096;
+const DAY_S: i64 = 86_400;
 /// The last reference time inside a week (IS-GPS-200N, table 20-VI).
 const TOA_LAST_S: i64 = 602_112;
 /// "Data ID" of the present structure, 01, in bits 61 and 62 (IS-GPS-200N, 20.3.3.5.1.1).
@@ -130,6 +131,25 @@ pub struct LeapEvent {
     pub week: i64,
     /// 1 to 7, Sunday first.
     pub day: u8,
+}
+
+impl LeapEvent {
+    /// The first change after one time, up to another; those that are known are in this program's table.
+    pub fn first(after: Epoch, until: Epoch) -> Option<Self> {
+        let leap_s = |seconds: i64| Epoch::new(seconds, 0.0).leap_seconds();
+        let (mut before, mut behind) = (after.seconds(), until.seconds());
+        if leap_s(before) == leap_s(behind) {
+            return None;
+        }
+        while behind - before > 1 {
+            let middle = before + (behind - before) / 2;
+            if leap_s(middle) == leap_s(after.seconds()) { before = middle } else { behind = middle }
+        }
+        let after_s = leap_s(behind);
+        // UTC's midnight, at the end of the day before.
+        let days = (behind - after_s).div_euclid(DAY_S) - 1;
+        Some(Self { after_s, week: days.div_euclid(7), day: days.rem_euclid(7) as u8 + 1 })
+    }
 }
 
 /// The multiple of 4096 s nearest to `reference` inside its week.

@@ -42,6 +42,7 @@ const ANTI_SPOOF: u32 = 1;
 pub static LNAV: Message = Message {
     name: "LNAV",
     symbol_s: 0.02,
+    bit: |_| &[1],
     unit_s: SUBFRAME_S,
     set_s: SUBFRAME_S,
     first_s: 0,

@@ -44,6 +44,7 @@ pub use reader::L1NavReader;
 pub static L1_NAV: Message = Message {
     name: "L1 NAV",
     symbol_s: 0.01,
+    bit: |_| &[1],
     unit_s: FRAME_S,
     set_s: FRAME_S,
     first_s: 0,

@@ -32,6 +32,7 @@ pub use reader::NavReader;
 pub static SPS_NAV: Message = Message {
     name: "SPS NAV",
     symbol_s: 0.02,
+    bit: |_| &[1],
     unit_s: SUBFRAME_S,
     set_s: SUBFRAME_S,
     first_s: 0,

@@ -37,6 +37,7 @@ pub use reader::SbasReader;
 pub static SBAS: Message = Message {
     name: "SBAS",
     symbol_s: 0.002,
+    bit: |_| &[1],
     unit_s: 1,
     first_s: 0,
     set_s: 1,

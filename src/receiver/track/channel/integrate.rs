@@ -11,6 +11,8 @@ use crate::track::{Report, Symbol};
 
 /// Periods over which the power of the samples is averaged.
 const POWER_PERIODS: f64 = 100.0;
+/// Halves of periods are compared in one of this many, once they have shown a true lock.
+const HALVES_EVERY: u64 = 16;
 /// The power is measured in one of this many periods.
 const POWER_EVERY: u64 = 8;
 
@@ -47,6 +49,7 @@ impl Channel {
             let phase = self.overlay_phase.unwrap_or_default();
             report.symbols.extend(data.read(samples, self.arithmetic, &nco, (self.period, phase, next), scale));
         }
+        let first = self.first_half(replica, samples, &nco);
         let found = self.seek_segment(samples, &nco, scale);
         self.pass(next);
         self.code -= replica.period();
@@ -67,10 +70,25 @@ impl Channel {
         if let Some(sides) = sides {
             self.watch_side_peaks(taps[1], sides.map(|sum| sum * scale), report);
         }
+        if let Some(first) = first {
+            self.halves.add(sums[1] * scale, first * scale);
+        }
         self.take(finished, taps, report);
         if let Some(phase) = found {
             self.follow_long(phase);
         }
+    }
+
+    /// The prompt of the running period's first half, where a false lock shows there alone.
+    fn first_half(&self, replica: &Replica, samples: Samples, nco: &Nco) -> Option<Complex64> {
+        let is_due = !self.is_true || self.period.is_multiple_of(HALVES_EVERY);
+        // The frequency loop alone has come to rest before.
+        let rests = matches!(self.stage, Stage::Assisted | Stage::Tracking(_));
+        let is_wanted = self.has_single_periods() && self.whole && !self.held && rests;
+        (is_wanted && is_due).then(|| {
+            let [sum] = replica.correlate_in(self.arithmetic, samples.part(0, samples.count() / 2), nco, &[0]);
+            sum
+        })
     }
 
     /// All taps of the running period in one pass.
@@ -134,6 +152,12 @@ impl Channel {
         if self.held {
             return;
         }
+        let is_in_bit = self.bit_begin.is_some();
+        if is_in_bit && self.confirmed {
+            // As it was sent, with the sign that its bit's code has there.
+            let soft = (prompt.re * self.overlay_chip(number)) as f32;
+            report.symbols.push(Symbol { first_period: number, end: self.first, soft });
+        }
         self.symbol.0 += prompt;
         self.symbol.1 += 1;
         self.rotation.add(prompt, self.symbol.1, self.group);
@@ -147,7 +171,7 @@ impl Channel {
             if slipped && self.lock.slip(self.first) {
                 self.break_count(report);
             }
-            if self.has_symbols && self.confirmed {
+            if self.has_symbols && self.confirmed && !is_in_bit {
                 let soft = (self.symbol.0.re / f64::from(self.group).sqrt()) as f32;
                 report.symbols.push(Symbol { first_period: number + 1 - length, end: self.first, soft });
             }

@@ -5,11 +5,12 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use super::supervise::pilot_group;
-use super::{Channel, Symbol};
+use super::{Channel, Stage, Symbol};
 use crate::correlate::sums::Samples;
 use crate::correlate::{Arithmetic, Nco, Replica, TURN, Wave};
 use crate::lead::beside;
 use crate::track::TrackingSettings;
+use crate::track::cn0::Cn0;
 use crate::track::model::ReplicaModel;
 use crate::track::overlay::{OverlayPhase, OverlaySync};
 use gnss::satellite::Sv;
@@ -93,11 +94,40 @@ impl Data {
 }
 
 impl Channel {
-    /// The sign of the overlay in a code period; one while it is unknown.
+    /// The sign of the overlay in a code period, or of the code under a bit; one while it is unknown.
     pub(super) fn overlay_chip(&self, number: u64) -> f64 {
-        match (&self.overlay, self.overlay_phase) {
-            (Some(overlay), Some(phase)) => overlay.chip(phase, number),
+        match (&self.overlay, self.overlay_phase, &self.bits, self.bit_begin) {
+            (Some(overlay), Some(phase), ..) => overlay.chip(phase, number),
+            (_, _, Some(bits), Some(begin)) => bits.sign(number, begin),
             _ => 1.0,
+        }
+    }
+
+    /// Looks for the code under bits, and takes it off from their next beginning on: integrations are within
+    /// bits then.
+    pub(super) fn find_bits(&mut self, number: u64, prompt: Complex64) {
+        let (prompt, sought) = (self.whitened(prompt), self.bit_begin.is_none() && self.is_true);
+        let Some(bits) = self.bits.as_mut().filter(|_| sought) else { return };
+        let Some(begin) = bits.add(number, prompt) else { return };
+        self.group = bits.periods();
+        self.bit_begin = Some(begin);
+        self.cn0 = self.cn0.wiped(self.group);
+        (self.previous, self.previous_sum) = (None, None);
+        self.enter(Stage::Tracking(begin));
+    }
+
+    /// Bits have to be sought again: every code period is a symbol by itself.
+    pub(super) fn forget_bits(&mut self) {
+        let Some(bits) = &mut self.bits else { return };
+        bits.clear();
+        if self.bit_begin.take().is_none() {
+            return;
+        }
+        self.group = 1;
+        self.cn0 = Cn0::of_single_periods(self.period_s, self.settings.cn0_average_s);
+        (self.previous, self.previous_sum) = (None, None);
+        if matches!(self.stage, Stage::Tracking(_)) {
+            self.enter(Stage::Tracking(0));
         }
     }
 

@@ -81,10 +81,10 @@ impl Channel {
     }
 
     /// The code period modulo a symbol's in which symbols begin, where that is beyond doubt; 0 where an
-    /// overlay is known, which numbers periods itself.
+    /// overlay or the code under bits is known, which numbers periods itself.
     pub fn symbols_begin(&self) -> Option<u64> {
         match self.stage {
-            Stage::Tracking(_) if self.has_overlay() => Some(0),
+            Stage::Tracking(_) if self.has_overlay() || self.bit_begin.is_some() => Some(0),
             Stage::Tracking(begin) if self.confirmed && self.has_symbols => Some(begin),
             _ => None,
         }
@@ -191,7 +191,7 @@ impl Channel {
         self.pull_in_since = now;
         self.sync = SymbolSync::new(self.group);
         self.rotation = Rotation::default();
-        self.symbol_lock = SymbolLock::new();
+        self.symbol_lock = SymbolLock::new(self.period_s * f64::from(self.group));
         self.phase_lock = PhaseLock::new(LOCK_PERIODS);
         if !begins && matches!(self.stage, Stage::Tracking(_)) {
             self.enter(Stage::Assisted);

@@ -4,6 +4,7 @@ use num_complex::Complex64;
 
 use super::{Channel, LOCK_PERIODS, Stage, WEAK_DBHZ};
 use crate::correlate::TURN;
+use crate::track::halves::Halves;
 use crate::track::lock::{LockChange, PhaseLock, Rotation, SymbolLock, is_weak};
 use crate::track::loops::Rates;
 use crate::track::pull_in::Batch;
@@ -14,8 +15,10 @@ use gnss::record::Event;
 /// A frequency error beyond this, in spite of phase lock, is a false lock: between 0 and the nearest one,
 /// 1/(2·symbol).
 const FALSE_LOCK_SHARE: f64 = 0.4;
-/// Symbols over which the frequency is verified: at 25 dB-Hz the error that is found scatters by 2 Hz.
+/// Symbols over which the frequency is verified, and for how long at least: at 25 dB-Hz the error that is
+/// found in those of 20 ms scatters by 2 Hz.
 const VERIFY_SYMBOLS: u32 = 25;
+const VERIFY_S: f64 = 0.5;
 /// Phase lock must come within this share of the limit for symbols.
 const PHASE_LIMIT_SHARE: f64 = 0.5;
 /// Batches of a weak signal's pull-in that may fail.
@@ -68,11 +71,33 @@ impl Channel {
                 }
                 if self.lock.is_locked() {
                     self.verify_symbols(begin, number, prompt, report);
+                    self.find_bits(number, prompt);
                 }
-                if self.rotation.symbols() >= VERIFY_SYMBOLS {
+                if self.rotation.symbols() >= VERIFY_SYMBOLS.max((VERIFY_S / self.symbol_s()) as u32) {
                     self.verify_frequency(report);
                 }
             }
+        }
+        self.verify_within_periods(report);
+    }
+
+    /// Whether each code period has a sign of its own, as far as is known.
+    pub(super) fn has_single_periods(&self) -> bool {
+        self.group == 1 && self.has_symbols
+    }
+
+    /// Where each period has a sign of its own, loops also rest half a cycle a period off; between the halves
+    /// of periods it shows.
+    fn verify_within_periods(&mut self, report: &mut Report) {
+        let Some(cycles) = self.halves.cycles() else { return };
+        self.halves = Halves::default();
+        let steps = (2.0 * cycles).round();
+        self.is_true = steps == 0.0;
+        if !self.is_true {
+            let rate = self.loops.carrier.rate + 0.5 * steps / self.period_s;
+            self.loops.carrier = Rates { rate, acceleration: 0.0 };
+            self.interrupt(report);
+            self.begin_pull_in();
         }
     }
 
@@ -151,13 +176,21 @@ impl Channel {
     }
 
     /// A prompt with noise of unit variance a component, whatever the front end makes of its spectrum.
-    fn whitened(&self, prompt: Complex64) -> Complex64 {
+    pub(super) fn whitened(&self, prompt: Complex64) -> Complex64 {
         let noise = self.noise();
         if noise > 0.0 { prompt * (2.0 / noise).sqrt() } else { prompt }
     }
 
+    /// Duration of what is summed like a symbol.
+    fn symbol_s(&self) -> f64 {
+        self.period_s * f64::from(self.group)
+    }
+
     pub(super) fn enter(&mut self, stage: Stage) {
         self.stage = stage;
+        if !matches!(stage, Stage::Tracking(_)) {
+            self.forget_bits();
+        }
         self.stage_since = self.first;
         self.pending = None;
         self.sync = SymbolSync::new(self.group);
@@ -170,12 +203,14 @@ impl Channel {
         match stage {
             Stage::Tracking(_) => {
                 self.cn0.know_symbols();
-                self.symbol_lock = if self.lock.is_locked() { SymbolLock::locked() } else { SymbolLock::new() };
+                let made = if self.lock.is_locked() { SymbolLock::locked } else { SymbolLock::new };
+                self.symbol_lock = made(self.symbol_s());
             }
             Stage::Open | Stage::Frequency | Stage::Assisted => {
                 self.cn0.forget_symbols();
                 self.phase_lock = PhaseLock::new(LOCK_PERIODS);
                 self.confirmed = false;
+                (self.halves, self.is_true) = (Halves::default(), false);
             }
         }
         self.design();
@@ -255,6 +290,7 @@ impl Channel {
     /// Symbols and overlay are sought where the phase is right only.
     fn forget_phase(&mut self) {
         self.polarity = None;
+        self.forget_bits();
         self.sync = SymbolSync::new(self.group);
         if let Some(overlay) = &mut self.overlay {
             overlay.clear();

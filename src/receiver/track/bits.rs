@@ -1,0 +1,162 @@
+//! Bits of several symbols with known signs, each symbol a code period: where they begin, from prompts in
+//! phase lock.
+//!
+//! A bit of BeiDou's D1 has twenty code periods with the signs of the Neuman-Hofman code, one of D2 has two
+//! of one sign. Until it is known where bits begin, signs of prompts are anyone's guess.
+
+use num_complex::Complex64;
+
+/// Code periods before a decision is tried.
+const LEAST_PERIODS: u64 = 300;
+/// Bits after which a search begins anew.
+const MOST_BITS: u64 = 300;
+/// Standard deviations by which the best place leads every other.
+const LEAD_SIGMAS: f64 = 5.0;
+/// Of the best place's energy any other has less than this: of wrong places of D1 the best has a ninth
+/// without noise, those of D2 have a half, ± 0.04 after 150 bits.
+const NEXT_SHARE: f64 = 0.7;
+
+/// Of the energy that prompts have where all are in step, noise included, bits have more than this: from 27
+/// dB-Hz on, where prompts of a millisecond have as much noise as signal. Other signs than the code's have a
+/// twentieth.
+const LEAST_SHARE: f64 = 0.5;
+
+/// Search for the code period in which bits begin.
+#[derive(Clone, Debug)]
+pub(super) struct BitSync {
+    signs: &'static [i8],
+    last: Vec<f64>,
+    energies: Vec<f64>,
+    taken: u64,
+    /// Power of all prompts that were taken.
+    power: f64,
+    found: Option<u64>,
+}
+
+impl BitSync {
+    /// For bits of symbols with these signs.
+    pub fn new(signs: &'static [i8]) -> Self {
+        Self {
+            signs,
+            last: vec![0.0; signs.len()],
+            energies: vec![0.0; signs.len()],
+            taken: 0,
+            power: 0.0,
+            found: None,
+        }
+    }
+
+    /// Code periods of a bit.
+    pub fn periods(&self) -> u32 {
+        self.signs.len() as u32
+    }
+
+    /// Forgets what was taken.
+    pub fn clear(&mut self) {
+        *self = Self::new(self.signs);
+    }
+
+    /// The sign that code period `number` has within its bit, where bits begin at periods of the residue
+    /// `begin`.
+    pub fn sign(&self, number: u64, begin: u64) -> f64 {
+        let length = self.signs.len() as u64;
+        let place = (number + length - begin) % length;
+        self.signs.get(place as usize).map_or(1.0, |&sign| f64::from(sign))
+    }
+
+    /// Takes the prompt (noise of unit variance a component) of code period `number`, consecutive ones; gives
+    /// the residue modulo the bit's length at which bits begin, where it is beyond doubt and the next one
+    /// begins a bit.
+    pub fn add(&mut self, number: u64, prompt: Complex64) -> Option<u64> {
+        let length = self.signs.len() as u64;
+        if self.found.is_none() {
+            self.found = self.seek(number, length, prompt);
+        }
+        self.found.filter(|begin| (number + 1) % length == *begin)
+    }
+
+    fn seek(&mut self, number: u64, length: u64, prompt: Complex64) -> Option<u64> {
+        if let Some(last) = self.last.get_mut((number % length) as usize) {
+            *last = prompt.re;
+        }
+        self.taken += 1;
+        self.power += prompt.re * prompt.re;
+        if self.taken < length {
+            return None;
+        }
+        // The last `length` prompts are a bit of the place that comes next.
+        let begin = ((number + 1) % length) as usize;
+        let (late, early) = self.last.split_at(begin.min(self.last.len()));
+        let sum: f64 = early.iter().chain(late).zip(self.signs).map(|(soft, sign)| soft * f64::from(*sign)).sum();
+        if let Some(energy) = self.energies.get_mut(begin) {
+            *energy += sum * sum;
+        }
+        // Every place has had as many bits now.
+        if !(self.taken + 1).is_multiple_of(length) || self.taken < LEAST_PERIODS {
+            return None;
+        }
+        let bits = (self.taken + 1) / length - 1;
+        let found = self.decide(bits as f64);
+        if bits >= MOST_BITS {
+            self.clear();
+        }
+        found
+    }
+
+    fn decide(&self, bits: f64) -> Option<u64> {
+        let (best, most) = self.energies.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let others = self.energies.iter().enumerate().filter(|(place, _)| *place != best);
+        let next = others.map(|(_, energy)| *energy).fold(0.0, f64::max);
+        // A sum of m prompts has noise of variance m: its square, of amplitude a, 4a²m + 2m². Two places.
+        let m = self.signs.len() as f64;
+        let deviation = (2.0 * (4.0 * most * m + 2.0 * bits * m * m)).sqrt();
+        // All prompts in step would have as much, noise aside.
+        let coherent = m * self.power * bits * m / self.taken as f64;
+        let is_sure = most - next > LEAD_SIGMAS * deviation && next < NEXT_SHARE * most;
+        (is_sure && most > LEAST_SHARE * coherent).then_some(best as u64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::Normal;
+    use super::*;
+    use gnss::beidou::d1d2::D1_D2;
+    use gnss::satellite::{Sv, System};
+
+    #[test]
+    fn bits_of_both_messages_are_found_at_every_place_and_never_in_noise_or_half_a_cycle_a_period_off() {
+        for (satellite, dbhz, most_s) in [(20, 32.0, 2.0), (20, 44.0, 0.35), (2, 36.0, 1.0), (2, 44.0, 0.35)] {
+            let signs = (D1_D2.bit)(Sv { system: System::BeiDou, number: satellite });
+            let length = signs.len() as u64;
+            let amplitude = (2.0 * libm::pow(10.0, dbhz / 10.0) * 1e-3).sqrt();
+            let mut normal = Normal::new(41);
+            for begin in 0..length {
+                for astray in [false, true] {
+                    let (mut sync, mut bit, mut found) = (BitSync::new(signs), 1.0, None);
+                    let mut number = 1000;
+                    while found.is_none() && number < 1000 + (1e3 * most_s) as u64 {
+                        let place = (number + length - begin) % length;
+                        if place == 0 && normal.next() > 0.0 {
+                            bit = -bit;
+                        }
+                        let turned = if astray && number % 2 == 1 { -1.0 } else { 1.0 };
+                        let soft = turned * bit * f64::from(signs[place as usize]) * amplitude + normal.next();
+                        found = sync.add(number, Complex64::new(soft, normal.next()));
+                        number += 1;
+                    }
+                    if astray {
+                        assert!(found.is_none() || length == 2, "{satellite} {dbhz}: {found:?}");
+                    } else {
+                        assert_eq!(found, Some(begin), "{satellite} {dbhz}");
+                        assert_eq!(sync.sign(begin + 3 * length, begin), f64::from(signs[0]));
+                    }
+                }
+            }
+            let mut sync = BitSync::new(signs);
+            for number in 0..100_000 {
+                assert_eq!(sync.add(number, Complex64::new(normal.next(), normal.next())), None);
+            }
+        }
+    }
+}
