@@ -258,7 +258,7 @@ fn targets() -> Vec<Target<'static>> {
             "positions, NMEA",
             kept(&["ride.nmea"]),
             Box::new(|bytes| {
-                nmea::read(bytes, "2010-07-01")
+                nmea::read(bytes, Epoch::parse("2010-07-01T08:05:45Z").unwrap())
                     .map(hashed)
                     .map_err(|fault| format!("file: line {}: {}", fault.line, fault.what))
             }),
@@ -267,7 +267,7 @@ fn targets() -> Vec<Target<'static>> {
             "trajectory, NMEA",
             kept(&["ride.nmea"]),
             Box::new(move |bytes| {
-                read_nmea(bytes, "file", &options()).map_err(text).and_then(|(found, _)| moves(&found))
+                read_nmea(bytes, "file", &options()).map_err(text).and_then(|found| moves(&found.trajectory))
             }),
         ),
         simple(
