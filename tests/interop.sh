@@ -274,7 +274,7 @@ path, latitude, longitude, height, places = sys.argv[1], *map(float, sys.argv[2:
 with open(path, "rb") as stream:
     read = [parsed for _, parsed in NMEAReader(stream, quitonerror=ERR_RAISE, validate=VALCKSUM)]
 fixes = [parsed for parsed in read if parsed.msgID == "GGA"]
-worst = max(max(abs(fix.lat - latitude), abs(fix.lon - longitude)) * 1.1132e5 + abs(fix.alt - height) for fix in fixes)
+worst = max(max(abs(fix.lat - latitude), abs(fix.lon - longitude)) * 1.1132e5 + abs(fix.alt + fix.sep - height) for fix in fixes)
 kinds = sorted({parsed.msgID for parsed in read})
 print(f"interop: pynmeagps read {len(fixes)} places of {len(read)} sentences ({' '.join(kinds)}), {worst * 1000:.3f} mm off")
 # Written to 1e-7 of a minute and 0.1 mm.

@@ -429,10 +429,10 @@ pub struct Analyze {
 #[derive(Args, Debug)]
 #[group(id = "files", multiple = true)]
 pub struct ReceiverFiles {
-    /// Its observations: a RINEX 3 file
+    /// Its observations: RINEX 2.11, 3 or 4, plain, by Hatanaka's scheme (CRINEX) or packed by gzip
     #[arg(long, value_name = "FILE", requires = "truth")]
     pub rinex_obs: Option<PathBuf>,
-    /// Its positions: NMEA 0183 with GGA, and RMC for date and velocity
+    /// Its positions: NMEA 0183 with GGA, RMC or ZDA for the date, RMC or VTG for the velocity
     #[arg(long, value_name = "FILE", requires = "truth")]
     pub nmea: Option<PathBuf>,
 }

@@ -36,6 +36,7 @@ pub mod exchange;
 pub mod facts;
 pub mod fec;
 pub mod galileo;
+pub mod geoid;
 pub mod glonass;
 pub mod gps;
 pub mod inflate;

@@ -1,21 +1,24 @@
 //! NMEA 0183 sentences: place, time, satellites.
 //!
 //! Source: NMEA 0183, version 4.11 (GGA, RMC, VTG, ZDA, GSA with the system's number, GSV with the signal's).
-//! Times are UTC to a millisecond, positions are written to 1e-7 of a minute (0.2 mm). Limits: no geoid is
-//! known here, so heights are those above the ellipsoid with a separation of 0; no sentence says how far the
-//! solution may be off.
+//! Times are UTC to a millisecond, positions are written to 1e-7 of a minute (0.2 mm). Heights are above mean
+//! sea level by EGM96 ([`crate::geoid`]), with the separation beside them: their sum is the height above the
+//! ellipsoid, to 0.05 mm. [`read`] reads sentences. Limit: no sentence says how far the solution may be off.
+
+pub mod read;
 
 use std::fmt::Write;
 
 use nalgebra::Vector3;
 
 use crate::earth::Geodetic;
+use crate::geoid::separation_m;
 use crate::satellite::{Sv, System};
 use crate::signal::Signal;
 use crate::time::Epoch;
 
-/// One knot.
-const KNOT_MPS: f64 = 1852.0 / 3600.0;
+/// One knot, metres per second.
+pub const KNOT_MPS: f64 = 1852.0 / 3600.0;
 /// Satellites of a GSA sentence and of a GSV sentence.
 const GSA_SATELLITES: usize = 12;
 const GSV_SATELLITES: usize = 4;
@@ -141,8 +144,8 @@ fn time(at: Epoch) -> (String, [String; 3]) {
     (clock, [part(8, 10), part(5, 7), part(0, 4)])
 }
 
-/// Latitude and longitude with their hemispheres.
-fn coordinates(position_m: &Vector3<f64>) -> (String, f64) {
+/// Latitude and longitude with their hemispheres, and the place that they name.
+fn coordinates(position_m: &Vector3<f64>) -> (String, Geodetic) {
     let place = Geodetic::from_ecef(position_m);
     let one = |rad: f64, width: usize, signs: [char; 2]| {
         // In 1e-7 of a minute, so that no rounding gives 60 minutes.
@@ -153,7 +156,7 @@ fn coordinates(position_m: &Vector3<f64>) -> (String, f64) {
     };
     let latitude = one(place.latitude_rad, 2, ['N', 'S']);
     let longitude = one(place.longitude_rad, 3, ['E', 'W']);
-    (format!("{latitude},{longitude}"), place.height_m)
+    (format!("{latitude},{longitude}"), place)
 }
 
 /// Speed over ground and course from north over east.
@@ -169,9 +172,12 @@ fn dilution(value: f64) -> f64 {
 
 fn gga(place: &Place) -> String {
     let (clock, _) = time(place.time);
-    let (coordinates, height_m) = coordinates(&place.position_m);
+    let (coordinates, at) = coordinates(&place.position_m);
     let (count, hdop) = (place.satellites.min(99), dilution(place.hdop));
-    format!("GGA,{clock},{coordinates},1,{count:02},{hdop:.2},{height_m:.4},M,0.0,M,,")
+    // Rounded first, so that altitude and separation add up to the height as it is.
+    let separation_m = (1e3 * separation_m(at.latitude_rad, at.longitude_rad)).round() / 1e3;
+    let altitude_m = at.height_m - separation_m;
+    format!("GGA,{clock},{coordinates},1,{count:02},{hdop:.2},{altitude_m:.4},M,{separation_m:.3},M,,")
 }
 
 fn rmc(place: &Place) -> String {
@@ -265,10 +271,17 @@ mod tests {
     #[test]
     fn minutes_and_seconds_never_round_up_to_sixty() {
         let text = gga(&place(-26.999_999_999_9, 179.999_999_999_99, 130.0));
-        assert!(text.starts_with("GGA,080600.000,2700.0000000,S,18000.0000000,E,1,09,0.90,130.0000,M,"), "{text}");
+        assert!(text.starts_with("GGA,080600.000,2700.0000000,S,18000.0000000,E,1,09,0.90,"), "{text}");
         let text = gga(&place(0.5, -0.25, -5.0));
-        assert!(text.contains(",0030.0000000,N,00015.0000000,W,") && text.contains(",-5.0000,M,"), "{text}");
+        assert!(text.contains(",0030.0000000,N,00015.0000000,W,"), "{text}");
         assert!(zda(&place(0.0, 0.0, 0.0)).contains("080600.000,01,07,2010,00,00"));
+    }
+
+    /// At 38° N 90° W the sea is 30.262 m below the ellipsoid (WW15MGH), in whole centimetres 30.26 m.
+    #[test]
+    fn altitude_is_above_the_sea_and_the_separation_stands_beside_it() {
+        let text = gga(&place(38.0, -90.0, 100.012_34));
+        assert!(text.ends_with(",130.2723,M,-30.260,M,,"), "{text}");
     }
 
     #[test]

@@ -208,6 +208,9 @@ fn targets() -> Vec<Target<'static>> {
         ranges(&found)?;
         Ok(hashed((found.ephemerides.len(), found.ephemerides.first(), found.skipped.len(), found.klobuchar)))
     };
+    let observations = |bytes: &[u8]| {
+        rinex_obs::read(bytes).map(hashed).map_err(|fault| format!("file: line {}: {}", fault.line, fault.what))
+    };
     let simple =
         |name, corpus, read: Read<'static>| Target { name, corpus, prefix: "file".to_owned(), runs: MANY, read };
     let scenes = SCENES.iter().map(|(_, text)| text.as_bytes().to_vec()).collect();
@@ -217,13 +220,9 @@ fn targets() -> Vec<Target<'static>> {
         simple("navigation, RINEX 3", kept(&["v3.rnx"]), Box::new(navigation)),
         simple("navigation, RINEX 4", kept(&["v4.rnx", "v3.rnx"]), Box::new(navigation)),
         simple("navigation, gzip", packed_corpus, Box::new(navigation)),
-        simple(
-            "observations, RINEX 3",
-            kept(&["obs.rnx"]),
-            Box::new(|bytes| {
-                rinex_obs::read(bytes).map(hashed).map_err(|fault| format!("file: line {}: {}", fault.line, fault.what))
-            }),
-        ),
+        simple("observations, RINEX 3", kept(&["obs.rnx"]), Box::new(observations)),
+        simple("observations, RINEX 2", kept(&["v2.11o"]), Box::new(observations)),
+        simple("observations, compressed", kept(&["obs.crx"]), Box::new(observations)),
         simple(
             "precise orbits, SP3",
             kept(&["orbits.sp3"]),
@@ -258,7 +257,7 @@ fn targets() -> Vec<Target<'static>> {
             "positions, NMEA",
             kept(&["ride.nmea"]),
             Box::new(|bytes| {
-                nmea::read(bytes, "2010-07-01")
+                nmea::read(bytes, Epoch::parse("2010-07-01T08:05:45Z").unwrap())
                     .map(hashed)
                     .map_err(|fault| format!("file: line {}: {}", fault.line, fault.what))
             }),
@@ -267,7 +266,7 @@ fn targets() -> Vec<Target<'static>> {
             "trajectory, NMEA",
             kept(&["ride.nmea"]),
             Box::new(move |bytes| {
-                read_nmea(bytes, "file", &options()).map_err(text).and_then(|(found, _)| moves(&found))
+                read_nmea(bytes, "file", &options()).map_err(text).and_then(|found| moves(&found.trajectory))
             }),
         ),
         simple(

@@ -12,7 +12,7 @@ pub const ORDER: Order<'static> = &[
         "gnss",
         &[
             &["plant"],
-            &["time", "earth", "satellite", "crc", "fec", "inflate", "place", "weil"],
+            &["time", "earth", "geoid", "satellite", "crc", "fec", "inflate", "place", "weil"],
             &["bits", "bdgim", "klobuchar", "nequick", "ionex", "samples", "vienna"],
             &["ionosphere"],
             &["packed", "signal", "vmf3"],

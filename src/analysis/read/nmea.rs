@@ -1,15 +1,18 @@
-//! NMEA 0183 position files: GGA for the place, RMC for date and velocity.
+//! NMEA 0183 position files: GGA for the place, RMC and ZDA for the date, RMC and VTG for the velocity.
 //!
-//! Source: NMEA 0183, 6.3 (GGA, RMC); heights become ellipsoidal by the sentence's own geoid separation. A
-//! time of day has the date of the RMC before or after it that has the same time; without any RMC the
-//! caller's day is taken. UTC becomes GPS time by the leap seconds of that date, which is the right way even
-//! for a receiver that mistook its week: it used those too. Sentences of other kinds are passed over; a wrong
-//! checksum refuses the file.
+//! Sentences are read by [`gnss::nmea::read`]. Those of one time of day are one epoch, and an epoch has one
+//! fix: that of the talker GN, or of the first one. A date holds until the next; where a file has none, the
+//! day is the one that brings the fixes nearest to a time that the caller knows. A time of day that falls by
+//! more than half a day begins the next day. UTC becomes GPS time by the leap seconds of that date, which is
+//! the right way even for a receiver that mistook its week: it used those too. RMC's status V makes an epoch
+//! one without a fix. A wrong checksum refuses the file; a last line that was cut off is left out. Limits:
+//! VTG has no time, and belongs to the epoch before it unless the file begins with one and does not end with
+//! one; GLL and GNS are not read.
 
 use nalgebra::Vector3;
 
 use crate::read::fault::Fault;
-use gnss::earth::Geodetic;
+use gnss::nmea::read::{Rmc, Sentence, SentenceError, sentences, time_of_day_s};
 use gnss::time::Epoch;
 
 /// One position.
@@ -21,7 +24,7 @@ pub struct PlaceFix {
     pub position_m: Vector3<f64>,
     /// Satellites used.
     pub satellites: u32,
-    /// Speed over ground and course from north over east, of the RMC with the same time.
+    /// Speed over ground, m/s, and course from north over east, radians: RMC's of the same time, or VTG's.
     pub ground_mps_rad: Option<(f64, f64)>,
 }
 
@@ -30,226 +33,258 @@ pub struct PlaceFix {
 pub struct Places {
     /// In the order of the file.
     pub fixes: Vec<PlaceFix>,
-    /// Sentences that say that there is no fix.
+    /// Sentences that say that there is no fix, and fixes that RMC's status V takes back.
     pub without_fix: usize,
-    /// Whether the date came from RMC sentences.
+    /// Whether the date came from RMC or ZDA sentences.
     pub dated: bool,
+    /// Fixes whose sentence has no geoid separation. Their altitude was taken as one above mean sea level,
+    /// and EGM96's separation added.
+    pub separations_assumed: usize,
+    /// Fixes of further talkers at a time that has one already.
+    pub repeated: usize,
     /// Smallest step of a latitude as written.
     pub resolution_m: f64,
 }
 
-const KNOT_MPS: f64 = 1852.0 / 3600.0;
+const KINDS: [&str; 4] = ["GGA", "RMC", "VTG", "ZDA"];
+const DAY_S: f64 = 86_400.0;
+/// Sentences of one epoch may stand among those of so many later ones.
+const OPEN_EPOCHS: usize = 4;
 
-struct Gga {
-    line: u64,
+/// The sentences of one time of day.
+#[derive(Default)]
+struct Instant {
+    /// The time of day as written and in seconds.
     time: String,
+    of_day_s: f64,
+    /// Midnights since the file's first time, and the date's day number where a sentence names it.
+    midnights: i64,
+    day: Option<i64>,
+    fix: Option<Candidate>,
+    talkers: Vec<String>,
+    /// Whether an RMC says that it is valid.
+    valid: Option<bool>,
+    ground: Option<(f64, f64)>,
+}
+
+struct Candidate {
+    line: u64,
     position_m: Vector3<f64>,
     satellites: u32,
+    separation_assumed: bool,
 }
 
-struct Rmc {
-    time: String,
-    date: String,
-    ground_mps_rad: Option<(f64, f64)>,
-}
-
-/// Reads a file; `day` (as `2010-07-01`) is the date where it names none.
+/// Reads a file; `near` is when it was recorded, to half a day, for a file that names no date.
 ///
 /// # Errors
 /// The first sentence that is damaged, and a file without a fix.
-pub fn read(bytes: &[u8], day: &str) -> Result<Places, Fault> {
-    let (mut ggas, mut rmcs) = (Vec::new(), Vec::new());
-    let mut found = Places { resolution_m: f64::INFINITY, ..Places::default() };
-    let mut last = 1;
-    for (line, bytes) in (1_u64..).zip(bytes.split(|byte| *byte == b'\n')) {
-        let refuse = |what: String| Fault { line, what };
-        let text = std::str::from_utf8(bytes).map_err(|_| refuse("not ASCII text".to_owned()))?.trim();
-        if text.is_empty() {
-            continue;
-        }
-        last = line;
-        let kind = text.get(3..6).unwrap_or("");
-        if !text.starts_with('$') || !["GGA", "RMC"].contains(&kind) {
-            continue;
-        }
-        let fields = fields(text).map_err(|reason| refuse(reason.to_owned()))?;
-        if kind == "GGA" {
-            match gga(&fields, line, &mut found.resolution_m).map_err(refuse)? {
-                Some(row) => ggas.push(row),
-                None => found.without_fix += 1,
+pub fn read(bytes: &[u8], near: Epoch) -> Result<Places, Fault> {
+    let mut file = File::default();
+    let mut lines = (1_u64..).zip(bytes.split(|byte| *byte == b'\n')).peekable();
+    while let Some((line, bytes)) = lines.next() {
+        let is_last = lines.peek().is_none();
+        for text in sentences(bytes) {
+            match file.take(line, text) {
+                Err(Refusal::Sentence(error)) if is_last && cut_off(&error) => {}
+                Err(refusal) => return Err(Fault { line, what: refusal.to_string() }),
+                Ok(()) => {}
             }
-        } else if let Some(row) = rmc(&fields).map_err(refuse)? {
-            rmcs.push(row);
+        }
+        if !bytes.is_empty() {
+            file.last_line = line;
         }
     }
-    if ggas.is_empty() {
-        let what = format!("no GGA sentence with a fix ({} without one)", found.without_fix);
-        return Err(Fault { line: last, what });
-    }
-    found.dated = !rmcs.is_empty();
-    found.fixes = dated(&ggas, &rmcs, day)?;
-    Ok(found)
+    file.finish(near)
 }
 
-/// Gives every position its date, and its velocity where an RMC has the same time of day.
-fn dated(ggas: &[Gga], rmcs: &[Rmc], day: &str) -> Result<Vec<PlaceFix>, Fault> {
-    let mut next = 0;
-    let mut date = rmcs.first().map_or(day.to_owned(), |rmc| rmc.date.clone());
-    let mut fixes: Vec<PlaceFix> = Vec::new();
-    for gga in ggas {
-        let ahead = rmcs.get(next..).unwrap_or(&[]).iter().position(|rmc| rmc.time == gga.time);
-        let rmc = ahead.and_then(|step| rmcs.get(next + step));
-        if let (Some(step), Some(rmc)) = (ahead, rmc) {
-            next += step + 1;
-            date = rmc.date.clone();
+#[derive(thiserror::Error, Debug)]
+enum Refusal {
+    #[error(transparent)]
+    Sentence(#[from] SentenceError),
+    #[error(transparent)]
+    Date(#[from] gnss::time::TimeError),
+    #[error("time {0} does not come after the one before")]
+    Again(String),
+}
+
+/// Whether the end of a sentence is missing.
+fn cut_off(error: &SentenceError) -> bool {
+    match error {
+        SentenceError::Short { checked, .. } => !checked,
+        SentenceError::Checksum { found, .. } => found.len() < 2,
+        _ => false,
+    }
+}
+
+/// A file as far as it was read.
+#[derive(Default)]
+struct File {
+    last_line: u64,
+    instants: Vec<Instant>,
+    /// Velocities of VTG, each with the number of epochs before it.
+    over_ground: Vec<(usize, (f64, f64))>,
+    /// The first kind of sentence, and the last one.
+    kinds: Option<[String; 2]>,
+    without_fix: usize,
+    repeated: usize,
+    decimals: Option<u32>,
+}
+
+impl File {
+    fn take(&mut self, line: u64, text: &[u8]) -> Result<(), Refusal> {
+        let Some(sentence) = Sentence::of(&KINDS, text)? else { return Ok(()) };
+        match sentence.kind {
+            "GGA" => self.gga(line, &sentence)?,
+            "RMC" => {
+                let Some(found) = sentence.rmc()? else { return Ok(()) };
+                let day = found.date.map(day_number).transpose()?;
+                let own = self.instant(found.time);
+                own.day = own.day.or(day);
+                own.valid = Some(found.valid || own.valid == Some(true));
+                let Rmc { speed_mps, course_rad, valid, .. } = found;
+                own.ground = own.ground.or(speed_mps.zip(course_rad).filter(|_| valid));
+            }
+            "ZDA" => {
+                let Some((time, date)) = sentence.zda()? else { return Ok(()) };
+                let day = day_number(date)?;
+                self.instant(time).day.get_or_insert(day);
+            }
+            _ => {
+                let before = self.instants.len();
+                self.over_ground.extend(sentence.vtg()?.map(|ground| (before, ground)));
+            }
         }
-        let [hours, minutes, seconds] =
-            [gga.time.get(..2), gga.time.get(2..4), gga.time.get(4..)].map(Option::unwrap_or_default);
-        let label = Epoch::parse(&format!("{date}T{hours}:{minutes}:{seconds}Z"))
-            .map_err(|error| Fault { line: gga.line, what: error.to_string() })?;
-        if fixes.last().is_some_and(|before| label.since(before.label) <= 0.0) {
-            let what = format!("time {} does not come after the one before", gga.time);
-            return Err(Fault { line: gga.line, what });
+        let kind = sentence.kind.to_owned();
+        let first = self.kinds.take().map_or_else(|| kind.clone(), |[first, _]| first);
+        self.kinds = Some([first, kind]);
+        Ok(())
+    }
+
+    fn gga(&mut self, line: u64, sentence: &Sentence<'_>) -> Result<(), Refusal> {
+        let Some(found) = sentence.gga()? else {
+            self.without_fix += 1;
+            return Ok(());
+        };
+        self.decimals = self.decimals.max(Some(found.decimals));
+        let combined = sentence.talker == "GN";
+        let candidate = Candidate {
+            line,
+            position_m: found.position_m(),
+            satellites: found.satellites,
+            separation_assumed: found.separation_m.is_none(),
+        };
+        let own = self.instant(found.time);
+        if own.talkers.iter().any(|talker| talker == sentence.talker) {
+            return Err(Refusal::Again(found.time.to_owned()));
         }
-        fixes.push(PlaceFix {
-            label,
-            position_m: gga.position_m,
-            satellites: gga.satellites,
-            ground_mps_rad: rmc.and_then(|rmc| rmc.ground_mps_rad),
+        own.talkers.push(sentence.talker.to_owned());
+        let again = own.fix.is_some();
+        if !again || combined {
+            own.fix = Some(candidate);
+        }
+        self.repeated += usize::from(again);
+        Ok(())
+    }
+
+    /// The epoch of a time of day, a new one where none of the newest has it.
+    fn instant(&mut self, time: &str) -> &mut Instant {
+        let of_day_s = time_of_day_s(time).unwrap_or(0.0);
+        let oldest = self.instants.len().saturating_sub(OPEN_EPOCHS);
+        let same = |instant: &Instant| instant.of_day_s.total_cmp(&of_day_s).is_eq();
+        let known = self.instants.iter().skip(oldest).rposition(same).map(|at| oldest + at);
+        let at = known.unwrap_or_else(|| {
+            let (before, before_s) = self.instants.last().map_or((0, of_day_s), |one| (one.midnights, one.of_day_s));
+            // The nearest day; a step back over midnight is a late sentence of an epoch before.
+            let midnights = before - ((of_day_s - before_s) / DAY_S).round() as i64;
+            self.instants.push(Instant { time: time.to_owned(), of_day_s, midnights, ..Instant::default() });
+            self.instants.len() - 1
         });
+        &mut self.instants[at]
     }
-    Ok(fixes)
-}
 
-/// Fields of a sentence whose checksum is right; the first is its name.
-fn fields(text: &str) -> Result<Vec<&str>, &'static str> {
-    let (body, sum) =
-        text.strip_prefix('$').and_then(|t| t.split_once('*')).ok_or("no checksum: expected *hh at the end")?;
-    let sum = u8::from_str_radix(sum.trim(), 16).map_err(|_| "the checksum is not two hexadecimal digits")?;
-    if body.bytes().fold(0, |x, b| x ^ b) != sum {
-        return Err("the checksum is wrong");
+    /// Gives every fix its date and, where RMC had none, VTG's velocity.
+    fn finish(mut self, near: Epoch) -> Result<Places, Fault> {
+        let leads = matches!(&self.kinds, Some([first, last]) if first == "VTG" && last != "VTG");
+        for (before, ground) in std::mem::take(&mut self.over_ground) {
+            let at = if leads { Some(before) } else { before.checked_sub(1) };
+            if let Some(own) = at.and_then(|at| self.instants.get_mut(at)) {
+                own.ground.get_or_insert(ground);
+            }
+        }
+        let is_fix = |own: &Instant| own.fix.is_some() && own.valid != Some(false);
+        let mut found = Places { without_fix: self.without_fix, repeated: self.repeated, ..Places::default() };
+        found.without_fix += self.instants.iter().filter(|own| own.fix.is_some() && !is_fix(own)).count();
+        found.dated = self.instants.iter().any(|own| own.day.is_some());
+        // A minute of latitude is a nautical mile.
+        let decimals = self.decimals.unwrap_or(0) as i32;
+        found.resolution_m = 1852.0 * libm::pow(10.0, -f64::from(decimals));
+        let mut first_day = self.first_day(near);
+        let mut date = (i64::MIN, String::new());
+        for own in self.instants.iter() {
+            if let Some(day) = own.day {
+                first_day = day - own.midnights;
+            }
+            let Some(fix) = own.fix.as_ref().filter(|_| is_fix(own)) else { continue };
+            let refuse = |what: String| Fault { line: fix.line, what };
+            let day = first_day + own.midnights;
+            if date.0 != day {
+                date = (day, date_text(day));
+            }
+            let [hours, minutes, seconds] =
+                [own.time.get(..2), own.time.get(2..4), own.time.get(4..)].map(Option::unwrap_or_default);
+            let label = Epoch::parse(&format!("{}T{hours}:{minutes}:{seconds}Z", date.1))
+                .map_err(|error| refuse(error.to_string()))?;
+            if found.fixes.last().is_some_and(|before| label.since(before.label) <= 0.0) {
+                return Err(refuse(Refusal::Again(own.time.clone()).to_string()));
+            }
+            found.separations_assumed += usize::from(fix.separation_assumed);
+            found.fixes.push(PlaceFix {
+                label,
+                position_m: fix.position_m,
+                satellites: fix.satellites,
+                ground_mps_rad: own.ground,
+            });
+        }
+        if found.fixes.is_empty() {
+            let what = format!(
+                "no GGA sentence with a fix ({} without one): expected GGA, which alone has the height",
+                found.without_fix
+            );
+            return Err(Fault { line: self.last_line.max(1), what });
+        }
+        Ok(found)
     }
-    Ok(body.split(',').collect())
-}
 
-fn number(text: &str) -> Option<f64> {
-    text.parse::<f64>().ok().filter(|value| value.is_finite())
-}
-
-/// `hhmmss` or `hhmmss.ss`, as written.
-fn time(text: &str) -> Result<String, String> {
-    let digits = |part: Option<&str>| part.is_some_and(|p| p.len() == 2 && p.bytes().all(|b| b.is_ascii_digit()));
-    let good = digits(text.get(..2)) && digits(text.get(2..4)) && text.get(4..).and_then(number).is_some();
-    if good { Ok(text.to_owned()) } else { Err(format!("time '{text}': expected hhmmss.ss")) }
-}
-
-fn gga(fields: &[&str], line: u64, resolution_m: &mut f64) -> Result<Option<Gga>, String> {
-    let [_, at, latitude, north, longitude, east, quality, satellites, _, height, _, geoid, ..] = fields else {
-        return Err(format!("{} fields: expected at least 12 of GGA", fields.len()));
-    };
-    if quality.is_empty() || *quality == "0" {
-        return Ok(None);
+    /// The day number of the file's first time: by the first date that it names, or by the known time.
+    fn first_day(&self, near: Epoch) -> i64 {
+        if let Some(day) = self.instants.iter().find_map(|own| Some(own.day? - own.midnights)) {
+            return day;
+        }
+        let since_s = |own: &Instant| own.midnights as f64 * DAY_S + own.of_day_s;
+        let mut all = self.instants.iter().filter(|own| own.fix.is_some()).map(since_s);
+        let first_s = all.next().unwrap_or(0.0);
+        let middle_s = 0.5 * (first_s + all.next_back().unwrap_or(first_s));
+        ((utc_s(near) as f64 - middle_s) / DAY_S).round() as i64
     }
-    let angle = |text: &str, digits: usize, sign: &str, signs: [&str; 2], most: f64| {
-        let degrees = number(text.get(..digits)?)?;
-        let minutes = number(text.get(digits..)?).filter(|minutes| (0.0..60.0).contains(minutes))?;
-        let size = degrees + minutes / 60.0;
-        let signed = signs.iter().position(|s| *s == sign).map(|i| if i == 0 { size } else { -size })?;
-        (signed.abs() <= most).then_some(signed)
-    };
-    let bad = |what: &str, text: &str, expected: &str| format!("{what} '{text}': expected {expected}");
-    let latitude_deg = angle(latitude, 2, north, ["N", "S"], 90.0)
-        .ok_or_else(|| bad("latitude", &format!("{latitude},{north}"), "ddmm.mm and N or S"))?;
-    let longitude_deg = angle(longitude, 3, east, ["E", "W"], 180.0)
-        .ok_or_else(|| bad("longitude", &format!("{longitude},{east}"), "dddmm.mm and E or W"))?;
-    let height_m = number(height).ok_or_else(|| bad("height", height, "a number"))?;
-    // Receivers that give heights above the ellipsoid leave the separation empty or zero.
-    let geoid_m =
-        if geoid.is_empty() { 0.0 } else { number(geoid).ok_or_else(|| bad("geoid separation", geoid, "a number"))? };
-    let decimals = latitude.split_once('.').map_or(0, |(_, rest)| rest.len()) as i32;
-    // A minute of latitude is a nautical mile.
-    *resolution_m = resolution_m.min(1852.0 * libm::pow(10.0, -f64::from(decimals)));
-    Ok(Some(Gga {
-        line,
-        time: time(at)?,
-        position_m: Geodetic::from_degrees(latitude_deg, longitude_deg, height_m + geoid_m).to_ecef(),
-        satellites: satellites.parse().unwrap_or(0),
-    }))
 }
 
-fn rmc(fields: &[&str]) -> Result<Option<Rmc>, String> {
-    let [_, at, status, _, _, _, _, speed, course, date, ..] = fields else {
-        return Err(format!("{} fields: expected at least 10 of RMC", fields.len()));
-    };
-    if *status != "A" {
-        return Ok(None);
-    }
-    let [day, month, year] = [date.get(..2), date.get(2..4), date.get(4..6)].map(Option::unwrap_or_default);
-    let year: u32 = year.parse().map_err(|_| format!("date '{date}': expected ddmmyy"))?;
-    // GPS began in 1980.
-    let century = if year >= 80 { 1900 } else { 2000 };
-    let ground = number(speed).zip(number(course));
-    Ok(Some(Rmc {
-        time: time(at)?,
-        date: format!("{}-{month}-{day}", century + year),
-        ground_mps_rad: ground.map(|(knots, degrees)| (knots * KNOT_MPS, degrees.to_radians())),
-    }))
+/// Seconds of UTC since 1980-01-06, inserted ones not counted.
+fn utc_s(at: Epoch) -> i64 {
+    at.seconds() - at.leap_seconds()
+}
+
+/// Days since 1980-01-06 of year, month and day.
+fn day_number([year, month, day]: [u32; 3]) -> Result<i64, gnss::time::TimeError> {
+    Ok(utc_s(Epoch::parse(&format!("{year:04}-{month:02}-{day:02}T00:00:00Z"))?).div_euclid(86_400))
+}
+
+/// `YYYY-MM-DD` of a day number.
+fn date_text(day: i64) -> String {
+    // Leap seconds move noon by less than half a day.
+    let noon = Epoch::new(day.saturating_mul(86_400).saturating_add(43_200), 0.0);
+    noon.to_utc_text().get(..10).unwrap_or_default().to_owned()
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const GGA: &str = "$GPGGA,080626.00,2630.7379654,N,08013.9740786,E,1,05,1.0,128.703,M,0.000,M,0.0,*70";
-    const RMC: &str = "$GPRMC,080626.00,A,2630.7379654,N,08013.9740786,E,0.06,0.00,140230,0.0,E,A*3E";
-
-    fn with_sum(body: &str) -> String {
-        format!("${body}*{:02X}", body.bytes().fold(0, |x, b| x ^ b))
-    }
-
-    #[test]
-    fn sentences_of_a_real_receiver_become_a_place_a_velocity_and_a_time() {
-        let found = read(format!("{RMC}\r\n{GGA}\r\n").as_bytes(), "2010-07-01").unwrap();
-        let fix = &found.fixes[0];
-        let place = Geodetic::from_ecef(&fix.position_m);
-        assert!((place.latitude_rad.to_degrees() - (26.0 + 30.737_965_4 / 60.0)).abs() < 1e-12);
-        assert!((place.height_m - 128.703).abs() < 1e-8);
-        // 2030-02-14 by its own date: 18 leap seconds, the last that are known.
-        assert_eq!(fix.label, Epoch::parse("2030-02-14T08:06:44").unwrap());
-        assert!((fix.ground_mps_rad.unwrap().0 - 0.06 * 0.514_444_4).abs() < 1e-6);
-        assert!(found.dated && (found.resolution_m - 1852e-7).abs() < 1e-12);
-    }
-
-    #[test]
-    fn without_a_date_the_given_day_is_taken() {
-        let found = read(GGA.as_bytes(), "2010-07-01").unwrap();
-        assert_eq!(found.fixes[0].label, Epoch::parse("2010-07-01T08:06:41").unwrap());
-        assert!(!found.dated);
-    }
-
-    #[test]
-    fn each_damage_is_refused_at_its_line() {
-        let broken = |from: &str, to: &str| {
-            let body = GGA.trim_start_matches('$').split('*').next().unwrap().replace(from, to);
-            format!("{RMC}\n{}\n", with_sum(&body))
-        };
-        let cases = [
-            (GGA.replace("*70", "*71"), 1, "checksum is wrong"),
-            (GGA.replace("*70", ""), 1, "no checksum"),
-            (broken("2630.73", "2690.73"), 2, "latitude '2690.7379654,N'"),
-            (broken(",E,1", ",Q,1"), 2, "longitude"),
-            (broken("128.703", "x"), 2, "height 'x'"),
-            (broken("080626.00", "250626.00"), 2, "25:06:26"),
-            (broken("080626.00", "8:06"), 2, "time '8:06'"),
-            (broken(",E,1,", ",E,0,"), 2, "no GGA sentence with a fix (1 without one)"),
-            (format!("{GGA}\n{GGA}\n"), 2, "does not come after"),
-            (String::new(), 1, "no GGA sentence"),
-        ];
-        for (text, line, words) in cases {
-            let fault = read(text.as_bytes(), "2010-07-01").unwrap_err();
-            assert_eq!(fault.line, line, "{text}: {}", fault.what);
-            assert!(fault.what.contains(words), "{text}: {}", fault.what);
-        }
-        assert!(read(&[b'$', 0xff, b'\n'], "2010-07-01").is_err());
-    }
-}
+#[path = "nmea_tests.rs"]
+mod tests;

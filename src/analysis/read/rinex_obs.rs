@@ -1,18 +1,26 @@
-//! RINEX 3 observation files, read epoch by epoch.
+//! RINEX observation files, read epoch by epoch: versions 2.00 to 2.11 and 3.00 to 4.02, plain or compressed
+//! by Hatanaka's scheme.
 //!
-//! Source: RINEX 3.05, tables A2 and A3. Columns are fixed: an epoch line, then a line a satellite with F14.3
-//! values, each followed by a loss-of-lock indicator and a signal strength digit. A reader of our own because
-//! a file under judgement is to be refused with its line and reason, and the `rinex` crate drops bad records,
-//! keeps the whole file and panics on some damage; it is the oracle of the tests. Limits: versions 3.00 to
-//! 4.02, time systems GPS and Galileo; only pseudorange, phase, Doppler and strength; records of events
-//! (flags 2 to 6) are passed over and counted.
+//! Sources: RINEX 2.11, tables A1 and A2; RINEX 3.05, tables A2 and A3; Hatanaka 2008 (Bulletin of the GSI
+//! 55). Columns are fixed: an epoch line, then each satellite's F14.3 values, each followed by a loss-of-lock
+//! indicator and a signal strength digit. A reader of our own because a file under judgement is to be refused
+//! with its line and reason, and the `rinex` crate drops bad records, keeps the whole file and panics on some
+//! damage; its kernels restore compressed numbers and texts, and the whole is the oracle of the tests.
+//! Limits: time systems whose seconds are GPS's; only pseudorange, phase, Doppler and strength; records of
+//! events (flags 2 to 6) are passed over and counted, header lines in them aside.
+
+mod compressed;
+mod header;
 
 use std::collections::BTreeMap;
 use std::io::BufRead;
 
 use crate::read::fault::Fault;
+use compressed::Restorer;
+use gnss::inflate::inflate;
 use gnss::satellite::Sv;
 use gnss::time::Epoch;
+pub use header::Header;
 
 /// What one satellite's signal gave at one epoch; a blank or a zero in the file is `None`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -95,19 +103,6 @@ fn columns(line: &str, from: usize, to: usize) -> &str {
     if from >= to { "" } else { line.get(from..to).unwrap_or("").trim() }
 }
 
-/// What a file's header says.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Header {
-    /// `PGM` and `REC # / TYPE / VERS`, to say whose file it is.
-    pub receiver: String,
-    /// Whether it says that a clock offset was applied to epoch, code and phase.
-    pub clock_applied: bool,
-    /// Frequency channels of GLONASS satellites.
-    pub channels: BTreeMap<Sv, i8>,
-    types: BTreeMap<char, Vec<String>>,
-    scales: BTreeMap<(char, String), f64>,
-}
-
 /// A file in reading: one epoch is held.
 pub struct Reader<R> {
     lines: Lines<R>,
@@ -116,14 +111,19 @@ pub struct Reader<R> {
     /// Event records passed over so far.
     pub events: usize,
     before: Option<Epoch>,
+    restorer: Option<Restorer>,
 }
 
-/// Reads a whole file's text.
+/// Reads a whole file, which may be packed by gzip.
 ///
 /// # Errors
-/// The first line that is not as RINEX 3 has it.
+/// The first line that is not as RINEX has it.
 pub fn read(bytes: &[u8]) -> Parsed<Observations> {
-    let mut reader = Reader::new(bytes)?;
+    if bytes.starts_with(&[0x1f, 0x9d]) {
+        return Err(Fault { line: 1, what: "packed by compress (.Z): expected plain text or gzip".to_owned() });
+    }
+    let plain = inflate(bytes, LARGEST_BYTES).map_err(|error| Fault { line: 1, what: error.to_string() })?;
+    let mut reader = Reader::new(plain.as_slice())?;
     let mut epochs = Vec::new();
     while let Some(epoch) = reader.next_epoch()? {
         epochs.push(epoch);
@@ -136,17 +136,18 @@ impl<R: BufRead> Reader<R> {
     /// Reads the header.
     ///
     /// # Errors
-    /// The first line that is not as RINEX 3 has it.
+    /// The first line that is not as RINEX has it.
     pub fn new(input: R) -> Parsed<Self> {
         let mut lines = Lines { input, number: 0 };
         let header = Header::read(&mut lines)?;
-        Ok(Self { lines, header, events: 0, before: None })
+        let restorer = header.is_compressed.then(|| Restorer::new(header.is_second));
+        Ok(Self { lines, header, events: 0, before: None, restorer })
     }
 
     /// The next epoch; none at the end of the file.
     ///
     /// # Errors
-    /// The first line that is not as RINEX 3 has it; a file without any epoch.
+    /// The first line that is not as RINEX has it; a file without any epoch.
     pub fn next_epoch(&mut self) -> Parsed<Option<ObservedEpoch>> {
         while let Some(line) = self.lines.next()? {
             if line.trim().is_empty() {
@@ -158,226 +159,231 @@ impl<R: BufRead> Reader<R> {
             }
         }
         if self.before.is_none() {
-            return Err(self.lines.fault("no epoch: expected a line that begins with '>'"));
+            let form = if self.header.is_second { "of RINEX 2" } else { "that begins with '>'" };
+            return Err(self.lines.fault(format!("no epoch: expected a line {form}")));
         }
         Ok(None)
     }
 
     /// The record that begins with a line; none of an event.
     fn epoch(&mut self, line: &str) -> Parsed<Option<ObservedEpoch>> {
-        let fault = |what: String| Err(self.lines.fault(what));
-        if !line.starts_with('>') {
-            return fault(format!("'{}': expected an epoch, which begins with '>'", cut(line)));
+        let restored = self.restorer.as_mut().map(|restorer| restorer.epoch(line)).transpose();
+        let restored = restored.map_err(|what| self.lines.fault(what))?;
+        let line = restored.as_deref().unwrap_or(line);
+        let head = Head::read(line, self.header.is_second).map_err(|what| self.lines.fault(what))?;
+        if head.flag > 1 {
+            self.event(&head)?;
+            return Ok(None);
         }
-        let count_text = columns(line, 32, 35);
-        let Some(count) = count_text.parse::<usize>().ok().filter(|count| *count <= 999) else {
-            return fault(format!("number of satellites '{count_text}': expected 0 to 999"));
+        let Some(label) = head.label else {
+            return Err(self.lines.fault(format!("time '{}': expected {}", head.time, head.form)));
         };
-        let is_event = match columns(line, 31, 32) {
-            "0" | "1" => false,
-            "2" | "3" | "4" | "5" | "6" => true,
-            other => return fault(format!("epoch flag '{other}': expected 0 to 6")),
-        };
-        let label = if is_event { None } else { time(line) };
-        if !is_event {
-            let Some(label) = label else {
-                return fault(format!("time '{}': expected yyyy mm dd hh mm ss.s", columns(line, 2, 29)));
-            };
-            if self.before.is_some_and(|before| label.since(before) <= 0.0) {
-                return fault(format!("epoch {label} does not come after the one before"));
-            }
+        if self.before.is_some_and(|before| label.since(before) <= 0.0) {
+            return Err(self.lines.fault(format!("epoch {label} does not come after the one before")));
+        }
+        let named =
+            if self.header.is_second || self.restorer.is_some() { self.named(line, &head)? } else { Vec::new() };
+        if let Some(restorer) = &mut self.restorer {
+            restorer.keep(&named);
+            // The receiver's clock, which is not read.
+            self.lines.next()?;
         }
         let mut values: BTreeMap<(Sv, String), Values> = BTreeMap::new();
+        for have in 0..head.count {
+            self.satellite(named.get(have).copied(), [have, head.count], &mut values)?;
+        }
+        // The receiver lost power since the epoch before.
+        if head.flag == 1 {
+            values.values_mut().filter(|own| own.carrier_cycles.is_some()).for_each(|own| own.lost_lock = true);
+        }
+        Ok(Some(ObservedEpoch { label, values }))
+    }
+
+    /// A line of an epoch that has so many of so many.
+    fn line_of(&mut self, [have, count]: [usize; 2]) -> Parsed<String> {
+        let line = self.lines.next()?;
+        line.ok_or_else(|| self.lines.fault(format!("the file ends after {have} of {count} lines of an epoch")))
+    }
+
+    /// Passes over an event; header lines in it hold from there on.
+    fn event(&mut self, head: &Head) -> Parsed<()> {
+        self.events += 1;
+        // Cycle slips of RINEX 2 are written as observations are.
+        let is_observed = head.flag == 6 && self.header.is_second && self.restorer.is_none();
+        let types = self.header.codes(gnss::satellite::System::Gps).len();
+        let count =
+            if is_observed { more_lines(head.count) + head.count * types.div_ceil(PER_LINE) } else { head.count };
         for have in 0..count {
-            let Some(line) = self.lines.next()? else {
-                return Err(self.lines.fault(format!("the file ends after {have} of {count} lines of an epoch")));
-            };
-            if !is_event {
-                self.header.satellite(&line, &mut values).map_err(|what| self.lines.fault(what))?;
+            let line = self.line_of([have, count])?;
+            if head.flag == 4 {
+                self.header.line(&line).map_err(|what| self.lines.fault(what))?;
             }
         }
-        self.events += usize::from(is_event);
-        Ok(label.map(|label| ObservedEpoch { label, values }))
-    }
-}
-
-impl Header {
-    fn read<R: BufRead>(lines: &mut Lines<R>) -> Parsed<Self> {
-        let first = lines.next()?.unwrap_or_default();
-        let label = |line: &str| columns(line, 60, 80).to_owned();
-        if label(&first) != "RINEX VERSION / TYPE" {
-            return Err(Fault { line: 1, what: "expected a first line that ends in RINEX VERSION / TYPE".to_owned() });
-        }
-        let version = columns(&first, 0, 9).parse::<f64>().ok().filter(|v| (3.0..5.0).contains(v));
-        if version.is_none() {
-            return Err(lines.fault(format!("version '{}': expected 3.00 to 4.02", columns(&first, 0, 9))));
-        }
-        if !columns(&first, 20, 40).starts_with('O') {
-            let kind = columns(&first, 20, 40);
-            return Err(lines.fault(format!("file type '{kind}': expected O, observation data")));
-        }
-        let mut header = Self::default();
-        let mut wanted: Option<(char, usize)> = None;
-        while let Some(line) = lines.next()? {
-            let told = match label(&line).as_str() {
-                "END OF HEADER" if header.types.is_empty() => {
-                    Err("the header names no observations: expected SYS / # / OBS TYPES".to_owned())
-                }
-                "END OF HEADER" => {
-                    complete(wanted).map_err(|what| lines.fault(what))?;
-                    return Ok(header);
-                }
-                "SYS / # / OBS TYPES" => header.types(&line, &mut wanted),
-                "TIME OF FIRST OBS" => time_system(columns(&line, 48, 51)),
-                "SYS / SCALE FACTOR" => header.scale(&line),
-                "GLONASS SLOT / FRQ #" => {
-                    header.channels(&line);
-                    Ok(())
-                }
-                "RCV CLOCK OFFS APPL" => {
-                    header.clock_applied = columns(&line, 0, 6) == "1";
-                    Ok(())
-                }
-                "PGM / RUN BY / DATE" => {
-                    header.receiver = columns(&line, 0, 20).to_owned();
-                    Ok(())
-                }
-                "REC # / TYPE / VERS" => {
-                    let own = format!("{} {}", columns(&line, 20, 40), columns(&line, 40, 60));
-                    header.receiver = own.trim().to_owned();
-                    Ok(())
-                }
-                _ => Ok(()),
-            };
-            told.map_err(|what| lines.fault(what))?;
-        }
-        Err(lines.fault("the header does not end: expected END OF HEADER"))
+        self.header.complete().map_err(|what| self.lines.fault(what))
     }
 
-    fn types(&mut self, line: &str, wanted: &mut Option<(char, usize)>) -> Result<(), String> {
-        if let Some(system) = line.chars().next().filter(|letter| !letter.is_whitespace()) {
-            complete(*wanted)?;
-            let count = columns(line, 3, 6).parse::<usize>().ok().filter(|count| (1..=200).contains(count));
-            let count = count
-                .ok_or_else(|| format!("number of observation types '{}': expected 1 to 200", columns(line, 3, 6)))?;
-            self.types.insert(system, Vec::new());
-            *wanted = Some((system, count));
-        }
-        let Some((system, missing)) = wanted else {
-            return Err(
-                "observation types continue before they begin: expected a system's letter in column 1".to_owned()
-            );
-        };
-        for code in columns(line, 6, 60).split_whitespace() {
-            if code.len() != 3 || *missing == 0 {
-                return Err(format!("observation type '{code}': expected {missing} more codes of three characters"));
-            }
-            self.types.entry(*system).or_default().push(code.to_owned());
-            *missing -= 1;
-        }
-        Ok(())
-    }
-
-    fn scale(&mut self, line: &str) -> Result<(), String> {
-        let system = line.chars().next().unwrap_or(' ');
-        let factor = columns(line, 2, 6).parse::<f64>().ok().filter(|f| [1.0, 10.0, 100.0, 1000.0].contains(f));
-        let factor =
-            factor.ok_or_else(|| format!("scale factor '{}': expected 1, 10, 100 or 1000", columns(line, 2, 6)))?;
-        let named: Vec<String> = columns(line, 10, 60).split_whitespace().map(str::to_owned).collect();
-        let of = if named.is_empty() { self.types.get(&system).cloned().unwrap_or_default() } else { named };
-        self.scales.extend(of.into_iter().map(|code| ((system, code), factor)));
-        Ok(())
-    }
-
-    /// Satellites and channels, eight on a line; others' files have them in other forms, and nothing of a
-    /// foreign file hangs on them.
-    fn channels(&mut self, line: &str) {
-        for from in (4..60).step_by(7) {
-            if let (Ok(sv), Ok(channel)) =
-                (columns(line, from, from + 3).parse(), columns(line, from + 3, from + 6).parse())
-            {
-                self.channels.insert(sv, channel);
+    /// The satellites of an epoch that its line names: twelve on each line, all on one line of a compressed
+    /// file.
+    fn named(&mut self, line: &str, head: &Head) -> Parsed<Vec<Sv>> {
+        let list = |line: &str| line.get(head.list..).unwrap_or("").to_owned();
+        let mut text = list(line);
+        if self.restorer.is_none() {
+            for have in 0..more_lines(head.count) {
+                text.truncate(3 * NAMES * (have + 1));
+                text = format!(
+                    "{text:width$}{}",
+                    list(&self.line_of([have, head.count])?),
+                    width = 3 * NAMES * (have + 1)
+                );
             }
         }
+        let mut found = Vec::new();
+        for index in 0..head.count {
+            let name = text.get(3 * index..(3 * index + 3).min(text.len())).unwrap_or("");
+            if name.trim().is_empty() {
+                let what = format!("{} satellites announced, {index} named", head.count);
+                return Err(self.lines.fault(what));
+            }
+            found.push(self.header.satellite(name).map_err(|what| self.lines.fault(what))?);
+        }
+        Ok(found)
     }
 
-    /// Reads a satellite's line into the values of its epoch.
-    fn satellite(&self, line: &str, all: &mut BTreeMap<(Sv, String), Values>) -> Result<(), String> {
-        // RINEX allows a blank in place of the leading zero.
-        let name = columns(line, 0, 3).replace(' ', "0");
-        let sv: Sv = name.parse().map_err(|error| format!("{error}"))?;
-        let Some(codes) = self.types.get(&sv.system.letter()) else {
-            return Err(format!("satellite {sv}: the header names no observations of its system"));
+    /// Reads the values of one satellite, which its epoch's line may name, into those of the epoch.
+    fn satellite(
+        &mut self,
+        named: Option<Sv>,
+        part: [usize; 2],
+        all: &mut BTreeMap<(Sv, String), Values>,
+    ) -> Parsed<()> {
+        let first = self.line_of(part)?;
+        let sv = match named {
+            Some(sv) => sv,
+            None => self.header.satellite(columns(&first, 0, 3)).map_err(|what| self.lines.fault(what))?,
         };
         if all.keys().any(|(other, _)| *other == sv) {
-            return Err(format!("satellite {sv} appears twice in one epoch"));
+            return Err(self.lines.fault(format!("satellite {sv} appears twice in one epoch")));
         }
-        if line.trim_end().len() > 3 + 16 * codes.len() {
-            return Err(format!("satellite {sv}: more values than the {} that the header names", codes.len()));
+        let count = self.header.codes(sv.system).len();
+        let from = if named.is_some() { 0 } else { 3 };
+        let restored = self.restorer.as_mut().map(|restorer| restorer.satellite(sv, count, &first)).transpose();
+        let restored = restored.map_err(|what| self.lines.fault(what))?;
+        let is_whole = named.is_none() || restored.is_some();
+        let mut line = restored.unwrap_or(first);
+        let per_line = if is_whole { count } else { PER_LINE };
+        if is_whole && line.trim_end().len() > from + 16 * count {
+            let what = format!("satellite {sv}: more values than the {count} that the header names");
+            return Err(self.lines.fault(what));
         }
-        for (index, code) in codes.iter().enumerate() {
-            let from = 3 + 16 * index;
-            let text = columns(line, from, from + 14);
-            if text.is_empty() {
-                continue;
+        for index in 0..count {
+            let at = index % per_line.max(1);
+            if index > 0 && at == 0 {
+                line = self.line_of(part)?;
             }
-            let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
-            let value = value.ok_or_else(|| {
-                format!("{sv} {code} = '{text}': expected a number in columns {} to {}", from + 1, from + 14)
-            })?;
-            // A zero means no observation (RINEX 3.05, 6.7).
-            if value == 0.0 {
-                continue;
+            let code = self.header.codes(sv.system).get(index).cloned().unwrap_or_default();
+            self.value(sv, &code, &line, from + 16 * at, all)?;
+        }
+        Ok(())
+    }
+
+    /// Reads the value that begins in a column of a line.
+    fn value(
+        &self,
+        sv: Sv,
+        code: &str,
+        line: &str,
+        from: usize,
+        all: &mut BTreeMap<(Sv, String), Values>,
+    ) -> Parsed<()> {
+        let text = columns(line, from, from + 14);
+        if text.is_empty() || code.is_empty() {
+            return Ok(());
+        }
+        let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
+        let value = value.ok_or_else(|| {
+            let (first, last) = (from + 1, from + 14);
+            self.lines.fault(format!("{sv} {code} = '{text}': expected a number in columns {first} to {last}"))
+        })?;
+        // A zero means no observation (RINEX 3.05, 6.7).
+        if value == 0.0 {
+            return Ok(());
+        }
+        let value = value / self.header.scale_of(sv, code);
+        let indicator = columns(line, from + 14, from + 15).parse::<u8>().unwrap_or(0);
+        let entry = all.entry((sv, code.get(1..).unwrap_or("").to_owned())).or_default();
+        match code.as_bytes().first() {
+            Some(b'C') => entry.pseudorange_m = Some(value),
+            Some(b'L') => {
+                entry.carrier_cycles = Some(value);
+                entry.lost_lock = indicator & 1 != 0;
+                entry.half_cycle_ambiguous = indicator & 2 != 0;
             }
-            let value = if self.scales.is_empty() {
-                value
-            } else {
-                value / self.scales.get(&(sv.system.letter(), code.clone())).copied().unwrap_or(1.0)
-            };
-            let indicator = columns(line, from + 14, from + 15).parse::<u8>().unwrap_or(0);
-            let entry = all.entry((sv, code.get(1..).unwrap_or("").to_owned())).or_default();
-            match code.as_bytes().first() {
-                Some(b'C') => entry.pseudorange_m = Some(value),
-                Some(b'L') => {
-                    entry.carrier_cycles = Some(value);
-                    entry.lost_lock = indicator & 1 != 0;
-                    entry.half_cycle_ambiguous = indicator & 2 != 0;
-                }
-                Some(b'D') => entry.doppler_hz = Some(value),
-                Some(b'S') => entry.cn0_dbhz = Some(value),
-                _ => {}
-            }
+            Some(b'D') => entry.doppler_hz = Some(value),
+            Some(b'S') => entry.cn0_dbhz = Some(value),
+            _ => {}
         }
         Ok(())
     }
 }
 
-/// Seconds of these scales are those of GPS time; BDT is 14 s behind, GLO is UTC.
-fn time_system(name: &str) -> Result<(), String> {
-    if ["", "GPS", "GAL", "QZS", "IRN"].contains(&name) {
-        return Ok(());
-    }
-    Err(format!("time system '{name}': expected GPS, GAL, QZS or IRN"))
+/// Satellites on an epoch line of RINEX 2, and values on a line.
+const NAMES: usize = 12;
+const PER_LINE: usize = 5;
+
+/// Lines that continue an epoch line of RINEX 2 with so many satellites.
+fn more_lines(satellites: usize) -> usize {
+    satellites.div_ceil(NAMES).saturating_sub(1)
 }
 
-/// That a system's list of types is as long as it said.
-fn complete(wanted: Option<(char, usize)>) -> Result<(), String> {
-    match wanted {
-        Some((system, missing)) if missing > 0 => {
-            Err(format!("{missing} observation types of system {system} are missing before this line"))
+/// What an epoch line says.
+struct Head {
+    /// Its time, which the file's header says is GPS time, and as it is written.
+    label: Option<Epoch>,
+    time: String,
+    /// How a time is written.
+    form: &'static str,
+    flag: u8,
+    /// Satellites, or lines of an event.
+    count: usize,
+    /// Column in which the list of satellites begins, where there is one.
+    list: usize,
+}
+
+impl Head {
+    fn read(line: &str, is_second: bool) -> Result<Self, String> {
+        if !is_second && !line.starts_with('>') {
+            return Err(format!("'{}': expected an epoch, which begins with '>'", cut(line)));
         }
-        _ => Ok(()),
+        // Columns of year, month, day, hour, minute and second; of flag and count.
+        let (at, flag, list, form) = if is_second {
+            ([(1, 3), (4, 6), (7, 9), (10, 12), (13, 15), (15, 26)], 28, 32, "yy mm dd hh mm ss.s")
+        } else {
+            ([(2, 6), (7, 9), (10, 12), (13, 15), (16, 18), (18, 29)], 31, 41, "yyyy mm dd hh mm ss.s")
+        };
+        let count_text = columns(line, flag + 1, flag + 4);
+        let Some(count) = count_text.parse::<usize>().ok().filter(|count| *count <= 999) else {
+            return Err(format!("number of satellites '{count_text}': expected 0 to 999"));
+        };
+        let flag_text = columns(line, flag, flag + 1);
+        let Some(flag) = flag_text.parse::<u8>().ok().filter(|flag| *flag <= 6) else {
+            return Err(format!("epoch flag '{flag_text}': expected 0 to 6"));
+        };
+        let [year, month, day, hour, minute, seconds] = at.map(|(from, to)| columns(line, from, to));
+        let century = match year.parse::<u8>() {
+            Ok(year) if is_second => {
+                if year >= 80 {
+                    "19"
+                } else {
+                    "20"
+                }
+            }
+            _ => "",
+        };
+        let (whole, rest) = seconds.split_once('.').unwrap_or((seconds, "0"));
+        let text = format!("{century}{year:0>2}-{month:0>2}-{day:0>2}T{hour:0>2}:{minute:0>2}:{whole:0>2}.{rest}");
+        let time = columns(line, at[0].0, at[5].1).to_owned();
+        Ok(Self { label: Epoch::parse(&text).ok(), time, form, flag, count, list })
     }
-}
-
-/// The time of an epoch line, which the file's header says is GPS time.
-fn time(line: &str) -> Option<Epoch> {
-    let part = |from, to| columns(line, from, to);
-    let two = |from: usize| format!("{:0>2}", part(from, from + 2));
-    let seconds = part(18, 29);
-    let (whole, rest) = seconds.split_once('.').unwrap_or((seconds, "0"));
-    let text = format!("{}-{}-{}T{}:{}:{whole:0>2}.{rest}", part(2, 6), two(7), two(10), two(13), two(16));
-    Epoch::parse(&text).ok()
 }
 
 fn cut(line: &str) -> String {

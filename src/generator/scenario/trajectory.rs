@@ -53,11 +53,19 @@ impl Scenario {
                         Ok(trajectory)
                     }
                     FileKind::Nmea => {
-                        let (trajectory, skipped) = file::read_nmea(input, &name, &options).map_err(refuse)?;
-                        if skipped > 0 {
-                            warnings.push(format!("{name}: {skipped} GGA sentences without a fix left out"));
+                        let found = file::read_nmea(input, &name, &options).map_err(refuse)?;
+                        if found.without_fix > 0 {
+                            warnings
+                                .push(format!("{name}: {} GGA sentences without a fix left out", found.without_fix));
                         }
-                        Ok(trajectory)
+                        if found.separations_assumed > 0 {
+                            warnings.push(format!(
+                                "{name}: {} GGA sentences without a geoid separation: heights taken as above mean sea \
+                                 level, EGM96's separation added",
+                                found.separations_assumed
+                            ));
+                        }
+                        Ok(found.trajectory)
                     }
                 }
             }

@@ -256,7 +256,8 @@ mod tests {
         let sentences = text("trajectory.nmea");
         let first: Vec<&str> = sentences.lines().filter(|line| line.contains("GGA")).collect();
         assert_eq!(first.len(), 3, "{sentences}");
-        let start = "$GNGGA,080601.000,2645.0000000,N,08015.0000000,W,1,02,99.99,130.0000,M,0.0,M,,*";
+        // The sea is there 27.989 m below the ellipsoid (WW15MGH), to the 1.9 m of a grid of 1°.
+        let start = "$GNGGA,080601.000,2645.0000000,N,08015.0000000,W,1,02,99.99,158.6760,M,-28.676,M,,*";
         assert!(first[1].starts_with(start), "{sentences}");
         // Of two signals of a satellite the stronger one.
         assert!(sentences.contains("GAGSV,1,1,01,04,45,123,41,7*"), "{sentences}");

@@ -3,8 +3,8 @@
 //! CSV columns, in any order: time as `time_s` (since the scene's start) or `gps_s` with an optional
 //! `gps_fraction_s`; position as `x_m,y_m,z_m` (ECEF) or `latitude_deg,longitude_deg,height_m`; velocity, if
 //! known, as `vx_mps,vy_mps,vz_mps` (ECEF) or `east_mps,north_mps,up_mps`. `#` begins a comment. NMEA heights
-//! become ellipsoidal by the sentence's own geoid separation, and what a logger puts before a sentence is
-//! passed over. A file is read row by row and refused at the first bad one.
+//! become ellipsoidal by the sentence's own geoid separation, or by EGM96's where it has none; what a logger
+//! puts before a sentence is passed over. A file is read row by row and refused at the first bad one.
 
 mod nmea;
 mod rows;
@@ -17,8 +17,9 @@ use thiserror::Error;
 use super::Trajectory;
 use super::spline::Row;
 use gnss::earth::Geodetic;
+use gnss::nmea::read::sentences;
 use gnss::time::Epoch;
-pub use nmea::{Rmc, gga, rising, rmc};
+pub use nmea::{Gga, Rmc, gga, rising, rmc};
 use rows::Rows;
 
 /// Rows read at most: eleven hours at 25 Hz. They become 80 MB of knots, and take three times that while
@@ -176,7 +177,7 @@ pub enum Fault {
         /// The sentence.
         sentence: String,
         /// What is wrong.
-        reason: &'static str,
+        reason: String,
     },
 }
 
@@ -398,14 +399,28 @@ pub fn read_csv(input: impl Read, file: &str, options: &Options) -> Result<(Traj
     Ok((rows.finish(file)?, columns.ignored))
 }
 
-/// Reads the GGA sentences of an NMEA file; also returns how many said that there was no fix and were left
-/// out.
-pub fn read_nmea(input: impl Read, file: &str, options: &Options) -> Result<(Trajectory, usize), FileError> {
+/// A trajectory of NMEA sentences, and what was passed over or assumed.
+#[derive(Clone, Debug)]
+pub struct NmeaTrajectory {
+    /// The motion.
+    pub trajectory: Trajectory,
+    /// GGA sentences that say that there is no fix.
+    pub without_fix: usize,
+    /// GGA sentences without a geoid separation, for which EGM96's was added.
+    pub separations_assumed: usize,
+}
+
+/// Reads the GGA sentences of an NMEA file. Of several talkers in one epoch the first is taken.
+///
+/// # Errors
+/// [`FileError`] with the first line that is not as it must be.
+pub fn read_nmea(input: impl Read, file: &str, options: &Options) -> Result<NmeaTrajectory, FileError> {
     let error = |line, fault| FileError { file: file.to_owned(), line, fault };
     let mut input = BufReader::new(input.take(MAX_BYTES + 1));
     let mut rows = Rows::new(options);
-    let (mut bytes, mut line, mut without_fix, mut total) = (Vec::new(), 0, 0, 0);
-    let (mut sentences, mut of_rmc) = (0_usize, 0_usize);
+    let (mut bytes, mut line, mut without_fix, mut separations_assumed, mut total) = (Vec::new(), 0, 0, 0, 0);
+    let mut talker = String::new();
+    let (mut found_any, mut of_rmc) = (false, false);
     loop {
         bytes.clear();
         line += 1;
@@ -416,24 +431,31 @@ pub fn read_nmea(input: impl Read, file: &str, options: &Options) -> Result<(Tra
         } else if total > MAX_BYTES {
             return Err(error(line, Fault::TooLong));
         }
-        let text = std::str::from_utf8(&bytes).map_err(|_| error(line, Fault::NotText))?.trim();
-        // Loggers put a time of their own before a sentence.
-        let Some(text) = text.find('$').and_then(|at| text.get(at..)) else { continue };
-        sentences += 1;
-        of_rmc += usize::from(text.get(3..7) == Some("RMC,"));
-        if text.get(3..7) == Some("GGA,") {
-            let before_s = rows.last_s();
-            match gga(text, options.start, before_s).map_err(|f| error(line, f))? {
-                Some(row) => rows.push(line, row).map_err(|f| error(line, f))?,
-                None => without_fix += 1,
+        for text in sentences(&bytes) {
+            found_any = true;
+            of_rmc |= text.get(3..7) == Some(b"RMC,");
+            if text.get(3..7) != Some(b"GGA,") {
+                continue;
             }
+            let text = std::str::from_utf8(text).map_err(|_| error(line, Fault::NotText))?.trim();
+            let before_s = rows.last_s();
+            let Some(found) = gga(text, options.start, before_s).map_err(|f| error(line, f))? else {
+                without_fix += 1;
+                continue;
+            };
+            if before_s == Some(found.row.t_s) && talker != found.talker {
+                continue;
+            }
+            talker = found.talker;
+            separations_assumed += usize::from(found.separation_assumed);
+            rows.push(line, found.row).map_err(|f| error(line, f))?;
         }
     }
-    let what = match (rows.last_s(), sentences, of_rmc) {
-        (Some(_), ..) => return Ok((rows.finish(file)?, without_fix)),
+    let what = match (rows.last_s(), found_any, of_rmc) {
+        (Some(_), ..) => return Ok(NmeaTrajectory { trajectory: rows.finish(file)?, without_fix, separations_assumed }),
         (None, ..) if without_fix > 0 => "no GGA sentence with a fix",
-        (None, 0, _) => "no sentence of NMEA",
-        (None, _, 0) => "no GGA sentence",
+        (None, false, _) => "no sentence of NMEA",
+        (None, _, false) => "no GGA sentence",
         (None, ..) => "RMC sentences, which have no height, and none of GGA",
     };
     Err(error(line, Fault::Foreign { what, expected: "GGA sentences with a fix, two at least" }))

@@ -1,6 +1,6 @@
 //! States from sentences of NMEA: GGA alone has the place and RMC alone place, speed and course, at the last
 //! height that was known. Where both come for one time they make one state, with what the height gained since
-//! the one before.
+//! the one before. Altitudes are above mean sea level; a GGA without a geoid separation takes EGM96's.
 
 use super::{Message, WireError};
 use generator::vehicle::file::{Rmc, gga, rising, rmc};
@@ -57,6 +57,7 @@ impl Reader {
             Some("GGA,") => {
                 let row = gga(text, self.start, before_s).map_err(|fault| wrong(fault.to_string()))?;
                 let row = row.ok_or_else(missing)?;
+                let row = row.row;
                 self.climb(row.t_s, Geodetic::from_ecef(&row.position_m).height_m);
                 (Half::Gga(row.t_s), Push::at(row.t_s, row.position_m))
             }

@@ -25,4 +25,6 @@ pub struct Judged {
     /// Whole seconds that positions' labels must be earlier for more of them to join: GPS time in place of
     /// UTC.
     pub labels_late_s: Option<i64>,
+    /// Positions whose file names no geoid separation, so that EGM96's was added to their altitude.
+    pub separations_assumed: usize,
 }

@@ -1,6 +1,6 @@
 //! Judging a receiver that this project did not write and that was fed this project's samples.
 //!
-//! It is known by its files alone: observations in RINEX 3 ([`crate::read::rinex_obs`]), positions
+//! It is known by its files alone: observations in RINEX ([`crate::read::rinex_obs`]), positions
 //! in NMEA ([`crate::read::nmea`]). They are joined with the truth by GPS time ([`timeline`]),
 //! since a foreign receiver knows nothing of sample numbers. [`observables`] and [`place`] measure;
 //! [`report`] names the biases. A receiver that took its week for one 1024 weeks off is moved back, and the
@@ -32,7 +32,7 @@ pub use report::{FIGURES, ForeignSummary};
 /// The files of a receiver under test.
 #[derive(Clone, Debug, Default)]
 pub struct Files {
-    /// Observations, RINEX 3.
+    /// Observations, RINEX 2.11, 3 or 4, also compressed.
     pub rinex_obs: Option<PathBuf>,
     /// Positions, NMEA 0183.
     pub nmea: Option<PathBuf>,
@@ -64,6 +64,7 @@ pub fn judge(truth: &Path, files: &Files) -> Result<Judgement, JudgeError> {
         observables: None,
         places: None,
         labels_late_s: None,
+        separations_assumed: 0,
     };
     if let Some(path) = &files.rinex_obs {
         let read = rinex_obs::read(&bytes(path)?).map_err(|fault| line(path, fault))?;
@@ -77,9 +78,8 @@ pub fn judge(truth: &Path, files: &Files) -> Result<Judgement, JudgeError> {
         judged.observables = Some(measured);
     }
     if let Some(path) = &files.nmea {
-        let middle = timeline.origin.plus_s(0.5 * timeline.span_s().1).to_utc_text();
-        let day = middle.get(..10).unwrap_or("1980-01-06");
-        let read = nmea::read(&bytes(path)?, day).map_err(|fault| line(path, fault))?;
+        let middle = timeline.origin.plus_s(0.5 * timeline.span_s().1);
+        let read = nmea::read(&bytes(path)?, middle).map_err(|fault| line(path, fault))?;
         let labels: Vec<Epoch> = read.fixes.iter().map(|fix| fix.label).collect();
         judged.rollover_s[1] = rollover(&labels, &timeline).ok_or_else(|| elsewhere(path, &labels, &timeline))?;
         let measured = place::measure(&read.fixes, &timeline, judged.rollover_s[1]);
@@ -92,6 +92,7 @@ pub fn judge(truth: &Path, files: &Files) -> Result<Judgement, JudgeError> {
         // A right label may be past the truth's end by its own error, one in GPS time by the leap seconds.
         let past_end = labels.iter().any(|label| label.since(timeline.origin) - end_s > 0.5 * leap_s as f64);
         judged.labels_late_s = (past_end && leap_s > 0 && joined(leap_s) > measured.rows.len()).then_some(leap_s);
+        judged.separations_assumed = read.separations_assumed;
         judged.places = Some(measured);
     }
     let summary = ForeignSummary::new(&judged);

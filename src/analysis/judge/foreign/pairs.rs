@@ -49,10 +49,15 @@ pub(super) fn join<'a>(
 }
 
 /// The code of a signal by that of a component or of both: E1's data are 1B, data and pilot 1X (RINEX 4.02,
-/// table 14).
+/// table 14). What RINEX 2 observes has an X where it does not say which component it is.
 fn whole(system: System, code: &str) -> &str {
     match (system, code) {
         (System::Galileo, "1B" | "1X") => "1C",
+        (System::Galileo, "6X") => "6C",
+        (System::Galileo, "7X") => "7Q",
+        (System::Galileo, "8X") => "8Q",
+        (System::Gps | System::Qzss, "2X") => "2L",
+        (System::Gps | System::Qzss | System::Galileo, "5X") => "5Q",
         _ => code,
     }
 }

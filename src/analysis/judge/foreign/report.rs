@@ -340,6 +340,13 @@ impl ForeignSummary {
                 places.fixes
             ));
         }
+        if judged.separations_assumed > 0 {
+            found.push(format!(
+                "{} positions have no geoid separation: altitudes taken as above mean sea level, EGM96's separation \
+                 added (0.5 m, up to 14 m in mountains)",
+                judged.separations_assumed
+            ));
+        }
         if let Some([east, north, up]) = judged.places.as_ref().and_then(|places| places.bias_enu_m) {
             for (axis, estimate) in [("east", east), ("north", north), ("up", up)] {
                 named(&mut found, &format!("position {axis}"), Some(estimate), 0.0, "m");

@@ -305,7 +305,8 @@ impl Sentences<'_> {
             return Ok(());
         }
         let begin = end - text.split_inclusive(|byte| *byte == b'\n').count() as u64;
-        match nmea::read(text, "") {
+        let near = self.fix.as_ref().map_or(Epoch::new(0, 0.0), Fix::time);
+        match nmea::read(text, near) {
             Ok(places) => places.fixes.iter().try_for_each(|place| self.compare(place)),
             Err(fault) => {
                 self.damaged.add(|| in_words("fixes.nmea", &Fault { line: begin + fault.line, ..fault }));
