@@ -82,7 +82,8 @@ pub fn judge(truth: &Path, files: &Files) -> Result<Judgement, JudgeError> {
         let read = nmea::read(&bytes(path)?, day).map_err(|fault| line(path, fault))?;
         let labels: Vec<Epoch> = read.fixes.iter().map(|fix| fix.label).collect();
         judged.rollover_s[1] = rollover(&labels, &timeline).ok_or_else(|| elsewhere(path, &labels, &timeline))?;
-        let measured = place::measure(&read.fixes, &timeline, judged.rollover_s[1]);
+        let mut measured = place::measure(&read.fixes, &timeline, judged.rollover_s[1]);
+        measured.resolution_m = read.resolution_m;
         if measured.rows.is_empty() {
             return Err(elsewhere(path, &labels, &timeline));
         }
