@@ -113,6 +113,7 @@ pub(super) fn carriers(measured: &mut Measured, pairs: &[Pair<'_>]) -> (Carriers
                         sv: link.sv.to_string(),
                         size_cycles: (!declared).then_some(size),
                         declared,
+                        link: *link,
                     });
                 }
                 last = Some(middle);
@@ -136,13 +137,26 @@ pub(super) fn carriers(measured: &mut Measured, pairs: &[Pair<'_>]) -> (Carriers
 
 /// +1 where the carrier grows with range, as RINEX has it, −1 where it falls.
 fn carrier_sign<'i>(pairs: &[Pair<'_>], links: impl Iterator<Item = &'i Vec<usize>>) -> Option<f64> {
-    let mut product = 0.0;
+    let mut steps: BTreeMap<(usize, &'static Signal), Vec<(f64, f64)>> = BTreeMap::new();
     for indices in links {
         for two in indices.windows(2) {
             let [a, b] = [&pairs[two[0]], &pairs[two[1]]];
             let (Some(from), Some(to)) = (a.values.carrier_cycles, b.values.carrier_cycles) else { continue };
-            product += ((to - from) * (b.truth.carrier_cycles - a.truth.carrier_cycles)).signum();
+            steps.entry(b.group()).or_default().push((to - from, b.truth.carrier_cycles - a.truth.carrier_cycles));
         }
     }
-    (product != 0.0).then(|| product.signum())
+    // What all satellites of an epoch have in common is the clock's; of a single one it is all that there is.
+    let product = |with_clock: bool| -> f64 {
+        let of = |steps: &Vec<(f64, f64)>| {
+            let middle = |of: fn(&(f64, f64)) -> f64| {
+                if with_clock { 0.0 } else { median(&steps.iter().map(of).collect::<Vec<_>>()).unwrap_or(0.0) }
+            };
+            let (found, truth) = (middle(|step| step.0), middle(|step| step.1));
+            // The size of the truth's step weighs; that of a slip does not.
+            steps.iter().map(|step| (step.0 - found).signum() * (step.1 - truth)).sum::<f64>()
+        };
+        steps.values().map(of).sum()
+    };
+    let found = Some(product(false)).filter(|product| *product != 0.0).unwrap_or_else(|| product(true));
+    (found != 0.0).then(|| found.signum())
 }

@@ -66,6 +66,9 @@ pub struct Slip {
     pub size_cycles: Option<f64>,
     /// By the file's loss-of-lock indicator.
     pub declared: bool,
+    /// Satellite and signal.
+    #[serde(skip)]
+    pub link: Link,
 }
 
 /// An unbroken stretch of a satellite's carrier.
@@ -127,8 +130,12 @@ pub struct Measured {
     pub observations: usize,
     /// Of satellites or times that the truth does not have.
     pub unmatched: usize,
+    /// Epochs and observations less than a row of the truth before its beginning or after its end.
+    pub at_edge: (usize, usize),
     /// Observations left out as of a wrong lock.
     pub outliers: usize,
+    /// Distance from the others of their epoch and signal from which on they are, metres.
+    pub outlier_limit_m: f64,
     /// By how much labels are late, seconds.
     pub time_tag_s: Option<Estimate>,
     /// Whether it was significant, so that the truth was taken at the corrected times.

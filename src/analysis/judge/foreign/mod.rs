@@ -26,6 +26,7 @@ use crate::read::{Fault, Run, nmea, rinex_obs};
 use gnss::time::{Epoch, WEEK_S};
 
 pub use fit::Estimate;
+pub(in crate::judge) use fit::slope;
 pub use judged::Judged;
 pub use report::{FIGURES, ForeignSummary};
 

@@ -54,7 +54,10 @@ pub fn measure(epochs: &[ObservedEpoch], timeline: &Timeline, shift_s: i64) -> M
     measured.observations = epochs.iter().map(|epoch| epoch.values.len()).sum();
     measured.unmatched = measured.observations - pairs.len();
     measured.joined = pairs.iter().map(|pair| pair.epoch).collect::<BTreeSet<_>>().len();
-    let common_m = common(&pairs, &mut measured.outliers);
+    let at_edge = |epoch: &&ObservedEpoch| timeline.is_at_edge(label(epoch));
+    let edges: Vec<&ObservedEpoch> = epochs.iter().filter(at_edge).collect();
+    measured.at_edge = (edges.len(), edges.iter().map(|epoch| epoch.values.len()).sum());
+    let common_m = common(&pairs, &mut measured);
     clock(&mut measured, &pairs, &common_m, timeline);
     doppler_and_strength(&mut measured, &pairs);
     let (carriers, arcs) = carriers(&mut measured, &pairs);
@@ -85,7 +88,7 @@ fn readings_s(pairs: &[Pair<'_>], epochs: usize) -> Vec<f64> {
 }
 
 /// Mean code error of each epoch and signal without outliers.
-fn common(pairs: &[Pair<'_>], outliers: &mut usize) -> BySignal {
+fn common(pairs: &[Pair<'_>], measured: &mut Measured) -> BySignal {
     let deviations: Vec<f64> = by_signal(pairs)
         .flat_map(|epoch| {
             let errors: Vec<f64> = epoch.iter().filter_map(|pair| pair.code_m()).collect();
@@ -95,13 +98,13 @@ fn common(pairs: &[Pair<'_>], outliers: &mut usize) -> BySignal {
         .collect();
     // Median of a normal magnitude is 0.6745σ.
     let limit_m = (OUTLIER_SIGMAS * median(&deviations).unwrap_or(0.0) / 0.6745).max(OUTLIER_M);
-    *outliers = 0;
+    (measured.outliers, measured.outlier_limit_m) = (0, limit_m);
     let mut found = BTreeMap::new();
     for epoch in by_signal(pairs) {
         let errors: Vec<f64> = epoch.iter().filter_map(|pair| pair.code_m()).collect();
         let Some(middle) = median(&errors) else { continue };
         let kept: Vec<f64> = errors.iter().copied().filter(|error| (error - middle).abs() <= limit_m).collect();
-        *outliers += errors.len() - kept.len();
+        measured.outliers += errors.len() - kept.len();
         if let (Some(mean), Some(first)) = (mean(&kept), epoch.first()) {
             found.insert(first.group(), mean);
         }
@@ -111,8 +114,7 @@ fn common(pairs: &[Pair<'_>], outliers: &mut usize) -> BySignal {
 
 /// Delay of the labels from the slope of code errors over Doppler, both about their epoch's mean.
 fn time_tag(pairs: &[Pair<'_>]) -> Option<Estimate> {
-    let mut outliers = 0;
-    let common_m = common(pairs, &mut outliers);
+    let common_m = common(pairs, &mut Measured::default());
     let mut points = Vec::new();
     for epoch in by_signal(pairs) {
         let Some(common_m) = epoch.first().and_then(|first| common_m.get(&first.group())) else { continue };

@@ -68,6 +68,8 @@ pub struct Places {
     pub changing_s: Option<Estimate>,
     /// Fixes at the place of the one before, to the last digit.
     pub repeated: usize,
+    /// Fixes less than a row of the truth before its beginning or after its end.
+    pub at_edge: usize,
     /// Smallest step of a latitude as written, metres.
     pub resolution_m: f64,
 }
@@ -77,10 +79,13 @@ const SLOWEST_MPS: f64 = 1.0;
 
 /// Joins and measures; `shift_s` is taken from every label first.
 pub fn measure(fixes: &[PlaceFix], timeline: &Timeline, shift_s: i64) -> Places {
-    let mut rows = Vec::new();
+    let (mut rows, mut at_edge) = (Vec::new(), 0);
     for fix in fixes {
         let label_s = fix.label.since(timeline.origin) - shift_s as f64;
-        let Some(place) = timeline.place(label_s) else { continue };
+        let Some(place) = timeline.place(label_s) else {
+            at_edge += usize::from(timeline.is_at_edge(label_s));
+            continue;
+        };
         let to_enu = Geodetic::from_ecef(&place.position_m).ecef_to_enu();
         let error_m = to_enu * (fix.position_m - place.position_m);
         let true_enu_mps = to_enu * place.velocity_mps;
@@ -116,6 +121,7 @@ pub fn measure(fixes: &[PlaceFix], timeline: &Timeline, shift_s: i64) -> Places 
         time_tag_s: time_tag(&rows, false),
         changing_s: time_tag(&rows, true),
         repeated: fixes.windows(2).filter(|two| two[0].position_m == two[1].position_m).count(),
+        at_edge,
         resolution_m: 0.0,
         rows,
     }

@@ -7,16 +7,18 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::plain::{self, EDGES_M, Scene};
+use super::plain::{self, Scene};
 use super::signals::{Found, One};
 use crate::expect::quantile::largest;
+use crate::judge::foreign::{Estimate, slope};
 use crate::judge::foreign::measured::{Measured, ObservationError};
 use crate::judge::judgement::Bound;
 use crate::judge::rules::kind::THEORY;
 use crate::judge::verdict::Verdict;
-use crate::statistics::{mean, median};
+use crate::statistics::{mean, median, rms};
 use crate::waveform::leading;
 use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::satellite::Sv;
 use gnss::signal::{Link, Signal};
 
 const RINEX: &str =
@@ -37,28 +39,59 @@ const DRIFT_MPS: f64 = 0.02;
 const FROZEN: usize = 20;
 /// Time over which they must have it.
 const FROZEN_S: f64 = 5.0;
+/// Farther from the others a pseudorange is of another signal, and says nothing of time.
+const FAR_M: f64 = 1e5;
+
+/// Drift of the receiver's clock by its code: the median over epochs, as it may be set.
+fn drift_of(measured: &Measured) -> f64 {
+    let steps = measured.clock.windows(2).map(|two| (two[1].bias_s - two[0].bias_s) / (two[1].label_s - two[0].label_s));
+    median(&steps.collect::<Vec<_>>()).unwrap_or(0.0)
+}
+
+/// By how much labels are late by the rows that are judged: what the truth was moved by already, and the slope
+/// of pseudoranges over Doppler that is left.
+fn judged_late(measured: &Measured, scene: &Scene<'_>) -> Option<Estimate> {
+    let mut epochs: BTreeMap<(u64, &'static Signal), Vec<(Link, f64, f64)>> = BTreeMap::new();
+    for row in measured.rows.iter().filter(|row| scene.judges(row)) {
+        if let Some(code_m) = row.code_m.filter(|code_m| code_m.abs() < FAR_M) {
+            let point = (row.link, row.link.wavelength_m() * row.truth.doppler_hz, code_m);
+            epochs.entry((row.label_s.to_bits(), row.link.signal)).or_default().push(point);
+        }
+    }
+    let points: Vec<(Sv, f64, f64)> = epochs
+        .into_values()
+        .flat_map(|points| {
+            let of = |of: fn(&(Link, f64, f64)) -> f64| mean(&points.iter().map(of).collect::<Vec<_>>()).unwrap_or(0.0);
+            let (speed, error) = (of(|point| point.1), of(|point| point.2));
+            points.into_iter().map(move |point| (point.0.sv, point.1 - speed, point.2 - error))
+        })
+        .collect();
+    let applied_s = measured.time_tag_s.filter(|_| measured.time_tag_applied).map_or(0.0, |late| late.value);
+    slope(&points).map(|found| Estimate { value: applied_s + found.value, sigma: found.sigma })
+}
 
 impl Verdict {
     /// Signs of carriers and Dopplers, satellite by satellite.
     pub(super) fn signs(&mut self, measured: &Measured, scene: &Scene<'_>) {
         let mut links: BTreeMap<Link, Vec<&ObservationError>> = BTreeMap::new();
         measured.rows.iter().for_each(|row| links.entry(row.link).or_default().push(row));
-        let drift = measured.drift_code.filter(|drift| drift.abs() < 1e-4).unwrap_or(0.0);
+        let drift = drift_of(measured);
         let (mut carriers, mut dopplers) = (Vec::new(), Vec::new());
         for (link, rows) in &links {
             let with_clock_hz = |row: &ObservationError| row.truth.doppler_hz - link.carrier_hz() * drift;
-            let usual_hz = mean(&rows.iter().map(|row| with_clock_hz(row)).collect::<Vec<_>>()).unwrap_or(0.0);
-            if usual_hz.abs() < SIGN_HZ {
+            let values: Vec<f64> = rows.iter().map(|row| with_clock_hz(row)).collect();
+            if rms(&values).is_none_or(|usual_hz| usual_hz < SIGN_HZ) {
                 continue;
             }
-            let found = mean(&rows.iter().filter_map(|row| row.values.doppler_hz).collect::<Vec<_>>());
-            dopplers.extend(found.map(|found_hz| (*link, found_hz * usual_hz > 0.0)));
+            let products = rows.iter().filter_map(|row| Some(row.values.doppler_hz? * with_clock_hz(row)));
+            dopplers.extend(mean(&products.collect::<Vec<_>>()).map(|product| (*link, product > 0.0)));
             let mut sum = 0.0;
             for two in rows.windows(2) {
-                let (Some(from), Some(to)) = (two[0].values.carrier_cycles, two[1].values.carrier_cycles) else {
-                    continue;
-                };
-                sum += (-usual_hz * (to - from)).signum();
+                let carriers = two[0].values.carrier_cycles.zip(two[1].values.carrier_cycles);
+                let Some((from, to)) = carriers.filter(|_| !two[1].values.lost_lock) else { continue };
+                let turned = -0.5 * (with_clock_hz(two[0]) + with_clock_hz(two[1])) * (two[1].at_s - two[0].at_s);
+                // A clock that is set by a millisecond turns a carrier by a million cycles, and tells no sign.
+                sum += turned * (to - from).clamp(-2.0 * turned.abs(), 2.0 * turned.abs());
             }
             if sum != 0.0 {
                 carriers.push((*link, sum > 0.0));
@@ -80,7 +113,10 @@ impl Verdict {
 
     /// Labels against what the pseudoranges say of the time.
     pub(super) fn time_tags(&mut self, measured: &Measured, ones: &[One<'_>], scene: &Scene<'_>) {
-        let Some(late) = measured.time_tag_s else { return };
+        let (late, what) = match judged_late(measured, scene) {
+            Some(late) => (late, "the slope of pseudoranges over Doppler"),
+            None => return,
+        };
         // Speeds along the lines of sight about their mean, and what biases of each satellite make of the slope.
         let speeds: Vec<f64> = ones
             .iter()
@@ -89,15 +125,16 @@ impl Verdict {
             })
             .collect();
         let squares: f64 = mean(&speeds).map_or(0.0, |usual| speeds.iter().map(|v| (v - usual).powi(2)).sum());
-        let bias_m = THEORY * libm::hypot(EDGES_M, scene.reach_m());
+        let bias_m = THEORY * libm::hypot(scene.usual_edges_m(), scene.reach_m());
         let theory_s = if squares > 0.0 { bias_m / squares.sqrt() } else { f64::INFINITY };
         // The scatter between satellites is itself uncertain where there are few.
         let sigma_s = theory_s.min(2.0 * late.sigma);
         let limit = 1e3 * (LATE_S + largest(1, 1) * sigma_s);
-        let source = "labels less the receiver's own clock are the time of reception: the slope of pseudoranges over \
-                      Doppler, 3 ms, and biases of satellites";
+        let source = format!(
+            "labels less the receiver's own clock are the time of reception: {what}, 3 ms, and biases of satellites"
+        );
         let path = "join.time_tag_offset_s";
-        self.judge("time tags of observations, late", path, 1e3 * late.value.abs(), "ms", Bound::Max(limit), source);
+        self.judge("time tags of observations, late", path, 1e3 * late.value.abs(), "ms", Bound::Max(limit), &source);
     }
 
     /// The clock by one signal against that by another.
@@ -123,7 +160,7 @@ impl Verdict {
         let chip_m = |signal| leading(signal).map_or(0.0, |own| SPEED_OF_LIGHT_MPS / own.chip_rate_hz);
         let delay_m = |signal: &Signal| SPEED_OF_LIGHT_MPS * scene.run.common.code_delay_s(signal);
         let found = offsets.into_iter().filter_map(|(signal, (all, satellites))| {
-            let biases_m = libm::hypot(EDGES_M, scene.reach_m()) / (satellites as f64).sqrt();
+            let biases_m = libm::hypot(scene.usual_edges_m(), scene.reach_m()) / (satellites as f64).sqrt();
             let value = median(&all)? - (delay_m(signal) - delay_m(usual));
             let limit = SIGNALS_CHIPS * chip_m(signal).max(chip_m(usual)) + largest(1, 1) * THEORY * biases_m;
             Some(Found { name: format!("{} against {}", signal.name, usual.name), value: value.abs(), limit })
@@ -160,7 +197,7 @@ impl Verdict {
             let plain_m = ones.iter().map(|one| one.plain_m).fold(0.0, f64::max);
             let count = plain::independent(labels.len(), span_s, plain::PLAIN_HZ);
             let noise = plain_m * 12.0_f64.sqrt() / (span_s * (count * satellites).sqrt());
-            let slow = (2.0 * EDGES_M / satellites.sqrt() + 2.0 * scene.reach_m()) / span_s;
+            let slow = (2.0 * scene.usual_edges_m() / satellites.sqrt() + 2.0 * scene.reach_m()) / span_s;
             let limit = DRIFT_MPS + largest(1, 1) * (THEORY * noise + slow.min(drift.sigma));
             let source = "one clock moves both: noise of codes, and the scatter between satellites";
             let path = "code.minus_carrier_drift_mps";
@@ -193,14 +230,14 @@ impl Verdict {
             let long = |part: &[&ObservationError]| {
                 part.len() >= FROZEN && ends(part, |row| row.at_s) >= FROZEN_S
             };
-            run("pseudorange", &|part| ends(part, |row| row.truth.range_m) > 1.0, &|row| row.values.pseudorange_m);
+            run("pseudorange", &|part| ends(part, |row| row.truth.range_m) > 10.0, &|row| row.values.pseudorange_m);
             run("carrier", &|part| ends(part, |row| row.truth.carrier_cycles) > 5.0, &|row| row.values.carrier_cycles);
             run("Doppler", &|part| long(part) && ends(part, |row| row.truth.doppler_hz) > 1.0, &|row| row.values.doppler_hz);
             if fine && scene.run.scene.noise {
                 run("C/N0", &|part| long(part), &|row| row.values.cn0_dbhz);
             }
         }
-        let source = "ranges that change by a metre, 20 epochs and 5 s of Dopplers that change and of C/N0 under noise";
+        let source = "ranges that change by ten metres, 20 epochs and 5 s of Dopplers that change and of C/N0 under noise";
         self.judge("values that stay as they were", "", found.len(), "", Bound::Max(0.0), source);
         self.explain(found);
     }

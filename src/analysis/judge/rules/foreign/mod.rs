@@ -17,17 +17,17 @@ mod times;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::availability::Came;
-use super::tracking::ONE_BIT_LOSS_DB;
 use crate::error::JudgeError;
 use crate::expect::due::Expectations;
 use crate::expect::due::receiver::Receiver;
-use crate::judge::foreign::measured::Measured;
+use crate::judge::foreign::measured::{Measured, ObservationError, Slip};
 use crate::judge::foreign::place::Places;
 use crate::judge::foreign::{ForeignSummary, Judgement};
 use crate::judge::judgement::Bound;
 use crate::judge::verdict::Verdict;
 use crate::read::Run;
-use gnss::signal::Link;
+use gnss::satellite::System;
+use gnss::signal::{Link, Signal};
 use plain::{PHASE_CYCLES, Scene};
 use times::{Begin, Labels};
 
@@ -59,7 +59,7 @@ impl Verdict {
         let begin = Begin::of(&scene, &expected, &labels);
         let mut verdict = Self::default();
         if let Some(measured) = measured {
-            verdict.observations(measured, summary);
+            verdict.observations(&scene, measured, summary);
             verdict.span("observations", &scene, &observed_s, begin.observation_s);
             let signals: BTreeSet<&str> = labels.of_links.keys().map(|link| link.signal.name).collect();
             let others: BTreeSet<&str> = expected.satellites.keys().map(|link| link.signal.name).collect();
@@ -75,6 +75,7 @@ impl Verdict {
         }
         if let Some(places) = places {
             verdict.positions(run, places, judged.labels_late_s);
+            verdict.weeks_of_positions(run, summary.join.positions_week_offset);
             let fixes: Vec<f64> = places.rows.iter().map(|row| row.label_s).collect();
             let labels = Labels::new(run, &fixes, BTreeMap::new(), judged.truth_interval_s)?;
             verdict.span("positions", &scene, &fixes, begin.fix_s);
@@ -97,25 +98,31 @@ impl Verdict {
     }
 
     /// Whether the file is of this scene, and its signals the ones that it names.
-    fn observations(&mut self, measured: &Measured, summary: &ForeignSummary) {
+    fn observations(&mut self, scene: &Scene<'_>, measured: &Measured, summary: &ForeignSummary) {
         let percent = |without: usize, of: usize| 100.0 * without as f64 / of.max(1) as f64;
         let source = "the scene's truth has every epoch of its samples, and every satellite in view";
         let bound = Bound::Max(UNMATCHED_PERCENT);
-        let epochs = percent(measured.epochs - measured.joined, measured.epochs);
+        let epochs = percent((measured.epochs - measured.joined).saturating_sub(measured.at_edge.0), measured.epochs);
         self.judge("epochs of observations without a truth", "", epochs, "%", bound.clone(), source);
-        let observations = percent(measured.unmatched, measured.observations);
+        let observations = percent(measured.unmatched.saturating_sub(measured.at_edge.1), measured.observations);
         self.judge("observations without a truth", "", observations, "%", bound, source);
         let source = "the other pseudoranges of their epochs";
         let path = "join.observations_outliers";
-        self.judge("pseudoranges of another signal", path, measured.outliers, "", Bound::Max(0.0), source);
-        let weeks = summary.join.observations_week_offset.abs() + summary.join.positions_week_offset.abs();
+        let limit_m = |row: &ObservationError| measured.outlier_limit_m + scene.reach(&row.link).code_m;
+        let is_far = |row: &&ObservationError| row.code_m.is_some_and(|code_m| code_m.abs() > limit_m(row));
+        let far: Vec<_> = measured.rows.iter().filter(|row| scene.judges(row)).filter(is_far).collect();
+        self.judge("pseudoranges of another signal", path, far.len(), "", Bound::Max(0.0), source);
+        let names: BTreeSet<String> = far.iter().map(|row| scene.run.name(row.link)).collect();
+        self.explain(names.into_iter().collect());
+        let weeks = summary.join.observations_week_offset.abs();
         self.judge("weeks by which dates are off", "", weeks, "", Bound::Max(0.0), "the scene's dates");
     }
 
     /// Code, carrier, Doppler and C/N0.
     fn observables(&mut self, scene: &Scene<'_>, measured: &Measured, summary: &ForeignSummary, expected: &Expectations) {
         self.signs(measured, scene);
-        let undeclared: Vec<_> = measured.slips.iter().filter(|slip| !slip.declared).collect();
+        let judged = |slip: &&Slip| scene.is_bounded(slip.label_s) && scene.is_sound(&slip.link, slip.label_s);
+        let undeclared: Vec<&Slip> = measured.slips.iter().filter(|slip| !slip.declared).filter(judged).collect();
         let path = "carrier.slips_undeclared";
         let source = "the file's own indicator";
         self.judge("undeclared breaks of carriers", path, undeclared.len(), "", Bound::Max(0.0), source);
@@ -136,12 +143,6 @@ impl Verdict {
             return;
         }
         if scene.run.scene.noise {
-            if let Some(bias_db) = summary.cn0.bias_db.filter(|_| scene.is_always_bounded()) {
-                let source = "loss of a one-bit quantiser, 10 lg(π/2): more is unexplained; fades by reflections";
-                let most_db = ones.iter().map(|one| scene.reach(&one.link).cn0_db).fold(0.0, f64::max);
-                let bound = Bound::Max(ONE_BIT_LOSS_DB + most_db);
-                self.judge("C/N0 bias, magnitude", "", bias_db.abs(), "dB", bound, source);
-            }
             self.strengths(&ones, scene);
         } else {
             self.not_judged.push("C/N0: the scene has no noise".to_owned());
@@ -160,11 +161,25 @@ impl Verdict {
     }
 
     fn positions(&mut self, run: &Run, places: &Places, labels_late_s: Option<i64>) {
-        let percent = 100.0 * (places.fixes - places.rows.len()) as f64 / places.fixes.max(1) as f64;
+        let percent = 100.0 * (places.fixes - places.rows.len()).saturating_sub(places.at_edge) as f64 / places.fixes.max(1) as f64;
         let source = format!("the scene's truth has every second of its {} s", run.scene.duration_s);
         self.judge("positions without a truth", "", percent, "%", Bound::Max(UNMATCHED_PERCENT), &source);
         if let Some(late_s) = labels_late_s {
             self.explain(vec![format!("labels are {late_s} s late: GPS time in place of UTC")]);
         }
+    }
+
+    /// Dates of positions. A week number of ten bits does not say which of its eras it is of, and a receiver that
+    /// was built later takes a later one.
+    fn weeks_of_positions(&mut self, run: &Run, weeks: i64) {
+        let ten_bits = |signal: &Signal| !matches!(signal.system, System::Galileo | System::BeiDou | System::Glonass);
+        if weeks > 0 && run.signals.iter().all(|signal| ten_bits(signal)) {
+            self.not_judged.push(format!(
+                "era of positions' dates: they are {weeks} weeks ahead, and the message's week number has ten bits"
+            ));
+            return;
+        }
+        let source = "the scene's dates";
+        self.judge("weeks by which dates of positions are off", "", weeks.abs(), "", Bound::Max(0.0), source);
     }
 }

@@ -8,7 +8,7 @@
 use std::collections::HashMap;
 
 use super::atmosphere::Atmosphere;
-use super::plain::{self, EDGES_M, Scene};
+use super::plain::{self, Scene};
 use super::times::Labels;
 use crate::error::JudgeError;
 use crate::expect::due::{Due, Expectations};
@@ -24,7 +24,7 @@ const MODEL_M: f64 = 1.0;
 /// Dilution up to which positions are judged.
 const MOST_PDOP: f64 = 10.0;
 /// Age of a position that nobody notices, and that of a filter's.
-const AGE_S: f64 = 0.05;
+const AGE_S: f64 = 0.03;
 /// Age of a velocity: half a second between positions, and a filter.
 const VELOCITY_AGE_S: f64 = 0.5;
 /// Speed from which on a course means something.
@@ -56,7 +56,7 @@ impl Verdict {
         let plain = expected.satellites.iter().filter_map(|(link, one)| plain::code_m(link, one.usual_dbhz));
         let Some(plain_m) = median(&plain.collect::<Vec<_>>()) else { return Ok(()) };
         // What lasts, and all.
-        let lasting_m = libm::hypot(libm::hypot(EDGES_M, MODEL_M), scene.reach_m());
+        let lasting_m = libm::hypot(libm::hypot(scene.usual_edges_m(), MODEL_M), scene.reach_m());
         let range_m = libm::hypot(plain_m, lasting_m);
         let mut air = Atmosphere::of(scene.run)?;
         let judged = |row: &FixError| scene.is_bounded(row.label_s) && !scene.is_faulty(row.label_s);
@@ -134,7 +134,7 @@ impl Verdict {
             _ => plain,
         };
         let limit = AGE_S + largest(1, 1) * sigma_s;
-        let source = "errors along the motion: 50 ms, and what lasting errors or, where the motion changes, the scatter \
+        let source = "errors along the motion: 30 ms, and what lasting errors or, where the motion changes, the scatter \
                       of the errors make of it";
         let path = "position.time_tag_offset_s";
         self.judge("age of positions", path, late_s.abs(), "s", Bound::Max(limit), source);
@@ -162,7 +162,7 @@ impl Verdict {
         let limits: Vec<f64> = with
             .iter()
             .enumerate()
-            .map(|(index, (one, _))| factor * sigma_mps(one) + aged(index) + scene.rate_mps)
+            .map(|(index, (one, _))| factor * sigma_mps(one) + aged(index) + scene.mirrors_mps())
             .collect();
         let worst = with.iter().zip(&limits).max_by(|a, b| (a.0.1 / a.1).total_cmp(&(b.0.1 / b.1)));
         if let Some(((one, value), limit)) = worst {
@@ -182,7 +182,7 @@ impl Verdict {
             product.0 += truth.x * east + truth.y * north;
             product.1 += truth.x * north - truth.y * east;
             squares += truth.xy().norm_squared();
-            let sigma = sigma_mps(one) + aged(index) + scene.rate_mps;
+            let sigma = sigma_mps(one) + aged(index) + scene.mirrors_mps();
             noise += truth.xy().norm_squared() * sigma * sigma;
         }
         let count = with.len().max(1) as f64;

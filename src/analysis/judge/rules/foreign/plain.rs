@@ -8,19 +8,24 @@ use std::collections::BTreeMap;
 
 use crate::error::JudgeError;
 use crate::expect::theory::dll::{self, Discriminator};
+use crate::expect::theory::edges;
 use crate::judge::foreign::measured::ObservationError;
 use crate::read::Run;
+use crate::statistics::{mean, rms, std};
 use crate::waveform::leading;
 use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::facts::FaultKind;
-use gnss::signal::Link;
+use gnss::signal::{Link, Signal};
 use gnss::time::Epoch;
 
 /// A plain receiver's code loop: bandwidth, and early to late in chips.
 pub(super) const PLAIN_HZ: f64 = 2.0;
 const PLAIN_CHIPS: f64 = 1.0;
-/// What code edges that fall between samples cost a replica of whole chips, rms.
-pub(super) const EDGES_M: f64 = 1.5;
+/// Least that code edges between samples cost a replica of whole chips, rms: GNSS-SDR's satellites have biases of
+/// up to 0.45 m at 2.6 Msps, three times what folds back there from edges that are averaged.
+const EDGES_M: f64 = 0.5;
+/// Bounds count as so many standard deviations where errors of several satellites or times add up.
+const BOUND_SIGMAS: f64 = 3.0;
 /// Rule of thumb for a phase loop (Kaplan and Hegarty, 5.6): 15 degrees of jitter.
 pub(super) const PHASE_CYCLES: f64 = 15.0 / 360.0;
 /// A plain receiver's phase loop, hertz, and its natural frequency at a damping of 0.707: 1.89 B.
@@ -61,8 +66,9 @@ pub(super) struct Reach {
     pub code_m: f64,
     /// Of its carrier, cycles.
     pub carrier_cycles: f64,
-    /// Of its strength, dB.
+    /// Of its strength on average, dB, and by how much that scatters.
     pub cn0_db: f64,
+    pub cn0_sigma_db: f64,
 }
 
 impl Reach {
@@ -71,21 +77,27 @@ impl Reach {
     fn of(run: &Run, link: Link) -> Result<Self, JudgeError> {
         let Some(component) = leading(link.signal) else { return Ok(Self::default()) };
         let chip_m = SPEED_OF_LIGHT_MPS / component.chip_rate_hz;
-        let mut epochs: BTreeMap<u64, (f64, f64)> = BTreeMap::new();
+        // Sum of amplitudes, metres moved, and the sum of direct and reflected rays at the prompt.
+        let mut epochs: BTreeMap<u64, (f64, f64, (f64, f64))> = BTreeMap::new();
         run.rays.each(link, |ray| {
-            let (amplitude, moved_m) = epochs.entry(ray.sample).or_default();
+            let (amplitude, moved_m, sum) = epochs.entry(ray.sample).or_insert((0.0, 0.0, (1.0, 0.0)));
             *amplitude += ray.amplitude_ratio;
             let most_m = 0.5 * PLAIN_CHIPS * chip_m * ray.amplitude_ratio;
             *moved_m += most_m.min(ray.amplitude_ratio * ray.excess_m);
+            let prompt = ray.amplitude_ratio * (1.0 - ray.excess_m / chip_m).max(0.0);
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU * ray.phase_cycles);
+            *sum = (sum.0 + prompt * cos, sum.1 + prompt * sin);
         })?;
-        let mut reach = Self::default();
-        for (amplitude, moved_m) in epochs.into_values() {
+        let (mut reach, mut fades_db) = (Self::default(), Vec::new());
+        for (amplitude, moved_m, sum) in epochs.into_values() {
             let left = (1.0 - amplitude).max(0.1);
             reach.code_m = reach.code_m.max((moved_m / left).min(0.5 * PLAIN_CHIPS * chip_m));
             let angle = if amplitude < 1.0 { libm::asin(amplitude) } else { std::f64::consts::PI };
             reach.carrier_cycles = reach.carrier_cycles.max(angle / std::f64::consts::TAU);
-            reach.cn0_db = reach.cn0_db.max(-20.0 * libm::log10(left));
+            fades_db.push(20.0 * libm::log10(libm::hypot(sum.0, sum.1).max(0.1)));
         }
+        reach.cn0_db = mean(&fades_db).unwrap_or(0.0);
+        reach.cn0_sigma_db = std(&fades_db).unwrap_or(0.0);
         Ok(reach)
     }
 }
@@ -94,6 +106,7 @@ impl Reach {
 pub(super) struct Scene<'r> {
     pub run: &'r Run,
     reach: BTreeMap<Link, Reach>,
+    edges_m: BTreeMap<&'static str, f64>,
     /// Seconds from sample 0 to where labels count from.
     offset_s: f64,
     /// When a spoofer claims a place.
@@ -115,7 +128,12 @@ impl<'r> Scene<'r> {
         for link in run.rays.keys() {
             reach.insert(link, Reach::of(run, link)?);
         }
-        let mut scene = Self { run, reach, offset_s, spoofed_s: None, rate_mps: 0.0, place_m: 0.0 };
+        let edges = |signal: &&'static Signal| {
+            let averaged_m = edges::averaged_m(signal, run.scene.waveform, run.rate_hz(signal));
+            (signal.name, averaged_m.max(EDGES_M))
+        };
+        let edges_m = run.signals.iter().map(edges).collect();
+        let mut scene = Self { run, reach, edges_m, offset_s, spoofed_s: None, rate_mps: 0.0, place_m: 0.0 };
         if !scene.reach.is_empty() {
             run.trajectory.each(|row| scene.rate_mps = scene.rate_mps.max(2.0 * row.velocity_mps().norm()))?;
         }
@@ -144,9 +162,26 @@ impl<'r> Scene<'r> {
         self.reach.get(link).copied().unwrap_or_default()
     }
 
-    /// The farthest that any satellite's code is moved.
+    /// How far codes are moved, as a standard deviation over satellites and times.
     pub fn reach_m(&self) -> f64 {
-        self.reach.values().map(|reach| reach.code_m).fold(0.0, f64::max)
+        let all: Vec<f64> = self.reach.values().map(|reach| reach.code_m / BOUND_SIGMAS).collect();
+        rms(&all).unwrap_or(0.0)
+    }
+
+    /// What mirrors change a range's rate by, as a standard deviation.
+    pub fn mirrors_mps(&self) -> f64 {
+        self.rate_mps / BOUND_SIGMAS
+    }
+
+    /// What code edges between samples cost a signal's code, rms: of averaged ones what folds back, but not less
+    /// than a replica of whole chips has.
+    pub fn edges_m(&self, signal: &Signal) -> f64 {
+        self.edges_m.get(signal.name).copied().unwrap_or(EDGES_M)
+    }
+
+    /// The same of all signals.
+    pub fn usual_edges_m(&self) -> f64 {
+        self.edges_m.values().copied().fold(EDGES_M, f64::max)
     }
 
     /// Whether errors at a label follow from noise and reflections: not where a spoofer sends, and not where

@@ -6,12 +6,13 @@
 
 use std::collections::BTreeMap;
 
-use super::plain::{self, EDGES_M, PHASE_CYCLES, PHASE_HZ, Scene};
+use super::plain::{self, PHASE_CYCLES, PHASE_HZ, Scene};
 use crate::expect::due::Expectations;
 use crate::expect::quantile::largest;
 use crate::judge::foreign::measured::{Measured, ObservationError};
 use crate::judge::judgement::Bound;
 use crate::judge::rules::kind::THEORY;
+use crate::judge::rules::tracking::ONE_BIT_LOSS_DB;
 use crate::judge::verdict::Verdict;
 use crate::statistics::{mean, median, std};
 use gnss::signal::{Link, Signal};
@@ -131,7 +132,7 @@ impl Verdict {
         let found = ones.iter().flat_map(|one| {
             means(&one.code_m).into_iter().map(move |(count, span_s, value)| {
                 let noise_m = one.plain_m / plain::independent(count, span_s, plain::PLAIN_HZ).sqrt();
-                let limit = factor * THEORY * noise_m + largest(1, 1) * EDGES_M + scene.reach(&one.link).code_m;
+                let limit = factor * THEORY * noise_m + largest(1, 1) * scene.edges_m(one.link.signal) + scene.reach(&one.link).code_m;
                 Found { name: one.name.clone(), value: value.abs(), limit }
             })
         });
@@ -140,7 +141,7 @@ impl Verdict {
         self.nearest("pseudorange error of a satellite, mean", "", "m", found.collect(), source);
         let ratios = ones.iter().filter(|one| one.code_m.len() >= ENOUGH).filter_map(|one| {
             let values: Vec<f64> = one.code_m.iter().map(|(_, value)| *value).collect();
-            let usual_m = libm::hypot(libm::hypot(one.plain_m, EDGES_M), scene.reach(&one.link).code_m);
+            let usual_m = libm::hypot(libm::hypot(one.plain_m, scene.edges_m(one.link.signal)), scene.reach(&one.link).code_m);
             Some(Found { name: one.name.clone(), value: std(&values)? / usual_m, limit: THEORY })
         });
         let source = "a plain receiver's loop (2 Hz, early and late a chip apart) at the scene's C/N0, code edges \
@@ -156,7 +157,7 @@ impl Verdict {
         let found = ones.iter().flat_map(|one| {
             means(&one.doppler_hz).into_iter().map(move |(count, span_s, value)| {
                 let noise_hz = plain::doppler_hz() / plain::independent(count, span_s, PHASE_HZ).sqrt();
-                let mirrors_hz = scene.rate_mps / one.link.wavelength_m();
+                let mirrors_hz = scene.mirrors_mps() / one.link.wavelength_m();
                 let limit = factor * THEORY * noise_hz + plain::aged_hz(one.rate_hzps) + mirrors_hz;
                 Found { name: one.name.clone(), value: value.abs(), limit }
             })
@@ -172,20 +173,35 @@ impl Verdict {
         }
     }
 
-    /// C/N0 of each satellite.
+    /// C/N0 of each satellite, and of each signal.
     pub(super) fn strengths(&mut self, ones: &[One<'_>], scene: &Scene<'_>) {
-        let means = ones.iter().filter_map(|one| {
+        let mut signals: BTreeMap<&'static Signal, Vec<(&One<'_>, f64)>> = BTreeMap::new();
+        for one in ones {
             let errors: Vec<f64> = one.rows.iter().filter_map(|row| row.cn0_db).collect();
-            Some((one, mean(&errors)?))
-        });
-        let means: Vec<(&One<'_>, f64)> = means.collect();
-        let Some(middle_db) = median(&means.iter().map(|(_, value)| *value).collect::<Vec<_>>()) else { return };
-        let found = means.iter().map(|(one, value)| {
-            let limit = CN0_DB + scene.reach(&one.link).cn0_db;
-            Found { name: one.name.clone(), value: (value - middle_db).abs(), limit }
-        });
-        let source = "the scene's C/N0 and the other satellites: a factor of two in power, and fades by reflections";
-        self.nearest("C/N0 error of a satellite against the others", "", "dB", found.collect(), source);
+            if let Some(value) = mean(&errors) {
+                let of_signal = signals.entry(one.link.signal).or_default();
+                of_signal.push((one, value - scene.reach(&one.link).cn0_db));
+            }
+        }
+        let (mut biases, mut satellites) = (Vec::new(), Vec::new());
+        for (signal, all) in &signals {
+            let Some(middle_db) = median(&all.iter().map(|(_, value)| *value).collect::<Vec<_>>()) else { continue };
+            let scatter = |one: &One<'_>| scene.reach(&one.link).cn0_sigma_db;
+            let scatter_db = mean(&all.iter().map(|(one, _)| scatter(one)).collect::<Vec<_>>()).unwrap_or(0.0);
+            // Who follows one component alone measures its part.
+            let shares = signal.components.iter().map(|component| component.power_share);
+            let part_db = -10.0 * libm::log10(shares.fold(1.0, f64::min));
+            let limit = ONE_BIT_LOSS_DB + scatter_db + if middle_db < 0.0 { part_db } else { 0.0 };
+            biases.push(Found { name: signal.name.to_owned(), value: middle_db.abs(), limit });
+            satellites.extend(all.iter().map(|(one, value)| {
+                let limit = CN0_DB + scatter(one);
+                Found { name: one.name.clone(), value: (value - middle_db).abs(), limit }
+            }));
+        }
+        let source = "loss of a one-bit quantiser, 10 lg(π/2), the part of one component, fades: more is unexplained";
+        self.nearest("C/N0 bias, magnitude", "", "dB", biases, source);
+        let source = "the scene's C/N0 and the other satellites of the signal: a factor of two in power, and fades";
+        self.nearest("C/N0 error of a satellite against the others", "", "dB", satellites, source);
     }
 
     /// Carriers of each satellite, arc by arc: drift, jitter, and the code beside them.
@@ -216,7 +232,7 @@ impl Verdict {
             let span_s = arc.span_s.1 - arc.span_s.0;
             let one = ones.iter().find(|one| one.link == arc.link)?;
             let noise_m = one.plain_m * slope(span_s, plain::independent(arc.count, span_s, plain::PLAIN_HZ));
-            let slow_m = (2.0 * largest(1, 1) * EDGES_M + 2.0 * scene.reach(&arc.link).code_m) / span_s;
+            let slow_m = (2.0 * largest(1, 1) * scene.edges_m(arc.link.signal) + 2.0 * scene.reach(&arc.link).code_m) / span_s;
             let limit = factor * THEORY * noise_m + slow_m;
             Some(Found { name: scene.run.name(arc.link), value: arc.code_carrier_mps?.abs(), limit })
         });

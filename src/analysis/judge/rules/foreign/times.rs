@@ -1,9 +1,9 @@
 //! When a foreign receiver's observations and positions are due.
 //!
 //! It is not known how it searches, nor whether it writes observations before its first fix. So its first
-//! observation and its first fix are due by one generous time: all satellites locked within two seconds, their
-//! ephemerides whole, the ionosphere's page where that comes at once, and a reserve. Where observations show a
-//! later lock, that lock counts. From its own first epoch on it must go on to within seconds of the scene's end.
+//! observation and its first fix are due by one generous time: satellites locked after a slow search, their
+//! ephemerides whole, the ionosphere's page where that comes at once, and a reserve. Observations that come before
+//! any orbit can be whole show when satellites were locked, and then that lock counts. From its own first epoch on it must go on to within seconds of the scene's end.
 //! Limits: a receiver that writes every second epoch alone is one of twice the interval.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -20,13 +20,14 @@ use crate::statistics::percentile;
 use gnss::signal::{Link, Signal};
 use gnss::time::Epoch;
 
-/// Time within which a receiver without knowledge has locked satellites in full view: twice what GNSS-SDR
-/// needs for four.
-const SEARCH_S: f64 = 2.0;
+/// Time within which a receiver without knowledge has locked four satellites in full view: one that searches
+/// channel after channel, as GNSS-SDR does.
+const SEARCH_S: f64 = 8.0;
 /// Reserve for a solution, and for a receiver that waits for a satellite more.
 const RESERVE_S: f64 = 6.0;
-/// A page of the ionosphere that comes within so long after the orbits is waited for.
-const PAGE_S: f64 = 10.0;
+/// A page of the ionosphere that comes within so long after the orbits is waited for: one subframe of NavIC, the
+/// longest unit of a message.
+const PAGE_S: f64 = 12.5;
 /// Seconds that a recording may end early: a receiver's last block and its queues.
 const END_S: f64 = 10.0;
 
@@ -116,7 +117,8 @@ impl Begin {
     pub fn of(scene: &Scene<'_>, expected: &Expectations, labels: &Labels) -> Self {
         let none = Self { observation_s: None, fix_s: None };
         let run = scene.run;
-        let (Some(first), Some(due_s)) = (run.trajectory.first(), expected.first_fix_s) else { return none };
+        let due_s = expected.first_fix_s.or(expected.four_by_s);
+        let (Some(first), Some(due_s)) = (run.trajectory.first(), due_s) else { return none };
         let start = first.time().plus_s(-run.time_s(first.sample));
         let signals: BTreeSet<&'static Signal> = expected.satellites.keys().map(|link| link.signal).collect();
         let with_four: Vec<&'static Signal> = {
@@ -132,20 +134,20 @@ impl Begin {
             let pages_s = of.iter().map(|one| table(one).ionosphere_by_s(locked_s));
             pages_s.filter(|page_s| *page_s <= orbit_s + PAGE_S).fold(orbit_s, f64::max)
         };
-        let usual_s = by(SEARCH_S) + RESERVE_S;
         // What the scene takes away delays more than the timetable does.
-        let due_s = if due_s <= by(LOCK_S) + RESERVE_S { due_s.min(usual_s) } else { due_s + RESERVE_S };
+        let usual_s = by(SEARCH_S).max(due_s) + RESERVE_S;
         let begun_s = labels.span_s.map(|(from_s, _)| scene.time_s(from_s));
         // Observations that come before any orbit is whole show when their satellites were locked.
-        let shown_s = begun_s.filter(|begun_s| *begun_s < orbits_s(SEARCH_S)).map(|begun_s| {
+        let shown_s = begun_s.filter(|begun_s| *begun_s < orbits_s(0.0)).map(|begun_s| {
             let timed = |locked_s: f64| {
                 of.iter().map(|one| table(one).frame_by_s(locked_s)).fold(f64::INFINITY, f64::min)
             };
             let locked = (0..40).map(|step| 0.5 * f64::from(step)).take_while(|locked_s| timed(*locked_s) <= begun_s);
             by(locked.last().unwrap_or(0.0).min(begun_s)) + RESERVE_S
         });
-        let fix_s = shown_s.unwrap_or(due_s).max(due_s);
-        Self { observation_s: Some(due_s), fix_s: Some(fix_s) }
+        // They show nothing of a scene that takes satellites away.
+        let fix_s = shown_s.filter(|_| due_s <= by(LOCK_S) + RESERVE_S).unwrap_or(usual_s);
+        Self { observation_s: Some(usual_s), fix_s: expected.first_fix_s.map(|_| fix_s) }
     }
 }
 
@@ -156,7 +158,7 @@ impl Verdict {
         let step_s = interval_s(labels).unwrap_or(0.0);
         if let Some(limit_s) = begin_s {
             let source = format!(
-                "satellites locked within {SEARCH_S} s, or when observations show it, their orbits whole, and \
+                "satellites locked within {SEARCH_S} s, or as the first observations show, their orbits whole, and \
                  {RESERVE_S} s"
             );
             let value = scene.time_s(first_s);
