@@ -11,8 +11,10 @@
 mod excused;
 mod files;
 mod fixes;
+mod foreign;
 mod links;
 mod observations;
+mod rinex;
 mod run;
 mod spectrum;
 mod table;

@@ -225,8 +225,8 @@ impl Run {
         Ok(read)
     }
 
-    /// Reads a truth alone, for a receiver that writes files of its own. A signal is received in the front end
-    /// whose facts name it.
+    /// Reads a truth alone, for a receiver that writes files of its own. A signal is received in the front
+    /// end whose facts name it.
     pub fn read_truth(truth: &Path) -> Result<Self, JudgeError> {
         // A truth may lie where nothing can be written.
         let mut read = Self::read_truth_by(truth, &std::env::temp_dir())?;

@@ -3,10 +3,10 @@
 //! A label is what the receiver's own clock reads. That clock moves all pseudoranges of an epoch alike, so
 //! their mean error, signal by signal, is its bias and not an error; the same goes for carriers and Dopplers.
 //! The truth is taken at the time of reception, the label less that bias. A label that is late by δ beyond it
-//! adds δ·λ·f_D to a pseudorange, whose slope over Doppler therefore gives δ; where it is significant the truth
-//! is looked up again at the corrected time. Carriers lose one
-//! constant an arc. Limits: biases common to all satellites cannot be separated from the clock, and a code
-//! bias that happens to go with Doppler not from a late label in a short static scene.
+//! adds δ·λ·f_D to a pseudorange, whose slope over Doppler therefore gives δ; where it is significant the
+//! truth is looked up again at the corrected time. Carriers lose one constant an arc. Limits: biases common
+//! to all satellites cannot be separated from the clock, and a code bias that happens to go with Doppler not
+//! from a late label in a short static scene.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -26,6 +26,8 @@ const LOOKS: usize = 6;
 /// a wrong lock.
 const OUTLIER_SIGMAS: f64 = 10.0;
 const OUTLIER_M: f64 = 30.0;
+
+const MILLISECOND_M: f64 = 1e-3 * SPEED_OF_LIGHT_MPS;
 
 /// Joins and measures; `shift_s` is taken from every label first (a week's rollover).
 pub fn measure(epochs: &[ObservedEpoch], timeline: &Timeline, shift_s: i64) -> Measured {
@@ -202,7 +204,7 @@ fn consistency(measured: &mut Measured, pairs: &[Pair<'_>], carriers: &Carriers,
                 let [a, b] = [&pairs[two[0]], &pairs[two[1]]];
                 let turned = carrier_sign * (b.values.carrier_cycles? - a.values.carrier_cycles?);
                 let mean_hz = 0.5 * doppler_sign * (a.values.doppler_hz? + b.values.doppler_hz?);
-                Some(mean_hz + turned / (b.label_s - a.label_s))
+                Some(mean_hz + turned / (b.at_s - a.at_s))
             })
             .collect();
         // A clock that jumps by a millisecond moves one of them by a million cycles.
@@ -219,7 +221,8 @@ fn consistency(measured: &mut Measured, pairs: &[Pair<'_>], carriers: &Carriers,
 /// What an arc's carriers come to; none of fewer than three.
 fn line_of(pairs: &[Pair<'_>], carriers: &Carriers, arc: &[usize]) -> Option<Arc> {
     let (first, last) = (pairs.get(*arc.first()?)?, pairs.get(*arc.last()?)?);
-    let points = arc.iter().filter_map(|index| Some((pairs.get(*index)?.label_s, carriers.get(*index)?.as_ref()?.cycles)));
+    let points =
+        arc.iter().filter_map(|index| Some((pairs.get(*index)?.label_s, carriers.get(*index)?.as_ref()?.cycles)));
     let points = centred(points);
     let drift_hz = line_slope(&points).filter(|_| points.len() > 2)?;
     let rest: Vec<f64> = points.iter().map(|(_, x, y)| y - drift_hz * x).collect();
@@ -245,7 +248,15 @@ fn divergence(pairs: &[Pair<'_>], carriers: &Carriers, arc: &[usize]) -> Option<
     if points.len() < 10 {
         return None;
     }
-    line_slope(&centred(points.into_iter()))
+    // A receiver may set the clock of its codes by whole milliseconds and leave that of its carriers.
+    let mut set_m = 0.0;
+    let mut last_m = points.first().map_or(0.0, |point| point.1);
+    let whole = points.into_iter().map(|(label_s, value_m)| {
+        set_m += MILLISECOND_M * ((value_m - last_m) / MILLISECOND_M).round();
+        last_m = value_m;
+        (label_s, value_m - set_m)
+    });
+    line_slope(&centred(whole))
 }
 
 fn rows(measured: &mut Measured, pairs: &[Pair<'_>], common_m: &BySignal, carriers: &Carriers) {

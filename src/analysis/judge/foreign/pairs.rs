@@ -26,7 +26,8 @@ impl Pair<'_> {
     }
 }
 
-/// Every observation whose satellite and time the truth has; an epoch's label is late by `late_s` of its number.
+/// Every observation whose satellite and time the truth has; an epoch's label is late by `late_s` of its
+/// number.
 pub(super) fn join<'a>(
     epochs: &'a [ObservedEpoch],
     timeline: &Timeline,

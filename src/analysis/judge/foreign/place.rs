@@ -151,8 +151,7 @@ fn time_tag(rows: &[FixError], about_means: bool) -> Option<Estimate> {
         return None;
     }
     let value = -points.iter().map(|(error, velocity)| error.dot(velocity)).sum::<f64>() / squares;
-    let rest: Vec<f64> =
-        points.iter().map(|(error, velocity)| (error + value * velocity).dot(velocity)).collect();
+    let rest: Vec<f64> = points.iter().map(|(error, velocity)| (error + value * velocity).dot(velocity)).collect();
     let found = Correlated::about_zero(&[rest])?;
     let sigma = found.variance().sqrt() * count / found.independent_of_mean().sqrt() / squares;
     Some(Estimate { value, sigma })

@@ -1,8 +1,9 @@
 //! How far the atmosphere may move a foreign receiver's positions.
 //!
-//! A receiver corrects the troposphere by a model, the ionosphere by the broadcast one once its page has come. So
-//! what a scene lacks, or what no page corrects, moves its positions: delays go through least squares with equal
-//! weights. Limits: a receiver with another model than the broadcast one is held against that one.
+//! A receiver corrects the troposphere by a model, the ionosphere by the broadcast one once its page has
+//! come. So what a scene lacks, or what no page corrects, moves its positions: delays go through least
+//! squares with equal weights. Limits: a receiver with another model than the broadcast one is held against
+//! that one.
 
 use nalgebra::{Matrix4, Vector3, Vector4};
 
@@ -13,13 +14,15 @@ use crate::expect::message::Message;
 use crate::read::Run;
 use gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
 use gnss::ionosphere::{Coefficients, Model};
+use gnss::klobuchar::Klobuchar;
 use gnss::record::SkyRow;
 use gnss::time::Epoch;
 
 /// Zenith delay of a standard troposphere.
 const ZENITH_M: f64 = 2.4;
-/// Zenith delay of the ionosphere by a receiver's default coefficients, at noon.
-const NOON_M: f64 = 10.0;
+/// Coefficients that a receiver takes before it has any: those of 2004-01-01, which RTKLIB has.
+const DEFAULT: Klobuchar =
+    Klobuchar { alpha: [1.118e-8, -7.451e-9, -5.961e-8, 1.192e-7], beta: [1.167e5, -2.294e5, -1.311e5, 1.049e6] };
 /// Time that a receiver may take to use what it has decoded.
 const USE_S: f64 = 5.0;
 /// Lowest elevation of satellites that count, degrees.
@@ -54,8 +57,7 @@ impl<'r> Atmosphere<'r> {
     pub fn moves_m(&mut self, sample: u64) -> Result<(f64, f64), JudgeError> {
         // The sky moves slowly: one answer for ten seconds.
         let step = (10.0 * self.run.scene.sample_rate_hz) as u64;
-        if let Some((at, moved)) = self.last.filter(|(at, _)| sample.abs_diff(*at) < step) {
-            let _ = at;
+        if let Some((_, moved)) = self.last.filter(|(at, _)| sample.abs_diff(*at) < step) {
             return Ok(moved);
         }
         let moved = self.moved(sample)?;
@@ -72,21 +74,12 @@ impl<'r> Atmosphere<'r> {
         let place = self.run.trajectory.finder()?.get(sample);
         let Some(place) = place.filter(|_| rows.len() >= 4) else { return Ok((0.0, 0.0)) };
         let user = Geodetic::from_ecef(&place.position_m());
-        let come = self.run.time_s(sample) >= self.page_s;
-        let left_m = |row: &SkyRow| {
-            let (sin, look) = (libm::sin(row.elevation_deg.to_radians()), look(row));
-            let sent_m = self.sent.as_ref().map(|model| {
-                let carrier_hz = row.signal.carrier_hz(row.sv);
-                SPEED_OF_LIGHT_MPS * model.delay_s((user, look), &Vector3::zeros(), place.time(), carrier_hz)
-            });
-            let ionosphere_m = match sent_m {
-                Some(sent_m) if come => sent_m - row.ionosphere_m,
-                // Nothing, the truth, or a model of the receiver's own.
-                _ => row.ionosphere_m.max(NOON_M * obliquity(row.elevation_deg)),
-            };
-            let troposphere_m = if row.troposphere_m == 0.0 { ZENITH_M / sin } else { 0.0 };
-            (ionosphere_m, troposphere_m)
+        let by = |row: &SkyRow, model: &Coefficients| {
+            let carrier_hz = row.signal.carrier_hz(row.sv);
+            let delay_s = model.delay_s((user, look(row)), &Vector3::zeros(), place.time(), carrier_hz);
+            SPEED_OF_LIGHT_MPS * delay_s - row.ionosphere_m
         };
+        let default = Coefficients::Klobuchar(DEFAULT);
         let solve = |of: &dyn Fn(&SkyRow) -> f64| {
             let (mut normal, mut right) = (Matrix4::<f64>::zeros(), Vector4::<f64>::zeros());
             for row in &rows {
@@ -101,16 +94,22 @@ impl<'r> Atmosphere<'r> {
                 (moved.xy().norm(), moved.z.abs())
             })
         };
-        let (by_ionosphere, by_troposphere) = (solve(&|row| left_m(row).0), solve(&|row| left_m(row).1));
+        let by_ionosphere = match self.sent.as_ref().filter(|_| self.run.time_s(sample) >= self.page_s) {
+            Some(sent) => solve(&|row| by(row, sent)),
+            // Nothing, or the receiver's own coefficients.
+            None => {
+                let (none, own) = (solve(&|row| row.ionosphere_m), solve(&|row| by(row, &default)));
+                (none.0.max(own.0), none.1.max(own.1))
+            }
+        };
+        let missing_m = |row: &SkyRow| {
+            if row.troposphere_m == 0.0 { ZENITH_M / libm::sin(row.elevation_deg.to_radians()) } else { 0.0 }
+        };
+        let by_troposphere = solve(&missing_m);
         Ok((by_ionosphere.0 + by_troposphere.0, by_ionosphere.1 + by_troposphere.1))
     }
 }
 
 fn look(row: &SkyRow) -> Look {
     Look { azimuth_rad: row.azimuth_deg.to_radians(), elevation_rad: row.elevation_deg.to_radians() }
-}
-
-/// Slant over zenith delay of the ionosphere (IS-GPS-200N, 20.3.3.5.2.5), elevation in semicircles.
-fn obliquity(elevation_deg: f64) -> f64 {
-    1.0 + 16.0 * libm::pow(0.53 - elevation_deg / 180.0, 3.0)
 }

@@ -1,17 +1,17 @@
-//! What a foreign receiver's satellites have in common: signs, labels, clocks by signal, and code, carrier and
-//! Doppler of one clock.
+//! What a foreign receiver's satellites have in common: signs, labels, clocks by signal, and code, carrier
+//! and Doppler of one clock.
 //!
-//! The clock itself is no error. Its readings by the signals agree, though, and so do its rates by code, carrier
-//! and Doppler: observations are those of one instant (RINEX 3.05, 4.1.1). A clock that is set by whole
-//! milliseconds has steps, which are no drift.
+//! The clock itself is no error. Its readings by the signals agree, though, and so do its rates by code,
+//! carrier and Doppler: observations are those of one instant (RINEX 3.05, 4.1.1). A clock that is set by
+//! whole milliseconds has steps, which are no drift.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::plain::{self, Scene};
 use super::signals::{Found, One};
 use crate::expect::quantile::largest;
-use crate::judge::foreign::{Estimate, slope};
 use crate::judge::foreign::measured::{Measured, ObservationError};
+use crate::judge::foreign::{Estimate, slope};
 use crate::judge::judgement::Bound;
 use crate::judge::rules::kind::THEORY;
 use crate::judge::verdict::Verdict;
@@ -27,7 +27,8 @@ const RINEX: &str =
 const LATE_S: f64 = 3e-3;
 /// Part of a chip by which signals of one front end may be late against each other: replicas and filters.
 const SIGNALS_CHIPS: f64 = 0.1;
-/// Rate by which Doppler and carrier may differ: a Doppler is one of a moment, a carrier's rate one of an interval.
+/// Rate by which Doppler and carrier may differ: a Doppler is one of a moment, a carrier's rate one of an
+/// interval.
 const RATE_HZ: f64 = 0.5;
 /// Longest interval over which a mean of two Dopplers is the carrier's rate.
 const INTERVAL_S: f64 = 2.0;
@@ -44,12 +45,13 @@ const FAR_M: f64 = 1e5;
 
 /// Drift of the receiver's clock by its code: the median over epochs, as it may be set.
 fn drift_of(measured: &Measured) -> f64 {
-    let steps = measured.clock.windows(2).map(|two| (two[1].bias_s - two[0].bias_s) / (two[1].label_s - two[0].label_s));
+    let steps =
+        measured.clock.windows(2).map(|two| (two[1].bias_s - two[0].bias_s) / (two[1].label_s - two[0].label_s));
     median(&steps.collect::<Vec<_>>()).unwrap_or(0.0)
 }
 
-/// By how much labels are late by the rows that are judged: what the truth was moved by already, and the slope
-/// of pseudoranges over Doppler that is left.
+/// By how much labels are late by the rows that are judged: what the truth was moved by already, and the
+/// slope of pseudoranges over Doppler that is left.
 fn judged_late(measured: &Measured, scene: &Scene<'_>) -> Option<Estimate> {
     let mut epochs: BTreeMap<(u64, &'static Signal), Vec<(Link, f64, f64)>> = BTreeMap::new();
     for row in measured.rows.iter().filter(|row| scene.judges(row)) {
@@ -90,7 +92,8 @@ impl Verdict {
                 let carriers = two[0].values.carrier_cycles.zip(two[1].values.carrier_cycles);
                 let Some((from, to)) = carriers.filter(|_| !two[1].values.lost_lock) else { continue };
                 let turned = -0.5 * (with_clock_hz(two[0]) + with_clock_hz(two[1])) * (two[1].at_s - two[0].at_s);
-                // A clock that is set by a millisecond turns a carrier by a million cycles, and tells no sign.
+                // A clock that is set by a millisecond turns a carrier by a million cycles, and tells no
+                // sign.
                 sum += turned * (to - from).clamp(-2.0 * turned.abs(), 2.0 * turned.abs());
             }
             if sum != 0.0 {
@@ -113,11 +116,9 @@ impl Verdict {
 
     /// Labels against what the pseudoranges say of the time.
     pub(super) fn time_tags(&mut self, measured: &Measured, ones: &[One<'_>], scene: &Scene<'_>) {
-        let (late, what) = match judged_late(measured, scene) {
-            Some(late) => (late, "the slope of pseudoranges over Doppler"),
-            None => return,
-        };
-        // Speeds along the lines of sight about their mean, and what biases of each satellite make of the slope.
+        let Some(late) = judged_late(measured, scene) else { return };
+        // Speeds along the lines of sight about their mean, and what biases of each satellite make of the
+        // slope.
         let speeds: Vec<f64> = ones
             .iter()
             .filter_map(|one| {
@@ -130,11 +131,10 @@ impl Verdict {
         // The scatter between satellites is itself uncertain where there are few.
         let sigma_s = theory_s.min(2.0 * late.sigma);
         let limit = 1e3 * (LATE_S + largest(1, 1) * sigma_s);
-        let source = format!(
-            "labels less the receiver's own clock are the time of reception: {what}, 3 ms, and biases of satellites"
-        );
+        let source = "labels less the receiver's own clock are the time of reception: the slope of pseudoranges over \
+                      Doppler, 3 ms, and biases of satellites";
         let path = "join.time_tag_offset_s";
-        self.judge("time tags of observations, late", path, 1e3 * late.value.abs(), "ms", Bound::Max(limit), &source);
+        self.judge("time tags of observations, late", path, 1e3 * late.value.abs(), "ms", Bound::Max(limit), source);
     }
 
     /// The clock by one signal against that by another.
@@ -179,7 +179,11 @@ impl Verdict {
         if let Some(rate) = measured.doppler_carrier_hz {
             let rates = ones.iter().map(|one| one.rate_hzps).fold(0.0, f64::max);
             if interval_s <= INTERVAL_S {
-                let limit = RATE_HZ + largest(1, 1) * rate.sigma + plain::aged_hz(rates);
+                // Seconds by a clock that drifts are other seconds for the Doppler of the drift itself.
+                let drift = drift_of(measured);
+                let carrier_hz = ones.iter().map(|one| one.link.carrier_hz()).fold(0.0, f64::max);
+                let seconds_hz = carrier_hz * drift * drift;
+                let limit = RATE_HZ + largest(1, 1) * rate.sigma + plain::aged_hz(rates) + seconds_hz;
                 let source = "a Doppler is minus its carrier's rate: half a hertz, the scatter between satellites, and \
                               an age of 0.1 s";
                 let path = "doppler.minus_carrier_rate_hz";
@@ -191,11 +195,12 @@ impl Verdict {
                 ));
             }
         }
-        let span_s = labels.first().zip(labels.last()).map_or(0.0, |(first, last)| last - first);
+        let span_s = measured.arcs.iter().map(|arc| 0.5 * (arc.span_s.1 - arc.span_s.0)).fold(0.0, f64::max);
         if let Some(drift) = measured.code_carrier_mps.filter(|_| span_s > INTERVAL_S && scene.is_always_bounded()) {
             let satellites = (ones.len() as f64).max(1.0);
             let plain_m = ones.iter().map(|one| one.plain_m).fold(0.0, f64::max);
-            let count = plain::independent(labels.len(), span_s, plain::PLAIN_HZ);
+            // Arcs half as long as the longest count at the least.
+            let count = plain::independent(1 + (span_s / interval_s.max(1e-3)) as usize, span_s, plain::PLAIN_HZ);
             let noise = plain_m * 12.0_f64.sqrt() / (span_s * (count * satellites).sqrt());
             let slow = (2.0 * scene.usual_edges_m() / satellites.sqrt() + 2.0 * scene.reach_m()) / span_s;
             let limit = DRIFT_MPS + largest(1, 1) * (THEORY * noise + slow.min(drift.sigma));
@@ -213,13 +218,18 @@ impl Verdict {
         let fine = measured.rows.iter().filter_map(|row| row.values.cn0_dbhz).any(|value| (2.0 * value).fract() != 0.0);
         let mut found = Vec::new();
         for (link, rows) in &links {
-            let mut run = |what: &str, moved: &dyn Fn(&[&ObservationError]) -> bool, value: &dyn Fn(&ObservationError) -> Option<f64>| {
+            let mut run = |what: &str,
+                           moved: &dyn Fn(&[&ObservationError]) -> bool,
+                           value: &dyn Fn(&ObservationError) -> Option<f64>| {
                 let same = |a: &&ObservationError, b: &&ObservationError| value(a).is_some() && value(a) == value(b);
                 for part in rows.chunk_by(same) {
                     let span_s = part.last().zip(part.first()).map_or(0.0, |(last, first)| last.at_s - first.at_s);
                     if part.len() > 1 && span_s > 0.0 && moved(part) {
                         let first_s = part.first().map_or(0.0, |row| row.label_s);
-                        found.push(format!("{what} of {} for {span_s:.1} s from {first_s:.1} s on", scene.run.name(*link)));
+                        found.push(format!(
+                            "{what} of {} for {span_s:.1} s from {first_s:.1} s on",
+                            scene.run.name(*link)
+                        ));
                         return;
                     }
                 }
@@ -227,17 +237,18 @@ impl Verdict {
             let ends = |part: &[&ObservationError], of: fn(&ObservationError) -> f64| {
                 part.last().zip(part.first()).map_or(0.0, |(last, first)| (of(last) - of(first)).abs())
             };
-            let long = |part: &[&ObservationError]| {
-                part.len() >= FROZEN && ends(part, |row| row.at_s) >= FROZEN_S
-            };
+            let long = |part: &[&ObservationError]| part.len() >= FROZEN && ends(part, |row| row.at_s) >= FROZEN_S;
             run("pseudorange", &|part| ends(part, |row| row.truth.range_m) > 10.0, &|row| row.values.pseudorange_m);
             run("carrier", &|part| ends(part, |row| row.truth.carrier_cycles) > 5.0, &|row| row.values.carrier_cycles);
-            run("Doppler", &|part| long(part) && ends(part, |row| row.truth.doppler_hz) > 1.0, &|row| row.values.doppler_hz);
+            run("Doppler", &|part| long(part) && ends(part, |row| row.truth.doppler_hz) > 1.0, &|row| {
+                row.values.doppler_hz
+            });
             if fine && scene.run.scene.noise {
                 run("C/N0", &|part| long(part), &|row| row.values.cn0_dbhz);
             }
         }
-        let source = "ranges that change by ten metres, 20 epochs and 5 s of Dopplers that change and of C/N0 under noise";
+        let source =
+            "ranges that change by ten metres, 20 epochs and 5 s of Dopplers that change and of C/N0 under noise";
         self.judge("values that stay as they were", "", found.len(), "", Bound::Max(0.0), source);
         self.explain(found);
     }

@@ -1,10 +1,11 @@
 //! A receiver that this project did not write, against what its scene allows: as far as its files show it.
 //!
 //! Which satellites must be observed and when fixes are due follows from the scene, for a receiver of common
-//! settings ([`Receiver`]) that begins when it likes within generous bounds ([`times`]). How it makes its ranges is
-//! not known, so random errors are held against a plain receiver's ([`plain`]): satellite by satellite
-//! ([`signals`]), by what they have in common ([`clocks`]), and in its positions ([`places`]). Reflections widen
-//! the limits; where a spoofer sends, or the scene expects any errors, [`excused`] has what is left.
+//! settings ([`Receiver`]) that begins when it likes within generous bounds ([`times`]). How it makes its
+//! ranges is not known, so random errors are held against a plain receiver's ([`plain`]): satellite by
+//! satellite ([`signals`]), by what they have in common ([`clocks`]), and in its positions ([`places`]).
+//! Reflections widen the limits; where a spoofer sends, or the scene expects any errors, [`excused`] has what
+//! is left.
 
 mod atmosphere;
 mod clocks;
@@ -26,6 +27,7 @@ use crate::judge::foreign::{ForeignSummary, Judgement};
 use crate::judge::judgement::Bound;
 use crate::judge::verdict::Verdict;
 use crate::read::Run;
+use crate::statistics::median;
 use gnss::satellite::System;
 use gnss::signal::{Link, Signal};
 use plain::{PHASE_CYCLES, Scene};
@@ -34,7 +36,7 @@ use times::{Begin, Labels};
 /// Share of a file's epochs, observations and positions that may be without a truth, in percent: those before
 /// its clock is set.
 const UNMATCHED_PERCENT: f64 = 1.0;
-/// Share of carriers that may be declared broken, in percent: each arc has one such epoch.
+/// Share of carriers that may be declared broken, in percent: fades break a few.
 const DECLARED_PERCENT: f64 = 10.0;
 
 impl Verdict {
@@ -71,6 +73,14 @@ impl Verdict {
                 let seen = labels.of_links.contains_key(link);
                 if seen { "lost, or late" } else { "never observed" }.to_owned()
             });
+            let absent: Vec<String> = (expected.satellites.iter())
+                .filter(|(link, one)| one.due > 0 && labels.may_come(link))
+                .map(|(link, _)| run.name(*link))
+                .collect();
+            if !absent.is_empty() {
+                let why = "a receiver that writes none before their orbits may find them later than the file ends";
+                verdict.not_judged.push(format!("satellites never observed ({}): {why}", absent.join(", ")));
+            }
             verdict.observables(&scene, measured, summary, &expected);
         }
         if let Some(places) = places {
@@ -119,7 +129,13 @@ impl Verdict {
     }
 
     /// Code, carrier, Doppler and C/N0.
-    fn observables(&mut self, scene: &Scene<'_>, measured: &Measured, summary: &ForeignSummary, expected: &Expectations) {
+    fn observables(
+        &mut self,
+        scene: &Scene<'_>,
+        measured: &Measured,
+        summary: &ForeignSummary,
+        expected: &Expectations,
+    ) {
         self.signs(measured, scene);
         let judged = |slip: &&Slip| scene.is_bounded(slip.label_s) && scene.is_sound(&slip.link, slip.label_s);
         let undeclared: Vec<&Slip> = measured.slips.iter().filter(|slip| !slip.declared).filter(judged).collect();
@@ -127,14 +143,7 @@ impl Verdict {
         let source = "the file's own indicator";
         self.judge("undeclared breaks of carriers", path, undeclared.len(), "", Bound::Max(0.0), source);
         self.explain(undeclared.iter().take(5).map(|slip| format!("{} at {:.1} s", slip.sv, slip.label_s)).collect());
-        let carriers = measured.rows.iter().filter(|row| row.values.carrier_cycles.is_some()).count();
-        if carriers > 0 {
-            let declared = measured.rows.iter().filter(|row| row.values.lost_lock).count();
-            let percent = 100.0 * declared as f64 / carriers as f64;
-            let source = "an indicator is of a break since the epoch before";
-            let bound = Bound::Max(DECLARED_PERCENT);
-            self.judge("carriers declared broken", "", percent, "%", bound, source);
-        }
+        self.declared(measured);
         self.frozen(measured, scene);
         let ones = signals::ones(measured, scene, expected);
         self.time_tags(measured, &ones, scene);
@@ -160,8 +169,26 @@ impl Verdict {
         self.rates(measured, &ones, scene);
     }
 
+    /// Indicators of carriers that go on from the epoch before: of those that begin, any may be set.
+    fn declared(&mut self, measured: &Measured) {
+        let mut links: BTreeMap<Link, Vec<&ObservationError>> = BTreeMap::new();
+        for row in measured.rows.iter().filter(|row| row.values.carrier_cycles.is_some()) {
+            links.entry(row.link).or_default().push(row);
+        }
+        let pairs =
+            links.values().flat_map(|rows| rows.windows(2)).map(|two| (two[1].label_s - two[0].label_s, two[1]));
+        let pairs: Vec<(f64, &ObservationError)> = pairs.collect();
+        let Some(usual_s) = median(&pairs.iter().map(|(step_s, _)| *step_s).collect::<Vec<_>>()) else { return };
+        let on: Vec<_> = pairs.iter().filter(|(step_s, _)| *step_s < 1.5 * usual_s).collect();
+        let declared = on.iter().filter(|(_, row)| row.values.lost_lock).count();
+        let percent = 100.0 * declared as f64 / on.len().max(1) as f64;
+        let source = "an indicator is of a break since the epoch before";
+        self.judge("carriers declared broken", "", percent, "%", Bound::Max(DECLARED_PERCENT), source);
+    }
+
     fn positions(&mut self, run: &Run, places: &Places, labels_late_s: Option<i64>) {
-        let percent = 100.0 * (places.fixes - places.rows.len()).saturating_sub(places.at_edge) as f64 / places.fixes.max(1) as f64;
+        let percent = 100.0 * (places.fixes - places.rows.len()).saturating_sub(places.at_edge) as f64
+            / places.fixes.max(1) as f64;
         let source = format!("the scene's truth has every second of its {} s", run.scene.duration_s);
         self.judge("positions without a truth", "", percent, "%", Bound::Max(UNMATCHED_PERCENT), &source);
         if let Some(late_s) = labels_late_s {
@@ -169,8 +196,8 @@ impl Verdict {
         }
     }
 
-    /// Dates of positions. A week number of ten bits does not say which of its eras it is of, and a receiver that
-    /// was built later takes a later one.
+    /// Dates of positions. A week number of ten bits does not say which of its eras it is of, and a receiver
+    /// that was built later takes a later one.
     fn weeks_of_positions(&mut self, run: &Run, weeks: i64) {
         let ten_bits = |signal: &Signal| !matches!(signal.system, System::Galileo | System::BeiDou | System::Glonass);
         if weeks > 0 && run.signals.iter().all(|signal| ten_bits(signal)) {

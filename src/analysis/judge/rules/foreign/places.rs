@@ -1,9 +1,9 @@
 //! A foreign receiver's positions and velocities against what the scene allows a plain receiver.
 //!
-//! Random errors are those of least squares with equal weights on a plain receiver's ranges. What lasts over a
-//! file is less: biases of single satellites, models that differ by a metre, and the ionosphere where no page of
-//! it came or the broadcast model errs. A position that is old lies behind along the motion. Limits: a receiver
-//! that filters its positions has smaller errors and is held against the same limits.
+//! Random errors are those of least squares with equal weights on a plain receiver's ranges. What lasts over
+//! a file is less: biases of single satellites, models that differ by a metre, and the ionosphere where no
+//! page of it came or the broadcast model errs. A position that is old lies behind along the motion. Limits:
+//! a receiver that filters its positions has smaller errors and is held against the same limits.
 
 use std::collections::HashMap;
 
@@ -194,7 +194,14 @@ impl Verdict {
         let limit = COURSE_RAD + largest(1, 1) * sigma;
         let source = "the true course and speed: 5 degrees, and a plain receiver's Dopplers";
         let angle = libm::atan2(product.1, product.0).abs();
-        self.judge("course over ground, departure", "", angle.to_degrees(), "°", Bound::Max(limit.to_degrees()), source);
+        self.judge(
+            "course over ground, departure",
+            "",
+            angle.to_degrees(),
+            "°",
+            Bound::Max(limit.to_degrees()),
+            source,
+        );
         let scale = (libm::hypot(product.0, product.1) / squares - 1.0).abs();
         self.judge("speed over ground, departure of its scale", "", scale, "of 1", Bound::Max(limit), source);
     }

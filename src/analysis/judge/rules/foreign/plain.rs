@@ -1,8 +1,9 @@
 //! What a plain receiver's errors are, and how far a scene's reflections and spoofers can move them.
 //!
-//! How a foreign receiver makes its observations is not known. Random errors are held against those of a plain
-//! one: early minus late power a chip apart, a code loop of two hertz, a phase loop of 18 Hz, no smoothing. Limits:
-//! reflections are bounded and not predicted, since phases and spacing decide about the sign of their error.
+//! How a foreign receiver makes its observations is not known. Random errors are held against those of a
+//! plain one: early minus late power a chip apart, a code loop of two hertz, a phase loop of 18 Hz, no
+//! smoothing. Limits: reflections are bounded and not predicted, since phases and spacing decide about the
+//! sign of their error.
 
 use std::collections::BTreeMap;
 
@@ -21,8 +22,8 @@ use gnss::time::Epoch;
 /// A plain receiver's code loop: bandwidth, and early to late in chips.
 pub(super) const PLAIN_HZ: f64 = 2.0;
 const PLAIN_CHIPS: f64 = 1.0;
-/// Least that code edges between samples cost a replica of whole chips, rms: GNSS-SDR's satellites have biases of
-/// up to 0.45 m at 2.6 Msps, three times what folds back there from edges that are averaged.
+/// Least that code edges between samples cost a replica of whole chips, rms: GNSS-SDR's satellites have
+/// biases of up to 0.45 m at 2.6 Msps, three times what folds back there from edges that are averaged.
 const EDGES_M: f64 = 0.5;
 /// Bounds count as so many standard deviations where errors of several satellites or times add up.
 const BOUND_SIGMAS: f64 = 3.0;
@@ -72,8 +73,8 @@ pub(super) struct Reach {
 }
 
 impl Reach {
-    /// Of the rays that the truth has: each moves a code by at most half its amplitude in spacings, and by its
-    /// excess over what is left of the direct ray; a carrier by the arc sine of all amplitudes.
+    /// Of the rays that the truth has: each moves a code by at most half its amplitude in spacings, and by
+    /// its excess over what is left of the direct ray; a carrier by the arc sine of all amplitudes.
     fn of(run: &Run, link: Link) -> Result<Self, JudgeError> {
         let Some(component) = leading(link.signal) else { return Ok(Self::default()) };
         let chip_m = SPEED_OF_LIGHT_MPS / component.chip_rate_hz;
@@ -173,8 +174,8 @@ impl<'r> Scene<'r> {
         self.rate_mps / BOUND_SIGMAS
     }
 
-    /// What code edges between samples cost a signal's code, rms: of averaged ones what folds back, but not less
-    /// than a replica of whole chips has.
+    /// What code edges between samples cost a signal's code, rms: of averaged ones what folds back, but not
+    /// less than a replica of whole chips has.
     pub fn edges_m(&self, signal: &Signal) -> f64 {
         self.edges_m.get(signal.name).copied().unwrap_or(EDGES_M)
     }

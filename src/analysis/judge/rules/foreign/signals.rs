@@ -1,8 +1,9 @@
 //! Code, carrier, Doppler and C/N0 of each satellite against the others of its signal.
 //!
-//! An error is counted from the median of its epoch and signal, so that one wrong satellite is wrong alone. Each
-//! row is of the satellite that is nearest to its limit or farthest beyond it, and names it. Limits: an error that
-//! most satellites of a signal share is the receiver's clock here; [`super::clocks`] compares clocks.
+//! An error is counted from the median of its epoch and signal, so that one wrong satellite is wrong alone.
+//! Each row is of the satellite that is nearest to its limit or farthest beyond it, and names it. Limits: an
+//! error that most satellites of a signal share is the receiver's clock here; [`super::clocks`] compares
+//! clocks.
 
 use std::collections::BTreeMap;
 
@@ -132,7 +133,9 @@ impl Verdict {
         let found = ones.iter().flat_map(|one| {
             means(&one.code_m).into_iter().map(move |(count, span_s, value)| {
                 let noise_m = one.plain_m / plain::independent(count, span_s, plain::PLAIN_HZ).sqrt();
-                let limit = factor * THEORY * noise_m + largest(1, 1) * scene.edges_m(one.link.signal) + scene.reach(&one.link).code_m;
+                let limit = factor * THEORY * noise_m
+                    + largest(1, 1) * scene.edges_m(one.link.signal)
+                    + scene.reach(&one.link).code_m;
                 Found { name: one.name.clone(), value: value.abs(), limit }
             })
         });
@@ -141,7 +144,8 @@ impl Verdict {
         self.nearest("pseudorange error of a satellite, mean", "", "m", found.collect(), source);
         let ratios = ones.iter().filter(|one| one.code_m.len() >= ENOUGH).filter_map(|one| {
             let values: Vec<f64> = one.code_m.iter().map(|(_, value)| *value).collect();
-            let usual_m = libm::hypot(libm::hypot(one.plain_m, scene.edges_m(one.link.signal)), scene.reach(&one.link).code_m);
+            let usual_m =
+                libm::hypot(libm::hypot(one.plain_m, scene.edges_m(one.link.signal)), scene.reach(&one.link).code_m);
             Some(Found { name: one.name.clone(), value: std(&values)? / usual_m, limit: THEORY })
         });
         let source = "a plain receiver's loop (2 Hz, early and late a chip apart) at the scene's C/N0, code edges \
@@ -220,7 +224,8 @@ impl Verdict {
             let limit = RATE_HZ + factor * cycles + mirrors;
             Found { name: scene.run.name(arc.link), value: arc.drift_hz.abs(), limit }
         });
-        let source = "the other satellites of the signal, 15 degrees of jitter, and reflections over an unbroken carrier";
+        let source =
+            "the other satellites of the signal, 15 degrees of jitter, and reflections over an unbroken carrier";
         self.nearest("drift of a carrier against the others", "", "Hz", drifts.collect(), source);
         let jitters = arcs.iter().filter(|arc| arc.count >= ENOUGH).map(|arc| {
             let limit = PHASE_CYCLES + scene.reach(&arc.link).carrier_cycles;
@@ -232,7 +237,8 @@ impl Verdict {
             let span_s = arc.span_s.1 - arc.span_s.0;
             let one = ones.iter().find(|one| one.link == arc.link)?;
             let noise_m = one.plain_m * slope(span_s, plain::independent(arc.count, span_s, plain::PLAIN_HZ));
-            let slow_m = (2.0 * largest(1, 1) * scene.edges_m(arc.link.signal) + 2.0 * scene.reach(&arc.link).code_m) / span_s;
+            let slow_m =
+                (2.0 * largest(1, 1) * scene.edges_m(arc.link.signal) + 2.0 * scene.reach(&arc.link).code_m) / span_s;
             let limit = factor * THEORY * noise_m + slow_m;
             Some(Found { name: scene.run.name(arc.link), value: arc.code_carrier_mps?.abs(), limit })
         });

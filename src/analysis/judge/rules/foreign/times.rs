@@ -2,9 +2,10 @@
 //!
 //! It is not known how it searches, nor whether it writes observations before its first fix. So its first
 //! observation and its first fix are due by one generous time: satellites locked after a slow search, their
-//! ephemerides whole, the ionosphere's page where that comes at once, and a reserve. Observations that come before
-//! any orbit can be whole show when satellites were locked, and then that lock counts. From its own first epoch on it must go on to within seconds of the scene's end.
-//! Limits: a receiver that writes every second epoch alone is one of twice the interval.
+//! ephemerides whole, the ionosphere's page where that comes at once, and a reserve. Observations that come
+//! before any orbit can be whole show when satellites were locked, and then that lock counts. From its own
+//! first epoch on it must go on to within seconds of the scene's end. Limits: a receiver that writes every
+//! second epoch alone is one of twice the interval.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,10 +24,15 @@ use gnss::time::Epoch;
 /// Time within which a receiver without knowledge has locked four satellites in full view: one that searches
 /// channel after channel, as GNSS-SDR does.
 const SEARCH_S: f64 = 8.0;
+/// Time within which a second search has found a satellite that the first one missed.
+const AGAIN_S: f64 = LOCK_S + 15.0;
+/// Time within which a receiver that searches one channel after another has found all: GNSS-SDR takes 40 s
+/// for a sky of twelve.
+const SLOW_S: f64 = 45.0;
 /// Reserve for a solution, and for a receiver that waits for a satellite more.
 const RESERVE_S: f64 = 6.0;
-/// A page of the ionosphere that comes within so long after the orbits is waited for: one subframe of NavIC, the
-/// longest unit of a message.
+/// A page of the ionosphere that comes within so long after the orbits is waited for: one subframe of NavIC,
+/// the longest unit of a message.
 const PAGE_S: f64 = 12.5;
 /// Seconds that a recording may end early: a receiver's last block and its queues.
 const END_S: f64 = 10.0;
@@ -51,12 +57,7 @@ fn interval_s(labels: &[f64]) -> Option<f64> {
 
 impl Labels {
     /// Of a receiver's epochs, and of each satellite's.
-    pub fn new(
-        run: &Run,
-        all: &[f64],
-        of_links: BTreeMap<Link, Vec<f64>>,
-        truth_s: f64,
-    ) -> Result<Self, JudgeError> {
+    pub fn new(run: &Run, all: &[f64], of_links: BTreeMap<Link, Vec<f64>>, truth_s: f64) -> Result<Self, JudgeError> {
         let interval_s = interval_s(all).unwrap_or(0.0).max(truth_s);
         // Labels count from the second that is nearest to the truth's first row.
         let first = run.trajectory.first();
@@ -64,11 +65,14 @@ impl Labels {
         let since_s = |time: Epoch| origin.map_or(0.0, |origin| time.since(origin));
         let epochs = run.trajectory.map(|row| (row.sample, since_s(row.time())))?;
         let start = first.map(|row| row.time().plus_s(-run.time_s(row.sample)));
+        let span_s = all.first().zip(all.last()).map(|(first, last)| (*first, *last));
         let late = |signal: &&'static Signal| {
             let table = Timetable::beside(signal, &run.signals, start?);
-            Some((*signal, table.ephemeris_by_s(LOCK_S) + RESERVE_S))
+            // Who writes nothing before an orbit is whole waits for it with every satellite that it finds.
+            let is_early = span_s.is_some_and(|(from_s, _)| from_s < table.ephemeris_by_s(0.0));
+            let ready_s = if is_early { table.frame_by_s(AGAIN_S) } else { table.ephemeris_by_s(SLOW_S) };
+            Some((*signal, ready_s + RESERVE_S))
         };
-        let span_s = all.first().zip(all.last()).map(|(first, last)| (*first, *last));
         let late_s = run.signals.iter().filter_map(late).collect();
         Ok(Self { epochs, reach_s: 0.5 * interval_s + 1e-3, interval_s, of_links, span_s, late_s })
     }
@@ -84,6 +88,12 @@ impl Labels {
         samples
     }
 
+    /// Whether a satellite that is never observed may still be in time when the file ends.
+    pub fn may_come(&self, link: &Link) -> bool {
+        let in_time_s = self.late_s.get(link.signal).copied().unwrap_or(0.0);
+        !self.of_links.contains_key(link) && self.span_s.is_some_and(|(_, to_s)| in_time_s > to_s)
+    }
+
     /// The truth's first epoch from a label on.
     pub fn sample_at(&self, label_s: f64) -> Option<u64> {
         self.epochs.iter().find(|(_, t_s)| *t_s >= label_s - 1e-3).map(|(sample, _)| *sample)
@@ -91,13 +101,13 @@ impl Labels {
 }
 
 impl Observed for Labels {
-    /// Those of the file. Before it begins and after it ends nothing is due, nor before a satellite's own first
-    /// one where that is in time.
+    /// Those of the file. Before it begins and after it ends nothing is due, nor before a satellite's own
+    /// first one where that is in time.
     fn samples(&self, link: Link) -> Result<Vec<u64>, JudgeError> {
         let Some((from_s, to_s)) = self.span_s else { return Ok(Vec::new()) };
         let labels = self.of_links.get(&link).map_or(&[][..], Vec::as_slice);
         let in_time_s = self.late_s.get(link.signal).copied().unwrap_or(0.0).max(from_s + RESERVE_S);
-        let own_s = labels.first().copied().filter(|first_s| *first_s <= in_time_s).unwrap_or(from_s);
+        let own_s = labels.first().copied().unwrap_or(f64::INFINITY).min(in_time_s);
         let mut samples = self.near(labels);
         let pardoned = |t_s: f64| t_s < own_s || t_s > to_s;
         samples.extend(self.epochs.iter().filter(|(_, t_s)| pardoned(*t_s)).map(|(sample, _)| *sample));
@@ -139,9 +149,8 @@ impl Begin {
         let begun_s = labels.span_s.map(|(from_s, _)| scene.time_s(from_s));
         // Observations that come before any orbit is whole show when their satellites were locked.
         let shown_s = begun_s.filter(|begun_s| *begun_s < orbits_s(0.0)).map(|begun_s| {
-            let timed = |locked_s: f64| {
-                of.iter().map(|one| table(one).frame_by_s(locked_s)).fold(f64::INFINITY, f64::min)
-            };
+            let timed =
+                |locked_s: f64| of.iter().map(|one| table(one).frame_by_s(locked_s)).fold(f64::INFINITY, f64::min);
             let locked = (0..40).map(|step| 0.5 * f64::from(step)).take_while(|locked_s| timed(*locked_s) <= begun_s);
             by(locked.last().unwrap_or(0.0).min(begun_s)) + RESERVE_S
         });
@@ -164,6 +173,10 @@ impl Verdict {
             let value = scene.time_s(first_s);
             let limit_s = limit_s + step_s;
             self.judge(&format!("time to the first of the {what}"), "", value, "s", Bound::Max(limit_s), &source);
+        }
+        if labels.len() < 2 {
+            self.not_judged.push(format!("time without {what} at the end: one epoch has no interval"));
+            return;
         }
         let left_s = scene.run.scene.duration_s - scene.time_s(last_s);
         let source = "a receiver's last block and its queues, and two intervals";
