@@ -190,8 +190,8 @@ impl Verdict {
                 self.judge("Doppler plus the carrier's rate", path, rate.value.abs(), "Hz", Bound::Max(limit), source);
             } else {
                 self.not_judged.push(format!(
-                    "Doppler plus the carrier's rate: {interval_s:.0} s between epochs are too long for the mean of two \
-                     Dopplers"
+                    "Doppler plus the carrier's rate: {interval_s:.0} s between epochs are too long for the mean of \
+                     two Dopplers"
                 ));
             }
         }

@@ -134,8 +134,8 @@ impl Verdict {
             _ => plain,
         };
         let limit = AGE_S + largest(1, 1) * sigma_s;
-        let source = "errors along the motion: 30 ms, and what lasting errors or, where the motion changes, the scatter \
-                      of the errors make of it";
+        let source = "errors along the motion: 30 ms, and what lasting errors or, where the motion changes, the \
+                      scatter of the errors make of it";
         let path = "position.time_tag_offset_s";
         self.judge("age of positions", path, late_s.abs(), "s", Bound::Max(limit), source);
     }
@@ -167,8 +167,8 @@ impl Verdict {
         let worst = with.iter().zip(&limits).max_by(|a, b| (a.0.1 / a.1).total_cmp(&(b.0.1 / b.1)));
         if let Some(((one, value), limit)) = worst {
             let source = format!(
-                "a plain receiver's Dopplers (1.4 Hz), dilution, half a second of acceleration and mirrors; at {:.1} s, \
-                 nearest to its limit or farthest beyond",
+                "a plain receiver's Dopplers (1.4 Hz), dilution, half a second of acceleration and mirrors; at {:.1} \
+                 s, nearest to its limit or farthest beyond",
                 one.row.label_s
             );
             self.judge("velocity over ground error, largest", "", *value, "m/s", Bound::Max(*limit), &source);

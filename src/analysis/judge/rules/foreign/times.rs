@@ -96,7 +96,8 @@ impl Labels {
 
     /// The truth's first epoch from a label on.
     pub fn sample_at(&self, label_s: f64) -> Option<u64> {
-        self.epochs.iter().find(|(_, t_s)| *t_s >= label_s - 1e-3).map(|(sample, _)| *sample)
+        let next = self.epochs.partition_point(|(_, t_s)| *t_s < label_s - 1e-3);
+        self.epochs.get(next).map(|(sample, _)| *sample)
     }
 }
 
