@@ -50,10 +50,13 @@ fn drift_of(measured: &Measured) -> f64 {
     median(&steps.collect::<Vec<_>>()).unwrap_or(0.0)
 }
 
+/// A satellite's signal, the speed along its line of sight in m/s, and its code error in metres.
+type Point = (Link, f64, f64);
+
 /// By how much labels are late by the rows that are judged: what the truth was moved by already, and the
 /// slope of pseudoranges over Doppler that is left.
 fn judged_late(measured: &Measured, scene: &Scene<'_>) -> Option<Estimate> {
-    let mut epochs: BTreeMap<(u64, &'static Signal), Vec<(Link, f64, f64)>> = BTreeMap::new();
+    let mut epochs: BTreeMap<(u64, &'static Signal), Vec<Point>> = BTreeMap::new();
     for row in measured.rows.iter().filter(|row| scene.judges(row)) {
         if let Some(code_m) = row.code_m.filter(|code_m| code_m.abs() < FAR_M) {
             let point = (row.link, row.link.wavelength_m() * row.truth.doppler_hz, code_m);
@@ -63,7 +66,7 @@ fn judged_late(measured: &Measured, scene: &Scene<'_>) -> Option<Estimate> {
     let points: Vec<(Sv, f64, f64)> = epochs
         .into_values()
         .flat_map(|points| {
-            let of = |of: fn(&(Link, f64, f64)) -> f64| mean(&points.iter().map(of).collect::<Vec<_>>()).unwrap_or(0.0);
+            let of = |of: fn(&Point) -> f64| mean(&points.iter().map(of).collect::<Vec<_>>()).unwrap_or(0.0);
             let (speed, error) = (of(|point| point.1), of(|point| point.2));
             points.into_iter().map(move |point| (point.0.sv, point.1 - speed, point.2 - error))
         })
