@@ -128,8 +128,13 @@ fn a_correlator_too_narrow_or_too_wide_is_refused_and_its_noise_stays_finite() {
     });
     the.all("refused with the range", refused.count(), 7);
     let finite = [0.02, 0.1, 1.0, 1.2, 1.5].iter().filter(|d| {
-        let noise =
-            CodeNoise { chip_m: 293.0, shape: loops::CodeShape::triangle(**d), bandwidth_hz: 0.5, integration_s: 1e-3 };
+        let noise = CodeNoise {
+            chip_m: 293.0,
+            share: 1.0,
+            shape: loops::CodeShape::triangle(**d),
+            bandwidth_hz: 0.5,
+            integration_s: 1e-3,
+        };
         let shape = loops::CodeShape::triangle(**d);
         let gain = shape.early_minus_late_gain(1.0);
         [1.0, 1e3, 1e10].iter().all(|cn0| noise.sigma_m(*cn0).is_finite() && noise.sigma_m(*cn0) > 0.0)

@@ -145,7 +145,13 @@ fn an_old_set_is_sent_by_no_satellite_and_used_by_no_receiver() {
         ..PositionSettings::default()
     };
     let rate = Rate::from_hz(1e6).unwrap();
-    let noise = CodeNoise { chip_m: 293.05, shape: CodeShape::triangle(0.5), bandwidth_hz: 0.5, integration_s: 0.004 };
+    let noise = CodeNoise {
+        chip_m: 293.05,
+        share: 1.0,
+        shape: CodeShape::triangle(0.5),
+        bandwidth_hz: 0.5,
+        integration_s: 0.004,
+    };
     let refused = [7_801.0, 14_400.0, 90_000.0].iter().filter(|age_s| {
         let at = toe.plus_s(**age_s);
         let seen = observations(&sets, Geodetic::from_degrees(26.5, 80.2, 130.0), at);

@@ -263,7 +263,7 @@ fn with_the_broadcast_offset_any_four_satellites_of_two_systems_give_place_and_t
 /// A code loop of 1 Hz with early and late half a chip apart.
 fn noise() -> CodeNoise {
     let chip_m = SPEED_OF_LIGHT_MPS / 1.023e6;
-    CodeNoise { chip_m, shape: CodeShape::triangle(0.5), bandwidth_hz: 1.0, integration_s: 4e-3 }
+    CodeNoise { chip_m, share: 1.0, shape: CodeShape::triangle(0.5), bandwidth_hz: 1.0, integration_s: 4e-3 }
 }
 
 #[test]

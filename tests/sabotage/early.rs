@@ -1,5 +1,5 @@
-//! Damage that wide limits would hide: before the ionosphere's parameters are known, of values that are frozen,
-//! of fixes that do not come, and of what two bands show of the ionosphere.
+//! Damage that wide limits would hide: before the ionosphere's parameters are known, of values that are
+//! frozen, of fixes that do not come, and of what two bands show of the ionosphere.
 
 use crate::Kind;
 use crate::fixes::kind;

@@ -67,7 +67,7 @@ pub fn in_motion() -> &'static Path {
 }
 
 /// The first fifty seconds of the shipped scene of two systems.
-fn two_systems() -> &'static Path {
+pub fn two_systems() -> &'static Path {
     static RUN: OnceLock<Made> = OnceLock::new();
     let scene = include_str!("../../scenarios/two_systems.toml");
     make(&RUN, "two_systems", &scene.replace("duration_s = 60", "duration_s = 50"))
@@ -79,6 +79,18 @@ fn two_bands() -> &'static Path {
     let scene = include_str!("../../scenarios/navic_two_bands.toml");
     let beside = concat!("file = \"", env!("CARGO_MANIFEST_DIR"), "/scenarios/navic_");
     make(&RUN, "two_bands", &scene.replace("duration_s = 70", "duration_s = 50").replace("file = \"navic_", beside))
+}
+
+/// The shipped scene of Galileo.
+pub fn galileo() -> &'static Path {
+    static RUN: OnceLock<Made> = OnceLock::new();
+    make(&RUN, "galileo", include_str!("../../scenarios/galileo.toml"))
+}
+
+/// The shipped street between two walls.
+pub fn urban() -> &'static Path {
+    static RUN: OnceLock<Made> = OnceLock::new();
+    make(&RUN, "urban", include_str!("../../scenarios/urban.toml"))
 }
 
 /// Another place, seed and start, without page 18 in time.

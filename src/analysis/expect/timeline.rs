@@ -182,6 +182,13 @@ impl Timeline {
         (self.places.first().map_or(0.0, |p| p.0), self.places.last().map_or(0.0, |p| p.0))
     }
 
+    /// Whether a time is less than a row before the first one or after the last one: samples go on there.
+    pub fn is_at_edge(&self, t_s: f64) -> bool {
+        let (from_s, to_s) = self.span_s();
+        let near = |beyond_s: f64| (0.0..=1.01 * self.interval_s).contains(&beyond_s);
+        (t_s < from_s && near(from_s - t_s)) || (t_s > to_s && near(t_s - to_s))
+    }
+
     /// Interval of its rows.
     pub fn interval_s(&self) -> f64 {
         self.interval_s

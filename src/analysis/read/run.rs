@@ -168,9 +168,7 @@ impl Run {
         read.rx = Some(rx.to_owned());
         read.scene_json = json(&truth.join("scene.json"))?.unwrap_or(Value::Null);
         read.scenario = text(&run.join("scenario.toml"))?;
-        each_of_any(&truth.join("rays.csv"), |_, row: RayRow| read.rays.push(row.link(), &row))?;
         read.truth_navigation = rows(&truth.join("navigation.csv"), TRUTH)?;
-        each_of_any(&truth.join("claimed.csv"), |_, row: TrajectoryRow| read.claimed.push(row))?;
         read.observations = observations(&rx.join("observations.csv"), RECEIVER, run, |_| Ok(()))?;
         let fixes = rx.join("fixes.csv");
         each(&fixes, RECEIVER, |line, row: Fix| {
@@ -227,16 +225,18 @@ impl Run {
         Ok(read)
     }
 
-    /// Reads a truth alone, for a receiver that writes files of its own.
+    /// Reads a truth alone, for a receiver that writes files of its own. A signal is received in the front
+    /// end whose facts name it.
     pub fn read_truth(truth: &Path) -> Result<Self, JudgeError> {
         // A truth may lie where nothing can be written.
-        let read = Self::read_truth_by(truth, &std::env::temp_dir())?;
-        if read.scene.front_ends.len() > 1 {
-            let expected = "one: a receiver's samples are those of one front end, whose truth `gnss-twin generate \
-                            --front-end NAME` writes";
-            let value = read.scene.front_ends.len() as f64;
-            return Err(JudgeError::Scene { key: "front_ends", value, expected });
-        }
+        let mut read = Self::read_truth_by(truth, &std::env::temp_dir())?;
+        read.truth_navigation = optional(&truth.join("navigation.csv"))?;
+        let place = |signal: &Signal| {
+            let has = |one: &FrontEndFacts| one.signals.iter().any(|name| name == signal.name);
+            read.scene.front_ends.iter().position(has).unwrap_or(0)
+        };
+        read.front_ends = read.signals.iter().map(|&signal| (signal, place(signal))).collect();
+        read.common.set_front_end(&read.scene, &Value::Null, &place);
         Ok(read)
     }
 
@@ -285,6 +285,9 @@ impl Run {
         let time_s = |sample: u64| sample as f64 / scene.sample_rate_hz;
         let steps = samples.windows(2).map(|two| time_s(two[1]) - time_s(two[0]));
         let truth_interval_s = median(&steps.collect::<Vec<_>>()).unwrap_or(0.0);
+        let (mut rays, mut claimed) = (SpillStore::new(directory), Table::new(directory));
+        each_of_any(&truth.join("rays.csv"), |_, row: RayRow| rays.push(row.link(), &row))?;
+        each_of_any(&truth.join("claimed.csv"), |_, row: TrajectoryRow| claimed.push(row))?;
         Ok(Self {
             scene,
             scene_json: Value::Null,
@@ -299,12 +302,12 @@ impl Run {
             common,
             ionosphere_m,
             troposphere_m,
-            rays: SpillStore::new(directory),
+            rays,
             trajectory,
             truth_interval_s,
             truth_navigation: Vec::new(),
             interference: optional(&truth.join("interference.csv"))?,
-            claimed: Table::new(directory),
+            claimed,
             alike: BTreeMap::new(),
             rx: None,
             observations: SpillStore::new(directory),

@@ -452,7 +452,9 @@ pub fn read_nmea(input: impl Read, file: &str, options: &Options) -> Result<Nmea
         }
     }
     let what = match (rows.last_s(), found_any, of_rmc) {
-        (Some(_), ..) => return Ok(NmeaTrajectory { trajectory: rows.finish(file)?, without_fix, separations_assumed }),
+        (Some(_), ..) => {
+            return Ok(NmeaTrajectory { trajectory: rows.finish(file)?, without_fix, separations_assumed });
+        }
         (None, ..) if without_fix > 0 => "no GGA sentence with a fix",
         (None, false, _) => "no sentence of NMEA",
         (None, _, false) => "no GGA sentence",

@@ -207,8 +207,9 @@ pub type Noises = Vec<(&'static Signal, CodeNoise)>;
 impl CodeNoise {
     /// Standard deviation of a non-coherent early-minus-late loop, metres, of a signal of `cn0_hz`.
     ///
-    /// With C the power that the loop follows: B·(1−ρ)/(2·C/N0·a′²)·(1 + (1+ρ)/(2·T·C/N0·a²)) with height a, slope a′ and noise correlation ρ of
-    /// early and late; on a triangle that is Kaplan and Hegarty's equation 5.23 (2nd ed.), first branch.
+    /// With C the power that the loop follows: B·(1−ρ)/(2·C/N0·a′²)·(1 + (1+ρ)/(2·T·C/N0·a²)) with height a,
+    /// slope a′ and noise correlation ρ of early and late; on a triangle that is Kaplan and Hegarty's
+    /// equation 5.23 (2nd ed.), first branch.
     pub fn sigma_m(&self, cn0_hz: f64) -> f64 {
         let CodeShape { value, slope, common } = self.shape;
         let cn0_hz = self.share * cn0_hz;

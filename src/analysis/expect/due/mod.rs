@@ -13,7 +13,7 @@ pub mod timetable;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::{Matrix4, Vector4};
+use nalgebra::Matrix4;
 
 use crate::error::JudgeError;
 use crate::expect::message::Message;
@@ -69,13 +69,22 @@ impl Due {
 
     /// Position dilution of those that must be used; infinite where there is no position.
     pub fn pdop(&self) -> f64 {
+        let (horizontal, vertical) = self.dilutions();
+        libm::hypot(horizontal, vertical)
+    }
+
+    /// Horizontal and vertical dilution of those that must be used; infinite where there is no position.
+    pub fn dilutions(&self) -> (f64, f64) {
+        let none = (f64::INFINITY, f64::INFINITY);
         if self.used < 4 {
-            return f64::INFINITY;
+            return none;
         }
         let [a, b, c, d, e, f, g, h, i, j] = self.normal.map(f64::from);
         let normal = Matrix4::new(a, b, c, d, b, e, f, g, c, f, h, i, d, g, i, j);
-        let variance = |inverse: Matrix4<f64>| Vector4::from(inverse.diagonal()).fixed_rows::<3>(0).sum();
-        normal.try_inverse().map(variance).filter(|v| *v > 0.0).map_or(f64::INFINITY, f64::sqrt)
+        let Some(inverse) = normal.try_inverse() else { return none };
+        let (horizontal, vertical) = (inverse.m11 + inverse.m22, inverse.m33);
+        let is_position = horizontal > 0.0 && vertical > 0.0;
+        if is_position { (horizontal.sqrt(), vertical.sqrt()) } else { none }
     }
 }
 

@@ -10,7 +10,6 @@ use std::f64::consts::PI;
 
 use nalgebra::Vector3;
 
-use super::ranges::Scene;
 use gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
 use gnss::ionosphere::Coefficients;
 use gnss::klobuchar::NOMINAL;
@@ -61,11 +60,10 @@ pub struct Air {
 }
 
 impl Air {
-    /// As the settings and the word of a fix have it.
-    pub fn of(scene: &Scene<'_>, model: IonosphereModel, sight: &Sight<'_>) -> Self {
-        let Some(chosen) = scene.choices.ionosphere else { return Self::default() };
+    /// As the word of a fix has it: with the coefficients that were sent of the model which the settings
+    /// choose, and the share by which they say that it errs.
+    pub fn of(model: IonosphereModel, sent: Option<&Coefficients>, share: f64, sight: &Sight<'_>) -> Self {
         let Sight { user, look, at, carrier_hz, .. } = *sight;
-        let share = scene.choices.ionosphere_error_share;
         if user.height_m > TOP_M && (share > 0.0 || model == IonosphereModel::Nominal) {
             return Self::default();
         }
@@ -76,7 +74,7 @@ impl Air {
             return Self { delay_m, ..Self::uncertain(level_m, look) };
         }
         // A correction of what the scene does not have is an error, not an expectation.
-        let sent = scene.message.ionosphere(chosen).filter(|_| sight.sky.ionosphere_m != 0.0);
+        let sent = sent.filter(|_| sight.sky.ionosphere_m != 0.0);
         let inside = |own: &&Coefficients| matches!(own, Coefficients::NequickG(_)) || user.height_m <= TOP_M;
         let delay_s = |own: &Coefficients| own.delay_s((user, look), sight.satellite_m, at, carrier_hz);
         let delay_m = SPEED_OF_LIGHT_MPS * sent.filter(inside).map_or(0.0, delay_s);

@@ -2,8 +2,9 @@
 //!
 //! The difference of both codes is I₁·(f₁²/f₂² − 1), so that the delay on a carrier f₀ is that difference
 //! times f₁²f₂²/((f₁² − f₂²)·f₀²), and its noise that of both code loops times the same. The difference of
-//! both carriers smooths it ([`Smoothing`]) and has no ionosphere of another sign, so that only noise is left.
-//! Limits: the signals whose carriers are farthest apart are taken, of equal ones the first of the table.
+//! both carriers smooths it ([`Smoothing`]) and has no ionosphere of another sign, so that only noise is
+//! left. Limits: the signals whose carriers are farthest apart are taken, of equal ones the first of the
+//! table.
 
 use std::collections::BTreeMap;
 use std::iter::Peekable;

@@ -273,7 +273,9 @@ impl<'r> Scene<'r> {
         let (satellite_m, computed_m) = computed_m(ephemeris, true_row, place)?;
         let carrier_hz = true_row.link().carrier_hz();
         let sight = Sight { user, look, satellite_m: &satellite_m, at: place.time(), carrier_hz, sky };
-        let air = Air::of(self, model, &sight);
+        let air = self.choices.ionosphere.map_or_else(Air::default, |chosen| {
+            Air::of(model, self.message.ionosphere(chosen), self.choices.ionosphere_error_share, &sight)
+        });
         let clock_m = SPEED_OF_LIGHT_MPS * place.clock_bias_s;
         let true_m = true_row.pseudorange_m - clock_m;
         let phase_m = true_row.link().wavelength_m() * true_row.carrier_cycles - clock_m - computed_m;

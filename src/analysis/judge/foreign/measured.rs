@@ -3,6 +3,8 @@
 use serde::Serialize;
 
 use super::fit::Estimate;
+use crate::expect::timeline::State;
+use crate::read::rinex_obs::Values;
 use gnss::signal::Link;
 
 /// One observation against the truth: a row of `foreign_observations.csv`. Errors are measured minus true;
@@ -28,6 +30,15 @@ pub struct ObservationError {
     /// Satellite and signal.
     #[serde(skip)]
     pub link: Link,
+    /// When the signal was received, by the truth's time in seconds after the truth began.
+    #[serde(skip)]
+    pub at_s: f64,
+    /// As the file has it.
+    #[serde(skip)]
+    pub values: Values,
+    /// What a receiver with a perfect clock would have seen.
+    #[serde(skip)]
+    pub truth: State,
 }
 
 /// What an epoch's satellites have in common: a row of `foreign_clock.csv`.
@@ -55,6 +66,26 @@ pub struct Slip {
     pub size_cycles: Option<f64>,
     /// By the file's loss-of-lock indicator.
     pub declared: bool,
+    /// Satellite and signal.
+    #[serde(skip)]
+    pub link: Link,
+}
+
+/// An unbroken stretch of a satellite's carrier.
+#[derive(Clone, Copy, Debug)]
+pub struct Arc {
+    /// Satellite and signal.
+    pub link: Link,
+    /// First and last label, seconds after the truth began.
+    pub span_s: (f64, f64),
+    /// Number of its carriers.
+    pub count: usize,
+    /// Slope of the carrier's errors over time, cycles a second.
+    pub drift_hz: f64,
+    /// Root mean square of the carrier's errors about their line, cycles.
+    pub sigma_cycles: f64,
+    /// Slope of code minus carrier over time, m/s, the truth's taken out.
+    pub code_carrier_mps: Option<f64>,
 }
 
 /// What one satellite's errors come to: a row of `foreign_satellites.csv`.
@@ -99,8 +130,12 @@ pub struct Measured {
     pub observations: usize,
     /// Of satellites or times that the truth does not have.
     pub unmatched: usize,
+    /// Epochs and observations less than a row of the truth before its beginning or after its end.
+    pub at_edge: (usize, usize),
     /// Observations left out as of a wrong lock.
     pub outliers: usize,
+    /// Distance from the others of their epoch and signal from which on they are, metres.
+    pub outlier_limit_m: f64,
     /// By how much labels are late, seconds.
     pub time_tag_s: Option<Estimate>,
     /// Whether it was significant, so that the truth was taken at the corrected times.
@@ -111,6 +146,8 @@ pub struct Measured {
     pub clock: Vec<ClockRow>,
     /// Every break of a carrier.
     pub slips: Vec<Slip>,
+    /// Every unbroken stretch of a carrier with more than two epochs.
+    pub arcs: Vec<Arc>,
     /// Every satellite.
     pub satellites: Vec<Satellite>,
     /// Root mean square of the code errors, metres.

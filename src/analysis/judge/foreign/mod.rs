@@ -26,6 +26,7 @@ use crate::read::{Fault, Run, nmea, rinex_obs};
 use gnss::time::{Epoch, WEEK_S};
 
 pub use fit::Estimate;
+pub(in crate::judge) use fit::slope;
 pub use judged::Judged;
 pub use report::{FIGURES, ForeignSummary};
 
@@ -82,7 +83,8 @@ pub fn judge(truth: &Path, files: &Files) -> Result<Judgement, JudgeError> {
         let read = nmea::read(&bytes(path)?, middle).map_err(|fault| line(path, fault))?;
         let labels: Vec<Epoch> = read.fixes.iter().map(|fix| fix.label).collect();
         judged.rollover_s[1] = rollover(&labels, &timeline).ok_or_else(|| elsewhere(path, &labels, &timeline))?;
-        let measured = place::measure(&read.fixes, &timeline, judged.rollover_s[1]);
+        let mut measured = place::measure(&read.fixes, &timeline, judged.rollover_s[1]);
+        measured.resolution_m = read.resolution_m;
         if measured.rows.is_empty() {
             return Err(elsewhere(path, &labels, &timeline));
         }

@@ -1,17 +1,18 @@
 //! Errors of a foreign receiver's code, carrier, Doppler and C/N0, and the biases that they show.
 //!
-//! The truth is taken at each epoch's label. A receiver's own clock moves all pseudoranges of an epoch alike,
-//! so their mean error, signal by signal, is its clock and not an error; the same goes for carriers and
-//! Dopplers. A label that is late by δ adds δ·λ·f_D to a pseudorange, whose slope over Doppler therefore
-//! gives δ; where it is significant the truth is looked up again at the corrected time. Carriers lose one
-//! constant an arc. Limits: biases common to all satellites cannot be separated from the clock, and a code
-//! bias that happens to go with Doppler not from a late label in a short static scene.
+//! A label is what the receiver's own clock reads. That clock moves all pseudoranges of an epoch alike, so
+//! their mean error, signal by signal, is its bias and not an error; the same goes for carriers and Dopplers.
+//! The truth is taken at the time of reception, the label less that bias. A label that is late by δ beyond it
+//! adds δ·λ·f_D to a pseudorange, whose slope over Doppler therefore gives δ; where it is significant the
+//! truth is looked up again at the corrected time. Carriers lose one constant an arc. Limits: biases common
+//! to all satellites cannot be separated from the clock, and a code bias that happens to go with Doppler not
+//! from a late label in a short static scene.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::carriers::{Arcs, Carriers, carriers};
 use super::fit::{Estimate, mean_of_means, slope};
-use super::measured::{ClockRow, Measured, ObservationError, Satellite};
+use super::measured::{Arc, ClockRow, Measured, ObservationError, Satellite};
 use super::pairs::{BySignal, Pair, by_epoch, by_signal, join};
 use crate::expect::timeline::Timeline;
 use crate::read::rinex_obs::ObservedEpoch;
@@ -26,30 +27,40 @@ const LOOKS: usize = 6;
 const OUTLIER_SIGMAS: f64 = 10.0;
 const OUTLIER_M: f64 = 30.0;
 
+const MILLISECOND_M: f64 = 1e-3 * SPEED_OF_LIGHT_MPS;
+
 /// Joins and measures; `shift_s` is taken from every label first (a week's rollover).
 pub fn measure(epochs: &[ObservedEpoch], timeline: &Timeline, shift_s: i64) -> Measured {
     let label = |epoch: &ObservedEpoch| epoch.label.since(timeline.origin) - shift_s as f64;
     let mut measured = Measured { epochs: epochs.len(), ..Measured::default() };
-    let (mut late_s, mut pairs) = (0.0, join(epochs, timeline, label, 0.0));
+    let (mut late_s, mut clock_s) = (0.0, vec![0.0; epochs.len()]);
+    let mut pairs = join(epochs, timeline, label, |_| 0.0);
     for _ in 0..LOOKS {
+        let before_s = (late_s, clock_s);
+        clock_s = readings_s(&pairs, epochs.len());
+        pairs = join(epochs, timeline, label, |number| late_s + clock_s[number]);
         let found = time_tag(&pairs);
         let total = found.map(|found| Estimate { value: late_s + found.value, sigma: found.sigma });
         measured.time_tag_s = total;
-        let Some(total) = total.filter(|total| total.differs_from(0.0)) else { break };
-        let step_s = total.value - late_s;
-        late_s = total.value;
-        measured.time_tag_applied = true;
-        pairs = join(epochs, timeline, label, late_s);
+        if let Some(total) = total.filter(|total| total.differs_from(0.0)) {
+            late_s = total.value;
+            measured.time_tag_applied = true;
+            pairs = join(epochs, timeline, label, |number| late_s + clock_s[number]);
+        }
+        let moved = clock_s.iter().zip(&before_s.1).map(|(new, old)| (new - old).abs());
         // A nanosecond is a micrometre of range.
-        if step_s.abs() < 1e-9 {
+        if moved.fold((late_s - before_s.0).abs(), f64::max) < 1e-9 {
             break;
         }
     }
     measured.observations = epochs.iter().map(|epoch| epoch.values.len()).sum();
     measured.unmatched = measured.observations - pairs.len();
     measured.joined = pairs.iter().map(|pair| pair.epoch).collect::<BTreeSet<_>>().len();
-    let common_m = common(&pairs, &mut measured.outliers);
-    clock(&mut measured, &pairs, &common_m, timeline, late_s);
+    let at_edge = |epoch: &&ObservedEpoch| timeline.is_at_edge(label(epoch));
+    let edges: Vec<&ObservedEpoch> = epochs.iter().filter(at_edge).collect();
+    measured.at_edge = (edges.len(), edges.iter().map(|epoch| epoch.values.len()).sum());
+    let common_m = common(&pairs, &mut measured);
+    clock(&mut measured, &pairs, &common_m, timeline);
     doppler_and_strength(&mut measured, &pairs);
     let (carriers, arcs) = carriers(&mut measured, &pairs);
     consistency(&mut measured, &pairs, &carriers, &arcs);
@@ -58,8 +69,28 @@ pub fn measure(epochs: &[ObservedEpoch], timeline: &Timeline, shift_s: i64) -> M
     measured
 }
 
+/// What the receiver's clock is ahead by at each epoch: the median of its code errors, as one signal may be
+/// wrong. Epochs without a pseudorange take the reading before them, the first ones that of the next.
+fn readings_s(pairs: &[Pair<'_>], epochs: usize) -> Vec<f64> {
+    let mut found = vec![None; epochs];
+    for epoch in by_epoch(pairs) {
+        let errors: Vec<f64> = epoch.iter().filter_map(Pair::code_m).collect();
+        if let (Some(first), Some(middle_m)) = (epoch.first(), median(&errors)) {
+            found[first.epoch] = Some(middle_m / SPEED_OF_LIGHT_MPS);
+        }
+    }
+    let mut last = found.iter().copied().flatten().next().unwrap_or(0.0);
+    found
+        .into_iter()
+        .map(|reading| {
+            last = reading.unwrap_or(last);
+            last
+        })
+        .collect()
+}
+
 /// Mean code error of each epoch and signal without outliers.
-fn common(pairs: &[Pair<'_>], outliers: &mut usize) -> BySignal {
+fn common(pairs: &[Pair<'_>], measured: &mut Measured) -> BySignal {
     let deviations: Vec<f64> = by_signal(pairs)
         .flat_map(|epoch| {
             let errors: Vec<f64> = epoch.iter().filter_map(|pair| pair.code_m()).collect();
@@ -69,13 +100,13 @@ fn common(pairs: &[Pair<'_>], outliers: &mut usize) -> BySignal {
         .collect();
     // Median of a normal magnitude is 0.6745σ.
     let limit_m = (OUTLIER_SIGMAS * median(&deviations).unwrap_or(0.0) / 0.6745).max(OUTLIER_M);
-    *outliers = 0;
+    (measured.outliers, measured.outlier_limit_m) = (0, limit_m);
     let mut found = BTreeMap::new();
     for epoch in by_signal(pairs) {
         let errors: Vec<f64> = epoch.iter().filter_map(|pair| pair.code_m()).collect();
         let Some(middle) = median(&errors) else { continue };
         let kept: Vec<f64> = errors.iter().copied().filter(|error| (error - middle).abs() <= limit_m).collect();
-        *outliers += errors.len() - kept.len();
+        measured.outliers += errors.len() - kept.len();
         if let (Some(mean), Some(first)) = (mean(&kept), epoch.first()) {
             found.insert(first.group(), mean);
         }
@@ -85,8 +116,7 @@ fn common(pairs: &[Pair<'_>], outliers: &mut usize) -> BySignal {
 
 /// Delay of the labels from the slope of code errors over Doppler, both about their epoch's mean.
 fn time_tag(pairs: &[Pair<'_>]) -> Option<Estimate> {
-    let mut outliers = 0;
-    let common_m = common(pairs, &mut outliers);
+    let common_m = common(pairs, &mut Measured::default());
     let mut points = Vec::new();
     for epoch in by_signal(pairs) {
         let Some(common_m) = epoch.first().and_then(|first| common_m.get(&first.group())) else { continue };
@@ -103,7 +133,7 @@ fn time_tag(pairs: &[Pair<'_>]) -> Option<Estimate> {
     slope(&points)
 }
 
-fn clock(measured: &mut Measured, pairs: &[Pair<'_>], common_m: &BySignal, timeline: &Timeline, late_s: f64) {
+fn clock(measured: &mut Measured, pairs: &[Pair<'_>], common_m: &BySignal, timeline: &Timeline) {
     for epoch in by_epoch(pairs) {
         let Some(first) = epoch.first() else { continue };
         // One clock, whatever the signals differ by: the mean of theirs.
@@ -111,7 +141,7 @@ fn clock(measured: &mut Measured, pairs: &[Pair<'_>], common_m: &BySignal, timel
         let of_signals: Vec<f64> =
             signals.iter().filter_map(|signal| common_m.get(&(first.epoch, *signal)).copied()).collect();
         let Some(bias_m) = mean(&of_signals) else { continue };
-        let Some(place) = timeline.place(first.label_s - late_s) else { continue };
+        let Some(place) = timeline.place(first.at_s) else { continue };
         measured.clock.push(ClockRow {
             label_s: first.label_s,
             satellites: epoch.len(),
@@ -124,8 +154,8 @@ fn clock(measured: &mut Measured, pairs: &[Pair<'_>], common_m: &BySignal, timel
 }
 
 /// Points about their middle.
-fn centred(points: impl Iterator<Item = (f64, f64)> + Clone) -> Vec<((), f64, f64)> {
-    let [xs, ys]: [Vec<f64>; 2] = [points.clone().map(|p| p.0).collect(), points.map(|p| p.1).collect()];
+fn centred(points: impl Iterator<Item = (f64, f64)>) -> Vec<((), f64, f64)> {
+    let (xs, ys): (Vec<f64>, Vec<f64>) = points.unzip();
     let (x0, y0) = (mean(&xs).unwrap_or(0.0), mean(&ys).unwrap_or(0.0));
     xs.iter().zip(&ys).map(|(x, y)| ((), x - x0, y - y0)).collect()
 }
@@ -174,16 +204,36 @@ fn consistency(measured: &mut Measured, pairs: &[Pair<'_>], carriers: &Carriers,
                 let [a, b] = [&pairs[two[0]], &pairs[two[1]]];
                 let turned = carrier_sign * (b.values.carrier_cycles? - a.values.carrier_cycles?);
                 let mean_hz = 0.5 * doppler_sign * (a.values.doppler_hz? + b.values.doppler_hz?);
-                Some(mean_hz + turned / (b.label_s - a.label_s))
+                Some(mean_hz + turned / (b.at_s - a.at_s))
             })
             .collect();
-        turns.extend(mean(&misses));
+        // A clock that jumps by a millisecond moves one of them by a million cycles.
+        turns.extend(median(&misses));
+        measured.arcs.extend(line_of(pairs, carriers, arc));
     }
     // Short arcs say too little.
     let longest = drifts.iter().map(|(_, length)| *length).max().unwrap_or(0);
     let long: Vec<f64> = drifts.iter().filter(|(_, length)| 2 * length >= longest).map(|(drift, _)| *drift).collect();
     measured.code_carrier_mps = mean_of_means(&long);
     measured.doppler_carrier_hz = mean_of_means(&turns);
+}
+
+/// What an arc's carriers come to; none of fewer than three.
+fn line_of(pairs: &[Pair<'_>], carriers: &Carriers, arc: &[usize]) -> Option<Arc> {
+    let (first, last) = (pairs.get(*arc.first()?)?, pairs.get(*arc.last()?)?);
+    let points =
+        arc.iter().filter_map(|index| Some((pairs.get(*index)?.label_s, carriers.get(*index)?.as_ref()?.cycles)));
+    let points = centred(points);
+    let drift_hz = line_slope(&points).filter(|_| points.len() > 2)?;
+    let rest: Vec<f64> = points.iter().map(|(_, x, y)| y - drift_hz * x).collect();
+    Some(Arc {
+        link: first.link,
+        span_s: (first.label_s, last.label_s),
+        count: points.len(),
+        drift_hz,
+        sigma_cycles: rms(&rest)?,
+        code_carrier_mps: divergence(pairs, carriers, arc),
+    })
 }
 
 /// Slope over time of code minus carrier error along an arc.
@@ -198,7 +248,15 @@ fn divergence(pairs: &[Pair<'_>], carriers: &Carriers, arc: &[usize]) -> Option<
     if points.len() < 10 {
         return None;
     }
-    line_slope(&centred(points.into_iter()))
+    // A receiver may set the clock of its codes by whole milliseconds and leave that of its carriers.
+    let mut set_m = 0.0;
+    let mut last_m = points.first().map_or(0.0, |point| point.1);
+    let whole = points.into_iter().map(|(label_s, value_m)| {
+        set_m += MILLISECOND_M * ((value_m - last_m) / MILLISECOND_M).round();
+        last_m = value_m;
+        (label_s, value_m - set_m)
+    });
+    line_slope(&centred(whole))
 }
 
 fn rows(measured: &mut Measured, pairs: &[Pair<'_>], common_m: &BySignal, carriers: &Carriers) {
@@ -226,6 +284,9 @@ fn rows(measured: &mut Measured, pairs: &[Pair<'_>], common_m: &BySignal, carrie
                 .map(|(error, common)| error - common),
             cn0_db: pair.values.cn0_dbhz.map(|value| value - pair.truth.effective_dbhz),
             link: pair.link,
+            at_s: pair.at_s,
+            values: pair.values.clone(),
+            truth: pair.truth,
         })
         .collect();
     let of = |of: fn(&ObservationError) -> Option<f64>| measured.rows.iter().filter_map(of).collect::<Vec<f64>>();

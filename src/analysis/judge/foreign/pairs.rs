@@ -12,6 +12,8 @@ use gnss::signal::{self, Link, Signal};
 pub(super) struct Pair<'a> {
     pub epoch: usize,
     pub label_s: f64,
+    /// When the signal was received, by the truth's time.
+    pub at_s: f64,
     pub link: Link,
     pub values: &'a Values,
     pub truth: State,
@@ -24,24 +26,26 @@ impl Pair<'_> {
     }
 }
 
-/// Every observation whose satellite and time the truth has; labels are late by `late_s`.
+/// Every observation whose satellite and time the truth has; an epoch's label is late by `late_s` of its
+/// number.
 pub(super) fn join<'a>(
     epochs: &'a [ObservedEpoch],
     timeline: &Timeline,
     label: impl Fn(&ObservedEpoch) -> f64,
-    late_s: f64,
+    late_s: impl Fn(usize) -> f64,
 ) -> Vec<Pair<'a>> {
     let signals = signal::all();
     let mut pairs = Vec::new();
     for (number, epoch) in epochs.iter().enumerate() {
         let label_s = label(epoch);
+        let at_s = label_s - late_s(number);
         for ((sv, code), values) in &epoch.values {
             let code = whole(sv.system, code);
             let signal = signals.iter().find(|signal| signal.system == sv.system && signal.rinex == code);
             let Some(signal) = signal else { continue };
             let link = Link { sv: *sv, signal };
-            if let Some(truth) = timeline.state(&link, label_s - late_s) {
-                pairs.push(Pair { epoch: number, label_s, link, values, truth });
+            if let Some(truth) = timeline.state(&link, at_s) {
+                pairs.push(Pair { epoch: number, label_s, at_s, link, values, truth });
             }
         }
     }

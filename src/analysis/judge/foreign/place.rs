@@ -64,6 +64,14 @@ pub struct Places {
     pub ground_speed_rms_mps: Option<f64>,
     /// By how much labels are late along the motion, seconds.
     pub time_tag_s: Option<Estimate>,
+    /// The same without what all errors have in common: of a motion that turns or changes its speed.
+    pub changing_s: Option<Estimate>,
+    /// Fixes at the place of the one before, to the last digit.
+    pub repeated: usize,
+    /// Fixes less than a row of the truth before its beginning or after its end.
+    pub at_edge: usize,
+    /// Smallest step of a latitude as written, metres.
+    pub resolution_m: f64,
 }
 
 /// Truth slower than this does not show a late label.
@@ -71,10 +79,13 @@ const SLOWEST_MPS: f64 = 1.0;
 
 /// Joins and measures; `shift_s` is taken from every label first.
 pub fn measure(fixes: &[PlaceFix], timeline: &Timeline, shift_s: i64) -> Places {
-    let mut rows = Vec::new();
+    let (mut rows, mut at_edge) = (Vec::new(), 0);
     for fix in fixes {
         let label_s = fix.label.since(timeline.origin) - shift_s as f64;
-        let Some(place) = timeline.place(label_s) else { continue };
+        let Some(place) = timeline.place(label_s) else {
+            at_edge += usize::from(timeline.is_at_edge(label_s));
+            continue;
+        };
         let to_enu = Geodetic::from_ecef(&place.position_m).ecef_to_enu();
         let error_m = to_enu * (fix.position_m - place.position_m);
         let true_enu_mps = to_enu * place.velocity_mps;
@@ -107,7 +118,11 @@ pub fn measure(fixes: &[PlaceFix], timeline: &Timeline, shift_s: i64) -> Places 
         up_rms_m: rms(&axes[2]),
         error_3d_p95_m: percentile(&of(&FixError::length_m), 0.95),
         ground_speed_rms_mps: rms(&ground),
-        time_tag_s: time_tag(&rows),
+        time_tag_s: time_tag(&rows, false),
+        changing_s: time_tag(&rows, true),
+        repeated: fixes.windows(2).filter(|two| two[0].position_m == two[1].position_m).count(),
+        at_edge,
+        resolution_m: 0.0,
         rows,
     }
 }
@@ -119,20 +134,25 @@ fn bias(errors: &[f64]) -> Option<Estimate> {
     Some(Estimate { value, sigma: (found.variance() / found.independent_of_mean()).sqrt() })
 }
 
-/// Delay of the labels: minus the slope of the error over the velocity, axis by axis in one fit.
-fn time_tag(rows: &[FixError]) -> Option<Estimate> {
-    let squares: f64 = rows.iter().map(|row| row.true_velocity_enu_mps.norm_squared()).sum();
-    if squares <= SLOWEST_MPS * SLOWEST_MPS * rows.len() as f64 {
+/// Delay of the labels: minus the slope of the error over the velocity, axis by axis in one fit, both about
+/// their means where `about_means` says so.
+fn time_tag(rows: &[FixError], about_means: bool) -> Option<Estimate> {
+    let count = rows.len() as f64;
+    let error = |row: &FixError| Vector3::new(row.east_m, row.north_m, row.up_m);
+    let middle = |of: &dyn Fn(&FixError) -> Vector3<f64>| match about_means {
+        true => rows.iter().map(of).sum::<Vector3<f64>>() / count.max(1.0),
+        false => Vector3::zeros(),
+    };
+    let (error_m, velocity_mps) = (middle(&error), middle(&|row| row.true_velocity_enu_mps));
+    let points: Vec<(Vector3<f64>, Vector3<f64>)> =
+        rows.iter().map(|row| (error(row) - error_m, row.true_velocity_enu_mps - velocity_mps)).collect();
+    let squares: f64 = points.iter().map(|(_, velocity)| velocity.norm_squared()).sum();
+    if squares <= SLOWEST_MPS * SLOWEST_MPS * count {
         return None;
     }
-    let error = |row: &FixError| Vector3::new(row.east_m, row.north_m, row.up_m);
-    let products: f64 = rows.iter().map(|row| error(row).dot(&row.true_velocity_enu_mps)).sum();
-    let value = -products / squares;
-    let rest: Vec<f64> = rows
-        .iter()
-        .map(|row| (error(row) + value * row.true_velocity_enu_mps).dot(&row.true_velocity_enu_mps))
-        .collect();
+    let value = -points.iter().map(|(error, velocity)| error.dot(velocity)).sum::<f64>() / squares;
+    let rest: Vec<f64> = points.iter().map(|(error, velocity)| (error + value * velocity).dot(velocity)).collect();
     let found = Correlated::about_zero(&[rest])?;
-    let sigma = found.variance().sqrt() * rows.len() as f64 / found.independent_of_mean().sqrt() / squares;
+    let sigma = found.variance().sqrt() * count / found.independent_of_mean().sqrt() / squares;
     Some(Estimate { value, sigma })
 }

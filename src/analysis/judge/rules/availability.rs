@@ -40,6 +40,11 @@ impl Came {
 impl Verdict {
     pub(crate) fn availability(&mut self, duration_s: f64, expect: &Expect, expected: &Expectations, came: &Came) {
         self.first_fix(duration_s, expect, expected, came);
+        self.coming(duration_s, expect, expected, came);
+    }
+
+    /// Whether fixes go on once they have begun or are due.
+    pub(super) fn coming(&mut self, duration_s: f64, expect: &Expect, expected: &Expectations, came: &Came) {
         self.unwanted(duration_s, expect, expected, came);
         let due = |due: &&Due| expected.measures(due) && expected.fix_due(expect, due, came.first_s);
         let all: Vec<&Due> = expected.epochs.iter().filter(due).collect();

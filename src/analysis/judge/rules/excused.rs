@@ -14,9 +14,9 @@ use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::signal::Link;
 
 /// What noise, fades and the pull-in of a loop leave of a Doppler.
-const LOOP_HZ: f64 = 50.0;
+pub(super) const LOOP_HZ: f64 = 50.0;
 /// The same of a velocity: a fifth of a metre a second for each hertz.
-const LOOP_MPS: f64 = 10.0;
+pub(super) const LOOP_MPS: f64 = 10.0;
 
 /// How far the scene lets a receiver's signals lie from the true ones.
 #[derive(Default)]

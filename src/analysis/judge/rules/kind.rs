@@ -20,7 +20,8 @@ pub(super) const THEORY: f64 = 1.2;
 /// smoothing.
 pub(super) const SIGMA: f64 = 1.25;
 
-/// Independent values from which on their mean square has a lower limit that says something: half of theory's.
+/// Independent values from which on their mean square has a lower limit that says something: half of
+/// theory's.
 const ENOUGH: f64 = 100.0;
 
 /// One kind of error of the rows `C`.

@@ -220,7 +220,8 @@ fn what_a_logger_puts_before_a_sentence_is_passed_over() {
     let body = |second: u32| sentence(&format!("GPGGA,1000{second:02},2630.0,N,08012.0,E,1,08,0.9,100.0,M,-30.0,M,,"));
     let plain = format!("{}{}", body(0), body(1));
     let stamped = format!("2010-07-01 10:00:00.123 {}[1277978401.2] {}\n", body(0), body(1));
-    let [one, other] = [plain, stamped].map(|text| read_nmea(text.as_bytes(), "ride.log", &options()).unwrap().trajectory);
+    let [one, other] =
+        [plain, stamped].map(|text| read_nmea(text.as_bytes(), "ride.log", &options()).unwrap().trajectory);
     assert_eq!((one.span_s(), one.at(-14.5)), (other.span_s(), other.at(-14.5)));
 }
 

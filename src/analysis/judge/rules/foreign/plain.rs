@@ -1,0 +1,222 @@
+//! What a plain receiver's errors are, and how far a scene's reflections and spoofers can move them.
+//!
+//! How a foreign receiver makes its observations is not known. Random errors are held against those of a
+//! plain one: early minus late power a chip apart, a code loop of two hertz, a phase loop of 18 Hz, no
+//! smoothing. Limits: reflections are bounded and not predicted, since phases and spacing decide about the
+//! sign of their error.
+
+use std::collections::BTreeMap;
+
+use crate::error::JudgeError;
+use crate::expect::theory::dll::{self, Discriminator};
+use crate::expect::theory::edges;
+use crate::judge::foreign::measured::ObservationError;
+use crate::read::Run;
+use crate::statistics::{mean, rms, std};
+use crate::waveform::leading;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::facts::FaultKind;
+use gnss::signal::{Link, Signal};
+use gnss::time::Epoch;
+
+/// A plain receiver's code loop: bandwidth, and early to late in chips.
+pub(super) const PLAIN_HZ: f64 = 2.0;
+const PLAIN_CHIPS: f64 = 1.0;
+/// Least that code edges between samples cost a replica of whole chips, rms: GNSS-SDR's satellites have
+/// biases of up to 0.45 m at 2.6 Msps, three times what folds back there from edges that are averaged.
+const EDGES_M: f64 = 0.5;
+/// Bounds count as so many standard deviations where errors of several satellites or times add up.
+const BOUND_SIGMAS: f64 = 3.0;
+/// Rule of thumb for a phase loop (Kaplan and Hegarty, 5.6): 15 degrees of jitter.
+pub(super) const PHASE_CYCLES: f64 = 15.0 / 360.0;
+/// A plain receiver's phase loop, hertz, and its natural frequency at a damping of 0.707: 1.89 B.
+pub(super) const PHASE_HZ: f64 = 18.0;
+const NATURAL: f64 = 1.89;
+/// Age of a plain receiver's Doppler: half an integration and the delay of its loop.
+const AGE_S: f64 = 0.1;
+/// A loop that a spoofer, a jammer or a fault has moved is back within so long.
+const RETURN_S: f64 = 5.0;
+
+/// Jitter of a plain receiver's pseudorange.
+pub(super) fn code_m(link: &Link, cn0_dbhz: f64) -> Option<f64> {
+    let component = leading(link.signal)?;
+    let cn0_hz = component.power_share * libm::pow(10.0, 0.1 * cn0_dbhz);
+    let sigma = dll::jitter_chips(Discriminator::EarlyMinusLate, PLAIN_CHIPS, PLAIN_HZ, component.period_s(), cn0_hz);
+    Some(sigma * SPEED_OF_LIGHT_MPS / component.chip_rate_hz)
+}
+
+/// Jitter of a plain receiver's Doppler at the phase jitter up to which its loop holds: σ·ωₙ/2π.
+pub(super) fn doppler_hz() -> f64 {
+    PHASE_CYCLES * NATURAL * PHASE_HZ
+}
+
+/// What the age of a Doppler makes of its rate.
+pub(super) fn aged_hz(rate_hzps: f64) -> f64 {
+    AGE_S * rate_hzps.abs()
+}
+
+/// Independent errors of a loop among `count` ones over `span_s`.
+pub(super) fn independent(count: usize, span_s: f64, bandwidth_hz: f64) -> f64 {
+    (count as f64).min(2.0 * bandwidth_hz * span_s).max(1.0)
+}
+
+/// How far reflections can move one satellite's signal.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Reach {
+    /// Of its code, metres.
+    pub code_m: f64,
+    /// Of its carrier, cycles.
+    pub carrier_cycles: f64,
+    /// Of its strength on average, dB, and by how much that scatters.
+    pub cn0_db: f64,
+    pub cn0_sigma_db: f64,
+}
+
+impl Reach {
+    /// Of the rays that the truth has: each moves a code by at most half its amplitude in spacings, and by
+    /// its excess over what is left of the direct ray; a carrier by the arc sine of all amplitudes.
+    fn of(run: &Run, link: Link) -> Result<Self, JudgeError> {
+        let Some(component) = leading(link.signal) else { return Ok(Self::default()) };
+        let chip_m = SPEED_OF_LIGHT_MPS / component.chip_rate_hz;
+        // Sum of amplitudes, metres moved, and the sum of direct and reflected rays at the prompt.
+        let mut epochs: BTreeMap<u64, (f64, f64, (f64, f64))> = BTreeMap::new();
+        run.rays.each(link, |ray| {
+            let (amplitude, moved_m, sum) = epochs.entry(ray.sample).or_insert((0.0, 0.0, (1.0, 0.0)));
+            *amplitude += ray.amplitude_ratio;
+            let most_m = 0.5 * PLAIN_CHIPS * chip_m * ray.amplitude_ratio;
+            *moved_m += most_m.min(ray.amplitude_ratio * ray.excess_m);
+            let prompt = ray.amplitude_ratio * (1.0 - ray.excess_m / chip_m).max(0.0);
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU * ray.phase_cycles);
+            *sum = (sum.0 + prompt * cos, sum.1 + prompt * sin);
+        })?;
+        let (mut reach, mut fades_db) = (Self::default(), Vec::new());
+        for (amplitude, moved_m, sum) in epochs.into_values() {
+            let left = (1.0 - amplitude).max(0.1);
+            reach.code_m = reach.code_m.max((moved_m / left).min(0.5 * PLAIN_CHIPS * chip_m));
+            let angle = if amplitude < 1.0 { libm::asin(amplitude) } else { std::f64::consts::PI };
+            reach.carrier_cycles = reach.carrier_cycles.max(angle / std::f64::consts::TAU);
+            fades_db.push(20.0 * libm::log10(libm::hypot(sum.0, sum.1).max(0.1)));
+        }
+        reach.cn0_db = mean(&fades_db).unwrap_or(0.0);
+        reach.cn0_sigma_db = std(&fades_db).unwrap_or(0.0);
+        Ok(reach)
+    }
+}
+
+/// What the scene does to whom, and when.
+pub(super) struct Scene<'r> {
+    pub run: &'r Run,
+    reach: BTreeMap<Link, Reach>,
+    edges_m: BTreeMap<&'static str, f64>,
+    /// Seconds from sample 0 to where labels count from.
+    offset_s: f64,
+    /// When a spoofer claims a place.
+    spoofed_s: Option<(f64, f64)>,
+    /// Most that a mirror or a spoofer changes a range's rate by.
+    pub rate_mps: f64,
+    /// Most that a spoofer's place is away.
+    pub place_m: f64,
+}
+
+impl<'r> Scene<'r> {
+    pub fn of(run: &'r Run) -> Result<Self, JudgeError> {
+        let first = run.trajectory.first();
+        // Labels count from the second that is nearest to the truth's first row.
+        let offset_s = first.map_or(0.0, |row| {
+            run.time_s(row.sample) - row.time().since(Epoch::new(row.gps_s, row.gps_fraction_s.round()))
+        });
+        let mut reach = BTreeMap::new();
+        for link in run.rays.keys() {
+            reach.insert(link, Reach::of(run, link)?);
+        }
+        let edges = |signal: &&'static Signal| {
+            let averaged_m = edges::averaged_m(signal, run.scene.waveform, run.rate_hz(signal));
+            (signal.name, averaged_m.max(EDGES_M))
+        };
+        let edges_m = run.signals.iter().map(edges).collect();
+        let mut scene = Self { run, reach, edges_m, offset_s, spoofed_s: None, rate_mps: 0.0, place_m: 0.0 };
+        if !scene.reach.is_empty() {
+            run.trajectory.each(|row| scene.rate_mps = scene.rate_mps.max(2.0 * row.velocity_mps().norm()))?;
+        }
+        let mut truth = run.trajectory.finder()?;
+        let mut beside_mps = 0.0_f64;
+        run.claimed.each(|row| {
+            if let Some(own) = truth.get(row.sample) {
+                let time_s = run.time_s(row.sample);
+                let (from_s, _) = scene.spoofed_s.unwrap_or((time_s, time_s));
+                scene.spoofed_s = Some((from_s, time_s));
+                scene.place_m = scene.place_m.max((row.position_m() - own.position_m()).norm());
+                beside_mps = beside_mps.max((row.velocity_mps() - own.velocity_mps()).norm());
+            }
+        })?;
+        scene.rate_mps += beside_mps;
+        Ok(scene)
+    }
+
+    /// Seconds from sample 0 by the sampler's clock of a label.
+    pub fn time_s(&self, label_s: f64) -> f64 {
+        label_s + self.offset_s
+    }
+
+    /// How far reflections move a signal.
+    pub fn reach(&self, link: &Link) -> Reach {
+        self.reach.get(link).copied().unwrap_or_default()
+    }
+
+    /// How far codes are moved, as a standard deviation over satellites and times.
+    pub fn reach_m(&self) -> f64 {
+        let all: Vec<f64> = self.reach.values().map(|reach| reach.code_m / BOUND_SIGMAS).collect();
+        rms(&all).unwrap_or(0.0)
+    }
+
+    /// What mirrors change a range's rate by, as a standard deviation.
+    pub fn mirrors_mps(&self) -> f64 {
+        self.rate_mps / BOUND_SIGMAS
+    }
+
+    /// What code edges between samples cost a signal's code, rms: of averaged ones what folds back, but not
+    /// less than a replica of whole chips has.
+    pub fn edges_m(&self, signal: &Signal) -> f64 {
+        self.edges_m.get(signal.name).copied().unwrap_or(EDGES_M)
+    }
+
+    /// The same of all signals.
+    pub fn usual_edges_m(&self) -> f64 {
+        self.edges_m.values().copied().fold(EDGES_M, f64::max)
+    }
+
+    /// Whether errors at a label follow from noise and reflections: not where a spoofer sends, and not where
+    /// the scene expects any and has no reflections that would explain them.
+    pub fn is_bounded(&self, label_s: f64) -> bool {
+        let time_s = self.time_s(label_s);
+        let spoofed = self.spoofed_s.is_some_and(|(from_s, to_s)| (from_s..to_s + RETURN_S).contains(&time_s));
+        let expected = self.run.scene.expect.bounded_since(time_s, RETURN_S) || !self.reach.is_empty();
+        expected && !spoofed
+    }
+
+    /// Whether all observations are judged by noise and reflections, so that figures of the whole file are.
+    pub fn is_always_bounded(&self) -> bool {
+        let expected = self.run.scene.expect.always_bounded() || !self.reach.is_empty();
+        expected && self.spoofed_s.is_none() && self.run.scene.faults.is_empty()
+    }
+
+    /// Whether a satellite sends right ranges at a label.
+    pub fn is_sound(&self, link: &Link, label_s: f64) -> bool {
+        let time_s = self.time_s(label_s);
+        let ranges = [FaultKind::ClockStep, FaultKind::ClockRamp, FaultKind::ClockNoise];
+        !self.run.scene.faults.iter().any(|fault| {
+            let own = fault.satellites.as_ref().is_none_or(|list| list.contains(&link.sv));
+            own && ranges.contains(&fault.kind) && time_s >= fault.from_s
+        })
+    }
+
+    /// Whether any satellite has a fault that moves positions at a label.
+    pub fn is_faulty(&self, label_s: f64) -> bool {
+        self.run.scene.faults.iter().any(|fault| self.time_s(label_s) >= fault.from_s)
+    }
+
+    /// Whether an observation is judged by noise and reflections.
+    pub fn judges(&self, row: &ObservationError) -> bool {
+        self.is_bounded(row.label_s) && self.is_sound(&row.link, row.label_s)
+    }
+}
