@@ -58,6 +58,11 @@ impl Message {
         self.ionospheres.iter().find(|sent| sent.model() == model)
     }
 
+    /// Whether a satellite sends more than one set of a message.
+    pub fn renews(&self, sv: Sv) -> bool {
+        self.sets.iter().any(|((own, _), sets)| *own == sv && sets.len() > 1)
+    }
+
     /// Whether no set of a satellite says that a signal must not be used.
     pub fn says_healthy(&self, link: Link) -> bool {
         let mut own = self.sets.iter().filter(|((sv, _), _)| *sv == link.sv).flat_map(|(_, sets)| sets);

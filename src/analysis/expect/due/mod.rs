@@ -170,7 +170,7 @@ impl Expectations {
             let receiver = found.receiver.of_signal(link.signal);
             let scene = Scene {
                 receiver: &receiver,
-                timetable: Timetable::beside(link.signal, &run.signals, start),
+                timetable: Timetable::beside(link.signal, &run.signals, start).renewed(found.message.renews(link.sv)),
                 expect: &run.scene.expect,
                 faults: &run.scene.faults,
                 interval_s,

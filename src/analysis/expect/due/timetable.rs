@@ -15,6 +15,8 @@ use gnss::time::Epoch;
 const HEADER_S: f64 = 1.2;
 /// Times of arrival of satellites around the Earth, at most: a geostationary user across the Earth.
 const LIGHT_S: f64 = 0.25;
+/// Satellites change their sets at whole multiples of this: of GPS at even hours, of Galileo every ten minutes.
+const RENEWAL_S: f64 = 300.0;
 /// Units that are looked through for one: two rounds of LNAV's pages.
 const LARGEST_UNITS: i64 = 250;
 
@@ -26,13 +28,15 @@ pub struct Timetable {
     dating: Option<&'static Message>,
     /// The first sample, by the clock of the system that sends.
     start: Epoch,
+    /// Whether a new set comes during the scene.
+    renewed: bool,
 }
 
 impl Timetable {
     /// Of a signal in a scene whose first sample was taken then.
     pub fn new(signal: &Signal, start: Epoch) -> Self {
         let message = signal.components.iter().find_map(|component| component.message);
-        Self { message, dating: None, start: signal.time.label(start) }
+        Self { message, dating: None, start: signal.time.label(start), renewed: false }
     }
 
     /// The same beside other signals, of which one may have to give time and orbit.
@@ -41,6 +45,11 @@ impl Timetable {
         let dating =
             signal.dated_by(signals.iter().copied()).find_map(|other| other.components.iter().find_map(|c| c.message));
         Self { dating: dating.filter(|_| undated), ..Self::new(signal, start) }
+    }
+
+    /// The same where satellites may send a new set during the scene.
+    pub fn renewed(self, renewed: bool) -> Self {
+        Self { renewed, ..self }
     }
 
     /// That of the message which says when it is and where the satellite is.
@@ -77,11 +86,19 @@ impl Timetable {
         numbers.iter().map(whole).fold(0.0, f64::max)
     }
 
-    /// When every unit of a set of elements has arrived whole.
+    /// When every unit of a set of elements has arrived whole. Units of two sets make none: where a new one
+    /// comes in between, it has to come from its beginning.
     pub fn ephemeris_by_s(&self, locked_s: f64) -> f64 {
         let dated = self.dated();
         let Some(message) = dated.message else { return f64::INFINITY };
-        dated.all_by_s(message.set, locked_s)
+        let whole_s = dated.all_by_s(message.set, locked_s);
+        let past_s = dated.start.plus_s(locked_s).tow_s().rem_euclid(RENEWAL_S);
+        let renewed_s = locked_s + RENEWAL_S - past_s;
+        if self.renewed && past_s > 0.0 && renewed_s < whole_s {
+            dated.all_by_s(message.set, renewed_s)
+        } else {
+            whole_s
+        }
     }
 
     /// When a set in short has arrived whole; never, where the message has none.
@@ -117,6 +134,16 @@ mod tests {
         // Locked within subframe 1: it is missed, and comes whole 30 s later.
         assert!((timetable.ephemeris_by_s(4.0) - 38.0 - LIGHT_S).abs() < 1e-9);
         assert!((timetable.ionosphere_by_s(21.0) - 776.0 - LIGHT_S).abs() < 1e-9);
+    }
+
+    #[test]
+    fn units_of_two_sets_make_none() {
+        // Locked within subframe 1, 26 s before new sets: subframes 2 and 3 are whole by 18 s, subframe 1 by 36 s
+        // with the next issue, and with it 2 and 3 by 48 s.
+        let timetable = at("2026-03-09T07:59:30").renewed(true);
+        assert!((timetable.ephemeris_by_s(4.0) - 48.0 - LIGHT_S).abs() < 1e-9, "{}", timetable.ephemeris_by_s(4.0));
+        assert!((timetable.renewed(false).ephemeris_by_s(4.0) - 36.0 - LIGHT_S).abs() < 1e-9);
+        assert_eq!(timetable.ephemeris_by_s(31.0), timetable.renewed(false).ephemeris_by_s(31.0));
     }
 
     #[test]

@@ -17,7 +17,7 @@ use gnss::signal::Signal;
 use gnss::time::Epoch;
 
 /// The lock detectors' memory: how long before a declared loss or slip the signal may have failed.
-const LOOK_BACK_S: f64 = 2.0;
+pub(super) const LOOK_BACK_S: f64 = 2.0;
 /// Losses that are named; the rest is in `slips.csv`.
 const NAMED: usize = 12;
 

@@ -9,6 +9,7 @@ use crate::judge::judgement::Bound;
 use crate::judge::summary::Summary;
 use crate::judge::verdict::Verdict;
 use crate::read::Run;
+use gnss::facts::Fixes;
 use gnss::record::{Event, Fix, IonosphereModel, NavigationRow};
 use gnss::satellite::Sv;
 use gnss::signal::Link;
@@ -76,6 +77,10 @@ impl Verdict {
     /// # Errors
     /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub(super) fn satellites(&mut self, run: &Run, expected: &Expectations) -> Result<(), JudgeError> {
+        if run.truth.is_empty() && run.scene.expect.fix(0.0) != Some(Fixes::None) {
+            let source = "a scene without a signal proves nothing; [expect] fix = \"none\" says that it is meant";
+            self.judge("satellites in view", "", 0.0, "", Bound::Min(1.0), source);
+        }
         let seen = Seen::of(run);
         let must = |of: fn(&Satellite) -> bool| expected.satellites.iter().filter(move |(_, one)| of(one));
         let found = must(|one| one.acquired_by_s.is_some()).count();

@@ -10,6 +10,7 @@ use nalgebra::{Vector3, Vector4};
 
 use super::cases::{Case, Stated, cases};
 use super::kind::{Kind, SIGMA, THEORY, Value};
+use super::losses::LOOK_BACK_S;
 use super::motion::Motion;
 use super::reception::is_augmented;
 use crate::error::JudgeError;
@@ -158,8 +159,10 @@ impl Verdict {
             .filter(|row| matches!(row.event, Event::LossOfLock | Event::CycleSlip))
             .map(|row| row.sample)
             .collect();
+        let before = (LOOK_BACK_S * run.scene.sample_rate_hz) as u64;
         let excused = |sample: u64| {
-            breaks.iter().any(|at| (*at..*at + 3 * away).contains(&sample)) || !bounded.holds(run.time_s(sample))
+            let around = |at: &u64| (at.saturating_sub(before)..*at + 3 * away).contains(&sample);
+            breaks.iter().any(around) || !bounded.holds(run.time_s(sample))
         };
         let alarm = run.receiver.pointer("/settings/position/false_alarm").and_then(serde_json::Value::as_f64);
         let tested = |fix: &Fix| {
