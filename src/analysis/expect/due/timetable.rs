@@ -15,7 +15,8 @@ use gnss::time::Epoch;
 const HEADER_S: f64 = 1.2;
 /// Times of arrival of satellites around the Earth, at most: a geostationary user across the Earth.
 const LIGHT_S: f64 = 0.25;
-/// Satellites change their sets at whole multiples of this: of GPS at even hours, of Galileo every ten minutes.
+/// Satellites change their sets at whole multiples of this: of GPS at even hours, of Galileo every ten
+/// minutes.
 const RENEWAL_S: f64 = 300.0;
 /// Units that are looked through for one: two rounds of LNAV's pages.
 const LARGEST_UNITS: i64 = 250;
@@ -138,8 +139,8 @@ mod tests {
 
     #[test]
     fn units_of_two_sets_make_none() {
-        // Locked within subframe 1, 26 s before new sets: subframes 2 and 3 are whole by 18 s, subframe 1 by 36 s
-        // with the next issue, and with it 2 and 3 by 48 s.
+        // Locked within subframe 1, 26 s before new sets: subframes 2 and 3 are whole by 18 s, subframe 1 by
+        // 36 s with the next issue, and with it 2 and 3 by 48 s.
         let timetable = at("2026-03-09T07:59:30").renewed(true);
         assert!((timetable.ephemeris_by_s(4.0) - 48.0 - LIGHT_S).abs() < 1e-9, "{}", timetable.ephemeris_by_s(4.0));
         assert!((timetable.renewed(false).ephemeris_by_s(4.0) - 36.0 - LIGHT_S).abs() < 1e-9);
