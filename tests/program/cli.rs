@@ -54,12 +54,17 @@ fn names(directory: &Path) -> Vec<String> {
 #[test]
 fn usage_errors_exit_with_two() {
     let here = workplace();
+    fs::write(here.path().join("raw.bin"), [0; 16]).unwrap();
     for arguments in
         [&["fly"][..], &["run", "--speed"], &["receive", "raw.bin", "--out", "x"], &["generate", "short.toml"]]
     {
         assert_eq!(code(&twin(arguments, here.path())), 2, "{arguments:?}");
     }
     assert_eq!(code(&twin(&["--help"], here.path())), 0);
+    // A file that is not there is said before flags that are not.
+    let missing = twin(&["receive", "nosuch.bin", "--out", "x"], here.path());
+    assert_eq!(code(&missing), 65);
+    assert!(stderr(&missing).contains("nosuch.bin: No such file"), "{}", stderr(&missing));
 }
 
 /// What `receive` searches for is what the flag says, a name that it does not know is refused as the flag's,
