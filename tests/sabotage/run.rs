@@ -42,7 +42,7 @@ fn make(slot: &'static OnceLock<Made>, name: &str, scenario: &str) -> &'static P
         fs::write(&file, scenario).unwrap();
         let run = directory.path().join("run");
         let output = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
-            .args(["run".as_ref(), file.as_os_str(), "--out".as_ref(), run.as_os_str()])
+            .args(["run".as_ref(), file.as_os_str(), "--out".as_ref(), run.as_os_str(), "--allow-outside".as_ref()])
             .output()
             .unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
