@@ -56,6 +56,16 @@ fn all(file: &mut Observations, kind: char, of: impl Fn(f64, f64) -> f64) {
     file.map(kind, |_| true, |t_s, _, value| of(t_s, value));
 }
 
+/// Adds white noise to the values of all satellites.
+fn noisy(file: &mut Observations, kind: char, sigma: f64, stream: u64) {
+    let mut index = 0;
+    let add = |_: f64, _: &str, value: f64| {
+        index += 1;
+        value + sigma * normal(index, stream)
+    };
+    file.map(kind, |_| true, add);
+}
+
 /// Gives a satellite's values of a kind the first one for good.
 fn freeze(file: &mut Observations, kind: char) {
     let (sv, mut first) = (file.one(), None);
@@ -90,22 +100,7 @@ fn codes() -> Vec<Variant> {
             }),
         ),
         unsound("one code that stays", REST, FROZEN, Rinex(|file| freeze(file, 'C'))),
-        unsound(
-            "code noise of 15 m",
-            MOTION,
-            SIGMA,
-            Rinex(|file| {
-                let mut index = 0;
-                file.map(
-                    'C',
-                    |_| true,
-                    |_, _, value| {
-                        index += 1;
-                        value + 15.0 * normal(index, 1)
-                    },
-                );
-            }),
-        ),
+        unsound("code noise of 15 m", MOTION, SIGMA, Rinex(|file| noisy(file, 'C', 15.0, 1))),
         unsound(
             "codes of GPS 300 m long",
             TWO,
@@ -181,22 +176,7 @@ fn carriers() -> Vec<Variant> {
         ),
         unsound("one carrier that stays", MOTION, "values that stay as they were", Rinex(|file| freeze(file, 'L'))),
         unsound("every carrier declared broken", REST, "carriers declared broken", Rinex(|file| file.indicate('1'))),
-        unsound(
-            "carrier noise of 0.15 cycles",
-            TWO,
-            "jitter of a carrier",
-            Rinex(|file| {
-                let mut index = 0;
-                file.map(
-                    'L',
-                    |_| true,
-                    |_, _, value| {
-                        index += 1;
-                        value + 0.15 * normal(index, 2)
-                    },
-                );
-            }),
-        ),
+        unsound("carrier noise of 0.15 cycles", TWO, "jitter of a carrier", Rinex(|file| noisy(file, 'L', 0.15, 2))),
     ]
 }
 
@@ -459,21 +439,7 @@ fn sounds() -> Vec<Variant> {
             }),
         ),
         sound("C/N0 in whole decibels", MOTION, Rinex(|file| all(file, 'S', |_, value| value.round()))),
-        sound(
-            "code noise of a metre",
-            GALILEO,
-            Rinex(|file| {
-                let mut index = 0;
-                file.map(
-                    'C',
-                    |_| true,
-                    |_, _, value| {
-                        index += 1;
-                        value + normal(index, 6)
-                    },
-                );
-            }),
-        ),
+        sound("code noise of a metre", GALILEO, Rinex(|file| noisy(file, 'C', 1.0, 6))),
         sound("positions a metre north", REST, Nmea(|file| file.north(|_| 1.0))),
     ]);
     all_scenes

@@ -249,7 +249,7 @@ fn strengths() -> Vec<Kind> {
             all,
             |_, value| value * factor
         )),
-        kind!("C/N0 of one satellite frozen at a value", "dB off", Some(0.3), 3.0, &CN0, AtRest, |rx, db| {
+        kind!("C/N0 of one satellite frozen at a value", "dB off", None, 3.0, &CN0, AtRest, |rx, db| {
             let table = rx.table("observations");
             let rows = table.of(ONE);
             let value = rows.iter().map(|row| table.get(*row, "cn0_dbhz")).sum::<f64>() / rows.len() as f64;

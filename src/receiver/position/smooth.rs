@@ -211,6 +211,7 @@ fn is_of((_, first, second): &Key, signals: &[&'static Signal]) -> bool {
 mod tests {
     use super::*;
     use gnss::gps::l1ca::L1_CA;
+    use gnss::gps::l5::L5;
 
     fn observation(k: u64, pseudorange_m: f64, carrier_m: f64) -> Observation {
         Observation {
@@ -295,6 +296,21 @@ mod tests {
         }
         // (N − 1) T 2 İ = 9.9 s × 2 mm/s; the filter's age and rounding of 2e7 m (4e-9) are far below.
         assert!((bias_m + 0.0198).abs() < 1e-5, "{bias_m}");
+    }
+
+    #[test]
+    fn noise_that_a_combination_amplifies_is_no_break_and_a_jump_beyond_is_one() {
+        let mut smoother = Smoother::new(10.0, 0.5, Rate::from_hz(1000.0).unwrap());
+        // L1 and L5 have the weights 2.26 and −1.26 (IS-GPS-705, 20.3.3.3.3.3), whose noise is 2.59 times
+        // that of one: 20 m of L1 are 45 m of the combination, 40 m are 90 m, of 78 m that are allowed.
+        let mut take = |k: u64, jump_m: f64| {
+            let first = observation(k, 2e7 + jump_m, 0.0);
+            let second = Observation { signal: &L5, carrier_cycles: 0.0, ..observation(k, 2e7, 0.0) };
+            smoother.smooth_combined(&Combination::of(&first, &second).unwrap()).variance_ratio
+        };
+        let noisy: Vec<f64> = (0..200).map(|k| take(k, [0.0, 20.0, 0.0, -20.0][k as usize % 4])).collect();
+        assert!(noisy[1..].iter().all(|ratio| *ratio < 1.0) && noisy[199] < 0.1, "{}", noisy[199]);
+        assert_eq!(take(200, 40.0), 1.0);
     }
 
     #[test]

@@ -365,3 +365,31 @@ fn within(ticks: &[u64], first: u64, end: u64) -> &[u64] {
     let of = |sample: u64| ticks.partition_point(|tick| *tick < sample);
     ticks.get(of(first)..of(end)).unwrap_or_default()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gnss::galileo::e1::E1;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::gps::l5::L5;
+    use gnss::samples::Format;
+    use gnss::time::Rate;
+
+    /// Shares of the pilots: half of L5's power (IS-GPS-705, 3.3.1.6), half of E1's (OS SIS ICD 2.1, 2.3.3)
+    /// less the eleventh that BOC(6,1) has and a replica of BOC(1,1) has not.
+    #[test]
+    fn a_code_is_as_noisy_as_what_its_loop_follows_of_the_signal() {
+        let of = |signal: &'static Signal| {
+            let (rate, center_hz) = (Rate::from_hz(25e6).unwrap(), signal.centre_hz());
+            let metadata = IfMetadata { format: Format::Ci8, rate, center_hz, inverted: false, start: None };
+            noise(signal, &metadata, &Settings::default())
+        };
+        for (signal, share, within) in [(&L1_CA, 1.0, 0.01), (&L5, 0.5, 0.01), (&E1, 5.0 / 11.0, 0.05)] {
+            let own = of(signal);
+            assert!((own.share - share).abs() < within, "{}: {}", signal.name, own.share);
+            let whole = CodeNoise { share: 1.0, ..own };
+            let (found_m, expected_m) = (own.sigma_m(1e4), whole.sigma_m(1e4 * own.share));
+            assert!((found_m / expected_m - 1.0).abs() < 1e-12, "{}", signal.name);
+        }
+    }
+}
