@@ -277,11 +277,18 @@ fn profile() -> Vec<Line> {
         let step = (1.023 / 2.6 * CODE_ONE as f64) as u64;
         let spreading = plain(&L1_CA, 11).unwrap();
         let position = spreading.strip(CodeTime::new(0, 0), step, RUN_SAMPLES, |_| false, &mut bits);
-        let run =
-            Run { bits: &bits, position, step, turns: 1 << 60, turns_step: 0x0765_4321_0fed_cba9, amplitude: 0.3 };
+        let run = Run {
+            bits: &bits,
+            position,
+            step,
+            turns: 1 << 60,
+            turns_step: 0x0765_4321_0fed_cba9,
+            amplitude: 0.3,
+            pulse: None,
+        };
         let mut buffers = Buffers::default();
         let kernel_ns = nanoseconds(|| {
-            isa::accumulate(level, edge, black_box(&[run; SATELLITES]), &mut i, &mut q, &mut buffers);
+            isa::accumulate(level, edge, black_box(&[&[run][..]; SATELLITES]), &mut i, &mut q, &mut buffers);
         });
         let unit = "ns a sample and satellite";
         lines.push(Line::new(&format!("{name}: gathering runs"), (both_ns - kernel_ns) / samples, unit, None));

@@ -36,6 +36,7 @@ impl Case {
             turns: 0x1234_5678_9abc_def0,
             turns_step: 0x0765_4321_0fed_cba9,
             amplitude,
+            pulse: None,
         }
     }
 }
@@ -46,7 +47,7 @@ fn edges(filter: &Filter) -> [Edge<'_>; 3] {
 
 fn fast(level: Level, edge: Edge<'_>, run: &Run<'_>, samples: usize) -> (Vec<f32>, Vec<f32>) {
     let (mut i, mut q) = (vec![0.0; samples], vec![0.0; samples]);
-    accumulate(level, edge, &[*run], &mut i, &mut q, &mut Buffers::default());
+    accumulate(level, edge, &[&[*run]], &mut i, &mut q, &mut Buffers::default());
     (i, q)
 }
 
@@ -103,7 +104,8 @@ fn runs_together_are_the_sum_of_each_by_itself() {
                 .collect();
             for edge in edges(&filter) {
                 let (mut i, mut q) = (vec![0.0; length], vec![0.0; length]);
-                accumulate(Level::detect(), edge, &runs, &mut i, &mut q, &mut Buffers::default());
+                let rays: Vec<&[Run<'_>]> = runs.chunks(1).collect();
+                accumulate(Level::detect(), edge, &rays, &mut i, &mut q, &mut Buffers::default());
                 let single: Vec<_> = runs.iter().map(|run| fast(Level::detect(), edge, run, length)).collect();
                 for n in 0..length {
                     let (si, sq) =
@@ -131,6 +133,7 @@ fn the_carrier_of_the_fast_kernel_is_within_a_millionth_of_a_cycle_and_has_no_sp
                 turns: 0xfedc << 44,
                 turns_step,
                 amplitude: 1.0,
+                pulse: None,
             };
             let (i, q) = fast(Level::detect(), edge, &run, LENGTH);
             // What is left of the samples on the true carrier.
@@ -220,7 +223,7 @@ fn code_bias_m(edge: Edge<'_>, rate_khz: usize, start_chips: f64) -> f64 {
     let mut bits = Vec::new();
     let at = CodeTime::new(0, (start_chips * CODE_ONE as f64) as u64);
     let position = spreading.strip(at, step, rate_khz, |_| false, &mut bits);
-    let run = Run { bits: &bits, position, step, turns: 0, turns_step: 0, amplitude: 1.0 };
+    let run = Run { bits: &bits, position, step, turns: 0, turns_step: 0, amplitude: 1.0, pulse: None };
     let wave: Vec<f64> = fast(Level::detect(), edge, &run, rate_khz).0.into_iter().map(f64::from).collect();
     let cross: Vec<(f64, f64)> = (1..rate_khz.div_ceil(2))
         .map(|k| {

@@ -1,17 +1,18 @@
 //! Choices that trade speed for accuracy, each with the error and the cost that were measured for it.
 //!
-//! A scene names a level or single knobs; [`choices`] says what was picked and what it is worth. The figures
-//! are those of `reports/trade.csv` (`cargo bench --bench trade` fills it), rounded up; costs are one core of
-//! the machine named there. Limits: a knob's figure assumes that every other knob is at its best.
+//! A scene names a level or single knobs ([`Wishes`]); [`choices`] says what was picked and what it is worth:
+//! errors of codes by the signals' waveforms ([`bias`]), costs as multiples that the kernels' bench measures
+//! (`cargo bench -p gnss-twin-generator`). Limits: a knob's figure assumes that every other knob is at its best.
+
+mod bias;
 
 use serde::Serialize;
 
-use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::facts::Edge;
 use gnss::signal::{Component, Layers, Signal};
 
-/// Rate of the code that the figures were measured with.
-const CHIP_HZ: f64 = 1.023e6;
+use bias::{LARGEST_BIAS_M, LOOP_HZ, moving_bias_m, standing_bias_m};
+pub use bias::{allowed_m, code_bias_m};
 
 /// A name for a value of every knob.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -146,71 +147,27 @@ impl Fidelity {
         }
     }
 
-    /// Measured time for one sample of one satellite, in ns on one core, everything that the generator does
-    /// included.
-    pub fn satellite_sample_ns(&self, rate_hz: f64) -> f64 {
-        // Edges come once in so many samples: what a filter's response costs falls with the rate.
-        let dense = rate_hz >= 8e6;
-        match (self.carrier, self.code_edge, dense) {
-            (Arithmetic::F32, CodeEdge::Nearest, _) => 0.3,
-            (Arithmetic::F32, CodeEdge::Area, _) => 0.4,
-            (Arithmetic::F32, CodeEdge::BandLimited, false) => 3.4,
-            (Arithmetic::F32, CodeEdge::BandLimited, true) => 1.5,
-            (Arithmetic::F64, CodeEdge::Nearest, _) => 0.8,
-            (Arithmetic::F64, CodeEdge::Area, _) => 0.95,
-            (Arithmetic::F64, CodeEdge::BandLimited, false) => 1.6,
-            (Arithmetic::F64, CodeEdge::BandLimited, true) => 0.7,
-        }
-    }
-
-    /// The knobs of a level for samples at `rate_hz`: `balanced` takes the cheapest edges whose code error is
-    /// below `allowed_m`, for which see [`allowed_m`], and never nearest ones, whose spurs are those of
-    /// `fast`.
-    pub fn suited(grade: Grade, rate_hz: f64, allowed_m: f64) -> Self {
+    /// The knobs of a level for `signals` at `rate_hz`. `balanced` takes area edges, which cost less than
+    /// band-limited ones at every rate, where the error of every signal's code is below `allowed_m`, for which
+    /// see [`allowed_m`]; never nearest ones, whose spurs are those of `fast`.
+    pub fn suited(grade: Grade, rate_hz: f64, allowed_m: f64, signals: &[&Signal]) -> Self {
         let level = Self { allowed_m, ..Self::of(grade) };
-        if grade != Grade::Balanced {
-            return level;
+        let too_much = |signal: &&Signal| code_bias_m(level.code_edge, signal, rate_hz) >= allowed_m;
+        if grade == Grade::Balanced && signals.iter().any(too_much) {
+            return Self { code_edge: CodeEdge::BandLimited, ..level };
         }
-        CodeEdge::NAMES
-            .into_iter()
-            .map(|(_, code_edge)| Self { code_edge, ..level })
-            .filter(|fidelity| fidelity.code_edge != CodeEdge::Nearest && fidelity.code_bias_m(rate_hz) < allowed_m)
-            .min_by(|a, b| a.satellite_sample_ns(rate_hz).total_cmp(&b.satellite_sample_ns(rate_hz)))
-            .unwrap_or(Self { code_edge: CodeEdge::BandLimited, ..level })
+        level
     }
 
-    /// Error of a code whose phase is at rest on the sampling grid, root mean square over phases, in
-    /// metres: measured, and for area edges computed.
-    pub fn code_bias_m(&self, rate_hz: f64) -> f64 {
-        let near = |at: [(f64, f64); 3]| {
-            at.into_iter().rev().find(|(from_hz, _)| rate_hz >= *from_hz).map_or(at[0].1, |(_, bias_m)| bias_m)
-        };
-        let everywhere = match self.code_edge {
-            CodeEdge::Nearest => near([(0.0, 1.1), (8e6, 0.3), (20e6, 0.1)]),
-            CodeEdge::Area => aliased_bias_m(rate_hz),
-            CodeEdge::BandLimited => 1e-4,
-        };
-        everywhere.max(standing_bias_m(self.code_edge, rate_hz))
-    }
-
-    /// The same where a Doppler moves the code over the grid, behind a code loop of `LOOP_HZ`: the error
-    /// repeats with each sample that the code moves by, and a first-order loop of noise bandwidth B passes `1
-    /// / √(1 + (2πν / 4B)²)` of it.
-    pub fn moving_bias_m(&self, rate_hz: f64, doppler_hz: f64) -> f64 {
-        let samples_per_s = doppler_hz / CARRIER_CYCLES_PER_CHIP * rate_hz / CHIP_HZ;
-        self.code_bias_m(rate_hz) / libm::hypot(1.0, std::f64::consts::TAU * samples_per_s / (4.0 * LOOP_HZ))
-    }
-}
-
-impl Fidelity {
-    /// What to warn of edges that leave the code metres off at a rate where chips meet the same places of
-    /// every sample.
-    pub fn warning(&self, rate_hz: f64) -> Option<String> {
-        let bias_m = standing_bias_m(self.code_edge, rate_hz);
+    /// What to warn of edges that leave the code of one of the `signals` metres off at a rate where chips
+    /// meet the same places of every sample.
+    pub fn warning(&self, rate_hz: f64, signals: &[&Signal]) -> Option<String> {
+        let (signal, bias_m) = worst(signals, |signal| standing_bias_m(self.code_edge, signal, rate_hz))?;
         (bias_m > self.allowed_m).then(|| {
             format!(
-                "fidelity.code_edge = {} at {:.3} Msps: chips meet the same places between samples, and the code of \
-                 a satellite without Doppler is {bias_m:.1} m off, rms; \"band_limited\" or another rate avoids it",
+                "fidelity.code_edge = {} at {:.3} Msps: chips of {signal} meet the same places between samples, and \
+                 the code of a satellite without Doppler is {bias_m:.1} m off, rms; \"band_limited\" or another rate \
+                 avoids it",
                 self.code_edge.name(),
                 1e-6 * rate_hz
             )
@@ -218,80 +175,55 @@ impl Fidelity {
     }
 }
 
-/// Largest error of a code at rest that `balanced` leaves, whatever the noise.
-const LARGEST_BIAS_M: f64 = 0.2;
-/// Cycles of L1 in a chip: how much slower the code moves than the carrier.
-const CARRIER_CYCLES_PER_CHIP: f64 = 1540.0;
-/// Noise bandwidth of the code loop behind which the plan states a moving code's error.
-const LOOP_HZ: f64 = 0.5;
+/// The signal of the largest figure, and that.
+fn worst<'s>(signals: &[&'s Signal], figure: impl Fn(&Signal) -> f64) -> Option<(&'s Signal, f64)> {
+    signals.iter().map(|signal| (*signal, figure(signal))).max_by(|(_, a), (_, b)| a.total_cmp(b))
+}
 
-/// Error of a code at rest with area edges, root mean square over codes and phases, in metres.
-///
-/// A mean over the sample's interval is a filter sinc(f/fs) before sampling, and what it leaves above half
-/// the rate folds back as a code of its own. An ideal early-minus-late correlator (half a chip) weighs line m
-/// of the code, m kHz, by `w = 2 sin(πmd/1023)`; with lines of power `p(m) = sinc²(m/1023)/1023` and the
-/// phases of a random code the folded lines add up by power: `σ² = Σ 2w² p(m) Σ_k p(m+kN) sinc²(m/N+k)`,
-/// against the slope `Σ 2w · 2πm/1023 · sinc(m/N) p(m)`, m below N/2 and N = fs/1 kHz. 0.15 m at 2.6 Msps and
-/// 0.02 m at 10; an independent correlator on real codes found 0.14 m at 2.6 and 0.20 m at 2.048 Msps, where
-/// this gives 0.33: near a multiple of the chip rate it is a bound.
-fn aliased_bias_m(rate_hz: f64) -> f64 {
-    const LINES: f64 = 1023.0;
-    const SPACING_CHIPS: f64 = 0.5;
-    use std::f64::consts::PI;
-    let sinc = |x: f64| if x == 0.0 { 1.0 } else { libm::sin(PI * x) / (PI * x) };
-    let power = |m: f64| sinc(m / LINES) * sinc(m / LINES) / LINES;
-    let per_line = rate_hz / CHIP_HZ * LINES;
-    let (mut noise, mut slope, mut m) = (0.0, 0.0, 1.0);
-    while m < 0.5 * per_line {
-        let weight = 2.0 * libm::sin(PI * m * SPACING_CHIPS / LINES);
-        let folded = (-FOLDS..=FOLDS).filter(|k| *k != 0).map(|k| {
-            let line = m + f64::from(k) * per_line;
-            power(line) * sinc(line / per_line) * sinc(line / per_line)
-        });
-        noise += 2.0 * weight * weight * power(m) * folded.sum::<f64>();
-        slope += 2.0 * weight * 2.0 * PI * m / LINES * sinc(m / per_line) * power(m);
-        m += 1.0;
+/// What a scene says of its fidelity: a level, and knobs of its own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wishes {
+    /// The level.
+    pub grade: Grade,
+    /// In place of the level's.
+    pub code_edge: Option<CodeEdge>,
+    /// In place of the level's.
+    pub waveform: Option<Layers>,
+    /// In place of the level's.
+    pub carrier: Option<Arithmetic>,
+    /// In place of the level's.
+    pub noise: Option<Arithmetic>,
+    /// In place of the level's.
+    pub knot_tolerance_cycles: Option<f64>,
+    /// Error of the code below which `balanced` chooses.
+    pub allowed_m: f64,
+}
+
+impl Wishes {
+    /// A level as it is.
+    pub fn of(grade: Grade, allowed_m: f64) -> Self {
+        Self {
+            grade,
+            code_edge: None,
+            waveform: None,
+            carrier: None,
+            noise: None,
+            knot_tolerance_cycles: None,
+            allowed_m,
+        }
     }
-    SPEED_OF_LIGHT_MPS / CHIP_HZ * noise.sqrt() / slope
-}
 
-/// Zones of the rate that fold back; their power falls with the fourth power of their number.
-const FOLDS: i32 = 4;
-
-/// Error of the code that a scene's own noise hides, in metres: that of a delay loop on its strongest signal,
-/// 0.2 m at most.
-///
-/// Thermal noise of a loop of bandwidth B with correlators d chips apart is √(B·d / (2·C/N0)) chips where
-/// T·C/N0 is far above one (Kaplan & Hegarty, equation 5.23, first branch). With 1 Hz and half a chip it is
-/// 0.2 m at 57 dB-Hz: above what any GPS signal reaches on the ground (52 dB-Hz, 0.37 m), so that only
-/// signals set stronger than nature's ask for less. Without noise nothing hides an error, and the 0.2 m apply
-/// by themselves.
-pub fn allowed_m(cn0_dbhz: Option<f64>) -> f64 {
-    const BANDWIDTH_HZ: f64 = 1.0;
-    const SPACING_CHIPS: f64 = 0.5;
-    cn0_dbhz.map_or(LARGEST_BIAS_M, |cn0_dbhz| {
-        let cn0_hz = libm::pow(10.0, 0.1 * cn0_dbhz);
-        let noise_m = SPEED_OF_LIGHT_MPS / CHIP_HZ * (BANDWIDTH_HZ * SPACING_CHIPS / (2.0 * cn0_hz)).sqrt();
-        noise_m.min(LARGEST_BIAS_M)
-    })
-}
-
-/// Error where every chip meets the same few places between samples, root mean square, in metres.
-///
-/// With `q` places in turn, nearest edges know the code to a sample in `q` (uniform: over √12); for area
-/// edges it falls with the square, from 1.6 m measured at 4.092 Msps.
-fn standing_bias_m(edge: CodeEdge, rate_hz: f64) -> f64 {
-    // Places drift apart within a code period of 1023 chips when the ratio misses by more than this.
-    let meets = |q: u32| {
-        let samples = f64::from(q) * rate_hz / CHIP_HZ;
-        (samples - samples.round()).abs() < 1.0 / 1023.0
-    };
-    let Some(q) = (1..=32).find(|q| meets(*q)) else { return 0.0 };
-    let finest_hz = f64::from(q) * rate_hz;
-    match edge {
-        CodeEdge::Nearest => SPEED_OF_LIGHT_MPS / finest_hz / 12_f64.sqrt(),
-        CodeEdge::Area => 1.6 * (4.092e6 / finest_hz).powi(2),
-        CodeEdge::BandLimited => 0.0,
+    /// The knobs for `signals` at `rate_hz`.
+    pub fn suited(&self, rate_hz: f64, signals: &[&Signal]) -> Fidelity {
+        let level = Fidelity::suited(self.grade, rate_hz, self.allowed_m, signals);
+        Fidelity {
+            code_edge: self.code_edge.unwrap_or(level.code_edge),
+            waveform: self.waveform.unwrap_or(level.waveform),
+            carrier: self.carrier.unwrap_or(level.carrier),
+            noise: self.noise.unwrap_or(level.noise),
+            knot_tolerance_cycles: self.knot_tolerance_cycles.unwrap_or(level.knot_tolerance_cycles),
+            ..level
+        }
     }
 }
 
@@ -313,24 +245,29 @@ pub struct Choice {
 /// What was chosen for each knob at a sample rate, the error to expect of it and its cost; of the noise's
 /// arithmetic where there is `noise`, and of the waveform where one of the `signals` has several layers.
 pub fn choices(chosen: Fidelity, rate_hz: f64, noise: bool, signals: &[&Signal]) -> Vec<Choice> {
-    let level = Fidelity::suited(chosen.grade, rate_hz, chosen.allowed_m);
-    let at_area = |carrier| Fidelity { carrier, code_edge: CodeEdge::Area, ..chosen }.satellite_sample_ns(rate_hz);
-    let carrier_ns = at_area(chosen.carrier) - at_area(Arithmetic::F32);
-    let edge_ns = chosen.satellite_sample_ns(rate_hz) - carrier_ns;
+    let level = Fidelity::suited(chosen.grade, rate_hz, chosen.allowed_m, signals);
+    let edge = chosen.code_edge;
+    let bias = worst(signals, |signal| code_bias_m(edge, signal, rate_hz));
     let mut found = vec![
         Choice {
             knob: "code_edge",
-            value: chosen.code_edge.name().to_owned(),
-            own: chosen.code_edge != level.code_edge,
-            error: format!(
-                "pseudorange {:.1e} m rms at {:.3} Msps where the code is at rest, {:.1e} m at 1 kHz of Doppler \
-                 behind a loop of {LOOP_HZ} Hz (balanced: below {:.1e} m)",
-                chosen.code_bias_m(rate_hz),
-                1e-6 * rate_hz,
-                chosen.moving_bias_m(rate_hz, 1000.0),
-                chosen.allowed_m
-            ),
-            cost: format!("{edge_ns:.2} ns"),
+            value: edge.name().to_owned(),
+            own: edge != level.code_edge,
+            error: bias.map_or_else(String::new, |(signal, bias_m)| {
+                format!(
+                    "pseudorange of {signal} {bias_m:.1e} m rms at {:.3} Msps where the code is at rest, {:.1e} m at 1 \
+                     kHz of Doppler behind a loop of {LOOP_HZ} Hz (balanced: below {:.1e} m)",
+                    1e-6 * rate_hz,
+                    moving_bias_m(edge, signal, rate_hz, 1000.0),
+                    chosen.allowed_m
+                )
+            }),
+            // The kernels' bench over every signal from 2.6 to 65 Msps, with AVX-512.
+            cost: match edge {
+                CodeEdge::Nearest => "the least".to_owned(),
+                CodeEdge::Area => "1.2 to 2 x nearest".to_owned(),
+                CodeEdge::BandLimited => "2.5 to 20 x nearest".to_owned(),
+            },
         },
         Choice {
             knob: "carrier",
@@ -340,7 +277,11 @@ pub fn choices(chosen: Fidelity, rate_hz: f64, noise: bool, signals: &[&Signal])
                 Arithmetic::F32 => "carrier 1e-6 cycle".to_owned(),
                 Arithmetic::F64 => "carrier 1e-10 cycle".to_owned(),
             },
-            cost: format!("{carrier_ns:.2} ns"),
+            cost: match (chosen.carrier, edge) {
+                (Arithmetic::F32, _) => "the least".to_owned(),
+                (Arithmetic::F64, CodeEdge::BandLimited) => "1 to 1.2 x f32".to_owned(),
+                (Arithmetic::F64, _) => "1 to 4 x f32".to_owned(),
+            },
         },
         Choice {
             knob: "knot_tolerance_cycles",
@@ -394,48 +335,39 @@ fn layers_choice(chosen: Fidelity, level: Fidelity, signals: &[&Signal]) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn area_edges_err_by_what_folds_back_and_less_as_the_code_moves() {
-        // The same sum in another language; and figures of an independent correlator on real codes, 0.14 and
-        // 0.02 m, within what five codes scatter about the mean of all.
-        for (rate_hz, expected_m) in [(2.048e6, 0.3273), (2.6e6, 0.1515), (5e6, 0.0563), (10e6, 0.0202), (25e6, 0.0038)]
-        {
-            assert!((aliased_bias_m(rate_hz) - expected_m).abs() < 6e-5, "{rate_hz}: {}", aliased_bias_m(rate_hz));
-        }
-        assert!((aliased_bias_m(2.6e6) / 0.14 - 1.0).abs() < 0.15);
-        let area = Fidelity::of(Grade::Balanced);
-        assert_eq!(area.moving_bias_m(2.6e6, 0.0), area.code_bias_m(2.6e6));
-        // 1 kHz: 0.649 chips or 1.65 samples a second, against a corner of 2 rad/s.
-        let share = area.moving_bias_m(2.6e6, 1000.0) / area.code_bias_m(2.6e6);
-        assert!((share - 0.1895).abs() < 1e-3, "{share}");
-        // Near twice the chip rate area edges are not good enough.
-        assert_eq!(Fidelity::suited(Grade::Balanced, 2.048e6, LARGEST_BIAS_M).code_edge, CodeEdge::BandLimited);
-    }
+    use gnss::galileo::e1::E1;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::gps::l5::L5;
 
     #[test]
     fn balanced_keeps_its_promise_where_the_rate_meets_the_chips() {
-        let suited = |grade: Grade, rate_hz: f64| Fidelity::suited(grade, rate_hz, LARGEST_BIAS_M);
-        for rate_hz in [2.046e6, 4.092e6, 5.115e6, 10.23e6, 2.5575e6] {
-            assert_eq!(suited(Grade::Balanced, rate_hz).code_edge, CodeEdge::BandLimited, "{rate_hz}");
+        let largest_m = allowed_m(None);
+        let suited = |grade, rate_hz, signal| Fidelity::suited(grade, rate_hz, largest_m, &[signal]).code_edge;
+        for rate_hz in [2.046e6, 2.048e6, 4.092e6, 5.115e6, 10.23e6, 2.5575e6] {
+            assert_eq!(suited(Grade::Balanced, rate_hz, &L1_CA), CodeEdge::BandLimited, "{rate_hz}");
         }
         for rate_hz in [2.6e6, 4e6, 10e6, 12e6, 25e6, 50e6] {
-            assert_eq!(suited(Grade::Balanced, rate_hz).code_edge, CodeEdge::Area, "{rate_hz}");
+            assert_eq!(suited(Grade::Balanced, rate_hz, &L1_CA), CodeEdge::Area, "{rate_hz}");
         }
         for rate_hz in [2.046e6, 2.6e6, 4.092e6, 10e6, 20.46e6] {
-            assert!(suited(Grade::Balanced, rate_hz).code_bias_m(rate_hz) < LARGEST_BIAS_M, "{rate_hz}");
-            assert_eq!(suited(Grade::Fast, rate_hz).code_edge, CodeEdge::Nearest);
+            for signal in [&L1_CA, &E1] {
+                let edge = suited(Grade::Balanced, rate_hz, signal);
+                assert!(code_bias_m(edge, signal, rate_hz) < largest_m, "{signal} {rate_hz}");
+                assert_eq!(suited(Grade::Fast, rate_hz, signal), CodeEdge::Nearest);
+            }
         }
+        // Chips of L5 are a tenth as long, and meet other rates.
+        assert_eq!(suited(Grade::Balanced, 20.46e6, &L5), CodeEdge::BandLimited);
+        assert_eq!(suited(Grade::Balanced, 25e6, &L5), CodeEdge::Area);
+        // Of several signals the worst counts.
+        let both = Fidelity::suited(Grade::Balanced, 20.46e6, largest_m, &[&L1_CA, &L5]);
+        assert_eq!(both.code_edge, CodeEdge::BandLimited);
     }
 
     #[test]
     fn signals_stronger_than_nature_s_ask_for_better_edges() {
-        // σ = 293.05 m · √(0.25 / 10^(x/10)): 0.46 m at 50 dB-Hz, hidden under the cap, and 0.2 m at 57.3
-        // dB-Hz.
-        assert_eq!((allowed_m(None), allowed_m(Some(50.0))), (0.2, 0.2));
-        assert!((allowed_m(Some(70.0)) - 0.046_335).abs() < 1e-6);
         let edge = |rate_hz: f64, cn0_dbhz: f64| {
-            Fidelity::suited(Grade::Balanced, rate_hz, allowed_m(Some(cn0_dbhz))).code_edge
+            Fidelity::suited(Grade::Balanced, rate_hz, allowed_m(Some(cn0_dbhz)), &[&L1_CA]).code_edge
         };
         // 0.164 m and 0.103 m against the 0.15 m of area edges.
         assert_eq!((edge(2.6e6, 59.0), edge(2.6e6, 63.0)), (CodeEdge::Area, CodeEdge::BandLimited));

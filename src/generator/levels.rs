@@ -95,6 +95,8 @@ pub struct Levels {
     /// Largest share of a stretch's components that is clipped, and when that stretch begins in s.
     pub worst: (f64, f64),
     stretches: u64,
+    /// Time of this machine for a sample of all that the scene sends, on one core: the median of the stretches.
+    pub sample_s: f64,
 }
 
 impl Levels {
@@ -126,6 +128,7 @@ impl Levels {
             clipped_share: sum(|stretch| stretch.clipped as f64) / components,
             worst: worst.fold((0.0, 0.0), |worst, (share, t_s)| if share > worst.0 { (share, t_s) } else { worst }),
             stretches: (met.len() + extra.len()) as u64,
+            sample_s: middle(met.iter().map(|stretch| stretch.sample_s)),
             full_scale_lsb,
             scale,
         })
@@ -140,6 +143,13 @@ impl Levels {
     pub fn satellite_dbfs(&self, cn0_dbhz: f64) -> f64 {
         self.dbfs(cn0_dbhz) - self.attenuation_db
     }
+}
+
+/// The median; zero of none.
+fn middle(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// The strongest satellite in view at the scene's start, and the C/N0 in dB-Hz of the direct ray of its

@@ -87,10 +87,12 @@ pub struct Plan {
     pub models: Vec<Model>,
     /// The parts of the sum against full scale.
     pub levels: Levels,
-    /// The level of fidelity, its time for a sample of a satellite (ns on one core), and each knob.
+    /// The level of fidelity.
     pub level: &'static str,
-    /// Time for a sample of a satellite, in ns on one core.
-    pub satellite_sample_ns: f64,
+    /// Time for a sample of all that is sent, in ns on one core of this machine, measured.
+    pub sample_ns: f64,
+    /// The same for each signal of each satellite.
+    pub signal_sample_ns: f64,
     /// What was chosen for each knob of fidelity.
     pub knobs: Vec<Choice>,
     /// Rate, format and tuning, in words.
@@ -101,7 +103,7 @@ pub struct Plan {
     pub bytes: u64,
     /// Memory of a batch and of the motion.
     pub memory_bytes: u64,
-    /// Estimated time to generate them.
+    /// Processor time to generate them, from what was measured.
     pub time_s: f64,
     /// What the synthesiser will do.
     pub machinery: Machinery,
@@ -119,7 +121,6 @@ impl Plan {
         // A spoofer sends about as many signals again.
         let sources = (1 + scene.spoofers.len()) as f64;
         let links: usize = satellites.iter().map(|satellite| scene.signals_of(satellite.sv).count()).sum();
-        let up = links as f64 * sources + scene.interference.len() as f64;
         let bytes = scene.samples.saturating_mul(scene.metadata.format.bytes() as u64);
         let knots = scene.trajectory.knots().len() as u64 * std::mem::size_of::<crate::vehicle::Knot>() as u64;
         Ok(Self {
@@ -133,16 +134,17 @@ impl Plan {
             speed_mps: extremes.speed_mps,
             acceleration_mps2: extremes.acceleration_mps2,
             models: models(scene),
-            levels,
             level: scene.fidelity.grade.name(),
-            satellite_sample_ns: scene.fidelity.satellite_sample_ns(scene.clock.rate.hz()),
+            sample_ns: 1e9 * levels.sample_s,
+            signal_sample_ns: 1e9 * levels.sample_s / (links as f64 * sources).max(1.0),
             knobs: fidelity::choices(scene.fidelity, scene.clock.rate.hz(), scene.noise, &scene.signals),
             sampling: sampling(scene),
             samples: scene.samples,
             bytes,
             memory_bytes: machinery.block_bytes + knots,
-            time_s: scene.samples as f64 * up.max(1.0) / machinery.satellite_samples_per_s,
+            time_s: scene.samples as f64 * levels.sample_s + machinery.knots_s,
             satellites,
+            levels,
             machinery,
         })
     }
@@ -258,7 +260,7 @@ impl fmt::Display for Plan {
         } else {
             writeln!(f, "knots      every {knot_spacing_s:.4} to {longest_knot_spacing_s:.4} s: {knot_reason}")?;
         }
-        writeln!(f, "needs      {} of memory, about {:.1} s", size(self.memory_bytes), self.time_s)?;
+        writeln!(f, "needs      {} of memory, about {:.1} s of one core", size(self.memory_bytes), self.time_s)?;
         if self.in_space {
             writeln!(f, "\n{} satellites not behind the Earth", self.satellites.len())?;
         } else {
@@ -289,8 +291,12 @@ impl fmt::Display for Plan {
             writeln!(f)?;
         }
         write!(f, "\n{}", self.levels)?;
-        let ns = self.satellite_sample_ns;
-        writeln!(f, "\nfidelity {}: {ns:.2} ns for a sample of a satellite on one core", self.level)?;
+        let (ns, each_ns) = (self.sample_ns, self.signal_sample_ns);
+        writeln!(
+            f,
+            "\nfidelity {}: {ns:.2} ns for a sample on one core here, {each_ns:.2} ns for each signal of a satellite",
+            self.level
+        )?;
         for Choice { knob, value, own, error, cost } in &self.knobs {
             let value = if *own { format!("{value} (own)") } else { value.clone() };
             writeln!(f, "  {knob:21}  {value:12}  {cost:24}  {error}")?;
@@ -323,6 +329,11 @@ impl fmt::Display for Together<'_> {
             let name = plan.front_end.as_deref().unwrap_or_default();
             writeln!(f, "  {name:14}  {}: {}, {}", plan.sampling, size(plan.bytes), plan.signals.join(", "))?;
         }
-        writeln!(f, "together   {} of samples, {} of memory, about {time_s:.1} s", size(bytes), size(memory_bytes))
+        writeln!(
+            f,
+            "together   {} of samples, {} of memory, about {time_s:.1} s of one core",
+            size(bytes),
+            size(memory_bytes)
+        )
     }
 }

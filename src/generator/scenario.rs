@@ -54,13 +54,13 @@ use stages::PlaybackSpec;
 use crate::effect::multipath::Echo;
 use crate::effect::obstruction::Obstacle;
 use crate::fast_phase::scintillation::Strength;
-use crate::fidelity::allowed_m;
-use crate::scene::{Arithmetic, CodeEdge, Fidelity, Grade};
+use crate::fidelity::{Wishes, allowed_m};
+use crate::scene::{Arithmetic, CodeEdge, Grade};
 use crate::vehicle::attitude::Attitude;
 use gnss::facts::Expect;
 use gnss::satellite::Sv;
 use gnss::signal::{Layers, Signal};
-use gnss::time::{Epoch, Rate};
+use gnss::time::Epoch;
 
 /// What an absent table comes to; a test holds these against the declared defaults.
 const MASK_DEG: f64 = 5.0;
@@ -455,19 +455,18 @@ fn satellite_list(table: &Table<'_>, key: &str) -> Result<Option<Vec<Sv>>, Scena
     satellites.map(Some).map_err(|_| table.bad(key, expected))
 }
 
-/// A level's knobs, each overridden where the table names it.
-fn fidelity_of(table: Option<&Table<'_>>, rate: Rate, allowed_m: f64) -> Result<Fidelity, ScenarioError> {
-    let Some(table) = table else { return Ok(Fidelity::suited(Grade::Balanced, rate.hz(), allowed_m)) };
-    let grade = table.choice("level", &Grade::NAMES)?.unwrap_or(Grade::Balanced);
-    let level = Fidelity::suited(grade, rate.hz(), allowed_m);
-    Ok(Fidelity {
-        grade: level.grade,
-        code_edge: table.choice("code_edge", &CodeEdge::NAMES)?.unwrap_or(level.code_edge),
-        waveform: table.choice("waveform", &Layers::NAMES)?.unwrap_or(level.waveform),
-        carrier: table.choice("carrier", &Arithmetic::NAMES)?.unwrap_or(level.carrier),
-        noise: table.choice("noise", &Arithmetic::NAMES)?.unwrap_or(level.noise),
-        knot_tolerance_cycles: table.number("knot_tolerance_cycles")?.unwrap_or(level.knot_tolerance_cycles),
-        allowed_m,
+/// A level, and the knobs that the table names.
+fn fidelity_of(table: Option<&Table<'_>>, allowed_m: f64) -> Result<Wishes, ScenarioError> {
+    let wishes = Wishes::of(Grade::Balanced, allowed_m);
+    let Some(table) = table else { return Ok(wishes) };
+    Ok(Wishes {
+        grade: table.choice("level", &Grade::NAMES)?.unwrap_or(wishes.grade),
+        code_edge: table.choice("code_edge", &CodeEdge::NAMES)?,
+        waveform: table.choice("waveform", &Layers::NAMES)?,
+        carrier: table.choice("carrier", &Arithmetic::NAMES)?,
+        noise: table.choice("noise", &Arithmetic::NAMES)?,
+        knot_tolerance_cycles: table.number("knot_tolerance_cycles")?,
+        ..wishes
     })
 }
 

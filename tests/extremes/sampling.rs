@@ -39,9 +39,9 @@ fn period(rate_khz: usize, edge: Edge<'_>, start: f64) -> Vec<f32> {
         let at = CodeTime::new(0, ((from % 1023.0) * one) as u64);
         let mut q = vec![0.0_f32; i.len()];
         let mut bank = Bank::default();
-        bank.push((0, 4096), 0, 0..i.len(), |bits| {
+        bank.push((0, 4096), 0, 0..i.len(), None, |bits| {
             let position = spreading.strip(at, step, 4096, |_| false, bits);
-            Run { bits: &[], position, step, turns: 0, turns_step: 0, amplitude: 1.0 }
+            Run { bits: &[], position, step, turns: 0, turns_step: 0, amplitude: 1.0, pulse: None }
         });
         bank.render(Kernel { edge, arithmetic: Arithmetic::F64, level: Level::detect() }, i, &mut q);
     }

@@ -1,5 +1,7 @@
 //! What the synthesiser will do for a scene: knots, memory and speed.
 
+use std::time::Instant;
+
 use serde::Serialize;
 
 use crate::arrival;
@@ -22,8 +24,8 @@ pub struct Machinery {
     pub knot_reason: String,
     /// Memory of the generator's blocks, which does not grow with the scene.
     pub block_bytes: u64,
-    /// Samples times satellites that this machine makes a second.
-    pub satellite_samples_per_s: f64,
+    /// Time of this machine for all knots of the scene, on one core.
+    pub knots_s: f64,
 }
 
 /// What the plan reports of the synthesiser: knots met along the scene, memory of a batch, and the usual
@@ -34,20 +36,22 @@ pub struct Machinery {
 pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
     let transmitters = transmitters(scene, Edge::Nearest)?;
     let rate = scene.clock.rate;
-    let (mut shortest, mut longest, mut worst_cycles) = (u64::MAX, 0, 0.0_f64);
+    let (mut shortest, mut longest, mut worst_cycles, mut knots_s) = (u64::MAX, 0, 0.0_f64, 0.0);
     for transmitter in &transmitters {
         if !arrival::in_view_from(scene, &transmitter.from, transmitter.sv, scene.clock.start)? {
             continue;
         }
         let size = transmitter.root_samples();
         let roots = scene.samples.div_ceil(size);
-        for root in (0..roots).step_by(roots.div_ceil(PLANNED_ROOTS).max(1) as usize) {
+        let (begin, each) = (Instant::now(), roots.div_ceil(PLANNED_ROOTS).max(1));
+        for root in (0..roots).step_by(each as usize) {
             for part in transmitter.root(scene, root)? {
                 shortest = shortest.min(part.end - part.start);
                 longest = longest.max(part.end - part.start);
                 worst_cycles = worst_cycles.max(part.error_cycles);
             }
         }
+        knots_s += begin.elapsed().as_secs_f64() * roots as f64 / roots.div_ceil(each).max(1) as f64;
     }
     let shortest = shortest.min(longest);
     let options = Options::default();
@@ -60,6 +64,6 @@ pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
             scene.fidelity.knot_tolerance_cycles
         ),
         block_bytes: batch.min(scene.samples) * scene.metadata.format.bytes() as u64,
-        satellite_samples_per_s: 1e9 / scene.fidelity.satellite_sample_ns(rate.hz()),
+        knots_s,
     })
 }

@@ -149,7 +149,7 @@ impl Scenario {
             warnings.extend(presence::warning(&missing, self.start));
         }
         for (scene, front_end) in scenes.iter().zip(&self.front_ends) {
-            let warning = scene.fidelity.warning(scene.clock.rate.hz());
+            let warning = scene.fidelity.warning(scene.clock.rate.hz(), &scene.signals);
             warnings.extend(warning.map(|warning| front_end.of_it() + &warning));
         }
         scenes.first().map_or(Ok(()), |scene| self.replay(scene, &files))?;
@@ -246,6 +246,7 @@ impl Scenario {
             messages: Arc::clone(&world.messages),
             message_faults: world.message_faults.clone(),
             satellite_clocks: Arc::clone(&world.satellite_clocks),
+            fidelity: front_end.fidelity.suited(metadata.rate.hz(), &signals),
             signals,
             excluded: world.excluded.clone(),
             mask_rad: self.mask_rad,
@@ -258,7 +259,6 @@ impl Scenario {
             noise: self.noise,
             front_end: stages.map_err(|reason| refuse(&reason))?,
             noise_lsb,
-            fidelity: front_end.fidelity,
             truth_interval_s: self.truth_interval_s,
             expect: self.expect.clone(),
             faults: self.faults(),

@@ -6,7 +6,7 @@
 use super::read::{Refusals, Table};
 use super::stages::{self, Stages};
 use super::{Scenario, ScenarioError, fidelity_of, signal_list};
-use crate::scene::Fidelity;
+use crate::fidelity::Wishes;
 use gnss::samples::Format;
 use gnss::signal::Signal;
 use gnss::time::Rate;
@@ -51,7 +51,7 @@ pub struct FrontEnd {
     /// What the hardware does to them.
     pub stages: Stages,
     /// How they are made.
-    pub fidelity: Fidelity,
+    pub fidelity: Wishes,
 }
 
 impl FrontEnd {
@@ -169,7 +169,7 @@ impl Reader<'_, '_> {
         let inverted = refusals.take(table.map_or(Ok(None), |table| table.flag("spectrum_inverted")));
         let noise_lsb = refusals.take(table.map_or(Ok(None), |table| table.number("noise_lsb")));
         let stages = self.stages(table, format, refusals);
-        let fidelity = refusals.take(fidelity_of(self.fidelity, rate, self.allowed_m));
+        let fidelity = refusals.take(fidelity_of(self.fidelity, self.allowed_m));
         Some(FrontEnd {
             name: name?,
             rate,

@@ -229,7 +229,7 @@ impl Source<'_> {
         match self.scene.fidelity.code_edge {
             CodeEdge::Nearest => ChipEdge::Nearest,
             CodeEdge::Area => ChipEdge::Area,
-            CodeEdge::BandLimited => ChipEdge::BandLimited(Box::new(Filter::new(self.scene.cutoff_cps()))),
+            CodeEdge::BandLimited => ChipEdge::BandLimited(Arc::new(Filter::new(self.scene.cutoff_cps()))),
         }
     }
 

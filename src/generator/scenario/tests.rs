@@ -17,7 +17,9 @@ use super::*;
 use crate::clock::oscillator::PowerLaw;
 use crate::effect::multipath::Detour;
 use crate::effect::transmit::Block;
+use crate::scene::Fidelity;
 use crate::vehicle::attitude::Nose;
+use gnss::gps::l1ca::L1_CA;
 use gnss::samples::Format;
 
 const MINIMAL: &str = "name = \"test\"\nstart = 2010-07-01T10:00:00\nduration_s = 10\n";
@@ -135,7 +137,7 @@ fn every_value_arrives_where_it_belongs_in_si_units() {
     assert_eq!(scenario.receiver_clock, clock);
     assert!(scenario.scintillation.is_some_and(|s| s.s4 == 0.5 && s.satellites == Some(vec![Sv::gps(2)])));
     let fidelity = scenario.front_ends[0].fidelity;
-    assert_eq!((fidelity.code_edge, fidelity.waveform), (CodeEdge::Nearest, Layers::Strongest));
+    assert_eq!((fidelity.code_edge, fidelity.waveform), (Some(CodeEdge::Nearest), Some(Layers::Strongest)));
     assert!(scenario.noise && scenario.truth_interval_s == 0.5);
     assert!(scenario.receiver.unwrap().contains_key("tracking"));
 }
@@ -250,8 +252,9 @@ fn what_cannot_be_turned_or_reflected_is_refused_with_the_remedy() {
 
 #[test]
 fn a_level_sets_every_knob_and_a_knob_overrides_its_level() {
-    let fidelity = |lines: &str| parse(&with("fidelity", lines)).unwrap().front_ends[0].fidelity;
-    assert_eq!(parse(&format!("{MINIMAL}{STATIC}")).unwrap().front_ends[0].fidelity, Fidelity::of(Grade::Balanced));
+    let of = |text: &str| parse(text).unwrap().front_ends[0].fidelity.suited(2.6e6, &[&L1_CA]);
+    let fidelity = |lines: &str| of(&with("fidelity", lines));
+    assert_eq!(of(&format!("{MINIMAL}{STATIC}")), Fidelity::of(Grade::Balanced));
     for (name, grade) in Grade::NAMES {
         assert_eq!(fidelity(&format!("level = \"{name}\"")), Fidelity::of(grade));
         let own = fidelity(&format!("level = \"{name}\"\nknot_tolerance_cycles = 3e-5"));

@@ -1,6 +1,7 @@
 //! Stretches of samples that are made to be measured.
 
 use std::ops::Range;
+use std::time::Instant;
 
 use super::GenerateError;
 use super::block::{Worker, edge, first_run, pack, run_begin, satellites};
@@ -20,6 +21,8 @@ pub(crate) struct Stretch {
     pub square_lsb2: f64,
     /// Those that were clipped.
     pub clipped: u64,
+    /// Time for a sample of all that is made, with what stages look back at.
+    pub sample_s: f64,
 }
 
 /// Makes the samples of `stretches`, which ascend, as the stream does, and measures them.
@@ -42,6 +45,7 @@ pub(crate) fn measured(scene: &Scene, stretches: &[Range<u64>]) -> Result<Vec<St
         // On this thread alone: a plan has to work where no other can be started.
         transmitters.iter_mut().try_for_each(|t| t.prepare_alone(scene, needed, made))?;
         let samples = (stretch.end - stretch.start) as usize;
+        let begin = Instant::now();
         let mut block = satellites(scene, &transmitters, kernel, (stretch.start, samples, memory), &mut worker);
         let sent = block.lead..block.lead + samples;
         let square = |block: &Block<'_>| {
@@ -58,10 +62,13 @@ pub(crate) fn measured(scene: &Scene, stretches: &[Range<u64>]) -> Result<Vec<St
             stage.act(&mut block);
         });
         bytes.resize(samples * format.bytes(), 0);
+        let square_lsb2 = before_lsb2.unwrap_or_else(|| square(&block));
+        let clipped = block.clipped + pack(&block, samples, format, &mut bytes);
         found.push(Stretch {
             components: if format.is_complex() { 2 } else { 1 } * samples as u64,
-            square_lsb2: before_lsb2.unwrap_or_else(|| square(&block)),
-            clipped: block.clipped + pack(&block, samples, format, &mut bytes),
+            square_lsb2,
+            clipped,
+            sample_s: begin.elapsed().as_secs_f64() / block.i.len().max(1) as f64,
         });
     }
     Ok(found)

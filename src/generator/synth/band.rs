@@ -1,16 +1,17 @@
 //! Band-limited code edges: the step response of a linear-phase low-pass filter.
 //!
 //! The filter is a sinc of the stated cut-off under a Kaiser window of ±8 samples, symmetric, so its
-//! group delay is zero. An edge at any phase is a row of the polyphase table, linear between rows
-//! of 1/256 sample (error below 4e-6 of a unit step).
+//! group delay is zero. The response to an edge at any phase is a polynomial of its cell of a sample.
 
 use std::f64::consts::PI;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::pulse::Pulse;
 
 /// Half width of the response in samples.
 pub const HALF_WIDTH: usize = 8;
 /// Samples of the response.
 pub(super) const WIDTH: usize = 2 * HALF_WIDTH;
-const ROWS: usize = 256;
 /// Points a sample in the table that the reference reads.
 const FINE: usize = 4096;
 /// Cells a sample in the table of responses in `f64`.
@@ -29,10 +30,10 @@ const COUNTER: f32 = 1.5 * (1 << 23) as f32;
 const BETA: f64 = 5.65;
 
 /// A low-pass filter, known by its response to a unit step.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Filter {
     fine: Vec<f64>,
-    rows: Vec<[f32; WIDTH]>,
+    pulses: Mutex<Vec<Arc<Pulse>>>,
     cells: Vec<Cell>,
     unit_cells: Vec<UnitCell>,
 }
@@ -99,12 +100,9 @@ impl Filter {
             fine.push(sum);
         }
         fine.iter_mut().for_each(|value| *value /= sum);
-        let mut filter = Self { fine, rows: Vec::new(), cells: Vec::new(), unit_cells: Vec::new() };
+        let mut filter = Self { fine, cells: Vec::new(), unit_cells: Vec::new(), pulses: Mutex::default() };
         let jump = |k: usize| if k >= HALF_WIDTH { 1.0 } else { 0.0 };
         let x = |k: usize, fraction: f64| k as f64 - HALF_WIDTH as f64 + fraction;
-        filter.rows = (0..=ROWS)
-            .map(|row| std::array::from_fn(|k| (filter.step(x(k, row as f64 / ROWS as f64)) - jump(k)) as f32))
-            .collect();
         // From the point of the fine table before it.
         let exactly = |x: f64| {
             let point = ((x + HALF_WIDTH as f64) * FINE as f64).floor();
@@ -156,21 +154,20 @@ impl Filter {
         }
     }
 
-    /// The response minus the ideal step, at the samples from 8 before to 7 after the first one that
-    /// lies at or behind the edge, for an edge `fraction` (0..1) of a sample before that one.
-    #[inline(always)]
-    pub fn residual(&self, fraction: f64) -> [f32; WIDTH] {
-        let place = fraction * ROWS as f64;
-        let index = (place as usize).min(ROWS - 1);
-        let weight = (place - index as f64) as f32;
-        match self.rows.get(index..index + 2) {
-            Some([a, b]) => std::array::from_fn(|k| a[k] + (b[k] - a[k]) * weight),
-            _ => [0.0; WIDTH],
+    /// The response to a pulse of one chip in equal steps of those levels, at `step` chips a sample; `None`
+    /// for a chip of more than 48 samples. It is made once.
+    pub(super) fn pulse(&self, levels: &[f64], step: f64) -> Option<Arc<Pulse>> {
+        let mut known = self.pulses.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(pulse) = known.iter().find(|pulse| pulse.is_of(levels, step)) {
+            return Some(Arc::clone(pulse));
         }
+        let pulse = Arc::new(Pulse::new(self, levels, step)?);
+        known.push(Arc::clone(&pulse));
+        Some(pulse)
     }
 
-    /// Twice [`Filter::residual`] in `f64`, in the cells of a sample in the order in which a change may lie
-    /// behind the sample before it.
+    /// The response to a change from −1 to 1 less the change itself, in the cells of a sample in the order in
+    /// which a change may lie behind the sample before it.
     #[inline(always)]
     pub(super) fn cells(&self) -> &[Cell] {
         &self.cells
@@ -213,7 +210,7 @@ fn impulse(x: f64, cutoff_cps: f64) -> f64 {
 }
 
 /// The cubic polynomial, from the constant up, that is a function at Chebyshev's four points of 0 to 1.
-fn cubic(value: impl Fn(f64) -> f64) -> [f64; 4] {
+pub(super) fn cubic(value: impl Fn(f64) -> f64) -> [f64; 4] {
     let angle = |k: usize| (k as f64 + 0.5) * PI / 4.0;
     let values: [f64; 4] = std::array::from_fn(|k| value(0.5 + 0.5 * libm::cos(angle(k))));
     // Coefficients of Chebyshev's polynomials of 2x − 1.
@@ -261,15 +258,6 @@ mod tests {
             assert!((filter.step(x) + filter.step(-x) - 1.0).abs() < 1e-12, "{x}");
         }
         assert_eq!((filter.step(-8.5), filter.step(8.5)), (0.0, 1.0));
-        // Linear interpolation over 1/256 sample of a function whose second derivative stays below 2.
-        for k in 0..97 {
-            let fraction = f64::from(k) / 97.0;
-            for (j, value) in filter.residual(fraction).iter().enumerate() {
-                let x = j as f64 - 8.0 + fraction;
-                let exact = filter.step(x) - if j >= 8 { 1.0 } else { 0.0 };
-                assert!((f64::from(*value) - exact).abs() < 4e-6, "{fraction} {j}");
-            }
-        }
     }
 
     #[test]

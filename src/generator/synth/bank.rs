@@ -5,8 +5,10 @@
 //! that of arrival.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::lanes::Buffers;
+use super::pulse::Pulse;
 use super::{Kernel, Run, exact, isa};
 use crate::fidelity::Arithmetic;
 
@@ -27,23 +29,26 @@ struct Entry {
     strip: Range<usize>,
     /// Place among the runs of its ray.
     part: usize,
-    /// All but its bits.
+    /// All but its bits and its pulse.
     run: Run<'static>,
+    pulse: Option<Arc<Pulse>>,
 }
 
 impl Bank {
     /// Adds a run for `samples` of the stretch, part of `span`: `make` appends its signs to the strip that it
-    /// is handed and returns everything else. `part` is its place among the runs of its ray, from 0.
+    /// is handed and returns everything else but the pulse. `part` is its place among the runs of its ray,
+    /// from 0.
     pub fn push(
         &mut self,
         span: (u64, u64),
         part: usize,
         samples: Range<usize>,
+        pulse: Option<&Arc<Pulse>>,
         make: impl FnOnce(&mut Vec<u64>) -> Run<'static>,
     ) {
         let begin = self.bits.len();
         let run = make(&mut self.bits);
-        self.entries.push(Entry { span, samples, strip: begin..self.bits.len(), part, run });
+        self.entries.push(Entry { span, samples, strip: begin..self.bits.len(), part, run, pulse: pulse.cloned() });
     }
 
     /// Adds the samples of all runs to the planar stretch and forgets the runs.
@@ -52,32 +57,22 @@ impl Bank {
         for entries in self.entries.chunk_by(|a, b| a.span == b.span) {
             let runs: Vec<Run<'_>> = entries
                 .iter()
-                .map(|entry| Run { bits: self.bits.get(entry.strip.clone()).unwrap_or(&[]), ..entry.run })
+                .map(|Entry { strip, run, pulse, .. }| Run {
+                    bits: self.bits.get(strip.clone()).unwrap_or(&[]),
+                    pulse: pulse.as_deref(),
+                    ..*run
+                })
                 .collect();
             let Some(samples) = entries.first().map(|entry| entry.samples.clone()) else { continue };
             let (Some(i), Some(q)) = (i.get_mut(samples.clone()), q.get_mut(samples)) else { continue };
-            match kernel.arithmetic {
-                // Rays of one run each, most of all: as they lie.
-                Arithmetic::F32 if entries.iter().all(|entry| entry.part == 0) => {
-                    isa::accumulate(kernel.level, kernel.edge, &runs, i, q, &mut self.buffers);
-                }
-                Arithmetic::F32 => {
-                    let mut left = runs.as_slice();
-                    let rays: Vec<&[Run<'_>]> = (entries.chunk_by(|_, next| next.part > 0))
-                        .filter_map(|ray| left.split_off(..ray.len()))
-                        .collect();
-                    for rays in rays.chunk_by(|a, b| (a.len() == 1) == (b.len() == 1)) {
-                        if let [[_], ..] = rays {
-                            let singles: Vec<Run<'_>> = rays.iter().flat_map(|ray| ray.iter().copied()).collect();
-                            isa::accumulate(kernel.level, kernel.edge, &singles, i, q, &mut self.buffers);
-                        } else {
-                            isa::accumulate_rays(kernel.level, kernel.edge, rays, i, q, &mut self.buffers);
-                        }
-                    }
-                }
-                Arithmetic::F64 => {
-                    isa::accumulate_exact(kernel.level, kernel.edge, &runs, i, q, &mut self.exact);
-                }
+            let mut left = runs.as_slice();
+            let rays: Vec<&[Run<'_>]> = (entries.chunk_by(|a, b| b.part > 0 && b.run.shares_carrier(&a.run)))
+                .filter_map(|ray| left.split_off(..ray.len()))
+                .collect();
+            let Kernel { edge, arithmetic, level } = kernel;
+            match arithmetic {
+                Arithmetic::F32 => isa::accumulate(level, edge, &rays, i, q, &mut self.buffers),
+                Arithmetic::F64 => isa::accumulate_exact(level, edge, &rays, i, q, &mut self.exact),
             }
         }
         self.entries.clear();

@@ -224,59 +224,6 @@ pub(crate) fn sign(words: &[u64], offset: usize) -> f64 {
     if window(words, offset) >> 63 == 1 { -1.0 } else { 1.0 }
 }
 
-/// Changes of sign in a strip, in order.
-pub(crate) struct Changes<'a> {
-    bits: &'a [u64],
-    word: usize,
-    /// Steps of the word at which its sign changes, from the next one on.
-    left: u64,
-    /// Where the next one is, Q16.48 steps; beyond all positions behind the last.
-    pub at: u64,
-    /// The strip's signs from there on.
-    pub signs: u64,
-}
-
-impl<'a> Changes<'a> {
-    /// Those behind a step.
-    #[inline(always)]
-    pub fn after(bits: &'a [u64], step: u64) -> Self {
-        let word = (step / 64) as usize;
-        let mut changes = Self { bits, word, left: 0, at: 0, signs: 0 };
-        changes.left = changes.of_word() & (u64::MAX >> (step % 64) >> 1);
-        changes.settle();
-        changes
-    }
-
-    /// Steps of the word whose sign is not that of the step before.
-    #[inline(always)]
-    fn of_word(&self) -> u64 {
-        let before = self.word.checked_sub(1).and_then(|word| self.bits.get(word)).copied().unwrap_or(0);
-        self.bits.get(self.word).map_or(0, |word| word ^ (word >> 1 | before << 63))
-    }
-
-    #[inline(always)]
-    fn settle(&mut self) {
-        while self.left == 0 {
-            self.word += 1;
-            if self.word >= self.bits.len() {
-                self.at = u64::MAX;
-                return;
-            }
-            self.left = self.of_word();
-        }
-        let within = self.left.leading_zeros();
-        self.at = (64 * self.word as u64 + u64::from(within)).saturating_mul(CODE_ONE);
-        self.signs = self.bits.get(self.word).map_or(0, |word| word << within);
-    }
-
-    /// On to the next one.
-    #[inline(always)]
-    pub fn advance(&mut self) {
-        self.left &= u64::MAX >> self.left.leading_zeros() >> 1;
-        self.settle();
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

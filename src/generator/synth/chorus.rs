@@ -4,14 +4,17 @@
 //! data and pilot at right angles are a quarter apart. Waves in phase are added first, so are those in
 //! quadrature, and both are turned by one carrier. Sequences that step together (*a layer*) share their
 //! places and, for area edges, the shares of a sample that its steps have. Each half of a group begins its
-//! window anew, so that a sample may span two steps: BOC(6,1) from 6.4 Msps on. Accuracy and order of
-//! operations are those of [`super::lanes`]: the same bits on every instruction set.
+//! window anew, so that a sample may span two steps: BOC(6,1) from 6.4 Msps on. Longer ones are read sample
+//! by sample ([`super::dense`]), and waves behind a filter come ready ([`super::waves`]). Accuracy and order
+//! of operations are those of [`super::lanes`]: the same bits on every instruction set.
 
 use super::chips::window;
 use super::lanes::{Carrier, FRACTION, GROUP, HALF, LANE_BITS, SIGN, Side, Sums, lane};
-use super::{CODE_BITS, CODE_ONE, Edge, Run};
+use super::waves::{TILE, Waves};
+use super::{CODE_BITS, CODE_ONE, Edge, Run, dense};
 
-/// Most steps a sample: half a group then spans 30 of the 32 of a window, two of which an area looks back.
+/// Most steps a sample that are read from a window for each half of a group, which then spans 30 of its 32,
+/// two of which an area looks back.
 const DENSEST: u64 = 29 * CODE_ONE / 15;
 
 /// The sequences of a ray made ready.
@@ -33,8 +36,7 @@ struct Layer {
     /// from half group to half group, Q16.48.
     position: u64,
     stride: u64,
-    /// Whether a sample spans more than a step.
-    dense: bool,
+    density: Density,
     /// A sample's span, or half of it where it is not dense, in units of a lane's place.
     span: f32,
     /// Number of each sequence's run, and its amplitude.
@@ -43,17 +45,18 @@ struct Layer {
     begins: u64,
 }
 
-/// Whether the runs of a ray can be made together.
-pub(super) fn fits(edge: Edge<'_>, runs: &[Run<'_>]) -> bool {
-    let Some(first) = runs.first() else { return false };
-    let together = |run: &Run<'_>| {
-        let apart = run.turns.wrapping_sub(first.turns);
-        run.turns_step == first.turns_step && apart << 2 == 0 && run.step <= DENSEST
-    };
-    !matches!(edge, Edge::BandLimited(_)) && runs.iter().all(together)
+/// How many steps a sample spans.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Density {
+    /// One at most.
+    Sparse,
+    /// Two at most, so that half a group's are in a window of 32.
+    Dense,
+    /// More.
+    Densest,
 }
 
-/// Adds rays of several runs each to planar samples, as [`super::lanes::accumulate`] does single runs.
+/// Adds rays to planar samples, as [`super::lanes::accumulate`] does those of a run of sparse steps.
 #[inline(always)]
 pub(super) fn accumulate<const AREA: bool>(rays: &[&[Run<'_>]], chords: &mut Vec<Chord>, i: &mut [f32], q: &mut [f32]) {
     if chords.len() < rays.len() {
@@ -71,6 +74,53 @@ pub(super) fn accumulate<const AREA: bool>(rays: &[&[Run<'_>]], chords: &mut Vec
     }
 }
 
+/// Adds rays whose waves come in `f64`, a tile at a time.
+#[inline(always)]
+pub(super) fn accumulate_ready(
+    edge: Edge<'_>,
+    rays: &[&[Run<'_>]],
+    chords: &mut Vec<Chord>,
+    waves: &mut Waves,
+    i: &mut [f32],
+    q: &mut [f32],
+) {
+    if chords.len() < rays.len() {
+        chords.resize_with(rays.len(), Chord::default);
+    }
+    for (Chord { carrier, .. }, runs) in chords.iter_mut().zip(rays) {
+        if let Some(first) = runs.first() {
+            carrier.anchor(first, 1.0);
+        }
+    }
+    for (tile, (i, q)) in i.chunks_mut(TILE).zip(q.chunks_mut(TILE)).enumerate() {
+        for (Chord { carrier, .. }, runs) in chords.iter().zip(rays) {
+            waves.make(edge, runs, tile);
+            let amplitude = waves.amplitude() as f32;
+            let in_phase = waves.in_phase().as_chunks::<GROUP>().0;
+            let quadrature = waves.quadrature().map_or(&[][..], |wave| wave.as_chunks::<GROUP>().0);
+            let groups = (tile * TILE / GROUP..).zip(i.chunks_mut(GROUP).zip(q.chunks_mut(GROUP)));
+            for ((group, (i, q)), (number, wave)) in groups.zip(in_phase.iter().enumerate()) {
+                let mut sums = Sums::new();
+                carrier.turn(group, amplitude, &sides(wave), &mut sums);
+                if let Some(wave) = quadrature.get(number) {
+                    carrier.turn_ahead(group, amplitude, &sides(wave), &mut sums);
+                }
+                sums.add_to(i, q);
+            }
+        }
+    }
+}
+
+/// A group's values as two sides.
+#[inline(always)]
+fn sides<T: Copy + Into<f64>>(wave: &[T; GROUP]) -> [Side; 2] {
+    let [mut before, mut after] = [[0.0; HALF]; 2];
+    for k in 0..HALF {
+        (before[k], after[k]) = (wave[HALF - 1 - k].into() as f32, wave[HALF + k].into() as f32);
+    }
+    [before, after]
+}
+
 impl Chord {
     #[inline(always)]
     fn anchor<const AREA: bool>(&mut self, runs: &[Run<'_>]) {
@@ -79,7 +129,7 @@ impl Chord {
         self.in_phase.clear();
         self.quadrature.clear();
         for (number, run) in runs.iter().enumerate() {
-            let quarters = run.turns.wrapping_sub(first.turns) >> (u64::BITS - 2);
+            let quarters = run.quarters_ahead(first);
             let layers = if quarters % 2 == 0 { &mut self.in_phase } else { &mut self.quadrature };
             let amplitude = if quarters < 2 { run.amplitude } else { -run.amplitude };
             let known = layers.iter_mut().find(|layer| layer.step == run.step && layer.begins == run.position);
@@ -97,26 +147,9 @@ impl Chord {
     /// Adds one group.
     #[inline(always)]
     fn add<const AREA: bool>(&self, runs: &[Run<'_>], group: usize, sums: &mut Sums) {
-        let Carrier { cos, sin, re, im } = &self.carrier;
-        let (Some(re), Some(im)) = (re.get(group), im.get(group)) else { return };
-        let [before, after] = waves::<AREA>(&self.in_phase, runs, group);
-        for k in 0..HALF {
-            let (a, b, c, d) = (re * cos[k], im * sin[k], re * sin[k], im * cos[k]);
-            sums.i_before[k] += before[k] * (a + b);
-            sums.q_before[k] += before[k] * (d - c);
-            sums.i_after[k] += after[k] * (a - b);
-            sums.q_after[k] += after[k] * (d + c);
-        }
-        if self.quadrature.is_empty() {
-            return;
-        }
-        let [before, after] = waves::<AREA>(&self.quadrature, runs, group);
-        for k in 0..HALF {
-            let (a, b, c, d) = (re * cos[k], im * sin[k], re * sin[k], im * cos[k]);
-            sums.i_before[k] -= before[k] * (d - c);
-            sums.q_before[k] += before[k] * (a + b);
-            sums.i_after[k] -= after[k] * (d + c);
-            sums.q_after[k] += after[k] * (a - b);
+        self.carrier.turn(group, 1.0, &waves::<AREA>(&self.in_phase, runs, group), sums);
+        if !self.quadrature.is_empty() {
+            self.carrier.turn_ahead(group, 1.0, &waves::<AREA>(&self.quadrature, runs, group), sums);
         }
     }
 }
@@ -135,13 +168,17 @@ impl Layer {
     #[inline(always)]
     fn new<const AREA: bool>(run: &Run<'_>) -> Self {
         let unit = (1_u64 << (CODE_BITS - LANE_BITS)) as f64;
-        let dense = run.step > CODE_ONE;
-        let span = run.step as f64 / unit * if dense { 1.0 } else { 0.5 };
+        let density = match run.step {
+            ..=CODE_ONE => Density::Sparse,
+            ..=DENSEST => Density::Dense,
+            _ => Density::Densest,
+        };
+        let span = run.step as f64 / unit * if density == Density::Dense { 1.0 } else { 0.5 };
         // The area of a sample ends half a step after its instant.
-        let position = match (AREA, dense) {
-            (false, _) => run.position,
-            (true, false) => run.position - run.step / 2 + run.step - CODE_ONE,
-            (true, true) => run.position - run.step / 2 + run.step - 2 * CODE_ONE,
+        let position = match (AREA, density) {
+            (false, _) | (true, Density::Densest) => run.position,
+            (true, Density::Sparse) => run.position - run.step / 2 + run.step - CODE_ONE,
+            (true, Density::Dense) => run.position - run.step / 2 + run.step - 2 * CODE_ONE,
         };
         let ahead: Side<u32> = std::array::from_fn(|k| lane(run.step * k as u64));
         Self {
@@ -149,7 +186,7 @@ impl Layer {
             behind: std::array::from_fn(|k| ahead[HALF - 1 - k]),
             position,
             stride: run.step * HALF as u64,
-            dense,
+            density,
             span: span as f32,
             voices: Vec::with_capacity(4),
             step: run.step,
@@ -157,21 +194,45 @@ impl Layer {
         }
     }
 
-    /// Area values are ±`span`.
+    /// Area values from windows are ±`span`.
     #[inline(always)]
     fn scaled<const AREA: bool>(&self, amplitude: f64) -> f32 {
-        (if AREA { amplitude / f64::from(self.span) } else { amplitude }) as f32
+        let in_spans = AREA && self.density != Density::Densest;
+        (if in_spans { amplitude / f64::from(self.span) } else { amplitude }) as f32
     }
 
     /// Adds the layer's wave over a group, its earlier half backwards.
     #[inline(always)]
     fn add<const AREA: bool>(&self, runs: &[Run<'_>], group: u64, before: &mut Side, after: &mut Side) {
+        if self.density == Density::Densest {
+            return self.add_densest::<AREA>(runs, group, before, after);
+        }
         let (pairs, rest) = self.voices.as_chunks::<2>();
         for voices in pairs {
             self.add_some::<AREA, 2>(runs, voices, group, before, after);
         }
         for &voice in rest {
             self.add_some::<AREA, 1>(runs, &[voice], group, before, after);
+        }
+    }
+
+    /// Adds sequences whose samples are read from windows of their own.
+    #[inline(always)]
+    fn add_densest<const AREA: bool>(&self, runs: &[Run<'_>], group: u64, before: &mut Side, after: &mut Side) {
+        let position = self.position + 2 * self.stride * group;
+        for (number, amplitude) in &self.voices {
+            let Some(run) = runs.get(*number) else { continue };
+            let mut wave = [0.0_f32; GROUP];
+            if AREA {
+                dense::means(run, position, &mut wave, |mean| mean as f32);
+            } else {
+                dense::signs(run, position, &mut wave, |signs| turned(1.0, (signs >> 32) as u32));
+            }
+            let [own_before, own_after] = sides(&wave);
+            for k in 0..HALF {
+                before[k] += amplitude * own_before[k];
+                after[k] += amplitude * own_after[k];
+            }
         }
     }
 
@@ -196,10 +257,12 @@ impl Layer {
         let sides = [(early, signs, &self.behind, before), (late, later, &self.ahead, after)];
         for (position, signs, places, wave) in sides {
             let fraction = lane(position) & FRACTION;
-            match (AREA, self.dense) {
+            match (AREA, self.density) {
                 (false, _) => each(fraction, places, wave, |place| nearest(&signs, &amplitudes, place)),
-                (true, false) => each(fraction, places, wave, |place| sparse(&signs, &amplitudes, self.span, place)),
-                (true, true) => each(fraction, places, wave, |place| dense(&signs, &amplitudes, self.span, place)),
+                (true, Density::Sparse) => {
+                    each(fraction, places, wave, |place| sparse(&signs, &amplitudes, self.span, place));
+                }
+                (true, _) => each(fraction, places, wave, |place| of_two(&signs, &amplitudes, self.span, place)),
             }
         }
     }
@@ -242,7 +305,7 @@ fn sparse<const V: usize>(signs: &[u32; V], amplitudes: &[f32; V], span: f32, pl
 /// A sample ends within a step and holds as much of it as lies behind its beginning, of the step before as
 /// much as is left or all of it, and the rest of the one before that.
 #[inline(always)]
-fn dense<const V: usize>(signs: &[u32; V], amplitudes: &[f32; V], span: f32, place: u32) -> f32 {
+fn of_two<const V: usize>(signs: &[u32; V], amplitudes: &[f32; V], span: f32, place: u32) -> f32 {
     const STEP: f32 = (1_u32 << LANE_BITS) as f32;
     let behind = (place & FRACTION) as i32 as f32;
     let rest = span - behind;

@@ -1,45 +1,79 @@
-//! Samples that are longer than a step of the code: its mean over each, from one window of signs.
+//! Samples read from windows of signs of their own, however many steps each spans: the code at their instants
+//! and its mean over each.
 //!
-//! The mean is that of [`super::reference`] to the last bit: lengths are counted in 2^-48 steps, at most
+//! Both are those of [`super::reference`] to the last bit: lengths are counted in 2^-48 steps, at most
 //! fifteen steps to a sample, and sums of them are exact in either order.
 
 use super::chips::window;
 use super::{CODE_BITS, CODE_ONE, Run};
 
-/// Samples of a block.
-pub(super) const BLOCK: usize = 8;
-/// Steps whose signs a window has, beside the one in which a block begins.
+/// Samples of a block where a window has the steps of so many, and where steps are as short as they may be:
+/// a window holds 62 beside the step in which a block begins.
+const BLOCK: usize = 8;
+const SHORT_BLOCK: usize = 4;
 const STEPS: u64 = 62;
 
-/// The code's means over samples, the first at `position`.
+const _: () = assert!(SHORT_BLOCK as f64 * super::chips::MAX_STEP <= STEPS as f64);
+
+/// The code's means over samples, the first about `position`.
 #[inline(always)]
-pub(super) fn means<T>(run: &Run<'_>, mut position: u64, out: &mut [T], number: impl Fn(f64) -> T) {
-    let (blocks, rest) = out.as_chunks_mut::<BLOCK>();
-    if run.step * BLOCK as u64 > STEPS * CODE_ONE {
-        for out in blocks.as_flattened_mut() {
-            let [mean] = block(run, position);
-            *out = number(mean);
-            position += run.step;
-        }
+pub(super) fn means<T>(run: &Run<'_>, position: u64, out: &mut [T], number: impl Fn(f64) -> T) {
+    if run.step * BLOCK as u64 <= STEPS * CODE_ONE {
+        blocks(run, position, out, |position| means_of::<BLOCK>(run, position), number);
     } else {
-        for out in blocks {
-            let means: [f64; BLOCK] = block(run, position);
-            for k in 0..BLOCK {
-                out[k] = number(means[k]);
-            }
-            position += run.step * BLOCK as u64;
+        blocks(run, position, out, |position| means_of::<1>(run, position), number);
+    }
+}
+
+/// The code's signs at samples' instants, the first at `position`, each as the first bit of a word.
+#[inline(always)]
+pub(super) fn signs<T>(run: &Run<'_>, position: u64, out: &mut [T], number: impl Fn(u64) -> T) {
+    if run.step * BLOCK as u64 <= STEPS * CODE_ONE {
+        blocks(run, position, out, |position| signs_of::<BLOCK>(run, position), number);
+    } else {
+        blocks(run, position, out, |position| signs_of::<SHORT_BLOCK>(run, position), number);
+    }
+}
+
+/// Writes numbers of samples, `N` at a time.
+#[inline(always)]
+fn blocks<const N: usize, V: Copy, T>(
+    run: &Run<'_>,
+    mut position: u64,
+    out: &mut [T],
+    block: impl Fn(u64) -> [V; N],
+    number: impl Fn(V) -> T,
+) {
+    let (whole, rest) = out.as_chunks_mut::<N>();
+    for out in whole {
+        let values = block(position);
+        for k in 0..N {
+            out[k] = number(values[k]);
+        }
+        position += run.step * N as u64;
+    }
+    if !rest.is_empty() {
+        for (out, value) in rest.iter_mut().zip(block(position)) {
+            *out = number(value);
         }
     }
-    for out in rest {
-        let [mean] = block(run, position);
-        *out = number(mean);
-        position += run.step;
+}
+
+/// The signs at as many samples as one window has the steps of.
+#[inline(always)]
+fn signs_of<const N: usize>(run: &Run<'_>, position: u64) -> [u64; N] {
+    let signs = window(run.bits, (position / CODE_ONE) as usize);
+    let first = position % CODE_ONE;
+    let mut found = [0; N];
+    for (found, k) in found.iter_mut().zip(0..) {
+        *found = signs.wrapping_shl((first.wrapping_add(run.step.wrapping_mul(k)) / CODE_ONE) as u32);
     }
+    found
 }
 
 /// The means over as many samples as one window of signs has the steps of.
 #[inline(always)]
-fn block<const N: usize>(run: &Run<'_>, position: u64) -> [f64; N] {
+fn means_of<const N: usize>(run: &Run<'_>, position: u64) -> [f64; N] {
     let from = position - run.step / 2;
     let signs = window(run.bits, (from / CODE_ONE) as usize);
     let (first, length) = (from % CODE_ONE, run.step as f64);
@@ -85,7 +119,7 @@ mod tests {
                 let mut bits = Vec::new();
                 let at = CodeTime::new(8, 1010 * CODE_ONE + fraction);
                 let position = spreading.strip(at, step, SAMPLES, |period| period % 2 == 1, &mut bits);
-                let run = Run { bits: &bits, position, step, turns: 0, turns_step: 0, amplitude: 1.0 };
+                let run = Run { bits: &bits, position, step, turns: 0, turns_step: 0, amplitude: 1.0, pulse: None };
                 let mut found = [0.0; SAMPLES];
                 means(&run, position, &mut found, |mean| mean);
                 for (n, found) in (0..).zip(found) {

@@ -7,9 +7,8 @@
 //! the rounding of the sum, as `responses` says. No value depends on the sample before. Sums over satellites
 //! are `f64` and become `f32` when all are in.
 
-use super::chips::{sign, window};
-use super::responses::{self, Responses, TILE};
-use super::{CODE_ONE, Edge, RUN_SAMPLES, Run, dense};
+use super::waves::{TILE, Waves};
+use super::{Edge, RUN_SAMPLES, Run};
 
 /// Phasors side by side: of tiles, of groups, and of the samples on each side of a group's middle.
 const LANES: usize = 16;
@@ -22,9 +21,6 @@ const GROUPS: usize = TILE / GROUP;
 
 const _: () = assert!(GROUPS <= LANES && RUN_SAMPLES <= LANES * TILE);
 
-/// Samples of a waveform side by side.
-const BLOCK: usize = 8;
-
 /// A value for each phasor, or for each sample of half a group.
 type Side = [f64; LANES];
 
@@ -36,7 +32,7 @@ struct Carrier {
     place: (Side, Side),
     /// From the middle of a tile's first group to that of each.
     groups: (Side, Side),
-    /// At the middle of each tile's first group, times the amplitude.
+    /// At the middle of each tile's first group.
     tiles: (Side, Side),
 }
 
@@ -50,43 +46,41 @@ struct Sums {
     q_after: Side,
 }
 
-/// Code of a tile.
-#[derive(Clone, Debug)]
-#[repr(align(64))]
-struct Wave([f64; TILE]);
-
 /// Scratch of the kernel.
 #[derive(Clone, Debug)]
 pub struct Scratch {
     carriers: Vec<Carrier>,
     sums: [Sums; GROUPS],
-    wave: Wave,
-    responses: Responses,
+    waves: Box<Waves>,
 }
 
 impl Default for Scratch {
     fn default() -> Self {
-        let (sums, wave) = ([Sums::default(); GROUPS], Wave([0.0; TILE]));
-        Self { carriers: Vec::new(), sums, wave, responses: Responses::default() }
+        Self { carriers: Vec::new(), sums: [Sums::default(); GROUPS], waves: Box::default() }
     }
 }
 
-/// Adds the sum of `runs` to planar samples; `i` and `q` have the same length, which is that of every run. At
-/// most [`RUN_SAMPLES`] of them.
+/// Adds rays to planar samples; `i` and `q` have the same length, which is that of every run, at most
+/// [`RUN_SAMPLES`]. The runs of a ray share a carrier ([`Run::shares_carrier`]).
 #[inline(always)]
-pub fn accumulate(edge: Edge<'_>, runs: &[Run<'_>], i: &mut [f32], q: &mut [f32], scratch: &mut Scratch) {
-    let Scratch { carriers, sums, wave, responses } = scratch;
+pub fn accumulate(edge: Edge<'_>, rays: &[&[Run<'_>]], i: &mut [f32], q: &mut [f32], scratch: &mut Scratch) {
+    let Scratch { carriers, sums, waves } = scratch;
     carriers.clear();
     // Loops, here and below, as what closures do may be compiled for the baseline.
-    for run in runs {
-        carriers.push(Carrier::new(run));
+    for runs in rays {
+        if let Some(first) = runs.first() {
+            carriers.push(Carrier::new(first));
+        }
     }
     for (tile, (i, q)) in i.chunks_mut(TILE).zip(q.chunks_mut(TILE)).enumerate() {
         sums.fill(Sums::default());
-        for (run, carrier) in runs.iter().zip(&*carriers) {
-            let run = Run { position: run.position + run.step * (tile * TILE) as u64, ..*run };
-            waveform(edge, &run, &mut wave.0, responses);
-            carrier.turn(tile, &wave.0, sums);
+        for (runs, carrier) in rays.iter().filter(|runs| !runs.is_empty()).zip(&*carriers) {
+            waves.make(edge, runs, tile);
+            let amplitude = waves.amplitude();
+            carrier.turn::<false>(tile, amplitude, waves.in_phase(), sums);
+            if let Some(wave) = waves.quadrature() {
+                carrier.turn::<true>(tile, amplitude, wave, sums);
+            }
         }
         for (sums, (i, q)) in sums.iter().zip(i.chunks_mut(GROUP).zip(q.chunks_mut(GROUP))) {
             add_to(&sums.i_before, &sums.i_after, i);
@@ -100,19 +94,17 @@ impl Carrier {
     fn new(run: &Run<'_>) -> Self {
         let half = run.turns_step >> 1;
         let middle = run.turns.wrapping_add(run.turns_step.wrapping_mul(LANES as u64 - 1)).wrapping_add(half);
-        let mut tiles = cos_sin(&ramp(middle, run.turns_step.wrapping_mul(TILE as u64)));
-        for k in 0..LANES {
-            (tiles.0[k], tiles.1[k]) = (run.amplitude * tiles.0[k], run.amplitude * tiles.1[k]);
-        }
+        let tiles = cos_sin(&ramp(middle, run.turns_step.wrapping_mul(TILE as u64)));
         let groups = cos_sin(&ramp(0, run.turns_step.wrapping_mul(GROUP as u64)));
         Self { place: cos_sin(&ramp(half, run.turns_step)), groups, tiles }
     }
 
-    /// Adds a waveform of a tile, turned by the carrier.
+    /// Adds a wave of a tile, turned by the carrier: in phase with it, or a quarter of a turn ahead.
     #[inline(always)]
-    fn turn(&self, tile: usize, wave: &[f64; TILE], sums: &mut [Sums; GROUPS]) {
+    fn turn<const AHEAD: bool>(&self, tile: usize, amplitude: f64, wave: &[f64; TILE], sums: &mut [Sums; GROUPS]) {
         let Self { place: (cos, sin), groups, tiles } = self;
         let (Some(tile_re), Some(tile_im)) = (tiles.0.get(tile), tiles.1.get(tile)) else { return };
+        let (tile_re, tile_im) = (amplitude * tile_re, amplitude * tile_im);
         let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
         for k in 0..LANES {
             re[k] = tile_re * groups.0[k] - tile_im * groups.1[k];
@@ -127,10 +119,17 @@ impl Carrier {
             let mut sum = *sums;
             for k in 0..LANES {
                 let (a, b, c, d) = (re * cos[k], im * sin[k], re * sin[k], im * cos[k]);
-                sum.i_before[k] += before[k] * (a + b);
-                sum.q_before[k] += before[k] * (d - c);
-                sum.i_after[k] += after[k] * (a - b);
-                sum.q_after[k] += after[k] * (d + c);
+                if AHEAD {
+                    sum.i_before[k] -= before[k] * (d - c);
+                    sum.q_before[k] += before[k] * (a + b);
+                    sum.i_after[k] -= after[k] * (d + c);
+                    sum.q_after[k] += after[k] * (a - b);
+                } else {
+                    sum.i_before[k] += before[k] * (a + b);
+                    sum.q_before[k] += before[k] * (d - c);
+                    sum.i_after[k] += after[k] * (a - b);
+                    sum.q_after[k] += after[k] * (d + c);
+                }
             }
             *sums = sum;
         }
@@ -163,73 +162,6 @@ fn ramp(start: u64, step: u64) -> [u64; LANES] {
         *turns = start.wrapping_add(step.wrapping_mul(k));
     }
     turns
-}
-
-/// Writes the code at each sample of a tile, of which the run's first is the first.
-#[inline(always)]
-fn waveform(edge: Edge<'_>, run: &Run<'_>, wave: &mut [f64; TILE], responses: &mut Responses) {
-    let blocks = (0..).step_by(BLOCK).zip(wave.as_chunks_mut().0);
-    match edge {
-        Edge::Nearest => {
-            for (first, block) in blocks {
-                *block = square(run, first);
-            }
-        }
-        Edge::Area if run.step <= CODE_ONE => {
-            for (first, block) in blocks {
-                *block = area(run, first);
-            }
-        }
-        Edge::Area => dense::means(run, run.position, wave, |mean| mean),
-        Edge::BandLimited(filter) => responses::waveform(filter, run, wave, responses),
-    }
-}
-
-/// The code at the instants of a block.
-#[inline(always)]
-fn square(run: &Run<'_>, first: u64) -> [f64; BLOCK] {
-    let position = run.position + run.step * first;
-    let mut block = [0.0; BLOCK];
-    // As many steps as a window has.
-    if run.step * (BLOCK as u64 - 1) > 63 * CODE_ONE {
-        for (k, value) in (0..).zip(&mut block) {
-            *value = sign(run.bits, ((position + run.step * k) / CODE_ONE) as usize);
-        }
-        return block;
-    }
-    let signs = window(run.bits, (position / CODE_ONE) as usize);
-    let mut steps = [0; BLOCK];
-    for (steps, k) in steps.iter_mut().zip(0..) {
-        *steps = (position % CODE_ONE + run.step * k) / CODE_ONE;
-    }
-    for (value, steps) in block.iter_mut().zip(steps) {
-        *value = signed(1.0, signs << (steps & 63));
-    }
-    block
-}
-
-/// The code's mean over the samples of a block, of one step at most each.
-#[inline(always)]
-fn area(run: &Run<'_>, first: u64) -> [f64; BLOCK] {
-    let position = run.position + run.step * first - run.step / 2;
-    let signs = window(run.bits, (position / CODE_ONE) as usize);
-    let changes = signs ^ signs << 1;
-    let scale = -2.0 / run.step as f64;
-    let mut block = [0.0; BLOCK];
-    for (value, k) in block.iter_mut().zip(0..) {
-        let from = position % CODE_ONE + run.step * k;
-        let behind = (from % CODE_ONE + run.step).saturating_sub(CODE_ONE) as i64 as f64;
-        let changed = ((changes << (from / CODE_ONE)) as i64 >> 63) as u64;
-        let mean = 1.0 + scale * f64::from_bits(behind.to_bits() & changed);
-        *value = signed(mean, signs << (from / CODE_ONE));
-    }
-    block
-}
-
-/// A value with its sign turned by the first of `signs`.
-#[inline(always)]
-fn signed(value: f64, signs: u64) -> f64 {
-    f64::from_bits(value.to_bits() ^ (signs & 1 << 63))
 }
 
 /// Cosine and sine of phases in 2^-64 turn.
@@ -286,7 +218,7 @@ mod tests {
     use crate::synth::band::Filter;
     use crate::synth::chips::CodeTime;
     use crate::synth::waveform::plain;
-    use crate::synth::{radians, reference};
+    use crate::synth::{CODE_ONE, radians, reference};
     use gnss::gps::l1ca::L1_CA;
 
     #[test]
@@ -314,10 +246,18 @@ mod tests {
                     let mut bits = Vec::new();
                     let position = spreading.strip(at, step, length, |period| period % 2 == 1, &mut bits);
                     let turns_step = 0x0765_4321_0fed_cba9;
-                    let run = Run { bits: &bits, position, step, turns: 0x1234 << 48, turns_step, amplitude: 1.0 };
+                    let run = Run {
+                        bits: &bits,
+                        position,
+                        step,
+                        turns: 0x1234 << 48,
+                        turns_step,
+                        amplitude: 1.0,
+                        pulse: None,
+                    };
                     let (mut i, mut q, mut scratch) = (vec![0.0; length], vec![0.0; length], Scratch::default());
                     let (mut ri, mut rq) = (i.clone(), q.clone());
-                    accumulate(edge, &[run], &mut i, &mut q, &mut scratch);
+                    accumulate(edge, &[&[run]], &mut i, &mut q, &mut scratch);
                     reference::accumulate(edge, &run, &mut ri, &mut rq);
                     for n in 0..length {
                         // One f32 rounding of a value up to 1.2; f64 sums in another order leave 1e-15,

@@ -50,20 +50,7 @@ impl Level {
 }
 
 /// [`lanes::accumulate`] on one instruction set; the baseline where the processor lacks it.
-pub fn accumulate(level: Level, edge: Edge<'_>, runs: &[Run<'_>], i: &mut [f32], q: &mut [f32], buffers: &mut Buffers) {
-    match level {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: the processor has these instructions.
-        Level::Avx512 if level.is_available() => unsafe { accumulate_avx512(edge, runs, i, q, buffers) },
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: the processor has these instructions.
-        Level::Avx2 if level.is_available() => unsafe { accumulate_avx2(edge, runs, i, q, buffers) },
-        _ => lanes::accumulate(edge, runs, i, q, buffers),
-    }
-}
-
-/// [`lanes::accumulate_rays`] on one instruction set; the baseline where the processor lacks it.
-pub fn accumulate_rays(
+pub fn accumulate(
     level: Level,
     edge: Edge<'_>,
     rays: &[&[Run<'_>]],
@@ -74,31 +61,19 @@ pub fn accumulate_rays(
     match level {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: the processor has these instructions.
-        Level::Avx512 if level.is_available() => unsafe { rays_avx512(edge, rays, i, q, buffers) },
+        Level::Avx512 if level.is_available() => unsafe { accumulate_avx512(edge, rays, i, q, buffers) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: the processor has these instructions.
-        Level::Avx2 if level.is_available() => unsafe { rays_avx2(edge, rays, i, q, buffers) },
-        _ => lanes::accumulate_rays(edge, rays, i, q, buffers),
+        Level::Avx2 if level.is_available() => unsafe { accumulate_avx2(edge, rays, i, q, buffers) },
+        _ => lanes::accumulate(edge, rays, i, q, buffers),
     }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn rays_avx512(edge: Edge<'_>, rays: &[&[Run<'_>]], i: &mut [f32], q: &mut [f32], buffers: &mut Buffers) {
-    lanes::accumulate_rays(edge, rays, i, q, buffers);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn rays_avx2(edge: Edge<'_>, rays: &[&[Run<'_>]], i: &mut [f32], q: &mut [f32], buffers: &mut Buffers) {
-    lanes::accumulate_rays(edge, rays, i, q, buffers);
 }
 
 /// [`exact::accumulate`] on one instruction set; the baseline where the processor lacks it.
 pub fn accumulate_exact(
     level: Level,
     edge: Edge<'_>,
-    runs: &[Run<'_>],
+    rays: &[&[Run<'_>]],
     i: &mut [f32],
     q: &mut [f32],
     scratch: &mut exact::Scratch,
@@ -106,24 +81,24 @@ pub fn accumulate_exact(
     match level {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: the processor has these instructions.
-        Level::Avx512 if level.is_available() => unsafe { exact_avx512(edge, runs, i, q, scratch) },
+        Level::Avx512 if level.is_available() => unsafe { exact_avx512(edge, rays, i, q, scratch) },
         #[cfg(target_arch = "x86_64")]
         // SAFETY: the processor has these instructions.
-        Level::Avx2 if level.is_available() => unsafe { exact_avx2(edge, runs, i, q, scratch) },
-        _ => exact::accumulate(edge, runs, i, q, scratch),
+        Level::Avx2 if level.is_available() => unsafe { exact_avx2(edge, rays, i, q, scratch) },
+        _ => exact::accumulate(edge, rays, i, q, scratch),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn exact_avx512(edge: Edge<'_>, runs: &[Run<'_>], i: &mut [f32], q: &mut [f32], scratch: &mut exact::Scratch) {
-    exact::accumulate(edge, runs, i, q, scratch);
+fn exact_avx512(edge: Edge<'_>, rays: &[&[Run<'_>]], i: &mut [f32], q: &mut [f32], scratch: &mut exact::Scratch) {
+    exact::accumulate(edge, rays, i, q, scratch);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn exact_avx2(edge: Edge<'_>, runs: &[Run<'_>], i: &mut [f32], q: &mut [f32], scratch: &mut exact::Scratch) {
-    exact::accumulate(edge, runs, i, q, scratch);
+fn exact_avx2(edge: Edge<'_>, rays: &[&[Run<'_>]], i: &mut [f32], q: &mut [f32], scratch: &mut exact::Scratch) {
+    exact::accumulate(edge, rays, i, q, scratch);
 }
 
 /// [`noise::add_block`] on one instruction set; the baseline where the processor lacks it.
@@ -226,14 +201,14 @@ fn pack_avx2(format: Format, i: &[f32], q: &[f32], out: &mut [u8]) -> u64 {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn accumulate_avx512(edge: Edge<'_>, runs: &[Run<'_>], i: &mut [f32], q: &mut [f32], buffers: &mut Buffers) {
-    lanes::accumulate(edge, runs, i, q, buffers);
+fn accumulate_avx512(edge: Edge<'_>, rays: &[&[Run<'_>]], i: &mut [f32], q: &mut [f32], buffers: &mut Buffers) {
+    lanes::accumulate(edge, rays, i, q, buffers);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn accumulate_avx2(edge: Edge<'_>, runs: &[Run<'_>], i: &mut [f32], q: &mut [f32], buffers: &mut Buffers) {
-    lanes::accumulate(edge, runs, i, q, buffers);
+fn accumulate_avx2(edge: Edge<'_>, rays: &[&[Run<'_>]], i: &mut [f32], q: &mut [f32], buffers: &mut Buffers) {
+    lanes::accumulate(edge, rays, i, q, buffers);
 }
 
 #[cfg(target_arch = "x86_64")]

@@ -9,10 +9,10 @@
 //! lane; code phases resolve 2^-27 chip.
 
 use super::angle::{cos_sin, ramp};
-use super::band::{Filter, HALF_WIDTH};
-use super::chips::{Changes, sign, window};
+use super::chips::window;
 use super::chorus::{self, Chord};
-use super::{CODE_BITS, CODE_ONE, Edge, RUN_SAMPLES, Run, dense, to_step};
+use super::waves::Waves;
+use super::{CODE_BITS, CODE_ONE, Edge, RUN_SAMPLES, Run};
 
 /// Samples on each side of a group's middle. The same on every instruction set, because rounding depends on
 /// it.
@@ -38,8 +38,9 @@ pub(super) type Side<T = f32> = [T; HALF];
 #[derive(Default)]
 pub struct Buffers {
     voices: Vec<Voice>,
-    wave: Vec<f32>,
     chords: Vec<Chord>,
+    /// On the heap: workers that wait for each other hold many of these.
+    waves: Box<Waves>,
 }
 
 /// A run made ready: its carrier, and the place of its code in each group.
@@ -101,6 +102,36 @@ impl Carrier {
             for k in 0..HALF {
                 (re[k], im[k]) = (re[k] * turn_re - im[k] * turn_im, re[k] * turn_im + im[k] * turn_re);
             }
+        }
+    }
+
+    /// Adds `amplitude` times a wave in phase with it over a group, its earlier half backwards.
+    #[inline(always)]
+    pub fn turn(&self, group: usize, amplitude: f32, [before, after]: &[Side; 2], sums: &mut Sums) {
+        let Self { cos, sin, re, im } = self;
+        let (Some(re), Some(im)) = (re.get(group), im.get(group)) else { return };
+        let (re, im) = (amplitude * re, amplitude * im);
+        for k in 0..HALF {
+            let (a, b, c, d) = (re * cos[k], im * sin[k], re * sin[k], im * cos[k]);
+            sums.i_before[k] += before[k] * (a + b);
+            sums.q_before[k] += before[k] * (d - c);
+            sums.i_after[k] += after[k] * (a - b);
+            sums.q_after[k] += after[k] * (d + c);
+        }
+    }
+
+    /// The same of a wave that is a quarter of a turn ahead of it.
+    #[inline(always)]
+    pub fn turn_ahead(&self, group: usize, amplitude: f32, [before, after]: &[Side; 2], sums: &mut Sums) {
+        let Self { cos, sin, re, im } = self;
+        let (Some(re), Some(im)) = (re.get(group), im.get(group)) else { return };
+        let (re, im) = (amplitude * re, amplitude * im);
+        for k in 0..HALF {
+            let (a, b, c, d) = (re * cos[k], im * sin[k], re * sin[k], im * cos[k]);
+            sums.i_before[k] -= before[k] * (d - c);
+            sums.q_before[k] += before[k] * (a + b);
+            sums.i_after[k] -= after[k] * (d + c);
+            sums.q_after[k] += after[k] * (a - b);
         }
     }
 }
@@ -173,65 +204,42 @@ impl Sums {
     }
 }
 
-/// Adds the sum of `runs` to planar samples; `i` and `q` have the same length, which is that of every run.
-/// At most [`RUN_SAMPLES`] of them.
+/// Adds rays to planar samples; `i` and `q` have the same length, which is that of every run, at most
+/// [`RUN_SAMPLES`]. The runs of a ray share a carrier ([`Run::shares_carrier`]).
 #[inline(always)]
-pub fn accumulate(edge: Edge<'_>, runs: &[Run<'_>], i: &mut [f32], q: &mut [f32], buffers: &mut Buffers) {
-    let Buffers { voices, wave, .. } = buffers;
-    if voices.len() < runs.len() {
-        voices.resize_with(runs.len(), Voice::default);
+pub fn accumulate(edge: Edge<'_>, rays: &[&[Run<'_>]], i: &mut [f32], q: &mut [f32], buffers: &mut Buffers) {
+    let Buffers { chords, waves, .. } = buffers;
+    match edge {
+        Edge::Nearest => pass::<false>(rays, i, q, buffers),
+        Edge::Area => pass::<true>(rays, i, q, buffers),
+        Edge::BandLimited(_) => chorus::accumulate_ready(edge, rays, chords, waves, i, q),
     }
-    // Steps longer than a sample do not fit in the window.
-    let dense = |run: &Run<'_>| run.step > CODE_ONE;
-    for runs in runs.chunk_by(|a, b| dense(a) == dense(b)) {
-        match edge {
-            Edge::Nearest if !runs.iter().any(dense) => fused::<false>(runs, voices, i, q),
-            Edge::Area if !runs.iter().any(dense) => fused::<true>(runs, voices, i, q),
-            // Loops, here and below: the compiler may take a closure out of a function and leave its
-            // instruction set behind.
-            Edge::Nearest | Edge::Area => {
-                for run in runs {
-                    wave.clear();
-                    wave.resize(i.len(), 0.0);
-                    if let Edge::Area = edge {
-                        dense::means(run, run.position, wave, |mean| mean as f32);
-                    } else {
-                        for (value, n) in wave.iter_mut().zip(0..) {
-                            *value = sign(run.bits, ((run.position + run.step * n) / CODE_ONE) as usize) as f32;
-                        }
-                    }
-                    rotate(run, wave, voices, i, q);
-                }
-            }
-            Edge::BandLimited(filter) => {
-                for run in runs {
-                    let skip = band_limited(filter, run, i.len(), wave);
-                    rotate(run, wave.get(skip..).unwrap_or(&[]), voices, i, q);
-                }
-            }
+}
+
+/// Codes and carriers in one pass, of rays of one run of sparse steps and of others in turn.
+#[inline(always)]
+fn pass<const AREA: bool>(rays: &[&[Run<'_>]], i: &mut [f32], q: &mut [f32], buffers: &mut Buffers) {
+    for rays in rays.chunk_by(|a, b| is_plain(a) == is_plain(b)) {
+        if rays.first().is_some_and(|runs| is_plain(runs)) {
+            let runs: Vec<Run<'_>> = rays.iter().flat_map(|runs| runs.iter().copied()).collect();
+            fused::<AREA>(&runs, &mut buffers.voices, i, q);
+        } else {
+            chorus::accumulate::<AREA>(rays, &mut buffers.chords, i, q);
         }
     }
 }
 
-/// Adds rays of several runs, each at once where their runs allow it.
-#[inline(always)]
-pub fn accumulate_rays(edge: Edge<'_>, rays: &[&[Run<'_>]], i: &mut [f32], q: &mut [f32], buffers: &mut Buffers) {
-    for rays in rays.chunk_by(|a, b| chorus::fits(edge, a) == chorus::fits(edge, b)) {
-        match edge {
-            _ if !rays.iter().all(|runs| chorus::fits(edge, runs)) => {
-                for runs in rays {
-                    accumulate(edge, runs, i, q, buffers);
-                }
-            }
-            Edge::Nearest => chorus::accumulate::<false>(rays, &mut buffers.chords, i, q),
-            Edge::Area | Edge::BandLimited(_) => chorus::accumulate::<true>(rays, &mut buffers.chords, i, q),
-        }
-    }
+/// Whether a ray is one run of at most one code step a sample.
+fn is_plain(runs: &[Run<'_>]) -> bool {
+    matches!(runs, [run] if run.step <= CODE_ONE)
 }
 
 /// Codes and carriers in one pass, for at most one code step a sample.
 #[inline(always)]
-fn fused<const AREA: bool>(runs: &[Run<'_>], voices: &mut [Voice], i: &mut [f32], q: &mut [f32]) {
+fn fused<const AREA: bool>(runs: &[Run<'_>], voices: &mut Vec<Voice>, i: &mut [f32], q: &mut [f32]) {
+    if voices.len() < runs.len() {
+        voices.resize_with(runs.len(), Voice::default);
+    }
     for (run, voice) in runs.iter().zip(&mut *voices) {
         voice.anchor::<AREA>(run);
     }
@@ -287,67 +295,4 @@ fn chip<const AREA: bool>(place: u32, now: u32, changes: u32, reach: u32) -> f32
 #[inline(always)]
 fn times<const AREA: bool>(chip: f32, x: f32) -> f32 {
     if AREA { chip * x } else { f32::from_bits(chip.to_bits() ^ x.to_bits()) }
-}
-
-/// Turns a ready waveform by the carrier.
-#[inline(always)]
-fn rotate(run: &Run<'_>, wave: &[f32], voices: &mut [Voice], i: &mut [f32], q: &mut [f32]) {
-    let Some(Voice { carrier, .. }) = voices.first_mut() else { return };
-    carrier.anchor(run, run.amplitude as f32);
-    let Carrier { cos, sin, re, im } = &*carrier;
-    let centres = re.iter().zip(im);
-    for (((i, q), wave), (re, im)) in i.chunks_mut(GROUP).zip(q.chunks_mut(GROUP)).zip(wave.chunks(GROUP)).zip(centres)
-    {
-        let mut padded = [0.0; GROUP];
-        let wave = <&[f32; GROUP]>::try_from(wave).unwrap_or_else(|_| {
-            padded.iter_mut().zip(wave).for_each(|(padded, value)| *padded = *value);
-            &padded
-        });
-        let mut sums = Sums::new();
-        for k in 0..HALF {
-            let (before, after) = (wave[HALF - 1 - k], wave[HALF + k]);
-            let (a, b, c, d) = (re * cos[k], im * sin[k], re * sin[k], im * cos[k]);
-            (sums.i_before[k], sums.q_before[k]) = (before * (a + b), before * (d - c));
-            (sums.i_after[k], sums.q_after[k]) = (after * (a - b), after * (d + c));
-        }
-        sums.add_to(i, q);
-    }
-}
-
-/// Writes the band-limited waveform with borders into `wave`, and returns the place of sample 0.
-///
-/// The square wave between edges, plus at each edge the filter's response minus the ideal step.
-#[inline(always)]
-fn band_limited(filter: &Filter, run: &Run<'_>, samples: usize, wave: &mut Vec<f32>) -> usize {
-    const BORDER: usize = 2 * HALF_WIDTH + 2;
-    wave.clear();
-    wave.resize(samples + 2 * BORDER, 0.0);
-    let reach = (HALF_WIDTH as u64 + 1) * run.step;
-    let first = (run.position - reach) / CODE_ONE;
-    let last = (run.position + run.step * samples as u64 + reach) / CODE_ONE;
-    let per_step = 1.0 / run.step as f64;
-    let mut filled = 0;
-    let mut changes = Changes::after(run.bits, first);
-    while changes.at / CODE_ONE <= last {
-        let new = if changes.signs >> 63 == 1 { -1.0 } else { 1.0 };
-        let x = to_step(run.position, changes.at / CODE_ONE) * per_step;
-        let place = x.ceil();
-        let at = (place as i64 + BORDER as i64).max(0) as usize;
-        if let Some(run) = wave.get_mut(filled..at) {
-            run.iter_mut().for_each(|w| *w -= new);
-        }
-        filled = filled.max(at);
-        if let Some(near) = at.checked_sub(HALF_WIDTH).and_then(|from| wave.get_mut(from..from + 2 * HALF_WIDTH)) {
-            let change = 2.0 * new;
-            for (w, r) in near.iter_mut().zip(filter.residual(place - x)) {
-                *w += change * r;
-            }
-        }
-        changes.advance();
-    }
-    let rest = sign(run.bits, last as usize) as f32;
-    if let Some(wave) = wave.get_mut(filled..) {
-        wave.iter_mut().for_each(|w| *w += rest);
-    }
-    BORDER
 }

@@ -1,13 +1,12 @@
 //! Rays and waveforms become samples: spreading codes, chip edges, carrier rotation.
 //!
-//! A [`Run`] is up to 4096 samples of one ray with constant carrier and code steps, both phases as
-//! fixed-point integers anchored at its first sample, so nothing accumulates from run to run.
+//! A [`Run`] is up to 4096 samples of one sequence of a ray with constant carrier and code steps, both phases
+//! as fixed-point integers anchored at its first sample, so nothing accumulates from run to run.
 //! [`mod@reference`] evaluates each sample in `f64`, [`exact`] the same at speed; [`lanes`] is the fast
-//! kernel, for all runs of a stretch at once as [`bank`] gathers them, and those of one ray together
-//! (`chorus`). Both are plain lane-array code that
-//! [`isa`] compiles for each instruction set with the same bits on all. What a component's layers and zeros
-//! come to are several sequences of ±1 ([`waveform`]), a run each. Limits: 15 code steps a sample; lanes fall
-//! back to a wave buffer above one step a sample, above 1.93 where several runs make a ray.
+//! kernel. Both take all rays of a stretch at once, as [`bank`] gathers them, and what the layers and zeros of
+//! a ray's components come to as several sequences of ±1 ([`waveform`]), a run each. They are plain lane-array
+//! code that [`isa`] compiles for each instruction set with the same bits on all. Limits: 15 code steps a
+//! sample.
 
 pub(crate) mod angle;
 pub mod band;
@@ -19,13 +18,16 @@ pub mod exact;
 pub mod isa;
 pub mod lanes;
 pub mod noise;
+pub mod pulse;
 pub mod reference;
 pub mod resample;
 mod responses;
 pub mod tone;
 pub mod waveform;
+mod waves;
 
 use band::Filter;
+use pulse::Pulse;
 
 use crate::fidelity::Arithmetic;
 
@@ -54,6 +56,28 @@ pub struct Run<'a> {
     pub turns_step: u64,
     /// Peak amplitude of the carrier, in LSB.
     pub amplitude: f64,
+    /// What band-limited edges make of a step: a pulse in place of a level.
+    pub pulse: Option<&'a Pulse>,
+}
+
+impl Run<'_> {
+    /// Whether one carrier turns both, a multiple of a quarter of a turn apart.
+    pub fn shares_carrier(&self, other: &Run<'_>) -> bool {
+        self.turns_step == other.turns_step && self.turns.wrapping_sub(other.turns) << 2 == 0
+    }
+
+    /// How many quarters of a turn it is ahead of one that shares its carrier, 0 to 3.
+    #[inline(always)]
+    fn quarters_ahead(&self, other: &Run<'_>) -> u64 {
+        self.turns.wrapping_sub(other.turns) >> (u64::BITS - 2)
+    }
+
+    /// Whether both have the same pulse and their chips at the same places.
+    fn pulses_with(&self, other: &Run<'_>) -> bool {
+        let same = |(a, b): (&Pulse, &Pulse)| std::ptr::eq(a, b);
+        let places = |run: &Run<'_>| (run.position, run.step);
+        self.pulse.zip(other.pulse).is_some_and(same) && places(self) == places(other)
+    }
 }
 
 /// From a position to the beginning of a code step, Q16.48 steps. Steps of a run reach beyond 2^15, so

@@ -22,6 +22,9 @@ pub fn waveform(edge: Edge<'_>, run: &Run<'_>, position: u64) -> f64 {
         Edge::Nearest => sign(run.bits, (position / CODE_ONE) as usize),
         Edge::Area => mean(run, position - run.step / 2, position - run.step / 2 + run.step),
         Edge::BandLimited(filter) => {
+            if let Some(pulse) = run.pulse {
+                return pulse.waveform(filter, run, position);
+            }
             let reach = HALF_WIDTH as u64 * run.step;
             let (first, last) = ((position - reach) / CODE_ONE, (position + reach) / CODE_ONE);
             let mut value = sign(run.bits, first as usize);

@@ -197,6 +197,11 @@ impl<T: Number> Default for Sums<T> {
     }
 }
 
+/// Vectors of eight doubles, or of as many bytes, in the response to an edge at so many steps a sample.
+pub(super) fn edge_vectors(step: f64) -> f64 {
+    if step * CODE_ONE as f64 <= LONGEST_IN_UNITS as f64 { 1.0 } else { 2.0 }
+}
+
 /// Writes the code behind the filter at the samples of a tile, of which the run's first is the first.
 #[inline(always)]
 pub fn waveform(filter: &Filter, run: &Run<'_>, wave: &mut [f64; TILE], scratch: &mut Responses) {
@@ -397,7 +402,7 @@ mod tests {
                 // On samples, as near to them as positions are counted, and between them.
                 let first = MARGIN_STEPS * CODE_ONE;
                 for position in [first, first + 1, first + CODE_ONE - 1, first + step / 3] {
-                    let run = Run { bits: &bits, position, step, turns: 0, turns_step: 0, amplitude: 1.0 };
+                    let run = Run { bits: &bits, position, step, turns: 0, turns_step: 0, amplitude: 1.0, pulse: None };
                     let mut wave = [0.0; TILE];
                     waveform(&filter, &run, &mut wave, &mut scratch);
                     // As documented for each of the changes in reach.

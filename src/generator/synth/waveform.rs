@@ -13,7 +13,10 @@ use std::sync::Arc;
 use thiserror::Error;
 
 use super::Edge;
+use super::band::Filter;
 use super::chips::{MAX_STEP, Pace, Spreading, packed, window};
+use super::pulse::Pulse;
+use super::responses::edge_vectors;
 use gnss::satellite::Sv;
 use gnss::signal::{Component, Layer, Layers, Link, Signal};
 
@@ -26,6 +29,35 @@ pub struct Voice {
     pub amplitude: f64,
     /// Carrier phase relative to the component's.
     pub phase_cycles: f64,
+    /// What the steps of the sequence are where they are no levels of ±1: chips behind a filter.
+    pub pulse: Option<Arc<Pulse>>,
+}
+
+/// One period of a sequence of a component's layers.
+struct Sequence {
+    /// −1, 0 or +1.
+    steps: Vec<i8>,
+    steps_hz: f64,
+    weight: f64,
+    phase_cycles: f64,
+    pulse: Option<Arc<Pulse>>,
+}
+
+/// Operations on eight doubles in a block of the response to a chip, and in a vector of that to an edge.
+const BLOCK_COST: f64 = 12.0;
+const EDGE_COST: f64 = 8.0;
+
+/// Operations that the edges of a layer take in a chip; between chips every second one is an edge.
+fn edges_cost(layer: &Layer, chips_a_sample: f64) -> f64 {
+    let within = layer.pulse.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    // A layer with zeros is two sequences.
+    let sequences = if layer.pulse.contains(&0) { 2.0 } else { 1.0 };
+    let vectors = edge_vectors(chips_a_sample * layer.pulse.len() as f64);
+    sequences * EDGE_COST * vectors * (within as f64 + 0.5)
+}
+
+fn least_common_multiple(a: usize, b: usize) -> usize {
+    (a..=a * b.max(1)).step_by(a.max(1)).find(|multiple| multiple.is_multiple_of(b.max(1))).unwrap_or(a)
 }
 
 /// A component's code and pulses for one satellite.
@@ -138,11 +170,12 @@ impl Waveform {
             }
         }
         let gain = 1.0 / self.power(edge, rate_hz).sqrt();
-        let apart = || layers.iter().map(|layer| (layer, self.steps(layer, layer.pulse.len()), steps_hz(layer)));
-        let turns = self.in_turn(layers).zip(layers.first());
-        let made = turns.map_or_else(|| apart().collect(), |((steps, steps_hz), layer)| vec![(layer, steps, steps_hz)]);
+        let made = match edge {
+            Edge::BandLimited(filter) => self.filtered(layers, filter, rate_hz),
+            Edge::Nearest | Edge::Area => self.sequences(layers),
+        };
         let mut voices = Vec::new();
-        for (layer, steps, steps_hz) in made {
+        for Sequence { steps, steps_hz, weight, phase_cycles, pulse } in made {
             let pace = Pace::new(steps.len(), steps_hz, self.link.signal.time).ok_or_else(|| {
                 let found = format!("{} steps at {steps_hz} Hz", steps.len());
                 self.refuse("code", found, "a rate of whole thousandths of a hertz, whose periods fill whole seconds")
@@ -150,8 +183,9 @@ impl Waveform {
             let negative: Vec<bool> = steps.iter().map(|&step| step < 0).collect();
             let voice = |negative: &[bool], share: f64| Voice {
                 spreading: Spreading::new(negative, pace, Arc::clone(&self.overlay)),
-                amplitude: gain * layer.weight * share,
-                phase_cycles: layer.phase_cycles,
+                amplitude: gain * weight * share,
+                phase_cycles,
+                pulse: pulse.clone(),
             };
             if steps.contains(&0) {
                 let other: Vec<bool> = steps.iter().map(|&step| step <= 0).collect();
@@ -161,6 +195,64 @@ impl Waveform {
             }
         }
         Ok(voices)
+    }
+
+    /// Layers as sequences of their steps: one for all that take turns, else one each.
+    fn sequences(&self, layers: &[Layer]) -> Vec<Sequence> {
+        let of = |(steps, steps_hz): (Vec<i8>, f64), layer: &Layer| Sequence {
+            steps,
+            steps_hz,
+            weight: layer.weight,
+            phase_cycles: layer.phase_cycles,
+            pulse: None,
+        };
+        if let Some((turns, first)) = self.in_turn(layers).zip(layers.first()) {
+            return vec![of(turns, first)];
+        }
+        let rate = |layer: &Layer| self.component.chip_rate_hz * layer.pulse.len() as f64;
+        layers.iter().map(|layer| of((self.steps(layer, layer.pulse.len()), rate(layer)), layer)).collect()
+    }
+
+    /// The same behind a filter: layers of one phase are one sequence of chips with a pulse where the response
+    /// to a chip costs less than those to its edges.
+    fn filtered(&self, layers: &[Layer], filter: &Filter, rate_hz: f64) -> Vec<Sequence> {
+        if self.chips.contains(&0) || layers.iter().any(|layer| !layer.chips.is_empty()) {
+            return self.sequences(layers);
+        }
+        let chips_a_sample = self.component.chip_rate_hz / rate_hz;
+        // A layer that is half a turn apart is one with the other sign.
+        let sign = |layer: &Layer, first: &Layer| match (layer.phase_cycles - first.phase_cycles).rem_euclid(1.0) {
+            0.0 => Some(1.0),
+            0.5 => Some(-1.0),
+            _ => None,
+        };
+        let in_phase = |a: &Layer, b: &Layer| sign(a, b).is_some();
+        let mut made = Vec::new();
+        for layers in layers.chunk_by(in_phase) {
+            let edges_cost: f64 = layers.iter().map(|layer| edges_cost(layer, chips_a_sample)).sum();
+            let cost = Pulse::blocks(chips_a_sample).map(|blocks| BLOCK_COST * blocks as f64);
+            let levels = || {
+                let count = layers.iter().map(|layer| layer.pulse.len()).fold(1, least_common_multiple);
+                let level = |layer: &Layer, step: usize| {
+                    let sign = layers.first().and_then(|first| sign(layer, first)).unwrap_or(0.0);
+                    let step = layer.pulse.get(step * layer.pulse.len() / count).copied().unwrap_or(0);
+                    sign * layer.weight * f64::from(step)
+                };
+                (0..count).map(|step| layers.iter().map(|layer| level(layer, step)).sum()).collect::<Vec<f64>>()
+            };
+            let pulse = cost.filter(|cost| *cost < edges_cost).and_then(|_| filter.pulse(&levels(), chips_a_sample));
+            match (pulse, layers) {
+                (Some(pulse), [first, ..]) => made.push(Sequence {
+                    steps: self.chips.clone(),
+                    steps_hz: self.component.chip_rate_hz,
+                    weight: 1.0,
+                    phase_cycles: first.phase_cycles,
+                    pulse: Some(pulse),
+                }),
+                _ => made.extend(self.sequences(layers)),
+            }
+        }
+        made
     }
 
     /// Layers that take turns, chip by chip, as the one sequence that they are, with its rate of steps.

@@ -17,7 +17,7 @@ fn plan(text: &str) -> Plan {
         longest_knot_spacing_s: 0.5,
         knot_reason: "a test".to_owned(),
         block_bytes: 1 << 20,
-        satellite_samples_per_s: 1e8,
+        knots_s: 0.5,
     };
     Plan::new(&scene, machinery, Levels::new(&scene).unwrap()).unwrap()
 }
@@ -35,8 +35,10 @@ fn the_static_scene_has_the_satellites_that_its_comment_promises() {
     assert!((6.5..7.5).contains(&lowest.elevation_deg), "{plan}");
     assert!(plan.satellites.iter().all(|s| s.appears.is_none() && s.leaves.is_none()), "{plan}");
     assert_eq!((plan.samples, plan.bytes), (156_000_000, 312_000_000));
-    // 156e6 samples of 12 satellites at 1e8 a second.
-    assert!((plan.time_s - 18.72).abs() < 1e-9 && plan.speed_mps == 0.0);
+    // What was measured, for all samples and knots: of one signal of twelve satellites.
+    let expected_s = 156e6 * 1e-9 * plan.sample_ns + plan.machinery.knots_s;
+    assert!((plan.time_s / expected_s - 1.0).abs() < 1e-9 && plan.sample_ns > 0.0 && plan.speed_mps == 0.0);
+    assert!((plan.sample_ns / plan.signal_sample_ns / 12.0 - 1.0).abs() < 1e-9);
     // The link budget's reach from 5 degrees to the zenith.
     assert!(plan.satellites.iter().all(|s| s.cn0_dbhz.is_some_and(|x| (37.0..52.0).contains(&x))), "{plan}");
 }
@@ -62,7 +64,6 @@ fn every_knob_is_named_with_its_choice_its_error_and_its_cost() {
     let reference = plan(&format!("{bare}[fidelity]\nlevel = \"reference\"\ncode_edge = \"area\"\n"));
     let text = reference.to_string();
     assert!(text.contains("area (own)") && text.contains("fidelity reference"), "{text}");
-    assert!(reference.satellite_sample_ns > plan(bare).satellite_sample_ns);
     // Without noise there is nothing for its knob to do.
     let free = plan(include_str!("../../../scenarios/noise_free.toml"));
     assert!(free.knobs.iter().all(|choice| choice.knob != "noise"));

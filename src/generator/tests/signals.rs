@@ -171,11 +171,12 @@ fn rendered(
     samples: usize,
 ) -> Vec<Complex64> {
     let mut sum = vec![Complex64::ZERO; samples];
-    for Voice { spreading, amplitude, phase_cycles } in voices {
+    for Voice { spreading, amplitude, phase_cycles, pulse } in voices {
         let step = (spreading.pace().step_rate_hz() / rate_hz * CODE_ONE as f64) as u64;
         let mut bits = Vec::new();
         let position = spreading.strip(spreading.at(start, 0.0), step, samples, |_| false, &mut bits);
-        let run = Run { bits: &bits, position, step, turns: 0, turns_step: 0, amplitude: 1.0 };
+        let pulse = pulse.as_deref();
+        let run = Run { bits: &bits, position, step, turns: 0, turns_step: 0, amplitude: 1.0, pulse };
         let factor = Complex64::from_polar(amplitude / gain, TAU * phase_cycles);
         for (n, sum) in sum.iter_mut().enumerate() {
             *sum += factor * reference::waveform(edge, &run, position + step * n as u64);
@@ -255,15 +256,16 @@ fn stretches(waveform: &Waveform, kernel: Kernel<'_>, rate_hz: f64, count: u32, 
     let mut bank = Bank::default();
     let stretch = |k: u32| {
         let at = Epoch::new(WEEK + 1000, 0.0).plus_s(f64::from(k) * apart_s);
-        for (part, Voice { spreading, amplitude, phase_cycles }) in voices.iter().enumerate() {
+        for (part, Voice { spreading, amplitude, phase_cycles, pulse }) in voices.iter().enumerate() {
             let step = (spreading.pace().step_rate_hz() / rate_hz * CODE_ONE as f64) as u64;
-            bank.push((0, RUN_SAMPLES as u64), part, 0..RUN_SAMPLES, |bits| Run {
+            bank.push((0, RUN_SAMPLES as u64), part, 0..RUN_SAMPLES, pulse.as_ref(), |bits| Run {
                 bits: &[],
                 position: spreading.strip(spreading.at(at, 0.0), step, RUN_SAMPLES, |_| false, bits),
                 step,
                 turns: (phase_cycles.rem_euclid(1.0) * 18_446_744_073_709_551_616.0) as u64,
                 turns_step: 0,
                 amplitude: *amplitude,
+                pulse: None,
             });
         }
         let (mut i, mut q) = (vec![0.0; RUN_SAMPLES], vec![0.0; RUN_SAMPLES]);

@@ -24,6 +24,7 @@ use crate::sky;
 use crate::spoof::Constellation;
 use crate::synth::bank::Bank;
 use crate::synth::chips::{CodeTime, Spreading};
+use crate::synth::pulse::Pulse;
 use crate::synth::waveform::{Voice, Waveform};
 use crate::synth::{CODE_ONE, Edge, RUN_SAMPLES, Run};
 use gnss::broadcast::OrbitError;
@@ -40,6 +41,7 @@ const DENSE_BREAKS: f64 = 5.0;
 /// A sequence of ±1 of a component.
 struct Sent {
     spreading: Spreading,
+    pulse: Option<Arc<Pulse>>,
     data: Option<Data>,
     /// Of the amplitude, for unit mean power of the component's waveform and its share.
     gain: f64,
@@ -157,12 +159,13 @@ impl Transmitter {
         let (mut sent, symbols) = (Vec::new(), Symbols::new(signal));
         for (index, component) in signal.components.iter().enumerate() {
             let Some(waveform) = Waveform::new(signal.link(sv), index)? else { return Ok(None) };
-            for Voice { spreading, amplitude, phase_cycles } in
+            for Voice { spreading, amplitude, phase_cycles, pulse } in
                 waveform.voices(scene.fidelity.waveform, edge, rate_hz)?
             {
                 let cycles = component.phase_cycles + phase_cycles;
                 sent.push(Sent {
                     spreading,
+                    pulse,
                     data: symbols.of(component),
                     gain: component.power_share.sqrt() * amplitude,
                     turns: turns(if scene.metadata.inverted { -cycles } else { cycles }),
@@ -427,13 +430,14 @@ impl Transmitter {
                 }
                 negative
             };
-            bank.push((anchor.n, end), sent.part, samples.clone(), |bits| Run {
+            bank.push((anchor.n, end), sent.part, samples.clone(), sent.pulse.as_ref(), |bits| Run {
                 bits: &[],
                 position: sent.spreading.strip(at, step, samples.len(), negative, bits),
                 step,
                 turns: carrier.0.wrapping_add(sent.turns),
                 turns_step: carrier.1,
                 amplitude: amplitude * sent.gain,
+                pulse: None,
             });
         }
     }

@@ -144,7 +144,10 @@ fn a_signal_outside_the_band_is_refused_where_it_is_the_only_one() {
 
 #[test]
 fn noise_and_strong_signals_decide_how_good_balanced_edges_are() {
-    let edge = |tables: &str| parse(&format!("{MINIMAL}{STATIC}{tables}")).unwrap().front_ends[0].fidelity.code_edge;
+    let edge = |tables: &str| {
+        let scenario = parse(&format!("{MINIMAL}{STATIC}{tables}")).unwrap();
+        scenario.front_ends[0].fidelity.suited(2.6e6, &[&L1_CA]).code_edge
+    };
     assert_eq!(edge("[noise]\n"), CodeEdge::Area);
     assert_eq!(edge("[power]\ncn0_dbhz = 80\n"), CodeEdge::Area);
     assert_eq!(edge("[noise]\n[power]\ncn0_dbhz = 80\n"), CodeEdge::BandLimited);

@@ -42,7 +42,7 @@ pub enum ChipEdge {
     /// By the share of the sample on either side.
     Area,
     /// Through a low-pass filter.
-    BandLimited(Box<Filter>),
+    BandLimited(Arc<Filter>),
 }
 
 /// What an interferer sends.
@@ -399,8 +399,9 @@ impl Interferer {
             turns: anchor.turns.wrapping_add(anchor.turns_step.wrapping_mul(from)),
             turns_step: anchor.turns_step,
             amplitude: anchor.amplitude * edge.gain(&[1.0], step as f64 / CODE_ONE as f64),
+            pulse: None,
         };
-        isa::accumulate(level, edge, &[run], i, q, &mut Buffers::default());
+        isa::accumulate(level, edge, &[&[run]], i, q, &mut Buffers::default());
     }
 
     fn resampled(
