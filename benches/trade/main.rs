@@ -24,6 +24,7 @@ use gnss_twin::generator::scenario::{Overrides, Scenario};
 use gnss_twin::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade, Scene};
 use gnss_twin::generator::stream::{Options, generate_with};
 use gnss_twin::generator::truth;
+use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::gnss::signal::Signal;
 use gnss_twin::receiver::output::Output;
@@ -281,7 +282,9 @@ fn position(fidelity: Fidelity) -> [f64; 3] {
 fn settings(rate_msps: f64) -> Vec<(String, Fidelity)> {
     let mut found: Vec<(String, Fidelity)> = Grade::NAMES
         .iter()
-        .map(|(name, grade)| ((*name).to_owned(), Fidelity::suited(*grade, rate_msps * 1e6, allowed_m(None))))
+        .map(|(name, grade)| {
+            ((*name).to_owned(), Fidelity::suited(*grade, rate_msps * 1e6, allowed_m(None), &[&L1_CA]))
+        })
         .collect();
     for (carrier_name, carrier) in Arithmetic::NAMES {
         for (edge_name, code_edge) in CodeEdge::NAMES {
