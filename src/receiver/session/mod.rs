@@ -208,6 +208,7 @@ impl Session {
             }
         }
         warnings.extend(self.assumed_era());
+        warnings.extend(self.shared.refusals().iter().map(ToString::to_string));
         warnings
     }
 
