@@ -200,6 +200,12 @@ impl Session {
                 continue;
             }
             warnings.extend(suited::warnings(&front_end.metadata, &front_end.settings));
+            warnings.extend(front_end.doubles.iter().map(|(weaker, stronger)| {
+                format!(
+                    "{weaker} was found at the delay and Doppler of {} and weaker: it is taken for that signal",
+                    stronger.sv
+                )
+            }));
             if several && front_end.gap.unknown.is_some() {
                 warnings.push(format!(
                     "front end {} lost samples, and no satellite shows how many: it is left out of fixes since",
@@ -244,9 +250,9 @@ impl Session {
         self.front_ends.iter().any(|front_end| front_end.searched)
     }
 
-    /// Searches recordings that ended before the first search had all the samples that it asks for.
-    pub fn search_rest(&mut self, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+    /// Searches recordings of so many samples of the first front end that ended before a second search.
+    pub fn search_rest(&mut self, samples: u64, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let each = &mut self.front_ends.iter_mut();
-        each.try_for_each(|front_end| front_end.search_rest(&mut self.shared, sink))
+        each.try_for_each(|front_end| front_end.search_rest(front_end.step.own(samples), &mut self.shared, sink))
     }
 }
