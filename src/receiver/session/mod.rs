@@ -8,7 +8,7 @@
 
 use crate::correlate::layers_refusal;
 use crate::diagnosis::Stage;
-use crate::lead::{lead, refusal, undated};
+use crate::lead::{lead, refusal};
 use crate::outcome::{Conditioning, Outcome, ReceiveError};
 use crate::output::Sink;
 use crate::position::Noises;
@@ -59,9 +59,6 @@ impl Session {
         let assigned = suited::assigned(metadata, &settings.acquisition.signals());
         let all = assigned.iter().flatten();
         if let Some((signal, reason)) = all.filter_map(|signal| Some((signal, refusal(signal)?))).next() {
-            return Err(ReceiveError::Unsupported { signal: signal.name, reason });
-        }
-        if let Some((signal, reason)) = undated(&assigned.concat()) {
             return Err(ReceiveError::Unsupported { signal: signal.name, reason });
         }
         for (metadata, signals) in metadata.iter().zip(&assigned) {
