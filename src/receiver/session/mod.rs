@@ -211,6 +211,7 @@ impl Session {
             }
         }
         warnings.extend(self.assumed_era());
+        warnings.extend(self.shared.solver.other_troposphere().map(str::to_owned));
         warnings.extend(self.shared.refusals().iter().map(ToString::to_string));
         warnings
     }
