@@ -12,6 +12,7 @@ use crate::acquire::{self, AcquireError, Acquired, Searcher};
 use crate::correlate::fixed::FixedSamples;
 use crate::correlate::sums::{RunningSums, Samples};
 use crate::decode::Decoder;
+use crate::followed;
 use crate::interference::{Followed, Watch};
 use crate::lead::{lead, other_side};
 use crate::looks::Looks;
@@ -362,7 +363,8 @@ pub(super) fn noise(signal: &'static Signal, metadata: &IfMetadata, settings: &S
         share: power_share * model.as_ref().map_or(1.0, |model| model.efficiency),
         shape: model.map_or(CodeShape::triangle(tracking.spacing_chips), |model| model.shape),
         bandwidth_hz: tracking.dll_bandwidth_hz,
-        integration_s: period_s * f64::from(tracking.integration),
+        integration_s: followed::Followed::of(signal, settings)
+            .map_or(period_s * f64::from(tracking.integration), |followed| followed.integration_s),
     }
 }
 
