@@ -341,8 +341,8 @@ fn latency(text: &str) -> Result<f64, String> {
     after_help = "Examples:\n  gnss-twin receive if.sigmf-data --out reports/mine\n  gnss-twin receive raw.bin --out \
                   reports/raw --format ci8 --rate-hz 4e6\n  gnss-twin receive rtl-tcp:1234 --rate-hz 2.4e6 --out \
                   reports/now --live --nmea tcp:10110 --json -\n\nExit code: 0 with a fix, 2 for a command line \
-                  that is refused, 3 without a fix (results are written, the reason is printed), 74 when the sender broke off (results end there), 130 after \
-                  Ctrl-C with --live, 65 when the input is no recording"
+                  that is refused, 3 without a fix (results are written, the reason is printed), 74 when the sender \
+                  broke off (results end there), 130 after Ctrl-C with --live, 65 when the input is no recording"
 )]
 pub struct Receive {
     /// Recording: a SigMF pair (either file), archive (.sigmf) or collection of front ends that share a

@@ -120,8 +120,8 @@ impl fmt::Display for Look {
     }
 }
 
-/// Whether both halves of a byte have one law, as samples that are packed into them have, and not an even one.
-/// Halves of whole numbers differ: the higher is the rougher half of one number.
+/// Whether both halves of a byte have one law, as samples that are packed into them have, and not an even
+/// one. Halves of whole numbers differ: the higher is the rougher half of one number.
 fn are_packed(bytes: &[u8]) -> bool {
     let mut counts = [[0_u32; 16]; 2];
     for byte in bytes {

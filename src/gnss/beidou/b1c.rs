@@ -60,9 +60,9 @@ pub static B1C: Signal = Signal {
     ],
 };
 
-/// First and last number that satellites of the third generation in medium and inclined orbits have been given
-/// (BDS-SIS-ICD-B1C 1.0, 4.2, and navigation files up to 2026). Those of other numbers have codes and do not
-/// send it.
+/// First and last number that satellites of the third generation in medium and inclined orbits have been
+/// given (BDS-SIS-ICD-B1C 1.0, 4.2, and navigation files up to 2026). Those of other numbers have codes and
+/// do not send it.
 pub const THIRD_GENERATION: [u8; 2] = [19, 50];
 
 /// Since when numbers send it.

@@ -133,10 +133,10 @@ impl FrontEnd {
         Ok((!near.0.is_empty()).then_some(Some(near)))
     }
 
-    /// Searches the first samples of a recording that ended before a second search was due, all that there are
-    /// up to [`OPENING_S`]: once as any recording's, where there was no search yet, and then by as many sums as
-    /// there is room for, beside what was found and where the next search would have looked. Ranges get wider
-    /// while there are too few satellites for a fix.
+    /// Searches the first samples of a recording that ended before a second search was due, all that there
+    /// are up to [`OPENING_S`]: once as any recording's, where there was no search yet, and then by as many
+    /// sums as there is room for, beside what was found and where the next search would have looked. Ranges
+    /// get wider while there are too few satellites for a fix.
     ///
     /// A signal for which there is no room is left out: there are sums of one code period where two do not
     /// fit.
@@ -369,8 +369,8 @@ mod tests {
     fn a_short_recording_is_searched_to_its_end_and_beyond_the_usual_dopplers() {
         let metadata = metadata(Format::Ci8, 2.6e6, 0.0, false);
         let sent = |prn, doppler_hz, cn0_dbhz| Sent { prn, doppler_hz, phase_chips: 37.3 * f64::from(prn), cn0_dbhz };
-        // A sky whose middle is far from zero, one of it beyond 5 kHz, and two whose powers of 20 ms are below
-        // the threshold: 20 + 2 · 20 ms · 2000 Hz, less two decibels, is 71, where 95 are asked for.
+        // A sky whose middle is far from zero, one of it beyond 5 kHz, and two whose powers of 20 ms are
+        // below the threshold: 20 + 2 · 20 ms · 2000 Hz, less two decibels, is 71, where 95 are asked for.
         let sky = [
             sent(3, 300.0, 46.0),
             sent(7, -1750.0, 45.0),
