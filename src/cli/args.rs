@@ -340,9 +340,9 @@ fn latency(text: &str) -> Result<f64, String> {
 #[command(
     after_help = "Examples:\n  gnss-twin receive if.sigmf-data --out reports/mine\n  gnss-twin receive raw.bin --out \
                   reports/raw --format ci8 --rate-hz 4e6\n  gnss-twin receive rtl-tcp:1234 --rate-hz 2.4e6 --out \
-                  reports/now --live --nmea tcp:10110 --json -\n\nExit code: 0 with a fix, 3 without one (results \
-                  are written, the reason is printed), 74 when the sender broke off (results end there), 130 after \
-                  Ctrl-C with --live, 65 when the input is no recording"
+                  reports/now --live --nmea tcp:10110 --json -\n\nExit code: 0 with a fix, 2 for a command line \
+                  that is refused, 3 without a fix (results are written, the reason is printed), 74 when the sender \
+                  broke off (results end there), 130 after Ctrl-C with --live, 65 when the input is no recording"
 )]
 pub struct Receive {
     /// Recording: a SigMF pair (either file), archive (.sigmf) or collection of front ends that share a
@@ -384,7 +384,9 @@ pub struct Receive {
     /// Sample rate of a raw file or stream
     #[arg(long, value_name = "HZ")]
     pub rate_hz: Option<f64>,
-    /// Frequency of GPS L1 in a raw file [default: 0]
+    /// Frequency at which GPS L1, 1575.42 MHz, lies in a raw file's samples: above zero where their 0 Hz is
+    /// at 1575.42 MHz less HZ, below zero where it is above 1575.42 MHz; with --inverted also as it lies in
+    /// the samples [default: 0 of complex samples; real ones need it]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub if_hz: Option<f64>,
     /// The raw file's spectrum is mirrored (local oscillator above the signal)

@@ -13,7 +13,7 @@ use crate::cli::scenario;
 use crate::cli::source;
 use crate::gnss::gps::l1ca::L1_CA;
 use crate::gnss::packed::{Layout, Unpacker};
-use crate::gnss::recording::{Description, Samples};
+use crate::gnss::recording::{Description, Samples, Unblocked};
 use crate::gnss::samples::{Format, IfMetadata};
 use crate::gnss::signal::Signal;
 use crate::gnss::time::{Epoch, Rate};
@@ -88,11 +88,14 @@ fn open_one(arguments: &args::Receive) -> Result<Recording, CliError> {
     }
     let found = match extension {
         Some("sigmf") => of_archive(&arguments.file)?,
-        Some("xml" | "sdrx") => of_ion(arguments)?,
-        _ => of_pair(arguments)?,
+        Some("xml" | "sdrx") => of_ion(&arguments.file, arguments)?,
+        _ => match ion_beside(&arguments.file)? {
+            Some(path) => of_ion(&path, arguments)?,
+            None => of_pair(arguments)?,
+        },
     };
     let Found { name, mut file, first, bytes, description } = found;
-    let (header, trailing) = (description.header_bytes, description.trailing_bytes);
+    let (header, trailing, blocks) = (description.header_bytes, description.trailing_bytes, description.blocks);
     let skipped = description.skipped_samples;
     let channels = u64::from(description.channels);
     let signals = description.signals.clone();
@@ -106,17 +109,19 @@ fn open_one(arguments: &args::Receive) -> Result<Recording, CliError> {
     };
     let before = header + skipped;
     let left = bytes.map(|bytes| bytes.saturating_sub(before + trailing));
+    let within = left.map(|left| blocks.map_or(left, |blocks| blocks.samples_among(left)));
     if first + before > 0 {
         file.seek(SeekFrom::Start(first + before)).map_err(|error| CliError::read(&name, &error))?;
     }
-    let samples = left.map(|left| match &layout {
+    let samples = within.map(|left| match &layout {
         None => left / sample_bytes,
         Some(layout) => left / layout.group_bytes() as u64 * layout.group_samples() as u64,
     });
     let limited = first + trailing > 0;
-    let reader = match left.filter(|_| limited) {
-        Some(left) => unpacked(layout, file.take(left)),
-        None => unpacked(layout, file),
+    let reader = match (left.filter(|_| limited), blocks) {
+        (Some(left), _) => unpacked(layout, file.take(left)),
+        (None, Some(blocks)) => unpacked(layout, Unblocked::new(blocks, file)),
+        (None, None) => unpacked(layout, file),
     };
     Ok(Recording { metadata, signals, reader, samples, broken: None })
 }
@@ -199,9 +204,23 @@ fn text_of(file: &mut File, member: &archive::Member) -> io::Result<String> {
     Ok(text)
 }
 
+/// ION's metadata of a file of samples that has no others: of the same name beside it.
+fn ion_beside(file: &Path) -> Result<Option<PathBuf>, CliError> {
+    let is_there = |path: &Path| present(path).map_err(|error| CliError::read(shown(path), &error));
+    if is_there(&pair(file).1)? {
+        return Ok(None);
+    }
+    for extension in ["sdrx", "xml"] {
+        let path = file.with_extension(extension);
+        if is_there(&path)? {
+            return Ok(Some(path));
+        }
+    }
+    Ok(None)
+}
+
 /// A stream of a recording that ION's metadata describe.
-fn of_ion(arguments: &args::Receive) -> Result<Found, CliError> {
-    let path = &arguments.file;
+fn of_ion(path: &Path, arguments: &args::Receive) -> Result<Found, CliError> {
     let (name, text) = scenario::text(path)?;
     let streams = ion::parse(&text, &name).map_err(CliError::input)?;
     let names = || streams.iter().map(|(stream, _)| stream.as_str()).collect::<Vec<_>>().join(", ");
@@ -286,6 +305,8 @@ fn metadata(arguments: &args::Receive, of: Description) -> Result<(IfMetadata, O
     let center_hz = match (arguments.if_hz, of.center_hz) {
         (Some(if_hz), _) => tuned(if_hz),
         (None, Some(center_hz)) => center_hz,
+        // Real samples hold nothing about 0 Hz.
+        (None, None) if !format.is_complex() => return Err(missing("--if-hz")),
         (None, None) => L1_CA.centre_hz(),
     };
     let rate = rate.or(of.rate).ok_or_else(|| missing("--rate-hz"))?;

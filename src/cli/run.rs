@@ -32,6 +32,7 @@ use crate::generator::{GenerateError, truth};
 use crate::gnss::samples::IfMetadata;
 use crate::gnss::sigmf::{self, Beside};
 use crate::gnss::signal::Signal;
+use crate::receiver::lead::undated;
 use crate::receiver::output::{Nmea, Output, OutputError, Rinex, Sink, Tracks};
 use crate::receiver::settings::Settings;
 use crate::receiver::{Outcome, ReceiveError, Reception};
@@ -51,6 +52,10 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     )?;
     let Some(scene) = scenes.first() else { return Err(CliError::bug("a scenario without a front end")) };
     let settings = twin::settings_for(&scenes, &scenario::receiver_settings(&named)?);
+    // A scene is made for its position: without one there is nothing to judge.
+    if let Some((signal, reason)) = undated(&settings.acquisition.signals()) {
+        return Err(receiver_error(ReceiveError::Unsupported { signal: signal.name, reason }));
+    }
     for warning in warnings {
         scenario::warn(&warning);
     }

@@ -4,7 +4,7 @@
 //! Source: ION GNSS SDR Metadata Standard, revision 1.0 (2020): lanes of blocks of chunks of lumps of
 //! streams, a system's base rate, bands. A stream's 0 Hz is its band's centre less what that was
 //! translated to. A format whose quadrature or in-phase part is negated (`IQn`, `InQ`, …) mirrors the
-//! spectrum. Limits: one chunk, with neither header nor footer, in which every lump has the same streams;
+//! spectrum. Limits: one kind of block of one kind of chunk, in which every lump has the same streams;
 //! encodings of 1 to 16 bits but for Gray codes, magnitude before sign and floating point. Times are
 //! passed over: of the files that there are some have the start as the session's, some as the file's.
 
@@ -14,7 +14,7 @@ use roxmltree::{Document, Node};
 use thiserror::Error;
 
 use crate::packed::{Components, Encoding, Group, Layout};
-use crate::recording::{Description, Samples};
+use crate::recording::{Blocks, Description, Samples};
 use crate::time::Rate;
 
 /// Why a text does not describe samples that can be read.
@@ -92,10 +92,19 @@ fn ids<'a, 'i>(root: Node<'a, 'i>) -> BTreeMap<(&'a str, &'a str), Node<'a, 'i>>
     ids
 }
 
-/// A chunk's words.
+/// A chunk's words, and the blocks of which they are a part.
 struct Chunk<'a, 'i> {
     node: Node<'a, 'i>,
     group: Group,
+    framing: Framing,
+}
+
+/// What of a file is no samples.
+#[derive(Default)]
+struct Framing {
+    header_bytes: u64,
+    trailing_bytes: u64,
+    blocks: Option<Blocks>,
 }
 
 /// A document, and what its elements are called by.
@@ -177,11 +186,6 @@ impl<'a, 'i> Of<'a, 'i> {
     /// The lane's one chunk.
     fn chunk(&self, lane: Node<'a, 'i>) -> Result<Chunk<'a, 'i>, IonError> {
         let block = self.only(lane, "block")?;
-        for name in ["sizeheader", "sizefooter"] {
-            if self.number(block, name, Some(0))? != 0 {
-                return Err(self.bad(block, format!("no <{name}>")));
-            }
-        }
         let node = self.only(block, "chunk")?;
         let endian = self.word(node, "endian");
         let shift = self
@@ -196,12 +200,25 @@ impl<'a, 'i> Of<'a, 'i> {
             big_endian: matches!(endian.as_str(), "big" | "b"),
             lowest_first: right.is_some_and(|word| word.starts_with('r')),
         };
-        Ok(Chunk { node, group })
+        let framing = self.framing(block, &group)?;
+        Ok(Chunk { node, group, framing })
+    }
+
+    /// Headers and footers of a block of so many cycles of its chunk. One of no cycles is the whole file.
+    fn framing(&self, block: Node<'a, 'i>, group: &Group) -> Result<Framing, IonError> {
+        let size = |name| self.number(block, name, Some(0)).map(u64::from);
+        let (header_bytes, footer_bytes, cycles) = (size("sizeheader")?, size("sizefooter")?, size("cycles")?);
+        let sample_bytes = cycles * (group.word_bytes * group.words) as u64;
+        Ok(match (header_bytes + footer_bytes, sample_bytes) {
+            (0, _) => Framing::default(),
+            (_, 0) => Framing { header_bytes, trailing_bytes: footer_bytes, blocks: None },
+            _ => Framing { blocks: Some(Blocks { header_bytes, sample_bytes, footer_bytes }), ..Framing::default() },
+        })
     }
 
     /// The streams of a chunk whose words are sampled at a multiple of a base rate.
     fn streams(&self, chunk: Chunk<'a, 'i>, base_hz: f64) -> Result<Vec<Stream>, IonError> {
-        let Chunk { node, group } = chunk;
+        let Chunk { node, group, framing } = chunk;
         let lumps: Vec<Node<'a, 'i>> = self.children(node, "lump").collect();
         let first = *lumps.first().ok_or_else(|| self.missing("lump", node))?;
         let names = |lump| self.children(lump, "stream").map(|node| node.attribute("id")).collect::<Vec<_>>();
@@ -230,6 +247,9 @@ impl<'a, 'i> Of<'a, 'i> {
                 rate,
                 center_hz: Some(center_hz),
                 inverted,
+                header_bytes: framing.header_bytes,
+                trailing_bytes: framing.trailing_bytes,
+                blocks: framing.blocks,
                 ..Default::default()
             };
             streams.push((id, description));
@@ -290,7 +310,10 @@ impl<'a, 'i> Of<'a, 'i> {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Read;
+
     use super::*;
+    use crate::recording::Unblocked;
     use crate::samples::Format;
 
     /// Two streams of 1-bit I and Q in the higher half of a little-endian word, and six samples of a third.
@@ -345,6 +368,27 @@ mod tests {
     }
 
     #[test]
+    fn headers_and_footers_of_blocks_are_no_samples() {
+        let framed = |cycles: u32| {
+            let block = format!("<cycles>{cycles}</cycles><sizeheader>3</sizeheader><sizefooter>1</sizefooter>");
+            let text = TRIPLE.replacen("<cycles>0</cycles><sizeheader>0</sizeheader>", &block, 1);
+            parse(&text, "three.xml").unwrap().remove(0).1
+        };
+        // Two words of two bytes a block.
+        let blocks = framed(2).blocks.unwrap();
+        assert_eq!(blocks, Blocks { header_bytes: 3, sample_bytes: 4, footer_bytes: 1 });
+        let file: Vec<u8> = (0..22).collect();
+        let mut samples = Vec::new();
+        Unblocked::new(blocks, &file[..]).read_to_end(&mut samples).unwrap();
+        assert_eq!(samples, [3, 4, 5, 6, 11, 12, 13, 14, 19, 20, 21]);
+        let counts = [0, 3, 5, 7, 8, 11, 12, 22].map(|bytes| blocks.samples_among(bytes));
+        assert_eq!(counts, [0, 0, 2, 4, 4, 4, 5, 11]);
+        // A block without cycles is the whole file.
+        let whole = framed(0);
+        assert_eq!((whole.header_bytes, whole.trailing_bytes, whole.blocks), (3, 1, None));
+    }
+
+    #[test]
     fn what_cannot_be_read_is_refused_by_element() {
         let refused = |from: &str, to: &str| parse(&TRIPLE.replacen(from, to, 1), "three.xml").unwrap_err().to_string();
         for (from, to, words) in [
@@ -352,7 +396,7 @@ mod tests {
             ("<system id=\"S\"><freq", "<system id=\"T\"><freq", ["no <freqbase>", "<system>"]),
             ("SIGN", "OG", ["<encoding> is \"OG\"", "SIGN, SM"]),
             (">IQn<", ">IFQ<", ["<format> is \"IFQ\"", "IF, IQ or QI"]),
-            ("<sizeheader>0", "<sizeheader>512", ["<block>", "no <sizeheader>"]),
+            ("<sizeheader>0", "<sizeheader>-2", ["<sizeheader> is \"-2\"", "a whole number"]),
             ("<quantization>1", "<quantization>2", ["<packedbits> is \"2\"", "1 samples of 4"]),
             ("<countwords>1", "<countwords>0", ["<stream>", "no room"]),
             ("format=\"GHz\"", "format=\"lines\"", ["<centerfreq>", "not \"lines\""]),

@@ -243,6 +243,20 @@ pub enum Read {
     Sender(Sv),
     /// Raw parameters as decoded.
     Parameters(Vec<NavigationRow>),
+    /// A unit that passed its checks is not used, or parts that did make no set: why.
+    Refused(String),
+}
+
+impl Read {
+    /// What comes of a unit that names another satellite than the one that is followed.
+    pub(crate) fn names_another(unit: &str, said: impl fmt::Display) -> Self {
+        Self::Refused(format!("{unit} names satellite {said}, which is another one"))
+    }
+
+    /// What comes of parts that were all read and make no set.
+    pub(crate) fn make_no_set(parts: &str) -> Self {
+        Self::Refused(format!("{parts} are of different sets or of another satellite"))
+    }
 }
 
 /// Reads the message of one satellite.
@@ -250,6 +264,9 @@ pub trait Reader: fmt::Debug + Send + Sync {
     /// Takes the next symbol: positive for a logical 0 if it is not upside down, and as large as it is sure.
     /// `near` resolves weeks.
     fn take(&mut self, soft: f32, near: Epoch) -> Vec<Read>;
+    /// Takes a time that is known to within a year. A message whose own date leaves something out is dated
+    /// by it.
+    fn know(&mut self, _near: Epoch) {}
     /// Symbols are missing before the next one.
     fn skip(&mut self);
     /// The time of a unit contradicts those before: where units begin is sought anew.

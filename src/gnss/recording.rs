@@ -1,6 +1,8 @@
 //! What metadata say of a recording before anything completes it: keys may be absent, samples packed, and a
 //! file may have more than samples.
 
+use std::io::Read;
+
 use crate::packed::{Components, Encoding, Interleaved, Layout, LayoutError};
 use crate::samples::Format;
 use crate::signal::Signal;
@@ -38,10 +40,71 @@ pub struct Description {
     pub header_bytes: u64,
     /// Bytes after the last sample.
     pub trailing_bytes: u64,
+    /// Blocks of the file, each with a header and a footer of its own that are no samples; none where the
+    /// file is samples from one end to the other.
+    pub blocks: Option<Blocks>,
     /// Samples before the first one that is described.
     pub skipped_samples: u64,
     /// The file of samples, where it is none of the same name.
     pub dataset: Option<String>,
+}
+
+/// Blocks of equal size, from the first byte of samples on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Blocks {
+    /// Bytes before the samples of each.
+    pub header_bytes: u64,
+    /// Bytes of its samples, above zero.
+    pub sample_bytes: u64,
+    /// Bytes after them.
+    pub footer_bytes: u64,
+}
+
+impl Blocks {
+    /// Bytes of samples among the first `bytes` of the file.
+    pub fn samples_among(&self, bytes: u64) -> u64 {
+        let whole = self.header_bytes + self.sample_bytes + self.footer_bytes;
+        let begun = (bytes % whole).saturating_sub(self.header_bytes).min(self.sample_bytes);
+        bytes / whole * self.sample_bytes + begun
+    }
+}
+
+/// The samples of a stream of blocks.
+#[derive(Debug)]
+pub struct Unblocked<R> {
+    blocks: Blocks,
+    reader: R,
+    /// Bytes that are no samples before the next one that is, and bytes of samples after these.
+    skip: u64,
+    left: u64,
+}
+
+impl<R: Read> Unblocked<R> {
+    /// Reads the blocks of `reader`, which begins with a header.
+    pub fn new(blocks: Blocks, reader: R) -> Self {
+        Self { blocks, reader, skip: blocks.header_bytes, left: blocks.sample_bytes }
+    }
+}
+
+impl<R: Read> Read for Unblocked<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        if self.left == 0 {
+            (self.skip, self.left) = (self.blocks.footer_bytes + self.blocks.header_bytes, self.blocks.sample_bytes);
+        }
+        while self.skip > 0 {
+            let mut passed = [0; 512];
+            let most = self.skip.min(passed.len() as u64) as usize;
+            let count = self.reader.read(passed.get_mut(..most).unwrap_or_default())?;
+            if count == 0 {
+                return Ok(0);
+            }
+            self.skip -= count as u64;
+        }
+        let most = self.left.min(buffer.len() as u64) as usize;
+        let count = self.reader.read(buffer.get_mut(..most).unwrap_or_default())?;
+        self.left -= count as u64;
+        Ok(count)
+    }
 }
 
 impl Default for Description {
@@ -56,6 +119,7 @@ impl Default for Description {
             channels: 1,
             header_bytes: 0,
             trailing_bytes: 0,
+            blocks: None,
             skipped_samples: 0,
             dataset: None,
         }

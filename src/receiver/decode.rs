@@ -58,6 +58,8 @@ pub enum News {
     },
     /// Raw parameters as decoded.
     Parameters(Vec<NavigationRow>),
+    /// A unit that passed its checks is not used: why.
+    Refused(String),
 }
 
 /// Satellite time of a code period: periods since the start of the week, modulo a week.
@@ -166,6 +168,11 @@ impl Decoder {
         Some((whole, rest / self.periods_per_second as f64))
     }
 
+    /// Takes a time that is known to within a year.
+    pub fn know(&mut self, near: Epoch) {
+        self.reader.know(self.time.label(near));
+    }
+
     /// Takes the channel's next symbol. `near` resolves weeks.
     pub fn take(&mut self, symbol: &Symbol, near: Epoch) -> Vec<News> {
         if self.expected.is_some_and(|period| period != symbol.first_period) {
@@ -199,6 +206,7 @@ impl Decoder {
                 Read::Ionosphere(coefficients) => news.push(News::Ionosphere(coefficients)),
                 Read::Sender(sv) => news.push(News::Sender(sv)),
                 Read::Parameters(rows) => news.push(News::Parameters(rows)),
+                Read::Refused(why) => news.push(News::Refused(why)),
                 Read::Augmentation(label, content) => {
                     news.push(News::Augmentation { sent: self.time.instant(label), content });
                 }

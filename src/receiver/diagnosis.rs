@@ -39,6 +39,11 @@ pub enum Stage {
         /// Satellites whose symbols came.
         with_symbols: Vec<Sv>,
     },
+    /// Frames came whose checks were right, and none was used.
+    Refused {
+        /// Why.
+        refused: Vec<Refusal>,
+    },
     /// Too few satellites have an ephemeris: of each with a frame, the subframes that are missing.
     NoEphemeris {
         /// Satellites with a whole ephemeris.
@@ -53,6 +58,25 @@ pub enum Stage {
         /// What the last attempt failed of.
         reason: Option<NoFix>,
     },
+}
+
+/// Units of messages that passed their checks and were not used.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refusal {
+    /// Why.
+    pub why: String,
+    /// Satellites that sent them.
+    pub svs: Vec<Sv>,
+    /// How many there were.
+    pub units: u64,
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { why, svs, units } = self;
+        let (unit, was) = if *units == 1 { ("unit", "was") } else { ("units", "were") };
+        write!(f, "the message of {}: {units} {unit} with right checks {was} refused: {why}", names(svs))
+    }
 }
 
 /// Why there was no fix.
@@ -112,6 +136,11 @@ impl Diagnosis {
                 say("the signal's strength: below 25 dB-Hz symbols cannot be distinguished".into());
             }
             Stage::NoFrame { .. } | Stage::NoEphemeris { .. } => say(TOO_WEAK.into()),
+            Stage::Refused { .. } => say(
+                "the start time: --start TIME, or core:datetime in the metadata, gives what a message's date leaves \
+                 out"
+                .into(),
+            ),
             Stage::NoPosition { reason, .. } => advice.extend(without_position(reason.as_ref(), &length)),
         }
         Self { stage, seconds, advice }
@@ -217,6 +246,10 @@ impl fmt::Display for Stage {
             Self::NoFrame { with_symbols } => {
                 write!(f, "no frame was found in the symbols of {}", names(with_symbols))
             }
+            Self::Refused { refused } => {
+                let all: Vec<String> = refused.iter().map(Refusal::to_string).collect();
+                write!(f, "frames were found, and none was used: {}", all.join("; "))
+            }
             Self::NoEphemeris { complete, missing } => {
                 write!(f, "fewer than four satellites with ephemeris: {}", names(complete))?;
                 for (sv, subframes) in missing {
@@ -256,6 +289,7 @@ mod tests {
     use super::*;
     use gnss::gps::l1c::L1C;
     use gnss::gps::l1ca::L1_CA;
+    use gnss::satellite::System;
 
     #[test]
     fn a_diagnosis_names_the_stage_the_numbers_and_what_to_check() {
@@ -269,6 +303,21 @@ mod tests {
         let text = Diagnosis::new(stage, 20.0, 2.6e6, "ci8", 0.0, 0, 7).with_messages(&[&L1_CA]).to_string();
         assert!(text.contains("G09 lacks subframe 2, 3") && text.contains("LNAV on GPS L1 C/A up to 38 s"), "{text}");
         assert!(!text.contains("may be false"), "{text}");
+    }
+
+    #[test]
+    fn frames_that_were_read_and_refused_are_named_with_the_reason_and_not_blamed_on_the_signal() {
+        let refused = Refusal {
+            why: "N_4 in string 5 is 0".to_owned(),
+            svs: vec![Sv { system: System::Glonass, number: 5 }, Sv { system: System::Glonass, number: 6 }],
+            units: 44,
+        };
+        let stage = Stage::Refused { refused: vec![refused] };
+        let text = Diagnosis::new(stage, 40.0, 6.6e6, "ci8", 0.0, 0, 5).to_string();
+        for part in ["R05 R06: 44 units with right checks were refused: N_4 in string 5 is 0", "--start TIME"] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        assert!(!text.contains("strength") && !text.contains("dB-Hz"), "{text}");
     }
 
     #[test]

@@ -64,6 +64,8 @@ pub struct Watch {
     powers: Vec<f64>,
     segments: u32,
     first: u64,
+    /// Whether there was a spectrum.
+    reported: bool,
 }
 
 /// A line, before it is known what the satellites are.
@@ -97,6 +99,7 @@ impl Watch {
             powers: vec![0.0; bins],
             segments: 0,
             first: 0,
+            reported: false,
         }
     }
 
@@ -132,10 +135,29 @@ impl Watch {
             }
             if self.segments == SEGMENTS {
                 each(self.first, self.judge(strongest_cn0_hz, followed));
+                self.reported = true;
                 self.powers.fill(0.0);
                 self.segments = 0;
             }
         }
+    }
+
+    /// Reports the spectrum of fewer segments that a recording shorter than a second leaves: the threshold is
+    /// that of so many.
+    pub fn rest(
+        &mut self,
+        (strongest_cn0_hz, followed): (f64, &[Followed]),
+        mut each: impl FnMut(u64, Option<LineRow>),
+    ) {
+        if self.segments == 0 || self.reported {
+            return;
+        }
+        let tested = if self.is_real { self.powers.len() / 2 } else { self.powers.len() };
+        let (degrees, mean) = (2 * self.segments, f64::from(2 * self.segments));
+        self.threshold = threshold(FALSE_ALARM / tested as f64, degrees) / mean;
+        self.median = threshold(0.5, degrees) / mean;
+        each(self.first, self.judge(strongest_cn0_hz, followed));
+        self.segments = 0;
     }
 
     fn transform(&mut self) {

@@ -202,7 +202,7 @@ impl Reception {
     /// Records that cannot be written.
     pub fn finish(mut self, sink: &mut dyn Sink) -> Result<Outcome, ReceiveError> {
         let cut_bytes = self.take_rest(sink)?;
-        self.session.search_rest(sink)?;
+        self.session.search_rest(self.samples(), sink)?;
         let Some(metadata) = self.metadata.first() else { return Err(ReceiveError::NoFrontEnd) };
         let settings = &self.settings;
         let count = self.samples();

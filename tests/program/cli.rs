@@ -93,6 +93,65 @@ fn signals_are_those_of_the_flag_or_of_the_band() {
     assert_eq!(all, r#"["GLONASS G1"]"#);
 }
 
+/// Real samples have no signal about 0 Hz: without an intermediate frequency a carrier of another band would
+/// be taken for the one that is meant.
+#[test]
+fn real_samples_need_their_intermediate_frequency() {
+    let here = workplace();
+    fs::write(here.path().join("real.bin"), vec![0; 100_000]).unwrap();
+    let usual = ["receive", "real.bin", "--format", "ri8", "--rate-hz", "12e6", "--out", "out"];
+    let without = twin(&usual, here.path());
+    assert_eq!(code(&without), 2, "{}", stderr(&without));
+    assert!(stderr(&without).contains("--if-hz is needed"), "{}", stderr(&without));
+    let with = twin(&[&usual[..], &["--if-hz", "3e6"]].concat(), here.path());
+    assert_eq!(code(&with), 3, "{}", stderr(&with));
+    let help = String::from_utf8_lossy(&twin(&["receive", "--help"], here.path()).stdout).into_owned();
+    for part in ["2 for a command line", "1575.42 MHz, lies in", "above zero"] {
+        assert!(help.split_whitespace().collect::<Vec<_>>().join(" ").contains(part), "{part}: {help}");
+    }
+}
+
+/// A band that holds a signal without time of its own is searched for it, and the reason why there is no
+/// position is said.
+#[test]
+fn a_signal_that_others_would_have_to_date_is_searched_for_alone() {
+    let here = workplace();
+    fs::write(here.path().join("e6.ci8"), vec![0; 3_000_000]).unwrap();
+    let flags = ["--format", "ci8", "--rate-hz", "12e6", "--if-hz", "296.67e6", "--out", "out"];
+    let output = twin(&[&["receive", "e6.ci8"][..], &flags].concat(), here.path());
+    let text = stderr(&output);
+    assert_eq!(code(&output), 3, "{text}");
+    assert!(text.contains("searching for Galileo E6") && text.contains("says neither time nor orbit"), "{text}");
+    assert!(!text.contains("no known signal"), "{text}");
+}
+
+/// Metadata of ION's standard are found beside the file of samples, and of its blocks the headers and footers
+/// are left out.
+#[test]
+fn blocks_of_a_file_beside_ions_metadata_are_read_without_their_headers() {
+    let here = workplace();
+    let metadata = "<metadata><lane id=\"l\"><system id=\"s\"/><block><cycles>1000</cycles>
+        <sizeheader>64</sizeheader><sizefooter>8</sizefooter><chunk><sizeword>1</sizeword><countwords>2</countwords>
+        <lump><stream id=\"L1\"><ratefactor>1</ratefactor><quantization>8</quantization>
+        <packedbits>16</packedbits><shift>Left</shift><format>IQ</format><encoding>TC</encoding><band id=\"b\"/>
+        </stream></lump></chunk></block></lane><system id=\"s\"><freqbase format=\"MHz\">4</freqbase></system>
+        <band id=\"b\"><centerfreq format=\"MHz\">1575.42</centerfreq>
+        <translatedfreq format=\"Hz\">0</translatedfreq></band>
+        <file><url>flight.usbx</url><lane id=\"l\"/></file></metadata>";
+    fs::write(here.path().join("flight.sdrx"), metadata).unwrap();
+    // Forty blocks, and 100 samples of one more.
+    let block = [vec![0x7f; 64], vec![1; 2000], vec![0x7f; 8]].concat();
+    fs::write(here.path().join("flight.usbx"), [block.repeat(40), block[..64 + 200].to_vec()].concat()).unwrap();
+    for file in ["flight.usbx", "flight.sdrx"] {
+        let output = twin(&["receive", file, "--out", "out"], here.path());
+        assert_eq!(code(&output), 3, "{}", stderr(&output));
+        let summary: serde_json::Value =
+            serde_json::from_slice(&fs::read(here.path().join("out/receiver.json")).unwrap()).unwrap();
+        assert_eq!((summary["samples"].as_u64(), summary["cut_bytes"].as_u64()), (Some(40_100), Some(0)), "{file}");
+        let _ = fs::remove_dir_all(here.path().join("out"));
+    }
+}
+
 #[test]
 fn a_misspelt_key_is_named_with_its_place_and_the_nearest_right_one() {
     let here = workplace();

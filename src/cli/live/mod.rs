@@ -96,6 +96,7 @@ pub fn execute(arguments: &args::Live) -> Result<(), CliError> {
         .zip(&arguments.to)
         .map(|((number, sink), spec)| Output::begin((number, spec), sink, pace, tick_s))
         .collect();
+    scenario::note(&format!("the first sample is of {0}: gnss-twin receive --start {0}", scene.clock.start));
     let first_is_now = arguments.motion_time == MotionTime::First;
     let live = Live { driver, recorder, inbox, outputs: outputs?, pace, scene, made: Made::default(), first_is_now };
     live.run(arguments, &Run { named: &named, scene, overrides: &overrides, restarted: start.is_some() })

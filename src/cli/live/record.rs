@@ -120,6 +120,7 @@ impl Recorder {
         drop(self.truth);
         let mut summary = summary;
         if let Some(object) = summary.as_object_mut() {
+            object.insert("start".to_owned(), run.scene.clock.start.to_string().into());
             object.insert("samples".to_owned(), self.samples.into());
             object.insert("sha256".to_owned(), sha256.into());
         }

@@ -29,7 +29,7 @@ pub static B1C: Signal = Signal {
     rinex: "1P",
     system: System::BeiDou,
     time: &BDT,
-    constellation: [1, 63],
+    constellation: THIRD_GENERATION,
     carrier: Carrier::Common(CARRIER_HZ),
     sent,
     minimum_power_dbw: Some(-159.0), // 4.5: both components
@@ -59,6 +59,11 @@ pub static B1C: Signal = Signal {
         },
     ],
 };
+
+/// First and last number that satellites of the third generation in medium and inclined orbits have been
+/// given (BDS-SIS-ICD-B1C 1.0, 4.2, and navigation files up to 2026). Those of other numbers have codes and
+/// do not send it.
+pub const THIRD_GENERATION: [u8; 2] = [19, 50];
 
 /// Since when numbers send it.
 const SINCE: [(std::ops::RangeInclusive<u8>, &str); 3] =

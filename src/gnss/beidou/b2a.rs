@@ -8,7 +8,7 @@
 
 use std::sync::LazyLock;
 
-use crate::beidou::b1c::{piece, sent};
+use crate::beidou::b1c::{THIRD_GENERATION, piece, sent};
 use crate::beidou::bcnav2::B_CNAV2;
 use crate::beidou::in_phase::registers;
 use crate::satellite::System;
@@ -27,7 +27,7 @@ pub static B2A: Signal = Signal {
     rinex: "5P",
     system: System::BeiDou,
     time: &BDT,
-    constellation: [1, 63],
+    constellation: THIRD_GENERATION,
     carrier: Carrier::Common(1_176.45e6), // 4.1
     sent,
     minimum_power_dbw: Some(-156.0), // 4.5: both components

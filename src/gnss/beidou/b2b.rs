@@ -8,7 +8,7 @@
 //! medium orbits, 2 dB less of inclined ones. Below some 38 dB-Hz the phase detector of single periods
 //! declares slips that are none.
 
-use crate::beidou::b1c::sent;
+use crate::beidou::b1c::{THIRD_GENERATION, sent};
 use crate::beidou::bcnav3::B_CNAV3;
 use crate::beidou::in_phase::registers;
 use crate::satellite::System;
@@ -26,7 +26,7 @@ pub static B2B: Signal = Signal {
     rinex: "7D",
     system: System::BeiDou,
     time: &BDT,
-    constellation: [FIRST, 58],
+    constellation: THIRD_GENERATION,
     carrier: Carrier::Common(CARRIER_HZ),
     sent,
     minimum_power_dbw: Some(-160.0), // 4.5

@@ -32,6 +32,7 @@ pub static B1I: Signal = Signal {
 pub static B2I: Signal = Signal {
     name: "BeiDou B2I",
     rinex: "7I",
+    constellation: [1, SECOND_GENERATION],
     carrier: Carrier::Common(1_207.14e6),
     sent: |number, _| number <= SECOND_GENERATION,
     ..B1I

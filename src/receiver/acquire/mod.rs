@@ -70,6 +70,7 @@ use grid::{Again, Grid, Map};
 use refine::Refined;
 pub use room::{least_samples, samples_needed, shortened};
 pub use settings::{ALL, AcquisitionSettings};
+pub(crate) use settings::{MOST_DOPPLER_HZ, MOST_SUMS};
 use window::Window;
 
 /// Hits this much weaker than the strongest (10 dB) have to show without those that are stronger.
@@ -266,16 +267,20 @@ impl Searcher {
     pub(crate) fn fitted(
         metadata: &IfMetadata,
         settings: &AcquisitionSettings,
+        centre_hz: f64,
         have: u64,
     ) -> Result<Self, AcquireError> {
-        Ok(Self { have: Some(have), ..Self::new(metadata, settings)? })
+        Ok(Self { have: Some(have), ..Self::around(metadata, settings, centre_hz)? })
     }
 
     /// Settings by which a signal is searched for; `None` where there are too few samples for it.
     fn settings_of(&self, signal: &Signal) -> Result<Option<AcquisitionSettings>, AcquireError> {
         let Some(have) = self.have else { return Ok(Some(self.settings.clone())) };
         let alone = AcquisitionSettings { signals: vec![signal.name.to_owned()], ..self.settings.clone() };
-        shortened(&self.metadata, &alone, have)
+        // The Doppler farthest from zero makes code periods longest.
+        let farthest_hz = (alone.doppler_max_hz + self.centre_hz.abs()).min(MOST_DOPPLER_HZ);
+        let room = shortened(&self.metadata, &AcquisitionSettings { doppler_max_hz: farthest_hz, ..alone }, have)?;
+        Ok(room.map(|room| AcquisitionSettings { doppler_max_hz: self.settings.doppler_max_hz, ..room }))
     }
 
     /// Whether there are samples enough to search for this signal at all.
@@ -553,4 +558,4 @@ mod pair_tests;
 #[cfg(test)]
 mod sky_tests;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -34,10 +34,15 @@ pub struct AcquisitionSettings {
     /// where the others' cross-correlation is seen to make the tail heavier, in that too. The default costs
     /// 0.7 dB against 1e-3.
     pub false_alarm_probability: f64,
-    /// Whether codes are searched for that no satellite of the constellation sends: of GPS, PRN 33 to 37.
+    /// Whether codes are searched for that no satellite of the constellation sends: of GPS, PRN 33 to 37; of
+    /// BeiDou's B1C, B2a and B2b those beyond 19 to 50, of B2I those beyond 18.
     pub reserved_codes: bool,
 }
 }
+
+/// The widest range of Dopplers, and the most sums, that a search may be asked for.
+pub(crate) const MOST_DOPPLER_HZ: f64 = 1e6;
+pub(crate) const MOST_SUMS: u32 = 100_000;
 
 /// In place of names: all that the bands hold.
 pub const ALL: &str = "all";
@@ -112,9 +117,9 @@ impl AcquisitionSettings {
     /// [`AcquireError::Setting`] with the first key that is out of its range.
     pub fn validate(&self) -> Result<(), AcquireError> {
         let rules: [(&'static str, f64, f64, f64, &'static str); 6] = [
-            ("doppler_max_hz", self.doppler_max_hz, 0.0, 1e6, "0 to 1e6 Hz"),
+            ("doppler_max_hz", self.doppler_max_hz, 0.0, MOST_DOPPLER_HZ, "0 to 1e6 Hz"),
             ("coherent_periods", f64::from(self.coherent_periods), 1.0, 1000.0, "1 to 1000"),
-            ("noncoherent_sums", f64::from(self.noncoherent_sums), 1.0, 1e5, "1 to 100 000"),
+            ("noncoherent_sums", f64::from(self.noncoherent_sums), 1.0, f64::from(MOST_SUMS), "1 to 100 000"),
             ("doppler_step_cycles", self.doppler_step_cycles, 0.01, 1.0, "0.01 to 1 cycle"),
             ("cells_per_chip", self.cells_per_chip, 2.0, 100.0, "2 to 100"),
             ("false_alarm_probability", self.false_alarm_probability, 1e-12, 0.5, "1e-12 to 0.5"),

@@ -8,7 +8,7 @@ use gnss::samples::Format;
 use gnss::time::Rate;
 
 /// Uniform numbers from a 64-bit mixing function (splitmix64), pairs of Gaussian ones by Box and Muller.
-pub(super) struct Noise(pub u64);
+pub(crate) struct Noise(pub u64);
 
 impl Noise {
     pub(super) fn uniform(&mut self) -> f64 {
@@ -27,21 +27,21 @@ impl Noise {
 }
 
 #[derive(Clone, Copy)]
-pub(super) struct Sent {
+pub(crate) struct Sent {
     pub prn: u8,
     pub doppler_hz: f64,
     pub phase_chips: f64,
     pub cn0_dbhz: f64,
 }
 
-pub(super) struct Recording {
+pub(crate) struct Recording {
     pub metadata: IfMetadata,
     pub i: Vec<f32>,
     pub q: Vec<f32>,
 }
 
 /// Samples with noise of variance one (complex E|n|² = 1, real E n² = 1) and chips taken at sample instants.
-pub(super) fn record(metadata: IfMetadata, samples: usize, sent: &[Sent], seed: u64) -> Recording {
+pub(crate) fn record(metadata: IfMetadata, samples: usize, sent: &[Sent], seed: u64) -> Recording {
     let rate_hz = metadata.rate.hz();
     let real = !metadata.format.is_complex();
     let mut noise = Noise(seed);
@@ -74,13 +74,13 @@ pub(super) fn record(metadata: IfMetadata, samples: usize, sent: &[Sent], seed: 
     Recording { metadata, i: single(i), q: single(q) }
 }
 
-pub(super) fn metadata(format: Format, rate_hz: f64, if_hz: f64, inverted: bool) -> IfMetadata {
+pub(crate) fn metadata(format: Format, rate_hz: f64, if_hz: f64, inverted: bool) -> IfMetadata {
     let offset_hz = if inverted { if_hz } else { -if_hz };
     let rate = Rate::from_hz(rate_hz).unwrap();
     IfMetadata { format, rate, center_hz: L1_CA.centre_hz() + offset_hz, inverted, start: None }
 }
 
-pub(super) fn all() -> Vec<Link> {
+pub(crate) fn all() -> Vec<Link> {
     (1..=32).map(|prn| L1_CA.link(Sv::gps(prn))).collect()
 }
 
@@ -93,7 +93,7 @@ fn run(
     search(&recording.metadata, &block, candidates, settings).unwrap()
 }
 
-pub(super) fn difference_chips(a: f64, b: f64) -> f64 {
+pub(crate) fn difference_chips(a: f64, b: f64) -> f64 {
     (a - b + 511.5).rem_euclid(1023.0) - 511.5
 }
 

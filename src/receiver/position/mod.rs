@@ -25,6 +25,7 @@ use gnss::satellite::Sv;
 use gnss::signal::Signal;
 use gnss::time::{Epoch, Rate, SampleClock, TimePolynomial, TimeScale};
 
+mod air;
 pub mod augmentation;
 pub mod combination;
 mod dispersion;
@@ -41,6 +42,7 @@ pub mod smooth;
 mod tests;
 pub mod troposphere;
 
+use air::Air;
 use augmentation::Augmentation;
 use electrons::Electrons;
 pub use exclusion::{Consistent, chi_square_threshold, consistent, without_faults};
@@ -315,6 +317,7 @@ pub struct Solver {
     settings: PositionSettings,
     noises: Noises,
     smoother: Smoother,
+    air: Air,
     /// The same of differences of two carriers.
     dispersion: Smoother,
     electrons: Electrons,
@@ -340,6 +343,7 @@ impl Solver {
             settings: settings.clone(),
             noises,
             smoother,
+            air: Air::default(),
             dispersion,
             electrons: Electrons::default(),
             rate,
@@ -443,6 +447,7 @@ impl Solver {
         } else {
             least_squares::position(&visible, first.position_m, &corrections)?
         };
+        self.air.compare(&visible, &all, &corrections, all.position_m);
         let (kept, solution, excluded) = without_faults(visible, all, &corrections, self.settings.false_alarm)?;
         let (velocity_mps, drift) = least_squares::velocity(&kept, &solution)?;
         self.last_m = Some(solution.position_m);
@@ -488,6 +493,20 @@ impl Solver {
             return (Ionosphere::Uncertain(delays, DelayError { share, least_m: 0.0 }), model);
         }
         (Ionosphere::Known(delays), model)
+    }
+
+    /// What to say where the ranges show that the choice of troposphere is the wrong one.
+    pub fn other_troposphere(&self) -> Option<&'static str> {
+        self.air.is_otherwise().then_some(match self.settings.troposphere {
+            TroposphereChoice::Standard => {
+                "the ranges are those of samples without a troposphere: what differs between satellites follows the \
+                 mapping of the one that is corrected; position.troposphere = \"none\" leaves that correction out"
+            }
+            TroposphereChoice::None => {
+                "the ranges have a troposphere in them: what differs between satellites follows its mapping; \
+                 position.troposphere = \"standard\" corrects it"
+            }
+        })
     }
 
     fn await_ionosphere(&mut self, sample: u64, is_known: bool) -> Result<(), NoFix> {

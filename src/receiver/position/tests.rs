@@ -11,7 +11,7 @@ use gnss::satellite::Sv;
 use gnss::time::{Epoch, GPST};
 
 /// Azimuth and elevation in degrees of a reference sky with known dilutions of precision.
-const SKY: [(f64, f64); 10] = [
+pub(super) const SKY: [(f64, f64); 10] = [
     (20.0, 75.0),
     (65.0, 42.0),
     (110.0, 18.0),
@@ -25,12 +25,12 @@ const SKY: [(f64, f64); 10] = [
 ];
 const BARE: Corrections = Corrections { ionosphere: Ionosphere::Absent, troposphere: false, model_sigma_m: 1e-6 };
 
-fn place() -> Geodetic {
+pub(super) fn place() -> Geodetic {
     Geodetic::from_degrees(26.5, 80.2, 130.0)
 }
 
 /// Ranges to satellites in these directions, with unit noise and a receiver clock ahead by `bias_s`.
-fn ranges(sky: &[(f64, f64)], bias_s: f64) -> Vec<Range> {
+pub(super) fn ranges(sky: &[(f64, f64)], bias_s: f64) -> Vec<Range> {
     let here_m = place().to_ecef();
     let axes = place().ecef_to_enu().transpose();
     sky.iter()
@@ -66,7 +66,7 @@ fn ranges(sky: &[(f64, f64)], bias_s: f64) -> Vec<Range> {
 }
 
 /// Sums of twelve uniforms from a seeded generator.
-fn noise(state: &mut u64) -> f64 {
+pub(super) fn noise(state: &mut u64) -> f64 {
     (0..12)
         .map(|_| {
             *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

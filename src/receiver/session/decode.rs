@@ -56,9 +56,10 @@ impl FrontEnd {
     fn decode(&mut self, until: u64, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let sink = &mut Counted { sink, step: self.step, ticks: &[] };
         for track in &mut self.tracks {
-            let near = shared.near();
+            let (near, known) = (shared.near(), shared.known());
             let (mut sv, signal) = (track.channel.sv(), track.channel.signal());
             let Some(decoder) = &mut track.decoder else { continue };
+            known.into_iter().for_each(|known| decoder.know(known));
             let slipped = track.report.events.iter().any(|(_, event)| *event == Event::CycleSlip);
             let mut all = Vec::new();
             let ended = track.report.symbols.partition_point(|symbol| symbol.end <= until);
@@ -81,7 +82,14 @@ impl FrontEnd {
                         }
                         None
                     }
-                    News::Contradiction => None,
+                    News::Contradiction => {
+                        shared.refuse(sv, "the time of a unit contradicts that of those before it".to_owned());
+                        None
+                    }
+                    News::Refused(why) => {
+                        shared.refuse(sv, why);
+                        None
+                    }
                     News::Time(time) => {
                         shared.timebase.take_time(time);
                         None
@@ -116,6 +124,8 @@ impl FrontEnd {
                         (serves && shared.ephemerides.of(sv).is_empty()).then_some(Event::ReducedElements)
                     }
                     News::Ephemeris(ephemeris) => {
+                        // What was refused on the way to it has done no harm.
+                        shared.refused.remove(&sv);
                         let is_sick = |set: &Ephemeris| set.is_healthy_on(signal) == Some(false);
                         let sick = is_sick(&ephemeris);
                         let before = shared.ephemerides.insert(*ephemeris).as_ref().is_some_and(is_sick);

@@ -8,10 +8,11 @@ use super::predict::{Missed, Near};
 use super::shared::Shared;
 use super::step::{Counted, Step, Tick};
 use super::{gap, plan, suited};
-use crate::acquire::{self, AcquireError, Searcher};
+use crate::acquire::{self, AcquireError, Acquired, Searcher};
 use crate::correlate::fixed::FixedSamples;
 use crate::correlate::sums::{RunningSums, Samples};
 use crate::decode::Decoder;
+use crate::followed;
 use crate::interference::{Followed, Watch};
 use crate::lead::{lead, other_side};
 use crate::looks::Looks;
@@ -126,6 +127,12 @@ pub(super) struct FrontEnd {
     lookback: Lookback,
     pub lost: BTreeMap<Link, u64>,
     pub refused: BTreeMap<Link, u64>,
+    /// Hits that were taken for another satellite's signal: at its delay and Doppler, and weaker.
+    pub doubles: BTreeMap<Link, Link>,
+    /// The first samples, for the search at the end of a short recording.
+    pub opening: Option<Gathered>,
+    /// What searches found in them.
+    pub opened: Vec<Acquired>,
     pub missed: BTreeMap<Link, Missed>,
     pub offset: Offset,
     /// Channels that measure it.
@@ -175,6 +182,9 @@ impl FrontEnd {
             lookback: Lookback::default(),
             lost: BTreeMap::new(),
             refused: BTreeMap::new(),
+            doubles: BTreeMap::new(),
+            opening: None,
+            opened: Vec::new(),
             missed: BTreeMap::new(),
             offset: Offset::default(),
             lines: 0,
@@ -268,14 +278,15 @@ impl FrontEnd {
     /// What follows when the block has been measured: the spectrum, the channels that end, the next search.
     pub fn close(&mut self, block: &Packed, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let sink = &mut Counted { sink, step: self.step, ticks: &[] };
-        self.watch(block, sink)?;
+        self.watch(Some(block), sink)?;
         self.retire(block.end(), shared, sink)?;
         self.hasten(block.end(), shared);
         Ok(())
     }
 
-    /// Looks for continuous waves, and reports those that are none of the satellites' own lines.
-    fn watch(&mut self, block: &Packed, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+    /// Looks for continuous waves in a block, or at the end in what there is of less than a second, and
+    /// reports those that are none of the satellites' own lines.
+    pub fn watch(&mut self, block: Option<&Packed>, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let mut followed: Vec<f64> = self.tracks.iter().map(|track| track.cn0_dbhz).collect();
         followed.sort_by(f64::total_cmp);
         // A channel's first estimates may be low; the search's is not.
@@ -286,7 +297,11 @@ impl FrontEnd {
             .map_or(0.0, |dbhz| libm::pow(10.0, dbhz / 10.0));
         let known: Vec<Followed> = self.tracks.iter().map(Track::followed).collect();
         let mut reported = Vec::new();
-        self.watch.take(block, (strongest_hz, &known), |_, row| reported.push(row));
+        let mut report = |_, row| reported.push(row);
+        match block {
+            Some(block) => self.watch.take(block, (strongest_hz, &known), &mut report),
+            None => self.watch.rest((strongest_hz, &known), &mut report),
+        }
         for row in reported {
             let Some(row) = row else {
                 self.quiet_dbhz = followed.get(followed.len() / 2).copied().or(self.quiet_dbhz);
@@ -348,7 +363,8 @@ pub(super) fn noise(signal: &'static Signal, metadata: &IfMetadata, settings: &S
         share: power_share * model.as_ref().map_or(1.0, |model| model.efficiency),
         shape: model.map_or(CodeShape::triangle(tracking.spacing_chips), |model| model.shape),
         bandwidth_hz: tracking.dll_bandwidth_hz,
-        integration_s: period_s * f64::from(tracking.integration),
+        integration_s: followed::Followed::of(signal, settings)
+            .map_or(period_s * f64::from(tracking.integration), |followed| followed.integration_s),
     }
 }
 

@@ -8,7 +8,7 @@
 
 use crate::correlate::layers_refusal;
 use crate::diagnosis::Stage;
-use crate::lead::{lead, refusal, undated};
+use crate::lead::{lead, refusal};
 use crate::outcome::{Conditioning, Outcome, ReceiveError};
 use crate::output::Sink;
 use crate::position::Noises;
@@ -59,9 +59,6 @@ impl Session {
         let assigned = suited::assigned(metadata, &settings.acquisition.signals());
         let all = assigned.iter().flatten();
         if let Some((signal, reason)) = all.filter_map(|signal| Some((signal, refusal(signal)?))).next() {
-            return Err(ReceiveError::Unsupported { signal: signal.name, reason });
-        }
-        if let Some((signal, reason)) = undated(&assigned.concat()) {
             return Err(ReceiveError::Unsupported { signal: signal.name, reason });
         }
         for (metadata, signals) in metadata.iter().zip(&assigned) {
@@ -200,6 +197,12 @@ impl Session {
                 continue;
             }
             warnings.extend(suited::warnings(&front_end.metadata, &front_end.settings));
+            warnings.extend(front_end.doubles.iter().map(|(weaker, stronger)| {
+                format!(
+                    "{weaker} was found at the delay and Doppler of {} and weaker: it is taken for that signal",
+                    stronger.sv
+                )
+            }));
             if several && front_end.gap.unknown.is_some() {
                 warnings.push(format!(
                     "front end {} lost samples, and no satellite shows how many: it is left out of fixes since",
@@ -208,6 +211,8 @@ impl Session {
             }
         }
         warnings.extend(self.assumed_era());
+        warnings.extend(self.shared.solver.other_troposphere().map(str::to_owned));
+        warnings.extend(self.shared.refusals().iter().map(ToString::to_string));
         warnings
     }
 
@@ -243,9 +248,9 @@ impl Session {
         self.front_ends.iter().any(|front_end| front_end.searched)
     }
 
-    /// Searches recordings that ended before the first search had all the samples that it asks for.
-    pub fn search_rest(&mut self, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+    /// Searches recordings of so many samples of the first front end that ended before a second search.
+    pub fn search_rest(&mut self, samples: u64, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let each = &mut self.front_ends.iter_mut();
-        each.try_for_each(|front_end| front_end.search_rest(&mut self.shared, sink))
+        each.try_for_each(|front_end| front_end.search_rest(front_end.step.own(samples), &mut self.shared, sink))
     }
 }

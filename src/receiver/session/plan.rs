@@ -14,9 +14,9 @@ use crate::acquire::{AcquireError, Searcher, samples_needed};
 use crate::position::least_squares::UNKNOWNS;
 
 /// Widths of searches that find too little, in those of the settings.
-const WIDTHS: [f64; 3] = [1.0, 2.0, 5.0];
+pub(super) const WIDTHS: [f64; 3] = [1.0, 2.0, 5.0];
 /// Seconds from one of these to the next.
-const WIDEN_S: f64 = 1.0;
+pub(super) const WIDEN_S: f64 = 1.0;
 /// Centres lie on this grid, so that a small drift changes nothing.
 const CENTRE_STEP_HZ: f64 = 500.0;
 /// A sky this far from zero stretches the range, and no further.

@@ -3,16 +3,21 @@
 use std::collections::BTreeSet;
 
 use super::gap::Watched;
+use super::plan::{WIDEN_S, WIDTHS};
 use super::predict::Near;
 use super::shared::Shared;
 use super::step::Counted;
 use super::{FrontEnd, Track, WRONG_TIME_FIXES, Window, suited};
-use crate::acquire::{AcquireError, Acquired, Searcher};
+use crate::acquire::{
+    AcquireError, Acquired, AcquisitionSettings, MOST_DOPPLER_HZ, MOST_SUMS, Searcher, samples_needed,
+};
 use crate::decode::Decoder;
+use crate::lead::lead;
 use crate::outcome::ReceiveError;
 use crate::output::{Record, Sink};
 use crate::parting::Line;
-use crate::source::{Gathered, Packed};
+use crate::position::least_squares::UNKNOWNS;
+use crate::source::{Gathered, Packed, Stretch};
 use crate::track::{Channel, Report};
 use gnss::record::{AcquisitionRow, Event, EventRow};
 use gnss::satellite::Sv;
@@ -22,6 +27,18 @@ use gnss::signal::Link;
 const EAGER_S: f64 = 30.0;
 /// A channel that was dropped for what it said is not followed again so long.
 const REFUSED_S: f64 = 120.0;
+/// First samples of a recording that are kept for a search at its end, if it is a short one: three times as
+/// many as the first search of C/A takes, which finds what is 3 dB weaker.
+const OPENING_S: f64 = 0.064;
+/// So many times the samples of the first search make another worth its time: they find what is 1 dB weaker.
+const WORTH: f64 = 1.5;
+/// Delays this near, in chips, and Dopplers this near, in cycles of a coherent sum, are equal: a search tells
+/// apart no more, and the side peaks of a sub-carrier lie half a chip from the main one.
+const SAME_CHIPS: f64 = 0.75;
+const SAME_CYCLES: f64 = 0.5;
+
+/// A row for a candidate, and where it was found.
+type Found = (AcquisitionRow, Option<Acquired>);
 
 impl FrontEnd {
     /// Collects samples while a search is due, searches when there are enough, starts channels.
@@ -34,6 +51,12 @@ impl FrontEnd {
         let end = block.end();
         if self.signals.is_empty() {
             return Ok(());
+        }
+        let opening = self.samples(OPENING_S);
+        if block.first < opening {
+            self.opening.get_or_insert_with(|| Gathered::from(block)).take(block, opening as usize);
+        } else if block.first > self.samples(WIDEN_S) {
+            self.opening = None;
         }
         if self.window.is_none() {
             let Some(near) = self.due(block, shared)? else { return Ok(()) };
@@ -110,37 +133,90 @@ impl FrontEnd {
         Ok((!near.0.is_empty()).then_some(Some(near)))
     }
 
-    /// Searches a recording that ended before the first search had all the samples that it asks for: by fewer
-    /// sums, and by sums of one code period where there is no room for another. A signal for which there is
-    /// no room at all is left out.
-    pub(super) fn search_rest(&mut self, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+    /// Searches the first samples of a recording that ended before a second search was due, all that there
+    /// are up to [`OPENING_S`]: once as any recording's, where there was no search yet, and then by as many
+    /// sums as there is room for, beside what was found and where the next search would have looked. Ranges
+    /// get wider while there are too few satellites for a fix.
+    ///
+    /// A signal for which there is no room is left out: there are sums of one code period where two do not
+    /// fit.
+    pub(super) fn search_rest(
+        &mut self,
+        samples: u64,
+        shared: &mut Shared,
+        sink: &mut dyn Sink,
+    ) -> Result<(), ReceiveError> {
         let sink = &mut Counted { sink, step: self.step, ticks: &[] };
-        let Some(window) = self.window.take().filter(|_| !self.searched) else { return Ok(()) };
-        let packed = window.samples.packed();
-        let have = packed.samples() as u64;
-        let mut searcher = Searcher::fitted(&self.metadata, &self.settings.acquisition, have)?;
-        let mut sought = Vec::new();
-        for link in suited::distinct(&self.candidates) {
-            sought.extend(searcher.has_room(link.signal)?.then_some(link));
-        }
-        if sought.is_empty() && !self.candidates.is_empty() {
+        self.watch(None, sink)?;
+        let Some(opening) = self.opening.take().filter(|_| samples < self.samples(WIDEN_S)) else { return Ok(()) };
+        // What a search waits for that no samples come for any more may be longer.
+        let opening = match self.window.take() {
+            Some(window) if !self.searched => window.samples,
+            _ => opening,
+        };
+        if !self.searched && !self.search_opening((&opening, 1.0), shared, sink)? {
             return Ok(());
         }
-        let results = searcher.search_stretch(&window.stretch(), &sought, &[])?;
-        self.start_channels(results, packed.first, shared, sink)?;
         self.searched = true;
+        self.follow_sky(shared);
+        for width in WIDTHS {
+            if width > 1.0 && self.tracks.len() >= UNKNOWNS {
+                break;
+            }
+            self.search_opening((&opening, width), shared, sink)?;
+        }
         Ok(())
+    }
+
+    /// One of these searches; whether there is room for any signal.
+    fn search_opening(
+        &mut self,
+        (opening, width): (&Gathered, f64),
+        shared: &mut Shared,
+        sink: &mut dyn Sink,
+    ) -> Result<bool, ReceiveError> {
+        let packed = opening.packed();
+        let have = packed.samples() as u64;
+        let usual = &self.settings.acquisition;
+        let (mut settings, mut centre_hz, mut is_elsewhere) = (usual.clone(), 0.0, !self.searched);
+        if self.searched {
+            let sweep = self.sweep(shared);
+            centre_hz = sweep.centre_hz;
+            settings.doppler_max_hz = (width * sweep.half_hz).min(MOST_DOPPLER_HZ);
+            settings.noncoherent_sums = MOST_SUMS;
+            is_elsewhere = width > 1.0 || sweep.half_hz > usual.doppler_max_hz;
+            let share = self.settings.operation.repeated_false_alarm_share;
+            settings.false_alarm_probability = (share * settings.false_alarm_probability).max(1e-12);
+        }
+        let mut searcher = Searcher::fitted(&self.metadata, &settings, centre_hz, have)?;
+        let known: Vec<Acquired> = self.opened.clone();
+        let mut sought = Vec::new();
+        for link in suited::distinct(&self.candidates) {
+            let is_known = known.iter().any(|one| one.link().is_alike(link));
+            let alone = AcquisitionSettings { signals: vec![link.signal.name.to_owned()], ..usual.clone() };
+            // Where nothing else is new, what has hardly more sums is not found either.
+            let seen = samples_needed(&self.metadata, &alone)?;
+            let is_new = is_elsewhere || have as f64 > WORTH * seen as f64;
+            sought.extend((is_new && !is_known && searcher.has_room(link.signal)?).then_some(link));
+        }
+        if sought.is_empty() && !self.candidates.is_empty() {
+            return Ok(false);
+        }
+        let results = searcher.search_stretch(&Stretch::Packed(packed), &sought, &known)?;
+        self.start_channels(results, packed.first, shared, sink)?;
+        Ok(true)
     }
 
     /// Records what a search came to, and starts channels on what it found.
     fn start_channels(
         &mut self,
-        results: Vec<(AcquisitionRow, Option<Acquired>)>,
+        results: Vec<Found>,
         since: u64,
         shared: &mut Shared,
         sink: &mut dyn Sink,
     ) -> Result<(), ReceiveError> {
         let followed: BTreeSet<Link> = self.tracks.iter().map(|track| track.channel.link()).collect();
+        let results = self.single(results);
         for (row, hit) in results {
             let sv = self.likeliest(row.link(), shared);
             let (row, hit) = (AcquisitionRow { sv, ..row }, hit.map(|hit| Acquired { sv, ..hit }));
@@ -167,6 +243,9 @@ impl FrontEnd {
                 signal: hit.signal,
                 event: Event::Acquired,
             }))?;
+            if self.opening.as_ref().is_some_and(|opening| opening.packed().first == hit.sample) || !self.searched {
+                self.opened.push(hit);
+            }
             let mut channel = Channel::start(&hit, &self.metadata, &self.settings.tracking);
             channel.set_carrier_offset(self.offset.hz());
             self.tracks.push(Track {
@@ -186,6 +265,32 @@ impl FrontEnd {
         }
         self.tracks.sort_by_key(|track| track.channel.link());
         Ok(())
+    }
+
+    /// The same without hits at the delay and Doppler of a stronger one of their signal: one code that is
+    /// received passes for another of its family.
+    fn single(&mut self, mut results: Vec<Found>) -> Vec<Found> {
+        let hits: Vec<Acquired> = results.iter().filter_map(|(_, hit)| *hit).collect();
+        for (row, found) in &mut results {
+            let Some(hit) = *found else { continue };
+            let is_same = |other: &&Acquired| other.cn0_dbhz > hit.cn0_dbhz && self.are_at_one_place(other, &hit);
+            if let Some(stronger) = hits.iter().find(is_same) {
+                self.doubles.insert(hit.link(), stronger.link());
+                (row.acquired, *found) = (false, None);
+            }
+        }
+        results
+    }
+
+    /// Whether two hits of one signal and carrier have equal delays and Dopplers.
+    fn are_at_one_place(&self, a: &Acquired, b: &Acquired) -> bool {
+        let Some(component) = lead(a.signal).filter(|_| a.signal == b.signal) else { return false };
+        let length = f64::from(component.code_chips);
+        let chips = (a.code_phase_chips - b.code_phase_chips + 0.5 * length).rem_euclid(length) - 0.5 * length;
+        let sum_s = component.period_s() * f64::from(self.settings.acquisition.periods(component));
+        a.link().carrier_hz() == b.link().carrier_hz()
+            && chips.abs() < SAME_CHIPS
+            && (a.doppler_hz - b.doppler_hz).abs() * sum_s < SAME_CYCLES
     }
 
     /// Whose signal it is that was found, of satellites that a search cannot tell apart: of one whose
@@ -244,5 +349,101 @@ impl FrontEnd {
             self.next_foreseen = self.next_foreseen.min(now + self.foreseen_wait());
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::acquire::tests::{Sent, metadata, record};
+    use crate::receive;
+    use crate::session::Session;
+    use crate::settings::Settings;
+    use gnss::beidou::b1c::B1C;
+    use gnss::beidou::in_phase::B2I;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::samples::Format;
+    use gnss::satellite::System;
+
+    #[test]
+    fn a_short_recording_is_searched_to_its_end_and_beyond_the_usual_dopplers() {
+        let metadata = metadata(Format::Ci8, 2.6e6, 0.0, false);
+        let sent = |prn, doppler_hz, cn0_dbhz| Sent { prn, doppler_hz, phase_chips: 37.3 * f64::from(prn), cn0_dbhz };
+        // A sky whose middle is far from zero, one of it beyond 5 kHz, and two whose powers of 20 ms are
+        // below the threshold: 20 + 2 · 20 ms · 2000 Hz, less two decibels, is 71, where 95 are asked for.
+        let sky = [
+            sent(3, 300.0, 46.0),
+            sent(7, -1750.0, 45.0),
+            sent(11, -4300.0, 44.0),
+            sent(19, -6424.0, 43.0),
+            sent(22, -800.0, 33.0),
+            sent(30, -2600.0, 33.0),
+        ];
+        let recording = record(metadata.clone(), 286_000, &sky, 5);
+        let byte = |x: f32| (24.0 * x).round().clamp(-127.0, 127.0) as i8 as u8;
+        let bytes: Vec<u8> = recording.i.iter().zip(&recording.q).flat_map(|(i, q)| [byte(*i), byte(*q)]).collect();
+        let found = |bytes: &[u8]| -> Vec<u8> {
+            let mut records: Vec<Record> = Vec::new();
+            let outcome = receive(&metadata, bytes, &Settings::default(), &mut records, &mut |_| ()).unwrap();
+            outcome.acquired.iter().map(|sv| sv.number).collect()
+        };
+        assert_eq!(found(&bytes), [3, 7, 11, 19, 22, 30]);
+        // As many samples as the first search takes hold the strong ones alone, now with those far off.
+        assert_eq!(found(&bytes[..2 * 56_000]), [3, 7, 11, 19]);
+    }
+
+    #[test]
+    fn of_hits_at_one_delay_and_doppler_the_strongest_stays_and_the_others_are_named() {
+        let metadata =
+            gnss::samples::IfMetadata { center_hz: B1C.centre_hz(), ..metadata(Format::Ci8, 4e6, 0.0, false) };
+        let mut settings = Settings::default();
+        settings.acquisition.signals = vec![B1C.name.to_owned()];
+        let mut session = Session::new(&[metadata], &settings).unwrap();
+        let front_end = session.front_ends.first_mut().unwrap();
+        let found = |number, code_phase_chips, doppler_hz, cn0_dbhz| {
+            let (sv, signal) = (Sv { system: System::BeiDou, number }, &B1C);
+            let hit = Acquired { sv, signal, sample: 0, code_phase_chips, doppler_hz, cn0_dbhz };
+            let (statistic, threshold, acquired) = (300.0, 100.0, true);
+            let row = AcquisitionRow {
+                sample: 0,
+                sv,
+                signal,
+                acquired,
+                statistic,
+                threshold,
+                doppler_hz,
+                code_phase_chips,
+                cn0_dbhz,
+            };
+            (row, Some(hit))
+        };
+        let kept = front_end.single(vec![
+            found(47, 10_229.9, 1003.0, 36.0),
+            found(34, 0.2, 1000.0, 45.0),
+            // Another delay, and another Doppler.
+            found(35, 2.2, 1000.0, 40.0),
+            found(36, 0.2, 1100.0, 40.0),
+        ]);
+        let numbers: Vec<u8> = kept.iter().filter_map(|(_, hit)| hit.map(|hit| hit.sv.number)).collect();
+        assert_eq!(numbers, [34, 35, 36]);
+        assert!(kept.iter().all(|(row, hit)| row.acquired == hit.is_some()));
+        let text = session.warnings().join("; ");
+        assert!(text.contains("C47 BeiDou B1C was found at the delay and Doppler of C34"), "{text}");
+    }
+
+    #[test]
+    fn numbers_that_send_no_such_signal_are_searched_for_on_request_alone() {
+        let numbers = |signal: &'static gnss::signal::Signal, reserved_codes: bool| -> Vec<u8> {
+            let own = metadata(Format::Ci8, 4e6, 0.0, false);
+            let own = gnss::samples::IfMetadata { center_hz: signal.centre_hz(), ..own };
+            let mut settings = Settings::default();
+            settings.acquisition.signals = vec![signal.name.to_owned()];
+            settings.acquisition.reserved_codes = reserved_codes;
+            suited::candidates(&own, &settings.acquisition).iter().map(|link| link.sv.number).collect()
+        };
+        assert!(numbers(&B1C, false).into_iter().eq(19..=50));
+        assert!(numbers(&B1C, true).into_iter().eq(1..=63));
+        assert!(numbers(&B2I, false).into_iter().eq(1..=18));
+        assert!(numbers(&L1_CA, false).into_iter().eq(1..=32));
     }
 }

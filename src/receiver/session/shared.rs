@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::diagnosis::Stage;
+use crate::diagnosis::{Refusal, Stage};
 use crate::observe::Timebase;
 use crate::position::least_squares::UNKNOWNS;
 use crate::position::{CodeNoise, NoFix, Noises, Sets, Solver};
@@ -57,6 +57,8 @@ pub(super) struct Shared {
     /// The best that a search met: satellite, statistic and threshold.
     pub strongest: Option<(Sv, f64, f64)>,
     pub progress: BTreeMap<Sv, Progress>,
+    /// Units that passed their checks and were not used, by satellite and reason, since its last set.
+    pub refused: BTreeMap<Sv, BTreeMap<String, u64>>,
     pub acquired: BTreeSet<Sv>,
     pub used: BTreeSet<Sv>,
     pub losses: u64,
@@ -90,6 +92,7 @@ impl Shared {
             reason: None,
             strongest: None,
             progress: BTreeMap::new(),
+            refused: BTreeMap::new(),
             acquired: BTreeSet::new(),
             used: BTreeSet::new(),
             losses: 0,
@@ -112,7 +115,31 @@ impl Shared {
 
     /// The time near which weeks are resolved.
     pub fn near(&self) -> Epoch {
-        self.timebase.clock().map(|clock| clock.start).or(self.start).unwrap_or(self.week_reference)
+        self.known().unwrap_or(self.week_reference)
+    }
+
+    /// The time where messages or the recording say it.
+    pub fn known(&self) -> Option<Epoch> {
+        self.timebase.clock().map(|clock| clock.start).or(self.start)
+    }
+
+    /// Counts a unit that passed its checks and was not used.
+    pub fn refuse(&mut self, sv: Sv, why: String) {
+        *self.refused.entry(sv).or_default().entry(why).or_default() += 1;
+    }
+
+    /// The reasons for which units were not used, each with its satellites and how many there were.
+    pub fn refusals(&self) -> Vec<Refusal> {
+        let mut all = BTreeMap::<&str, Refusal>::new();
+        for (sv, reasons) in &self.refused {
+            for (why, count) in reasons {
+                let blank = || Refusal { why: why.clone(), svs: Vec::new(), units: 0 };
+                let refusal = all.entry(why).or_insert_with(blank);
+                refusal.svs.push(*sv);
+                refusal.units += count;
+            }
+        }
+        all.into_values().collect()
     }
 
     /// The first stage that failed, where there was no fix.
@@ -128,7 +155,8 @@ impl Shared {
             return Stage::NoSymbols { acquired: self.acquired.iter().copied().collect() };
         }
         if of(|progress| progress.frame).is_empty() {
-            return Stage::NoFrame { with_symbols };
+            let refused = self.refusals();
+            return if refused.is_empty() { Stage::NoFrame { with_symbols } } else { Stage::Refused { refused } };
         }
         let complete: Vec<Sv> = self.ephemerides.satellites().collect();
         if complete.len() < UNKNOWNS {

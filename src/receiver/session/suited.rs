@@ -32,6 +32,7 @@ pub(super) fn warnings(metadata: &IfMetadata, settings: &Settings) -> Vec<String
     };
     let signals = settings.acquisition.signals();
     let mut found: Vec<String> = signals.iter().filter_map(|signal| one(signal, lead(signal)?)).collect();
+    found.extend(undated(&signals).map(|(signal, reason)| format!("{signal}: {reason}")));
     found.extend(signals.iter().filter_map(|signal| image(metadata, signal, settings.acquisition.doppler_max_hz)));
     found
 }
@@ -112,8 +113,13 @@ pub(crate) fn held(metadata: &[IfMetadata], settings: &Settings) -> Vec<&'static
     let is_followed = |signal: &'static Signal| signal.sides_hz() == 0.0 && refusal(signal).is_none();
     let mut held = signal::all();
     held.retain(|signal| is_followed(signal) && metadata.iter().any(|metadata| is_held(signal, metadata)));
+    let all = held.clone();
     while let Some((undated, _)) = undated(&held) {
         held.retain(|signal| *signal != undated);
+    }
+    // Without others to date them they can still be searched for and followed.
+    if held.is_empty() {
+        held = all;
     }
     if held.is_empty() { vec![&L1_CA] } else { held }
 }
@@ -179,5 +185,7 @@ mod tests {
         let two = held(&[of(Format::Ci8, 4e6, 1_575.42e6), of(Format::Ci8, 21e6, 1_176.45e6)]);
         assert!(["GPS L1 C/A", "GPS L5", "Galileo E5a", "BeiDou B2a"].iter().all(|name| two.contains(name)));
         assert_eq!(held(&[of(Format::Ci8, 4e6, 900e6)]), ["GPS L1 C/A"]);
+        // What others would have to date is searched for where there are none.
+        assert!(held(&[of(Format::Ci8, 15e6, 1_278.75e6)]).contains(&"Galileo E6"));
     }
 }

@@ -5,6 +5,7 @@
 //! satellite's number, whose symbols the code leaves as they are. Messages say their second of the week, one
 //! type says the week.
 
+use std::cell::Cell;
 use std::fmt;
 use std::sync::LazyLock;
 
@@ -293,12 +294,17 @@ impl Reader for TypedReader {
     fn take(&mut self, soft: f32, near: Epoch) -> Vec<Read> {
         let (layout, number) = (self.layout, self.sv.number);
         let may_begin = |symbols: &[f32]| share(layout.first(number), symbols).abs() > LEAST_SHARE;
+        let another = Cell::new(None);
         let own = |symbols: &[f32]| {
-            let found = layout.decode(symbols);
-            found.filter(|(bits, inverted)| layout.said_number(symbols, bits, *inverted) == i64::from(number))
+            let (bits, inverted) = layout.decode(symbols)?;
+            let named = layout.said_number(symbols, &bits, inverted);
+            another.set(Some(named).filter(|named| *named != i64::from(number)));
+            another.get().is_none().then_some((bits, inverted))
         };
-        let found = self.frames.take(soft, may_begin, own);
-        found.map_or_else(Vec::new, |(bits, inverted)| self.read(bits, inverted, near))
+        match (self.frames.take(soft, may_begin, own), another.get()) {
+            (Some((bits, inverted)), _) => self.read(bits, inverted, near),
+            (None, another) => another.map(|another| Read::names_another("a message", another)).into_iter().collect(),
+        }
     }
 
     fn skip(&mut self) {

@@ -160,6 +160,7 @@ impl D1D2Reader {
         // for sets change between frames.
         let frame_of = |part: &Subframe| i64::from(second(part)) / UNIT_S;
         if set.toe != set.toc && parts.iter().any(|part| frame_of(part) != frame_of(first)) {
+            news.extend(self.complete.is_none().then(|| Read::make_no_set("the latest subframes")));
             return;
         }
         // A set is sent from its reference time on: an older part is of the one before.

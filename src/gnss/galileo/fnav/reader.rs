@@ -85,7 +85,10 @@ impl FnavReader {
         if self.complete.as_ref() == Some(&content()) {
             return;
         }
-        let Some(set) = elements(self.sv, pages, near) else { return };
+        let Some(set) = elements(self.sv, pages, near) else {
+            news.extend(self.complete.is_none().then(|| Read::make_no_set("pages 1 to 4")));
+            return;
+        };
         self.complete = Some(content());
         let rows = NavigationRow::each(self.sv, FNAV.name, u32::from(set.iode), all).collect();
         news.push(Read::Ephemeris(Box::new(set)));

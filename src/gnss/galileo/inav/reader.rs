@@ -136,7 +136,10 @@ impl InavReader {
         if self.complete.is_some_and(|before| content(&before) == content(&set)) {
             return;
         }
-        let Some(ephemeris) = elements(self.sv, set.each_ref(), near) else { return };
+        let Some(ephemeris) = elements(self.sv, set.each_ref(), near) else {
+            news.extend(self.complete.is_none().then(|| Read::make_no_set("words 1 to 5")));
+            return;
+        };
         let issue = u32::from(ephemeris.iode);
         let mut rows: Vec<NavigationRow> =
             [one, two, three, four].iter().flat_map(|word| self.rows(word, issue)).collect();
@@ -169,7 +172,7 @@ impl Reader for InavReader {
         match decode_any(self.symbols.make_contiguous()) {
             Some((parts, _)) if is_alert(&parts) => {
                 (self.page, self.failures) = (Some(begin), 0);
-                Vec::new()
+                vec![Read::Refused("a page is an alert page".to_owned())]
             }
             Some((parts, inverted)) => {
                 (self.page, self.failures) = (Some(begin), 0);

@@ -17,6 +17,8 @@
 mod fields;
 mod reader;
 
+use std::ops::RangeInclusive;
+
 use crate::bits::{Element, FieldError, Store, add_to, bits_of, integers, quantise_all, read_all, write_all};
 use crate::broadcast::{Ephemeris, SetForm};
 use crate::ionosphere::Model;
@@ -276,16 +278,41 @@ pub fn elements(sv: Sv, strings: [&GlonassString; 4], sent: Epoch) -> Ephemeris 
     Ephemeris { toe, toc: toe, ..found }
 }
 
-/// When the frame began of which these are strings 1, 4 and 5; `None` for a time or date that is none.
-pub fn frame_began(one: &GlonassString, four: &GlonassString, five: &GlonassString) -> Option<Epoch> {
+/// When the frame began of which these are strings 1, 4 and 5. Where string 5 leaves out the interval of four
+/// years, a time that is known to within a year gives it.
+///
+/// # Errors
+/// What in them is no time or date.
+pub fn frame_began(
+    one: &GlonassString,
+    four: &GlonassString,
+    five: &GlonassString,
+    known: Option<Epoch>,
+) -> Result<Epoch, String> {
     let [hours, minutes, halves] = TIME.map(|place| i64::from(one.piece(place)));
-    let four_years = integers(&STRING_5, five).into_iter().find(|(name, _)| *name == "four_years")?.1;
+    let sent = integers(&STRING_5, five).into_iter().find(|(name, _)| *name == "four_years").map(|(_, raw)| raw);
     let day = i64::from(four.piece(DAY));
-    let exists = hours < 24 && minutes < 60 && four_years > 0 && (1..=1461).contains(&day);
+    let away_s = |four_years: i64, near: Epoch| midnight((four_years, day)).since(near).abs();
+    let nearest = |near: Epoch| INTERVALS.min_by(|a, b| away_s(*a, near).total_cmp(&away_s(*b, near)));
+    let four_years = sent.filter(|sent| *sent > 0).or_else(|| known.and_then(nearest)).unwrap_or_default();
+    for (string, name, value, possible) in [
+        (1, "the hour of t_k", hours, 0..=23),
+        (1, "the minute of t_k", minutes, 0..=59),
+        (4, "N_T", day, 1..=1461),
+        (5, "N_4", four_years, INTERVALS),
+    ] {
+        if !possible.contains(&value) {
+            let (first, last) = (possible.start(), possible.end());
+            return Err(format!("{name} in string {string} is {value}, where {first} to {last} makes a date"));
+        }
+    }
     let half_minutes = planted!("gnss.glonass.frame_read", halves, halves + 1);
     let of_day_s = hours * 3600 + minutes * 60 + half_minutes * FRAME_S;
-    exists.then(|| Epoch::new(midnight((four_years, day)).seconds() + of_day_s, 0.0))
+    Ok(Epoch::new(midnight((four_years, day)).seconds() + of_day_s, 0.0))
 }
+
+/// Numbers of the intervals of four years from 1996 on, of five bits (ICD L1, L2 5.1, table 4.9).
+const INTERVALS: RangeInclusive<i64> = 1..=31;
 
 /// Slot by string 4.
 pub fn slot(four: &GlonassString) -> u8 {
@@ -333,8 +360,53 @@ fn alike(mark: impl Iterator<Item = f32>) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::message::Common;
+    use crate::message::{Common, Read};
     use crate::satellite::System;
+
+    /// What a reader finds in two frames from a time on whose strings 5 say an interval of four years.
+    fn read_with(sent: i64, start: Epoch, known: Option<Epoch>) -> Vec<Read> {
+        let sender = (GNAV.sender)(&Common::default()).unwrap();
+        let sv = Sv { system: System::Glonass, number: 5 };
+        let set = Ephemeris { form: &GNAV_SETS, ..Ephemeris::blank(sv, start) };
+        let mut reader = (GNAV.reader)(sv);
+        known.into_iter().for_each(|known| reader.know(known));
+        let far = Epoch::parse("2011-01-01T00:00:00").unwrap();
+        let mut news = Vec::new();
+        for second in (0..60).step_by(2) {
+            let mut symbols = sender.unit(&set, start.plus_s(f64::from(second))).unwrap();
+            if second % 30 == 8 {
+                let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
+                let mut string = decode_soft(&soft).unwrap();
+                write_all(&STRING_5, &SystemTime { four_years: sent as f64, ..SystemTime::default() }, &mut string)
+                    .unwrap();
+                symbols = encode(&string);
+            }
+            news.extend(symbols.into_iter().flat_map(|one| reader.take(if one { -1.0 } else { 1.0 }, far)));
+        }
+        news
+    }
+
+    #[test]
+    fn a_frame_without_its_four_years_is_refused_by_name_or_dated_by_a_known_time() {
+        let start = Epoch::parse("2023-09-19T11:45:00").unwrap();
+        let times = |news: &[Read]| -> Vec<Epoch> {
+            news.iter().filter_map(|read| if let Read::Time(at) = read { Some(*at) } else { None }).collect()
+        };
+        let refused = read_with(0, start, None);
+        assert!(times(&refused).is_empty());
+        assert!(refused.contains(&Read::Refused("N_4 in string 5 is 0, where 1 to 31 makes a date".to_owned())));
+        let whole = read_with(7, start, None);
+        assert_eq!(times(&whole), [start.plus_s(8.0), start.plus_s(38.0)]);
+        assert!(!whole.iter().any(|read| matches!(read, Read::Refused(_))));
+        // A year off is as good as exact: the nearest day of that number is within two years of it.
+        for known in ["2022-10-01T00:00:00", "2023-09-19T11:45:07", "2024-09-01T00:00:00"] {
+            let dated = read_with(0, start, Some(Epoch::parse(known).unwrap()));
+            assert_eq!(times(&dated), times(&whole), "{known}");
+        }
+        // What is said is believed rather than what was known.
+        let other = read_with(6, start, Some(start));
+        assert_eq!(times(&other).first(), Some(&start.plus_s(8.0 - 1461.0 * 86_400.0)));
+    }
 
     #[test]
     fn all_odd_strings_from_the_fifth_on_repeat_the_flag_of_the_third() {

@@ -37,6 +37,8 @@ pub struct GnavReader {
     parts: BTreeMap<u8, Placed>,
     /// Those of the set that was reported last.
     complete: Option<Vec<(&'static str, i64)>>,
+    /// A time that is known to within a year.
+    known: Option<Epoch>,
 }
 
 impl GnavReader {
@@ -50,6 +52,7 @@ impl GnavReader {
             failures: 0,
             parts: BTreeMap::new(),
             complete: None,
+            known: None,
         }
     }
 
@@ -61,7 +64,7 @@ impl GnavReader {
             // On a channel that is not its slot's nothing is known of it.
             if channel(slot).is_none() || channel(slot) != channel(self.sv.number) {
                 self.parts.clear();
-                return news;
+                return vec![Read::names_another("string 4", slot)];
             }
             // What was read under the other name is forgotten: another satellite may have sent it.
             self.sv = Sv { number: slot, ..self.sv };
@@ -74,7 +77,13 @@ impl GnavReader {
         // Strings of an earlier frame are those of another day, or set.
         let oldest = begin.saturating_sub(STRINGS * STRING_SYMBOLS as u64);
         self.parts.retain(|_, (placed, _)| *placed >= oldest);
-        let Some(start) = self.begun(begin) else { return news };
+        let start = match self.begun(begin) {
+            Some(Ok(start)) => start,
+            refused => {
+                news.extend(refused.and_then(Result::err).map(Read::Refused));
+                return news;
+            }
+        };
         news.push(Read::Unit { symbols: STRING_SYMBOLS as u64, of_week_s: start.tow_whole_s(), inverted });
         if number == 5 {
             news.push(Read::Time(start));
@@ -85,11 +94,11 @@ impl GnavReader {
     }
 
     /// When the string with that first symbol began, by strings 1, 4 and 5 of the last frame.
-    fn begun(&self, begin: u64) -> Option<Epoch> {
+    fn begun(&self, begin: u64) -> Option<Result<Epoch, String>> {
         let [one, four, five] = [1, 4, 5].map(|number| self.parts.get(&number));
         let ((placed, one), (_, four), (_, five)) = (one?, four?, five?);
-        let frame = frame_began(one, four, five)?;
-        Some(frame.plus_s((begin as f64 - *placed as f64) / RATE_HZ))
+        let frame = frame_began(one, four, five, self.known);
+        Some(frame.map(|frame| frame.plus_s((begin as f64 - *placed as f64) / RATE_HZ)))
     }
 
     fn look_for_set(&mut self, (begin, start): (u64, Epoch), news: &mut Vec<Read>) {
@@ -152,6 +161,10 @@ impl Reader for GnavReader {
                 Vec::new()
             }
         }
+    }
+
+    fn know(&mut self, near: Epoch) {
+        self.known = Some(near);
     }
 
     fn skip(&mut self) {

@@ -34,8 +34,9 @@ impl CnavReader {
     /// Takes a message that began so many symbols before the newest.
     fn read(&mut self, bits: Vec<bool>, inverted: bool, symbols: u64, near: Epoch) -> Vec<Read> {
         let of_week_s = self.begun_s(&bits);
-        if number(bits.get(8..14).unwrap_or_default()) != u128::from(self.sv.number) {
-            return Vec::new();
+        let named = number(bits.get(8..14).unwrap_or_default());
+        if named != u128::from(self.sv.number) {
+            return vec![Read::names_another("a message", named)];
         }
         let mut news = vec![Read::Unit { symbols, of_week_s, inverted }];
         // The week is that of the message's beginning.
@@ -75,7 +76,10 @@ impl CnavReader {
             return;
         }
         let Some(sent) = self.sent_at(one, near) else { return };
-        let Some(set) = elements(self.sv, messages, sent) else { return };
+        let Some(set) = elements(self.sv, messages, sent) else {
+            news.extend(self.complete.is_none().then(|| Read::make_no_set("messages 10, 11 and 30")));
+            return;
+        };
         self.complete = Some(all.clone());
         let rows = NavigationRow::each(self.sv, self.message.name, u32::from(set.iode), all).collect();
         news.push(Read::Ephemeris(Box::new(set)));

@@ -35,8 +35,8 @@ impl Cnav2Reader {
 
     /// Takes a frame that ends with the newest symbol.
     fn read(&mut self, frame: &Frame, near: Epoch) -> Vec<Read> {
-        if frame.prn().is_some_and(|prn| prn != u128::from(self.sv.prn())) {
-            return Vec::new();
+        if let Some(other) = frame.prn().filter(|prn| *prn != u128::from(self.sv.prn())) {
+            return vec![Read::names_another("a frame", other)];
         }
         let sent = frame.sent_at(near);
         let unit = Read::Unit { symbols: SYMBOLS as u64, of_week_s: frame.of_week_s(), inverted: frame.inverted };

@@ -309,6 +309,13 @@ pub enum SubframeError {
     },
 }
 
+impl SubframeError {
+    /// Whether it is of ten words that were read: the preamble and each word's parity were right.
+    pub fn is_read(&self) -> bool {
+        !matches!(self, Self::Parity { .. } | Self::Preamble { .. })
+    }
+}
+
 /// A subframe whose parity held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Subframe {

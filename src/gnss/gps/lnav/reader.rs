@@ -147,12 +147,16 @@ impl LnavReader {
         if words[0] >> 22 != PREAMBLE && words[0] >> 22 != PREAMBLE_INVERTED && self.frame.is_none() {
             return;
         }
-        if let Ok(subframe) = Subframe::decode(&words, previous) {
-            // Ten words with parity are beyond chance: they show the frame by themselves.
-            self.frame = Some(begin);
-            let inverted = previous & 1 == 1;
-            news.push(self.begun(Header { bit: begin, tow_count: subframe.tow_count, inverted }));
-            self.read(subframe, near, news);
+        match Subframe::decode(&words, previous) {
+            Ok(subframe) => {
+                // Ten words with parity are beyond chance: they show the frame by themselves.
+                self.frame = Some(begin);
+                let inverted = previous & 1 == 1;
+                news.push(self.begun(Header { bit: begin, tow_count: subframe.tow_count, inverted }));
+                self.read(subframe, near, news);
+            }
+            Err(error) if error.is_read() => news.push(Read::Refused(error.to_string())),
+            Err(_) => {}
         }
     }
 
@@ -185,17 +189,22 @@ impl LnavReader {
         if self.complete.is_some_and(|[a, b, c]| same(&a, one) && same(&b, two) && same(&c, three)) {
             return;
         }
-        if let Ok(ephemeris) = ephemeris(self.sv, one, two, three, near) {
-            let set = [*one, *two, *three];
-            let issue = u32::from(ephemeris.iode);
-            let rows = set
-                .iter()
-                .flat_map(|part| NavigationRow::each(self.sv, super::LNAV.name, issue, part.parameters()))
-                .collect();
-            self.complete = Some(set);
-            news.push(Read::Ephemeris(Box::new(ephemeris)));
-            news.push(Read::Parameters(rows));
-        }
+        let ephemeris = match ephemeris(self.sv, one, two, three, near) {
+            Ok(ephemeris) => ephemeris,
+            Err(error) => {
+                news.extend(self.complete.is_none().then(|| Read::Refused(error.to_string())));
+                return;
+            }
+        };
+        let set = [*one, *two, *three];
+        let issue = u32::from(ephemeris.iode);
+        let rows = set
+            .iter()
+            .flat_map(|part| NavigationRow::each(self.sv, super::LNAV.name, issue, part.parameters()))
+            .collect();
+        self.complete = Some(set);
+        news.push(Read::Ephemeris(Box::new(ephemeris)));
+        news.push(Read::Parameters(rows));
     }
 }
 

@@ -32,8 +32,8 @@ impl L1NavReader {
 
     /// Takes a frame that ends with the newest symbol.
     fn read(&mut self, frame: &Frame, near: Epoch) -> Vec<Read> {
-        if frame.prn().is_some_and(|prn| prn != u128::from(self.sv.prn())) {
-            return Vec::new();
+        if let Some(other) = frame.prn().filter(|prn| *prn != u128::from(self.sv.prn())) {
+            return vec![Read::names_another("a frame", other)];
         }
         let sent = frame.sent_at(near);
         let (symbols, inverted) = (SYMBOLS as u64, frame.0.inverted);

@@ -58,6 +58,8 @@ impl NavReader {
         let mut news = Vec::new();
         if let Some(of_week_s) = began_s(&subframe) {
             news.push(Read::Unit { symbols: SUBFRAME_SYMBOLS as u64, of_week_s, inverted });
+        } else {
+            news.push(Read::Refused("the count of the time of week is beyond the week".to_owned()));
         }
         match (id(&subframe), message_type(&subframe)) {
             (1, _) => {
@@ -81,7 +83,10 @@ impl NavReader {
 
     fn look_for_set(&mut self, near: Epoch, news: &mut Vec<Read>) {
         let (Some(one), Some(two)) = (self.set.get(&1), self.set.get(&2)) else { return };
-        let Some(set) = elements(self.sv, one, two, near) else { return };
+        let Some(set) = elements(self.sv, one, two, near) else {
+            news.extend(self.complete.is_none().then(|| Read::make_no_set("subframes 1 and 2")));
+            return;
+        };
         let content: Vec<(&'static str, i64)> = [parameters(one), parameters(two)].concat();
         if self.complete.as_ref() == Some(&content) {
             return;

@@ -79,6 +79,8 @@ impl Reader for SbasReader {
                 if let Some(at) = Self::said(&found.bits, near) {
                     self.time = Some((begin, at));
                     news.push(Read::Time(at));
+                } else {
+                    news.push(Read::Refused(format!("the time of week in message {OF_TIME} is beyond the week")));
                 }
             }
             OF_PLACE => self.place = Some((begin, found.bits)),
