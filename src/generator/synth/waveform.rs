@@ -150,7 +150,10 @@ impl Waveform {
             let negative: Vec<bool> = steps.iter().map(|&step| step < 0).collect();
             let voice = |negative: &[bool], share: f64| Voice {
                 spreading: Spreading::new(negative, pace, Arc::clone(&self.overlay)),
-                amplitude: gain * layer.weight * share,
+                amplitude: gain
+                    * planted!("generator.synth.layers", 1.0, if layer.pulse.len() > 2 { 0.8 } else { 1.0 })
+                    * layer.weight
+                    * share,
                 phase_cycles: layer.phase_cycles,
             };
             if steps.contains(&0) {
