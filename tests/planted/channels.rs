@@ -65,7 +65,7 @@ fn codes_of_glonass_are_aided_by_the_carriers_of_their_own_channels() {
     });
     let mean = errors.sum::<f64>() / late.len() as f64;
     println!("{mean:+.5} chips");
-    // The middle of the band, 2.5e-3 of the carrier away, would aid by 0.032 chips a second less than 12.79. A
-    // loop of half a hertz lags by that over 4B: 0.016 chips.
+    // The middle of the band, 2.5e-3 of the carrier away, would aid by 0.032 chips a second less than 12.79.
+    // A loop of half a hertz lags by that over 4B: 0.016 chips.
     assert!(mean.abs() < 0.005, "{mean} chips");
 }

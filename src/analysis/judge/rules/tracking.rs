@@ -30,7 +30,7 @@ impl Verdict {
                 self.not_judged.push(format!("{figure}: no observation past its pull-in"));
                 continue;
             };
-            // What no loop of this bandwidth can have is no measure of one; theory, satellite by satellite, is.
+            // What no loop of this bandwidth can have is no measure of one; theory judges each satellite.
             if path == "tracking.pll_sigma_deg" && oscillator_deg > limit {
                 self.not_judged.push(format!("{figure}: the oscillator alone leaves {oscillator_deg:.0}° of {limit}°"));
                 continue;
