@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::acquire::{AcquisitionSettings, companion, pair_sums};
 use crate::lead::{lead, other_side};
 use crate::settings::Settings;
 use crate::track::closed::Mode;
@@ -34,6 +35,29 @@ pub struct Followed {
     pub pll_bandwidth_hz: f64,
     /// The same of the code loop.
     pub dll_bandwidth_hz: f64,
+    /// How it is searched for.
+    pub search: Searched,
+}
+
+/// The sums in which a signal is searched for.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Searched {
+    /// Places of the components among the signal's whose powers are added.
+    pub components: Vec<usize>,
+    /// Length of a coherent sum, seconds: no longer than a component keeps its sign.
+    pub coherent_s: f64,
+    /// Coherent sums of each component.
+    pub sums: u32,
+}
+
+impl Searched {
+    /// Of the component that a search is led by, at these places among its signal's.
+    fn of(leading: &Component, components: Vec<usize>, settings: &AcquisitionSettings) -> Self {
+        let coherent_s = leading.period_s() * f64::from(settings.periods(leading));
+        let sums = settings.sums(leading);
+        let sums = if components.len() > 1 { pair_sums(sums) } else { sums };
+        Self { components, coherent_s, sums }
+    }
 }
 
 impl Followed {
@@ -60,6 +84,11 @@ impl Followed {
             least_integration_s: (least_s < most_s).then_some(least_s),
             pll_bandwidth_hz: fitted.pll_bandwidth_hz,
             dll_bandwidth_hz: fitted.dll_bandwidth_hz,
+            search: Searched::of(
+                leading,
+                std::iter::once(leading).chain(companion(leading, signal)).filter_map(at).collect(),
+                &settings.acquisition,
+            ),
         })
     }
 }
@@ -100,6 +129,29 @@ mod tests {
             ("BeiDou B2b", (1.0, None)),
             ("Galileo E1", (4.0, None)),
             ("GPS L1C", (10.0, None)),
+        ] {
+            assert_eq!(of(name), expected, "{name}");
+        }
+    }
+
+    #[test]
+    fn searches_sum_no_longer_than_signs_last_and_by_both_components_of_equal_power() {
+        let settings = Settings::default();
+        assert_eq!((settings.acquisition.coherent_periods, settings.acquisition.noncoherent_sums), (2, 10));
+        let of = |name: &str| {
+            let signal = SIGNALS.iter().find(|signal| signal.name == name).unwrap();
+            let Searched { components, coherent_s, sums } = Followed::of(signal, &settings).unwrap().search;
+            (components.len(), 1e3 * coherent_s, sums)
+        };
+        // Two periods within bits; one of symbols and of chips of overlays, which are as long; eight tenths
+        // of the sums where data and pilot are searched together.
+        for (name, expected) in [
+            ("GPS L1 C/A", (1, 2.0, 10)),
+            ("BeiDou B1I", (1, 1.0, 20)),
+            ("GLONASS G1", (1, 2.0, 10)),
+            ("Galileo E1", (2, 4.0, 8)),
+            ("GPS L2C", (1, 20.0, 10)),
+            ("GPS L1C", (1, 10.0, 10)),
         ] {
             assert_eq!(of(name), expected, "{name}");
         }

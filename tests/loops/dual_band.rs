@@ -45,13 +45,13 @@ fn figure(summary: &serde_json::Value, path: &str) -> f64 {
 }
 
 #[test]
-fn two_bands_give_a_place_to_a_metre_and_the_ionosphere_to_three_decimetres() {
+fn two_bands_give_a_place_to_a_metre_and_the_ionosphere_to_decimetres() {
     if !crate::long::is_asked_for() {
         return;
     }
-    // Of GPS the bars are the verdict's: codes are noisier than those of Galileo, and two satellites have
-    // L2C alone.
-    for (scene, ionosphere_m) in [("scenarios/dual_band.toml", 0.3), ("scenarios/gps_bands.toml", f64::INFINITY)] {
+    // Codes of GPS are noisier than those of Galileo, and two satellites have L2C alone: smoothed codes of
+    // 0.2 m make f₂²/(f₁² − f₂²)·√2 = 2.2 times as much of it, and nine decimetres at 95 %.
+    for (scene, ionosphere_m) in [("scenarios/dual_band.toml", 0.3), ("scenarios/gps_bands.toml", 0.9)] {
         let (summary, off_m) = run(scene);
         assert!(figure(&summary, "/ionosphere/error_p95_m") <= ionosphere_m, "{scene}");
         assert!(figure(&summary, "/ionosphere/true_mean_m") > 3.0, "{scene}");

@@ -89,6 +89,13 @@ const TWO_BANDS: &str =
     "laws::two_bands_show_the_ionosphere_without_the_group_delays_of_the_message_and_give_a_place_without_it";
 const CLOCKS: &str = "laws::two_systems_whose_times_differ_give_one_place_and_a_clock_of_each";
 const SUMS: &str = "laws::running_sums_give_what_every_sample_by_itself_does";
+const LAYERS: &str = "bands::composite_chips_have_a_tenth_as_much_power_in_the_quick_layer_as_in_the_slow_one";
+const NO_L1: &str = "bands::two_bands_neither_of_which_is_l1_show_the_ionosphere_on_l1_and_how_well";
+const COMBINED: &str =
+    "bands::a_combination_is_as_old_as_its_younger_carrier_and_may_jump_by_as_much_more_as_it_is_noisier";
+const SHARE: &str = "bands::half_of_the_power_is_as_noisy_as_a_signal_of_half_the_power";
+const WRITTEN_OBS: &str = "bands::observation_files_count_satellites_flag_slips_and_name_channels";
+const FDMA: &str = "channels::codes_of_glonass_are_aided_by_the_carriers_of_their_own_channels";
 const OFFSET: &str = "laws::with_the_broadcast_offset_any_four_satellites_of_two_systems_give_place_and_time";
 const PAGES: &str =
     "witness::printed::the_page_with_the_ionosphere_and_the_count_of_the_handover_are_where_they_are_printed";
@@ -326,6 +333,16 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.inav.word_order_e5b", "words on E5b come one page early", E5_PAGES),
     fault("receiver.position.dispersion", "the ionosphere is weighted as on the other carrier", TWO_BANDS),
     fault("receiver.position.dispersion_delay", "group delays enter the ionosphere with the wrong sign", TWO_BANDS),
+    fault("receiver.position.dispersion_square", "the ionosphere on L1 follows from the carriers' ratio", NO_L1),
+    fault("receiver.position.dispersion_sigma", "the sigma of the measured ionosphere is halved", NO_L1),
+    fault("receiver.position.locked", "a combination is as old as its older carrier", COMBINED),
+    fault("receiver.smooth.gain", "a combination may jump by no more than one code", COMBINED),
+    fault("receiver.position.share", "codes are weighted as if all power were in the pilot", SHARE),
+    fault("receiver.nco.channel", "codes of GLONASS are aided by the middle channel", FDMA),
+    fault("generator.synth.layers", "BOC(6,1) has eight tenths of its amplitude", LAYERS),
+    fault("gnss.exchange.satellites", "epochs of observation files count observations", WRITTEN_OBS),
+    fault("gnss.exchange.slips", "observation files flag no slip", WRITTEN_OBS),
+    fault("gnss.exchange.channels", "headers name GLONASS's channels with the other sign", WRITTEN_OBS),
     fault("analysis.errors.join", "observations are joined with the satellite's first epoch", JOBS),
     fault("analysis.errors.code_scale", "code errors are halved", JOBS),
     fault("analysis.errors.doppler", "Doppler errors are zero", JOBS),

@@ -28,7 +28,7 @@ use gnss_twin::gnss::time::{Epoch, Rate, SampleClock, TimePolynomial, TimeScale}
 use gnss_twin::receiver::correlate::sums::{RunningSums, Samples};
 use gnss_twin::receiver::correlate::{Arithmetic, Edge, Nco, Replica, chips_to_units};
 use gnss_twin::receiver::position::smooth::Smoother;
-use gnss_twin::receiver::position::{CodeNoise, NoFix, PositionSettings, Sets, Solver, SystemClocks};
+use gnss_twin::receiver::position::{CodeNoise, NoFix, Noises, PositionSettings, Sets, Solved, Solver, SystemClocks};
 use gnss_twin::receiver::track::loops::CodeShape;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -38,19 +38,19 @@ const CN0_DBHZ: f64 = 45.0;
 const MPS: [f64; 3] = [12.0, -7.0, 3.0];
 const RATE_HZ: f64 = 1e6;
 /// The sample of the epoch under test.
-const SAMPLE: u64 = 3_000_000;
+pub const SAMPLE: u64 = 3_000_000;
 
 /// What an ideal receiver observes: geometry, atmosphere and clocks by the generator, no noise.
-struct Ideal {
-    catalogue: Catalogue,
+pub struct Ideal {
+    pub catalogue: Catalogue,
     klobuchar: Klobuchar,
     effects: Vec<Box<dyn Effect>>,
-    clock: SampleClock,
+    pub clock: SampleClock,
     place: Geodetic,
 }
 
 impl Ideal {
-    fn new() -> Self {
+    pub fn new() -> Self {
         let navigation = rinex::embedded().unwrap();
         let klobuchar = navigation.klobuchar.unwrap();
         Self {
@@ -119,7 +119,7 @@ impl Ideal {
         })
     }
 
-    fn observations(&self, sample: u64) -> Vec<Observation> {
+    pub fn observations(&self, sample: u64) -> Vec<Observation> {
         let local = self.clock.epoch(sample);
         let healthy = self.catalogue.satellites().filter(|sv| self.catalogue.healthy(*sv, local));
         healthy.filter_map(|sv| self.observation(sv, sample)).collect()
@@ -128,6 +128,12 @@ impl Ideal {
     fn ephemerides(&self) -> Sets {
         let at = self.clock.epoch(SAMPLE);
         self.catalogue.satellites().filter_map(|sv| self.catalogue.sent_at(sv, at).cloned()).collect()
+    }
+
+    /// What a receiver with such noise makes of observations without knowing the ionosphere.
+    pub fn solved(&self, noises: Noises, observations: &[Observation]) -> Solved {
+        let mut solver = Solver::new(&PositionSettings::default(), noises, self.clock.rate);
+        solver.solve(SAMPLE, self.clock, observations, &self.ephemerides(), None).unwrap()
     }
 
     fn solver(&self, settings: &PositionSettings) -> Solver {
@@ -202,9 +208,7 @@ fn two_bands_show_the_ionosphere_without_the_group_delays_of_the_message_and_giv
         both.push(Observation { signal: &BAND, sent_s, sent_fraction_s, pseudorange_m, ..first.clone() });
         both.push(first);
     }
-    let noises = vec![(&L1_CA, noise()), (&BAND, noise())];
-    let mut solver = Solver::new(&PositionSettings::default(), noises, ideal.clock.rate);
-    let solved = solver.solve(SAMPLE, ideal.clock, &both, &ideal.ephemerides(), None).unwrap();
+    let solved = ideal.solved(vec![(&L1_CA, noise()), (&BAND, noise())], &both);
     // Group delays of metres would show.
     assert!(apart_m > 2.0 && solved.ionosphere.len() == true_m.len(), "{apart_m}");
     for (row, (sv, delay_m)) in solved.ionosphere.iter().zip(&true_m) {
@@ -261,7 +265,7 @@ fn with_the_broadcast_offset_any_four_satellites_of_two_systems_give_place_and_t
 }
 
 /// A code loop of 1 Hz with early and late half a chip apart.
-fn noise() -> CodeNoise {
+pub fn noise() -> CodeNoise {
     let chip_m = SPEED_OF_LIGHT_MPS / 1.023e6;
     CodeNoise { chip_m, share: 1.0, shape: CodeShape::triangle(0.5), bandwidth_hz: 1.0, integration_s: 4e-3 }
 }

@@ -4,6 +4,8 @@
 //! target; without a fault the same tests pass in this very run. `GNSS_TWIN_WRITE_PLANTED` names the report
 //! that the run writes.
 
+mod bands;
+mod channels;
 mod faults;
 mod judge;
 mod laws;

@@ -17,6 +17,7 @@ use crate::run;
 use crate::table::normal;
 
 /// What is done to a file.
+#[derive(Clone, Copy)]
 enum Change {
     Rinex(fn(&mut Observations)),
     Nmea(fn(&mut Sentences)),
@@ -238,7 +239,18 @@ fn times() -> Vec<Variant> {
     fn late(file: &mut Observations, by_s: f64) {
         file.epochs.iter_mut().for_each(|epoch| epoch.time_s += by_s);
     }
+    fn every_second(file: &mut Observations) {
+        let mut index = 0;
+        file.epochs.retain(|_| {
+            index += 1;
+            index % 2 == 0
+        });
+    }
+    const INTERVAL: &str = "interval of epochs against the header's";
     vec![
+        unsound("every second epoch gone", REST, INTERVAL, Rinex(every_second)),
+        unsound("every second epoch gone in motion", MOTION, INTERVAL, Rinex(every_second)),
+        unsound("every second epoch of two systems gone", TWO, INTERVAL, Rinex(every_second)),
         unsound("observations 50 ms late", REST, LATE, Rinex(|file| late(file, 0.05))),
         unsound("observations 50 ms early", MOTION, LATE, Rinex(|file| late(file, -0.05))),
         unsound("observations a second late", TWO, LATE, Rinex(|file| late(file, 1.0))),
@@ -336,6 +348,22 @@ fn places() -> Vec<Variant> {
             }),
         ),
         unsound(
+            "positions 20 m high of E1",
+            GALILEO,
+            "vertical position error, mean",
+            Nmea(|file| {
+                file.number("GGA", 9, |value| value + 20.0);
+            }),
+        ),
+        unsound(
+            "positions 20 m low of E1",
+            GALILEO,
+            "vertical position error, mean",
+            Nmea(|file| {
+                file.number("GGA", 9, |value| value - 20.0);
+            }),
+        ),
+        unsound(
             "positions that scatter by 25 m",
             REST,
             "position error, 95 %",
@@ -388,11 +416,118 @@ fn places() -> Vec<Variant> {
     ]
 }
 
+/// Kinds of damage from above on other scenes.
+fn elsewhere() -> Vec<Variant> {
+    use Change::{Nmea, Rinex};
+    fn noisy(file: &mut Observations, kind: char, sigma: f64) {
+        let mut index = 0;
+        file.map(
+            kind,
+            |_| true,
+            |_, _, value| {
+                index += 1;
+                value + sigma * normal(index, 7)
+            },
+        );
+    }
+    fn without_one(file: &mut Observations) {
+        let sv = file.one();
+        file.epochs.iter_mut().for_each(|epoch| epoch.rows.retain(|row| row.0 != sv));
+    }
+    fn late(file: &mut Observations, by_s: f64) {
+        file.epochs.iter_mut().for_each(|epoch| epoch.time_s += by_s);
+    }
+    fn late_first(file: &mut Sentences) {
+        let first_s = file.times_s()[0];
+        file.keep(|t_s| t_s >= first_s + 12.0);
+    }
+    const CODE: &str = "pseudorange error of a satellite, mean";
+    const DOPPLER: &str = "Doppler error of a satellite, mean";
+    const FROZEN: &str = "values that stay as they were";
+    const STRENGTH: &str = "C/N0 error of a satellite against the others";
+    const LATE: &str = "time tags of observations, late";
+    const LITTLE: &str = "satellites observed too little";
+    let kinds: Vec<(&'static str, &[&'static str], &'static str, Change)> = vec![
+        ("one code eight metres long", &[TWO, MOTION], CODE, Rinex(|file| one(file, 'C', |_, value| value + 8.0))),
+        (
+            "one code eight metres short",
+            &[REST, TWO, GALILEO],
+            CODE,
+            Rinex(|file| one(file, 'C', |_, value| value - 8.0)),
+        ),
+        ("one code that stays", &[TWO, GALILEO], FROZEN, Rinex(|file| freeze(file, 'C'))),
+        (
+            "one code 300 m long",
+            &[REST, TWO, GALILEO],
+            "pseudoranges of another signal",
+            Rinex(|file| one(file, 'C', |_, value| value + 300.0)),
+        ),
+        (
+            "code noise of 15 m",
+            &[REST, TWO],
+            "pseudorange sigma over a plain receiver's, largest",
+            Rinex(|file| noisy(file, 'C', 15.0)),
+        ),
+        ("one carrier's sign", &[MOTION, TWO], "sign of the carrier", Rinex(|file| one(file, 'L', |_, value| -value))),
+        (
+            "half a cycle undeclared",
+            &[REST, GALILEO],
+            "undeclared breaks of carriers",
+            Rinex(|file| one(file, 'L', |t_s, value| value + if t_s > 15.0 { 0.5 } else { 0.0 })),
+        ),
+        ("carrier noise of 0.15 cycles", &[REST, GALILEO], "jitter of a carrier", Rinex(|file| noisy(file, 'L', 0.15))),
+        (
+            "every carrier declared broken",
+            &[TWO, GALILEO],
+            "carriers declared broken",
+            Rinex(|file| file.indicate('1')),
+        ),
+        ("one Doppler five hertz high", &[TWO, GALILEO], DOPPLER, Rinex(|file| one(file, 'D', |_, value| value + 5.0))),
+        ("one Doppler five hertz low", &[REST, MOTION], DOPPLER, Rinex(|file| one(file, 'D', |_, value| value - 5.0))),
+        ("all Dopplers' signs", &[MOTION, GALILEO], "sign of Doppler", Rinex(|file| all(file, 'D', |_, value| -value))),
+        (
+            "Dopplers 50 Hz high",
+            &[TWO, GALILEO],
+            "Doppler plus the carrier's rate",
+            Rinex(|file| all(file, 'D', |_, value| value + 50.0)),
+        ),
+        ("one C/N0 8 dB low", &[REST, MOTION, TWO], STRENGTH, Rinex(|file| one(file, 'S', |_, value| value - 8.0))),
+        (
+            "all C/N0 8 dB high",
+            &[REST, TWO, GALILEO],
+            "C/N0 bias, magnitude",
+            Rinex(|file| all(file, 'S', |_, value| value + 8.0)),
+        ),
+        ("observations 50 ms late", &[TWO, GALILEO], LATE, Rinex(|file| late(file, 0.05))),
+        ("observations a second late", &[REST, MOTION, GALILEO], LATE, Rinex(|file| late(file, 1.0))),
+        ("a satellite gone", &[MOTION, TWO, GALILEO], LITTLE, Rinex(without_one)),
+        ("first fix twelve seconds late", &[MOTION, TWO], "time to the first of the positions", Nmea(late_first)),
+        (
+            "half the positions gone",
+            &[REST, MOTION],
+            "epochs without a fix",
+            Nmea(|file| file.keep(|t_s| normal((10.0 * t_s) as usize, 8) > 0.0)),
+        ),
+        ("positions 30 m north", &[TWO], "horizontal position error, mean", Nmea(|file| file.north(|_| 30.0))),
+        (
+            "positions that scatter by 25 m",
+            &[MOTION, TWO],
+            "position error, 95 %",
+            Nmea(|file| file.north(|index| 25.0 * normal(index, 9))),
+        ),
+    ];
+    let each = |(name, scenes, row, change): (&'static str, &[&'static str], &'static str, Change)| {
+        scenes.iter().map(|&scene| unsound(name, scene, row, change)).collect::<Vec<_>>()
+    };
+    kinds.into_iter().flat_map(each).collect()
+}
+
 fn sounds() -> Vec<Variant> {
     use Change::{Nmea, Rinex};
     fn every(file: &mut Observations, seconds: f64) {
         let whole = |t_s: f64| ((t_s / seconds).round() * seconds - t_s).abs() < 1e-6;
         file.epochs.retain(|epoch| whole(epoch.time_s));
+        file.state_interval(seconds);
     }
     fn set(t_s: f64) -> f64 {
         // 20 ppm, set by whole milliseconds.
@@ -501,10 +636,10 @@ fn wrong(variant: &Variant) -> Option<String> {
 #[test]
 fn another_receiver_s_files_fail_by_the_row_that_names_the_fault_and_sound_ones_by_none() {
     let mut variants: Vec<Variant> =
-        [codes(), carriers(), dopplers(), times(), places(), sounds()].into_iter().flatten().collect();
+        [codes(), carriers(), dopplers(), times(), places(), elsewhere(), sounds()].into_iter().flatten().collect();
     let names: BTreeSet<String> = variants.iter().map(|one| format!("{}, {}", one.name, one.scene)).collect();
     assert_eq!(names.len(), variants.len(), "two variants bear one name");
-    assert!(variants.iter().filter(|variant| variant.row.is_some()).count() >= 55);
+    assert!(variants.iter().filter(|variant| variant.row.is_some()).count() >= 100);
     // Every second one at rest and in motion each day, all with `GNSS_TWIN_LONG`.
     if std::env::var_os("GNSS_TWIN_LONG").is_none() {
         let mut number = 0..;

@@ -23,6 +23,9 @@ pub struct Observations {
     pub epochs: Vec<Epoch>,
 }
 
+/// The last line of a header.
+const END: &str = "                                                            END OF HEADER";
+
 impl Observations {
     pub fn read(text: &str) -> Self {
         let (header, body) = text.split_once("END OF HEADER\n").unwrap();
@@ -52,7 +55,17 @@ impl Observations {
             let row = (line[..3].to_owned(), (0..count).map(padded).collect());
             found.epochs.last_mut().unwrap().rows.push(row);
         }
+        let steps = found.epochs.windows(2).map(|two| two[1].time_s - two[0].time_s);
+        let interval_s = steps.fold(f64::INFINITY, f64::min);
+        found.state_interval(interval_s);
         found
+    }
+
+    /// Says in the header how often epochs come.
+    pub fn state_interval(&mut self, interval_s: f64) {
+        let kept = self.header.lines().filter(|line| !line.ends_with("INTERVAL") && *line != END);
+        let kept: String = kept.map(|line| format!("{line}\n")).collect();
+        self.header = format!("{kept}{interval_s:10.3}{:50}INTERVAL\n{END}\n", "");
     }
 
     pub fn write(&self) -> String {

@@ -2,14 +2,15 @@
 //! with which loops.
 
 use serde::Deserialize;
+use serde_json::Value;
 
 use crate::read::Run;
 use crate::waveform::{Waveform, leading};
-use gnss::signal::{Component, Layer, Layers, Signal, Tone};
+use gnss::signal::{Component, Layer, Layers, Link, Signal, Tone};
 
 /// What `receiver.json` says of a signal.
 #[derive(Clone, Debug, Deserialize)]
-struct Entry {
+pub(crate) struct Entry {
     signal: String,
     component: usize,
     /// None where the replica has all.
@@ -17,9 +18,63 @@ struct Entry {
     /// Of both sides of a sub-carrier the other.
     other_side: Option<usize>,
     spacing_chips: f64,
-    integration_s: f64,
-    pll_bandwidth_hz: f64,
+    pub integration_s: f64,
+    /// Of satellites whose bits are shorter.
+    least_integration_s: Option<f64>,
+    pub pll_bandwidth_hz: f64,
     dll_bandwidth_hz: f64,
+    pub search: Option<Searched>,
+}
+
+/// The sums in which a signal is searched for.
+#[derive(Clone, Debug, Deserialize)]
+pub(crate) struct Searched {
+    /// Places of the components whose powers are added.
+    pub components: Vec<usize>,
+    pub coherent_s: f64,
+    /// Coherent sums of each.
+    pub sums: u32,
+}
+
+impl Entry {
+    /// What `receiver.json` says of a signal, if it does.
+    pub fn of(receiver: &Value, signal: &Signal) -> Option<Self> {
+        let stated = receiver.get("followed").and_then(Value::as_array);
+        let mut entries = stated.into_iter().flatten().filter_map(|entry| Self::deserialize(entry).ok());
+        entries.find(|entry| entry.signal == signal.name)
+    }
+
+    /// Power that the replica finds, over the signal's.
+    pub fn share(&self, signal: &Signal) -> f64 {
+        let places = [Some(self.component), self.other_side].into_iter().flatten();
+        let followed = places.filter_map(|place| signal.components.get(place));
+        let share = |component: &Component| {
+            let found = if self.layer.is_some() { efficiency(component) } else { 1.0 };
+            component.power_share * found
+        };
+        followed.map(share).sum()
+    }
+
+    /// Time of an update of the loops of one satellite, whose bits may be too short for the usual one.
+    pub fn update_s(&self, link: Link) -> f64 {
+        let component = link.signal.components.get(self.component);
+        let bit_s = component.and_then(|component| {
+            let message = component.message.filter(|_| component.periods_per_symbol() == Some(1))?;
+            Some((message.bit)(link.sv).len() as f64 * component.period_s())
+        });
+        let is_short = bit_s.is_some_and(|bit_s| bit_s < self.integration_s - 1e-9);
+        self.least_integration_s.filter(|_| is_short).unwrap_or(self.integration_s)
+    }
+}
+
+/// Power that the replica of a component's strongest layer finds over the component's; of one side of a
+/// sub-carrier that of its chips.
+pub(crate) fn efficiency(component: &Component) -> f64 {
+    let layer = component.strongest().filter(|_| component.tone().is_none());
+    layer.map_or(1.0, |layer| {
+        let [found, own] = component.shapes_by(Layers::Whole, layer).map(|shape| shape.correlation(0.0));
+        found * found / own
+    })
 }
 
 /// What a receiver follows of a signal.
@@ -43,8 +98,6 @@ pub(crate) struct Followed {
     pub share: f64,
     /// Distance of early and late, chips; the settings' where the receiver does not say it, as the others.
     pub spacing_chips: Option<f64>,
-    /// Time of a loop's update, seconds.
-    pub integration_s: Option<f64>,
     /// Noise bandwidths, Hz.
     pub pll_bandwidth_hz: Option<f64>,
     pub dll_bandwidth_hz: Option<f64>,
@@ -54,9 +107,7 @@ impl Followed {
     /// In a run. A receiver that does not say it follows the leading component by a replica of all its
     /// layers.
     pub fn of(run: &Run, signal: &Signal) -> Option<Self> {
-        let stated = run.receiver.get("followed").and_then(|all| all.as_array());
-        let entries = stated.into_iter().flatten().filter_map(|entry| Entry::deserialize(entry).ok());
-        let entry = entries.into_iter().find(|entry| entry.signal == signal.name);
+        let entry = Entry::of(&run.receiver, signal);
         let component = match &entry {
             Some(entry) => signal.components.get(entry.component)?,
             None => leading(signal)?,
@@ -89,7 +140,6 @@ impl Followed {
             sides,
             share: component.power_share + other.map_or(0.0, |other| other.power_share),
             spacing_chips: entry.as_ref().map(|entry| entry.spacing_chips),
-            integration_s: entry.as_ref().map(|entry| entry.integration_s),
             pll_bandwidth_hz: entry.as_ref().map(|entry| entry.pll_bandwidth_hz),
             dll_bandwidth_hz: entry.as_ref().map(|entry| entry.dll_bandwidth_hz),
         })

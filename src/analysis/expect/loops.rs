@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 
 use crate::error::JudgeError;
-use crate::expect::followed::Followed;
+use crate::expect::followed::{Entry, Followed};
 use crate::expect::peak::{Code, Peak, raw_chips};
 use crate::expect::spectrum::edge_cost_db;
 use crate::expect::theory::clock::PowerLaw;
@@ -18,7 +18,7 @@ use crate::read::Run;
 use crate::statistics::Sum;
 use crate::waveform::{Edge, Waveform, leading};
 use gnss::earth::SPEED_OF_LIGHT_MPS;
-use gnss::signal::{Link, Signal, sinc_squared};
+use gnss::signal::{Component, Link, Signal, sinc_squared};
 
 /// Which loop a row is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -78,12 +78,70 @@ impl Settings {
     }
 }
 
-/// Time of a loop's update in the tracking stage: as the receiver says it, or by its settings, which count it
-/// in code periods.
-pub fn update_s(run: &Run, signal: &Signal) -> Option<f64> {
-    let stated = || Followed::of(run, signal)?.integration_s;
-    let counted = || Some(run.tracking_setting("integration")? * leading(signal)?.period_s());
+/// Time of an update of a satellite's loops in the tracking stage: as the receiver says it, or by its
+/// settings, which count it in code periods.
+pub fn update_s(run: &Run, link: Link) -> Option<f64> {
+    let stated = || Some(Entry::of(&run.receiver, link.signal)?.update_s(link));
+    let counted = || Some(run.tracking_setting("integration")? * leading(link.signal)?.period_s());
     stated().or_else(counted).or(run.update_s)
+}
+
+/// A receiver's phase loop as far as it decides what can be held: noise, with no motion.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Carrier {
+    bandwidth_hz: f64,
+    update_s: f64,
+    /// Power that is followed, over the signal's.
+    share: f64,
+    /// What the scene's oscillator leaves.
+    oscillator_rad: f64,
+}
+
+impl Carrier {
+    /// Of a signal that the receiver states so, or else by its settings.
+    pub fn of(
+        signal: &Signal,
+        entry: Option<&Entry>,
+        oscillator: Option<PowerLaw>,
+        number: impl Fn(&str, f64) -> f64,
+    ) -> Self {
+        let counted_s = || number("integration", 4.0) * leading(signal).map_or(1e-3, Component::period_s);
+        let update_s = entry.map_or_else(counted_s, |entry| entry.integration_s);
+        let bandwidth_hz = entry.map_or_else(|| number("pll_bandwidth_hz", 18.0), |entry| entry.pll_bandwidth_hz);
+        let closed = exact_loop(number("pll_order", 3.0) as u32, bandwidth_hz * update_s);
+        let oscillator_rad = closed.zip(oscillator).map_or(0.0, |(closed, law)| {
+            oscillator::jitter_discrete_rad(&law, signal.centre_hz(), &closed.linear(), update_s)
+        });
+        let share = entry.map_or(1.0, |entry| entry.share(signal));
+        Self { bandwidth_hz, update_s, share, oscillator_rad }
+    }
+
+    /// Of a signal in a run, with its oscillator.
+    pub fn in_run(run: &Run, signal: &Signal) -> Self {
+        let oscillator = run.scene.oscillator.map(|noise| PowerLaw { h: noise.h });
+        let number = |key: &str, default| run.tracking_setting(key).unwrap_or(default);
+        Self::of(signal, Entry::of(&run.receiver, signal).as_ref(), oscillator, number)
+    }
+
+    /// Standard deviation of the phase at the whole signal's C/N0.
+    pub fn jitter_rad(&self, cn0_hz: f64) -> f64 {
+        libm::hypot(pll::jitter_rad(self.bandwidth_hz, self.update_s, cn0_hz * self.share), self.oscillator_rad)
+    }
+
+    /// Standard deviation that the oscillator alone leaves.
+    pub fn oscillator_rad(&self) -> f64 {
+        self.oscillator_rad
+    }
+
+    /// The whole signal's C/N0 at which the phase has that standard deviation; infinite where the oscillator
+    /// alone makes as much.
+    pub fn least_dbhz(&self, jitter_rad: f64) -> f64 {
+        let thermal2 = jitter_rad * jitter_rad - self.oscillator_rad * self.oscillator_rad;
+        if thermal2 <= 0.0 {
+            return f64::INFINITY;
+        }
+        pll::cn0_dbhz(thermal2.sqrt(), self.bandwidth_hz, self.update_s) - 10.0 * libm::log10(self.share)
+    }
 }
 
 /// A loop of exact bandwidth whose roots all lie at one place; `None` where no such place is.

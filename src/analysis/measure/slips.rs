@@ -5,9 +5,9 @@
 //! half cycle of a Costas loop; where the count began anew (another lock) it has none. The cause is the first
 //! of these that the half second before it shows: the signal is not there or fell by [`FADE_DB`];
 //! interference takes [`JAMMED_DB`] and leaves less than the loop needs; the true motion leaves a phase error
-//! of which 3σ + θ > 45° (the loop of the receiver's settings, `expect::loops`); noise
-//! alone breaks that rule. What is left is unexplained. Limits: causes are those that the truth's rows, a
-//! tenth of a second apart, can show.
+//! of which 3σ + θ > 45° (the loop of the receiver's settings, `expect::loops`); the oscillator's noise or
+//! all noise alone breaks that rule. What is left is unexplained. Limits: causes are those that the truth's
+//! rows, a tenth of a second apart, can show.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
@@ -15,7 +15,7 @@ use std::ops::RangeInclusive;
 use serde::Serialize;
 
 use crate::error::JudgeError;
-use crate::expect::loops::update_s;
+use crate::expect::loops::{self, update_s};
 use crate::expect::multiple_access::MultipleAccess;
 use crate::expect::theory::pll;
 use crate::measure::errors::{Errors, Link, SLIP_CYCLES, SignalError, first_jump_of};
@@ -55,6 +55,8 @@ pub enum Cause {
     Interference,
     /// The motion was too fast for the loop.
     Dynamics,
+    /// The oscillator moves too much for the loop.
+    Oscillator,
     /// Too little C/N0 for the loop.
     WeakSignal,
     /// Nothing in the truth explains it.
@@ -63,8 +65,15 @@ pub enum Cause {
 
 impl Cause {
     /// Every cause.
-    pub const ALL: [Self; 6] =
-        [Self::NotThere, Self::Obstruction, Self::Interference, Self::Dynamics, Self::WeakSignal, Self::Unexplained];
+    pub const ALL: [Self; 7] = [
+        Self::NotThere,
+        Self::Obstruction,
+        Self::Interference,
+        Self::Dynamics,
+        Self::Oscillator,
+        Self::WeakSignal,
+        Self::Unexplained,
+    ];
 }
 
 /// A row of `slips.csv`.
@@ -89,7 +98,7 @@ pub struct Slip {
     /// What the truth says of its cause.
     pub cause: Cause,
     /// The evidence: least C/N0 that the scene allowed, what interference took of it, largest error that the
-    /// motion leaves in the phase loop, and 3σ of its noise at that C/N0.
+    /// motion leaves in the phase loop, and 3σ of its noise at that C/N0, the oscillator's with it.
     pub cn0_dbhz: Option<f64>,
     /// By how much interference lowers C/N0, dB.
     pub interference_db: Option<f64>,
@@ -258,7 +267,7 @@ impl Known {
         let Some(usual_dbhz) = median(&rows.iter().map(|row| row.cn0_dbhz).collect::<Vec<_>>()) else {
             return Ok(None);
         };
-        let motion_deg = match evidence.settings.zip(update_s(run, link.signal)) {
+        let motion_deg = match evidence.settings.zip(update_s(run, link)) {
             Some(choice) => motion_error_deg(run, link, choice, |at_s| {
                 found.iter().any(|one| evidence.before_s(run.time_s(one.sample)).contains(&at_s))
             })?,
@@ -318,12 +327,12 @@ impl<'r> Evidence<'r> {
         slip.interference_db = near.iter().map(|(cn0_dbhz, effective_dbhz)| cn0_dbhz - effective_dbhz).reduce(f64::max);
         let inside = motion_deg.iter().filter(|(t_s, _)| before_s.contains(t_s));
         slip.motion_deg = inside.map(|(_, error)| error.abs()).reduce(f64::max);
-        slip.noise_3sigma_deg = slip.cn0_dbhz.zip(self.settings.zip(update_s(self.run, link.signal))).map(
-            |(dbhz, (settings, update_s))| {
-                let cn0_hz = libm::pow(10.0, dbhz / 10.0);
-                3.0 * pll::jitter_rad(settings.pll_bandwidth_hz, update_s, cn0_hz).to_degrees()
-            },
-        );
+        let carrier = self.settings.map(|_| loops::Carrier::in_run(run, link.signal));
+        let three_deg = |rad: f64| 3.0 * rad.to_degrees();
+        slip.noise_3sigma_deg = slip
+            .cn0_dbhz
+            .zip(carrier)
+            .map(|(dbhz, carrier)| three_deg(carrier.jitter_rad(libm::pow(10.0, 0.1 * dbhz))));
         // No row within an interval and a half before: it has set, or something obstructs it.
         let before = rows.iter().rev().find(|row| row.sample <= sample);
         let absent = before.is_none_or(|row| time_s - run.time_s(row.sample) > 1.5 * self.interval_s);
@@ -337,6 +346,8 @@ impl<'r> Evidence<'r> {
             Cause::Interference
         } else if slip.motion_deg.is_some_and(|motion| motion + noise_deg > limit_deg && motion > 0.5 * noise_deg) {
             Cause::Dynamics
+        } else if carrier.is_some_and(|carrier| three_deg(carrier.oscillator_rad()) > limit_deg) {
+            Cause::Oscillator
         } else if weak {
             Cause::WeakSignal
         } else {

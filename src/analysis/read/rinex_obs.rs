@@ -59,6 +59,8 @@ pub struct Observations {
     pub events: usize,
     /// Whether the header says that a clock offset was applied to epoch, code and phase.
     pub clock_applied: bool,
+    /// Interval of the epochs by the header, seconds.
+    pub interval_s: Option<f64>,
 }
 
 /// Largest file that is read.
@@ -128,8 +130,8 @@ pub fn read(bytes: &[u8]) -> Parsed<Observations> {
     while let Some(epoch) = reader.next_epoch()? {
         epochs.push(epoch);
     }
-    let Header { receiver, clock_applied, .. } = reader.header;
-    Ok(Observations { receiver, epochs, events: reader.events, clock_applied })
+    let Header { receiver, clock_applied, interval_s, .. } = reader.header;
+    Ok(Observations { receiver, epochs, events: reader.events, clock_applied, interval_s })
 }
 
 impl<R: BufRead> Reader<R> {

@@ -43,6 +43,11 @@ struct Sequence {
     pulse: Option<Arc<Pulse>>,
 }
 
+/// Amplitude of a layer in its component.
+fn weight(layer: &Layer) -> f64 {
+    planted!("generator.synth.layers", 1.0, if layer.pulse.len() > 2 { 0.8 } else { 1.0 }) * layer.weight
+}
+
 /// Operations on eight doubles in a block of the response to a chip, and in a vector of that to an edge.
 const BLOCK_COST: f64 = 12.0;
 const EDGE_COST: f64 = 8.0;
@@ -202,7 +207,7 @@ impl Waveform {
         let of = |(steps, steps_hz): (Vec<i8>, f64), layer: &Layer| Sequence {
             steps,
             steps_hz,
-            weight: layer.weight,
+            weight: weight(layer),
             phase_cycles: layer.phase_cycles,
             pulse: None,
         };
@@ -236,7 +241,7 @@ impl Waveform {
                 let level = |layer: &Layer, step: usize| {
                     let sign = layers.first().and_then(|first| sign(layer, first)).unwrap_or(0.0);
                     let step = layer.pulse.get(step * layer.pulse.len() / count).copied().unwrap_or(0);
-                    sign * layer.weight * f64::from(step)
+                    sign * weight(layer) * f64::from(step)
                 };
                 (0..count).map(|step| layers.iter().map(|layer| level(layer, step)).sum()).collect::<Vec<f64>>()
             };

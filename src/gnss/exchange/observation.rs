@@ -103,7 +103,7 @@ impl<W: Write> ObservationFile<W> {
         let ticks = ticks as u64 % TICKS_A_SECOND as u64;
         let mut text = format!(
             "> {year:04} {month:02} {day:02} {hour:02} {minute:02} {second:2}.{ticks:07}  0{:3}",
-            satellites.len()
+            planted!("gnss.exchange.satellites", satellites.len(), rows.len())
         );
         // The label is off by what its rounding took.
         if let Some(offset_s) = bias_s.map(|bias_s| bias_s + tag.since(reading)) {
@@ -119,7 +119,7 @@ impl<W: Write> ObservationFile<W> {
                             .seen
                             .get(&row.link())
                             .is_some_and(|seen| row.locked_s < reading.since(*seen) - SAME_TIME_S);
-                        line += &values(row, slipped);
+                        line += &values(row, planted!("gnss.exchange.slips", slipped, false));
                     }
                     None => line += &" ".repeat(64),
                 }
@@ -191,7 +191,8 @@ fn channels(signals: &[&'static Signal], version: Version) -> String {
     let mut text = String::new();
     for (index, some) in all.chunks(CHANNELS_ON_A_LINE).enumerate() {
         let count = if index == 0 { format!("{:3} ", all.len()) } else { " ".repeat(4) };
-        let each: String = some.iter().map(|(sv, channel)| format!("{sv} {channel:2} ")).collect();
+        let written = |channel: i8| planted!("gnss.exchange.channels", channel, -channel);
+        let each: String = some.iter().map(|(sv, channel)| format!("{sv} {:2} ", written(*channel))).collect();
         text += &header_line(&(count + &each), "GLONASS SLOT / FRQ #");
     }
     if version == Version::Three {

@@ -95,6 +95,11 @@ impl Room {
     }
 }
 
+/// Dwells of data and pilot in place of so many code periods of one code.
+pub(crate) fn pair_sums(periods: u32) -> u32 {
+    (DWELLS * f64::from(periods)).ceil().max(1.0) as u32
+}
+
 impl Dwells {
     /// Sums of so many code periods one after the other, of maps with so many independent cells.
     pub fn alone(sums: u32, periods: u32, cells: usize) -> Self {
@@ -105,7 +110,7 @@ impl Dwells {
 
     /// Periods of data and pilot, among so many code periods, of maps with so many independent cells.
     pub fn of_pair(periods: u32, cells: usize) -> Self {
-        let count = (DWELLS * f64::from(periods)).ceil().max(1.0) as u32;
+        let count = pair_sums(periods);
         let apart = f64::from(periods - 1) / f64::from((count - 1).max(1));
         let mut begins: Vec<f64> = (0..count).map(|dwell| f64::from(dwell) * apart).collect();
         // The second one that is looked at begins about half a period from the first.

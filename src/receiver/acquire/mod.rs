@@ -65,6 +65,7 @@ use gnss::signal::{Component, Layers, Link, Signal};
 
 use codes::{Code, Codes};
 use dwells::Rooms;
+pub(crate) use dwells::pair_sums;
 pub use error::AcquireError;
 use grid::{Again, Grid, Map};
 use refine::Refined;
@@ -228,7 +229,7 @@ type Known<'a> = (&'a Code, Refined);
 
 /// The data beside a pilot, where both are searched for: they have the same power, and the pilot's overlay
 /// keeps coherent sums to one code period.
-fn companion(component: &'static Component, signal: &'static Signal) -> Option<&'static Component> {
+pub(crate) fn companion(component: &'static Component, signal: &'static Signal) -> Option<&'static Component> {
     let equal = |data: &&Component| (data.power_share / component.power_share - 1.0).abs() < 1e-9;
     (component.overlay.periods() > 1).then(|| beside(component, signal)).flatten().filter(equal)
 }

@@ -79,7 +79,8 @@ impl<'a> Combination<'a> {
 
     /// Time since either carrier was locked.
     pub fn locked_s(&self) -> f64 {
-        self.first.locked_s.min(self.second.locked_s)
+        let (first_s, second_s) = (self.first.locked_s, self.second.locked_s);
+        planted!("receiver.position.locked", first_s.min(second_s), first_s.max(second_s))
     }
 
     /// The satellite's clock as the combination carries it.

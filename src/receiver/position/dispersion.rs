@@ -29,13 +29,13 @@ impl Solver {
             let apart_m = planted!("receiver.position.dispersion_delay", apart_m, -apart_m);
             let ((first_m, _), (second_m, _)) = (self.noise(pair.first)?, self.noise(pair.second)?);
             let ratio = pair.first.signal.carrier_hz(sv) / L1_CA.carrier_hz(sv);
-            let on_l1 = ratio * ratio;
+            let on_l1 = planted!("receiver.position.dispersion_square", ratio * ratio, ratio);
             let sigma_m = pair.dispersed(libm::hypot(first_m, second_m)).abs() * smoothed.variance_ratio.sqrt();
             Some(IonosphereRow {
                 sample: pair.first.sample,
                 sv,
                 delay_m: on_l1 * (smoothed.pseudorange_m - pair.dispersed(apart_m)),
-                sigma_m: on_l1 * sigma_m,
+                sigma_m: on_l1 * planted!("receiver.position.dispersion_sigma", 1.0, 0.5) * sigma_m,
             })
         };
         used.iter().filter_map(&mut one).collect()

@@ -214,7 +214,7 @@ impl CodeNoise {
     /// equation 5.23 (2nd ed.), first branch.
     pub fn sigma_m(&self, cn0_hz: f64) -> f64 {
         let CodeShape { value, slope, common } = self.shape;
-        let cn0_hz = self.share * cn0_hz;
+        let cn0_hz = planted!("receiver.position.share", self.share, 1.0) * cn0_hz;
         let squaring = 1.0 + (1.0 + common) / (2.0 * self.integration_s * cn0_hz * value * value);
         let spread = (1.0 - common) / (slope * slope);
         self.chip_m * (self.bandwidth_hz * spread / (2.0 * cn0_hz) * squaring).sqrt()

@@ -181,7 +181,7 @@ impl Smoother {
             && passed_s <= LONGEST_GAP_S
             && new.locked_s > old.locked_s
             && (new.pseudorange_m - predicted_m - input.offset_hz * parted_m_per_hz).abs()
-                < LARGEST_JUMP_M * input.gain.max(1.0);
+                < LARGEST_JUMP_M * planted!("receiver.smooth.gain", input.gain, 0.0).max(1.0);
         if !whole || self.window_s <= 0.0 {
             return None;
         }

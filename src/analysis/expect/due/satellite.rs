@@ -69,6 +69,8 @@ pub enum Excuse {
     Weak,
     /// It was weaker for a moment than the receiver can hold.
     Faded,
+    /// The receiver's loop does not follow the scene's oscillator.
+    Oscillator,
     /// Below another's cross-correlation.
     Hidden,
     /// Something is wrong with the satellite or its message.
@@ -84,6 +86,7 @@ impl Excuse {
             Self::NotThere => "set or obstructed",
             Self::Weak => "too weak to hold",
             Self::Faded => "faded",
+            Self::Oscillator => "oscillator too noisy for the loop",
             Self::Hidden => "hidden by a stronger satellite",
             Self::Fault => "faulty",
             Self::Scene => "expected by the scene",
@@ -152,7 +155,9 @@ impl Scene<'_> {
             Some(Losses::None) => return None,
             None => {}
         }
-        if row.effective_dbhz < self.receiver.hold_dbhz {
+        if self.receiver.hold_dbhz.is_infinite() {
+            Some(Excuse::Oscillator)
+        } else if row.effective_dbhz < self.receiver.hold_dbhz {
             Some(Excuse::Weak)
         } else if row.cn0_dbhz < usual_dbhz - FADE_DB {
             Some(Excuse::Faded)

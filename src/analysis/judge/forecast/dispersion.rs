@@ -63,7 +63,7 @@ pub fn expected(
 ) -> Result<(), JudgeError> {
     let mut signals: Vec<Signal<'_>> = Vec::new();
     for link in errors.signals.keys().filter(|link| link.sv == sv) {
-        let update_s = scene.choices.updates_s.get(link.signal);
+        let update_s = scene.choices.updates_s.get(&link);
         let theory = update_s.and_then(|update_s| Theory::new(scene.run, scene.choices.loops, &link, *update_s));
         let rows = errors.signals.cursor(link).peekable();
         signals.extend(theory.map(|theory| Signal { link, theory, rows }));

@@ -94,8 +94,19 @@ pub enum Figure {
 pub struct Links {
     /// The worst satellite of each figure.
     pub worst: BTreeMap<Figure, Worst>,
-    /// Satellites whose signal no loop of the receiver's settings can hold.
-    pub unheld: Vec<String>,
+    /// Satellites that are not judged, by reason.
+    pub left_out: BTreeMap<LeftOut, Vec<String>>,
+}
+
+/// Why figures of a satellite's loops are not judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LeftOut {
+    /// No loop of the receiver's settings can hold the signal.
+    Unheld,
+    /// Too few observations past pull-in, with a steady C/N0 and without jamming.
+    Unsettled,
+    /// Too few updates of the length that the receiver states.
+    Updates,
 }
 
 impl Links {
@@ -112,13 +123,14 @@ impl Links {
         }
         let access = MultipleAccess::new(run);
         for link in errors.signals.keys() {
-            let Some(update_s) = update_s(run, link.signal) else { continue };
+            let Some(update_s) = update_s(run, link) else { continue };
             let Some(theory) = Theory::new(run, settings, &link, update_s) else {
-                links.unheld.push(run.name(link));
+                links.leave_out(LeftOut::Unheld, run.name(link));
                 continue;
             };
             let rows = Settled::of((run, &access), errors, link, &theory, stated)?;
             if rows.count < LEAST {
+                links.leave_out(LeftOut::Unsettled, run.name(link));
                 continue;
             }
             let Some(one) = One::new(run, link, &theory, settings, rows)? else { continue };
@@ -132,9 +144,17 @@ impl Links {
                     updates.add(&row);
                 }
             })?;
+            if updates.count < LEAST {
+                links.leave_out(LeftOut::Updates, run.name(link));
+                continue;
+            }
             one.updates(&mut links, &updates);
         }
         Ok(links)
+    }
+
+    fn leave_out(&mut self, reason: LeftOut, name: String) {
+        self.left_out.entry(reason).or_default().push(name);
     }
 
     /// Keeps a value if it is the worst so far; a lower limit is kept as such.
@@ -332,9 +352,6 @@ impl<'a> One<'a> {
 
     /// What the loops put out, update by update.
     fn updates(&self, links: &mut Links, sums: &Updates) {
-        if sums.count < LEAST {
-            return;
-        }
         let count = sums.count as f64;
         for (which, sum, squares) in sums.put_out {
             let (Some(raw), Some([_, _, stress])) = (self.raw.get(&which), self.sigma.get(&which)) else { continue };

@@ -41,7 +41,7 @@ pub struct Choices {
     /// Of the loops.
     pub loops: Settings,
     /// Time of a loop's update, by signal.
-    pub updates_s: BTreeMap<&'static Signal, f64>,
+    pub updates_s: BTreeMap<Link, f64>,
     /// Memory of the smoothing of code by carrier, seconds.
     pub smoothing_s: f64,
     /// Elevation below which no satellite is used, radians.
@@ -94,9 +94,9 @@ fn klobuchar(run: &Run) -> Model {
     Model::KLOBUCHAR.into_iter().find(brought).unwrap_or(Model::Klobuchar)
 }
 
-/// That of every signal; `None` where one has none.
-fn updates_s(run: &Run) -> Option<BTreeMap<&'static Signal, f64>> {
-    run.truth.keys().map(|link| Some((link.signal, update_s(run, link.signal)?))).collect()
+/// That of every satellite's signal; `None` where one has none.
+fn updates_s(run: &Run) -> Option<BTreeMap<Link, f64>> {
+    run.truth.keys().map(|link| Some((link, update_s(run, link)?))).collect()
 }
 
 /// Space: no horizon, and models that are as good in every direction.
@@ -233,7 +233,7 @@ impl<'r> Scene<'r> {
     /// # Errors
     /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn ranges<'s>(&'s self, errors: &'s Errors, link: Link) -> Result<Option<Ranges<'s, 'r>>, JudgeError> {
-        let update_s = self.choices.updates_s.get(link.signal);
+        let update_s = self.choices.updates_s.get(&link);
         let theory = update_s.and_then(|update_s| Theory::new(self.run, self.choices.loops, &link, *update_s));
         let (Some(theory), Some(sky)) = (theory, self.run.seen_at(link.sv)?) else { return Ok(None) };
         let smoothing = || Smoothing::new(self.choices.smoothing_s, self.choices.loops.dll_bandwidth_hz);

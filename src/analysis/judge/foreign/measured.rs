@@ -124,6 +124,8 @@ pub struct Satellite {
 pub struct Measured {
     /// Epochs of the file.
     pub epochs: usize,
+    /// Interval of them by its header, seconds.
+    pub stated_interval_s: Option<f64>,
     /// Epochs that the truth has.
     pub joined: usize,
     /// Observations that the truth has.

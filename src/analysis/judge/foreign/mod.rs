@@ -72,7 +72,8 @@ pub fn judge(truth: &Path, files: &Files) -> Result<Judgement, JudgeError> {
         judged.receiver = Some(read.receiver).filter(|name| !name.is_empty());
         let labels: Vec<Epoch> = read.epochs.iter().map(|epoch| epoch.label).collect();
         judged.rollover_s[0] = rollover(&labels, &timeline).ok_or_else(|| elsewhere(path, &labels, &timeline))?;
-        let measured = observables::measure(&read.epochs, &timeline, judged.rollover_s[0]);
+        let mut measured = observables::measure(&read.epochs, &timeline, judged.rollover_s[0]);
+        measured.stated_interval_s = read.interval_s;
         if measured.rows.is_empty() {
             return Err(elsewhere(path, &labels, &timeline));
         }

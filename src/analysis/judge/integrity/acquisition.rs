@@ -9,6 +9,7 @@ use std::collections::BTreeSet;
 
 use super::{Finding, Found};
 use crate::error::JudgeError;
+use crate::expect::followed::Entry;
 use crate::read::Run;
 use crate::read::spill_store::Finder;
 use crate::waveform::leading;
@@ -63,6 +64,11 @@ fn against_truth(run: &Run) -> Result<Vec<Finding>, JudgeError> {
     let (Some(periods), Some(cells)) = (setting("coherent_periods"), setting("cells_per_chip")) else {
         return Ok(Vec::new());
     };
+    // As a search states its sums, which no sign may turn in, or by the settings.
+    let coherent_s = |link: Link, period_s: f64| {
+        let stated = Entry::of(&run.receiver, link.signal).and_then(|entry| Some(entry.search?.coherent_s));
+        stated.unwrap_or(periods * period_s)
+    };
     let (mut doppler, mut code, mut cn0) = (0.0_f64, 0.0_f64, 0.0_f64);
     let mut count = 0;
     for link in run.truth.keys() {
@@ -73,10 +79,10 @@ fn against_truth(run: &Run) -> Result<Vec<Finding>, JudgeError> {
         }
         let Some(component) = leading(link.signal) else { continue };
         let mut truth = run.truth.finder(link)?;
+        let bin_hz = 1.0 / coherent_s(link, component.period_s());
         for row in searches {
             let Some((true_row, after_s)) = near(&mut truth, row.sample, run.scene.sample_rate_hz) else { continue };
             count += 1;
-            let bin_hz = 1.0 / (periods * component.period_s());
             doppler = doppler
                 .max((row.doppler_hz - true_row.doppler_hz - run.common.doppler_hz).abs() / (DOPPLER_BINS * bin_hz));
             let chips = sent_chips(

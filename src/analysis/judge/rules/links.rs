@@ -1,7 +1,7 @@
 //! The worst satellite of each figure of the loops ([`crate::judge::forecast::links`]).
 
 use crate::error::JudgeError;
-use crate::judge::forecast::links::{Figure, Links};
+use crate::judge::forecast::links::{Figure, LeftOut, Links};
 use crate::judge::judgement::Bound;
 use crate::judge::summary::Summary;
 use crate::judge::verdict::Verdict;
@@ -47,12 +47,21 @@ impl Verdict {
     /// A row for each figure.
     pub(super) fn links(&mut self, run: &Run, errors: &Errors, summary: &Summary) -> Result<(), JudgeError> {
         if !run.scene.expect.bounded(0.0) {
+            self.not_judged.push("loops satellite by satellite: the scene expects any errors".to_owned());
+            return Ok(());
+        }
+        if !run.scene.noise {
+            self.not_judged.push("loops satellite by satellite: the scene has no noise".to_owned());
             return Ok(());
         }
         let links = Links::measure(run, errors, &summary.details.stated)?;
-        if !links.unheld.is_empty() {
-            let names = links.unheld.join(", ");
-            self.not_judged.push(format!("loops of {names}: the settings make no loop that holds the signal"));
+        for (reason, names) in &links.left_out {
+            let (what, why) = match reason {
+                LeftOut::Unheld => ("loops", "the settings make no loop that holds the signal"),
+                LeftOut::Unsettled => ("loops", "too few observations past pull-in at a steady C/N0"),
+                LeftOut::Updates => ("loops' updates", "too few rows of tracking of the length that is stated"),
+            };
+            self.not_judged.push(format!("{what} of {}: {why}", names.join(", ")));
         }
         if links.worst.is_empty() {
             self.not_judged.push("loops satellite by satellite: no settings, or nothing past its pull-in".to_owned());

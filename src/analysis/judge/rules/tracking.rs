@@ -1,5 +1,6 @@
 //! Loop jitter against its thresholds, and the measured C/N0 against the one that the scene allows.
 
+use crate::expect::loops::Carrier;
 use crate::judge::judgement::Bound;
 use crate::judge::summary::Summary;
 use crate::judge::verdict::Verdict;
@@ -22,11 +23,18 @@ impl Verdict {
             ("PLL jitter, 1σ", "tracking.pll_sigma_deg", tracking.pll_sigma_deg, "°", limits.pll_deg, "15°"),
             ("FLL jitter, 1σ", "tracking.fll_sigma_hz", tracking.fll_sigma_hz, "Hz", limits.fll_hz, "1/(12T)"),
         ];
+        let carriers = run.signals.iter().map(|signal| Carrier::in_run(run, signal).oscillator_rad());
+        let oscillator_deg = carriers.fold(0.0, f64::max).to_degrees();
         for (figure, path, value, unit, limit, rule) in rows {
             let Some(value) = value else {
                 self.not_judged.push(format!("{figure}: no observation past its pull-in"));
                 continue;
             };
+            // What no loop of this bandwidth can have is no measure of one; theory judges each satellite.
+            if path == "tracking.pll_sigma_deg" && oscillator_deg > limit {
+                self.not_judged.push(format!("{figure}: the oscillator alone leaves {oscillator_deg:.0}° of {limit}°"));
+                continue;
+            }
             let source = format!("rule of thumb {rule} (Kaplan and Hegarty, 5.6)");
             self.judge(figure, path, value, unit, Bound::Max(limit), &source);
         }

@@ -326,7 +326,7 @@ fn oscillator_mps(run: &Run, choices: &Choices) -> f64 {
         links.entry(Emission::of(link)).or_insert(link);
     });
     let of = |link: &Link| {
-        let theory = Theory::new(run, choices.loops, link, *choices.updates_s.get(link.signal)?)?;
+        let theory = Theory::new(run, choices.loops, link, *choices.updates_s.get(link)?)?;
         Some(theory.oscillator_rate_hz() * link.wavelength_m())
     };
     links.values().filter_map(of).fold(0.0, f64::max)

@@ -13,6 +13,8 @@ pub struct Header {
     pub receiver: String,
     /// Whether it says that a clock offset was applied to epoch, code and phase.
     pub clock_applied: bool,
+    /// Interval of its epochs, if it says one, seconds.
+    pub interval_s: Option<f64>,
     /// Frequency channels of GLONASS satellites.
     pub channels: BTreeMap<Sv, i8>,
     /// Whether the records are those of RINEX 2.
@@ -85,6 +87,8 @@ impl Header {
             }
             "SYS / SCALE FACTOR" => self.scale(line)?,
             "GLONASS SLOT / FRQ #" => self.channels(line),
+            // 2.11, table A1, and 3.05, table A2. Some say zero.
+            "INTERVAL" => self.interval_s = columns(line, 0, 10).parse().ok().filter(|s: &f64| *s > 0.0),
             "RCV CLOCK OFFS APPL" => self.clock_applied = columns(line, 0, 6) == "1",
             "PGM / RUN BY / DATE" => columns(line, 0, 20).clone_into(&mut self.receiver),
             "REC # / TYPE / VERS" => {

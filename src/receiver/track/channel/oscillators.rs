@@ -40,7 +40,9 @@ impl Channel {
         let update_s = self.period_s * f64::from(self.periods_per_update());
         let offset_hz = self.loops.carrier.mean(update_s);
         self.carrier_step = (offset_hz / rate_hz * TURN) as i128;
-        let aid_hz = (self.sense * offset_hz - self.carrier_offset_hz) * self.chip_rate_hz / self.link().carrier_hz();
+        let link = self.link();
+        let carrier_hz = planted!("receiver.nco.channel", link.carrier_hz(), link.signal.centre_hz());
+        let aid_hz = (self.sense * offset_hz - self.carrier_offset_hz) * self.chip_rate_hz / carrier_hz;
         let aid_hz = planted!("receiver.nco.carrier_aid", aid_hz, -aid_hz);
         self.code_step = chips_to_units((self.chip_rate_hz + aid_hz + self.loops.code.mean(update_s)) / rate_hz).max(1);
     }

@@ -28,6 +28,40 @@ const USE_S: f64 = 5.0;
 /// Lowest elevation of satellites that count, degrees.
 const MASK_DEG: f64 = 5.0;
 
+/// How far positions may be moved, metres.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Moved {
+    pub horizontal_m: f64,
+    /// Down and up. A delay that is not corrected lifts a position, as it is longest near the horizon; one
+    /// that is corrected and is not there lowers it.
+    down_m: f64,
+    up_m: f64,
+}
+
+impl Moved {
+    /// Of an error upwards or downwards as much as may be there.
+    pub fn vertical_m(&self, error_up_m: f64) -> f64 {
+        if error_up_m < 0.0 { self.down_m } else { self.up_m }
+    }
+
+    /// With any of these moves, or none: east, north and up.
+    fn any(moves: &[Vector3<f64>]) -> Self {
+        moves.iter().fold(Self::default(), |most, one| Self {
+            horizontal_m: most.horizontal_m.max(one.xy().norm()),
+            down_m: most.down_m.max(-one.z),
+            up_m: most.up_m.max(one.z),
+        })
+    }
+
+    fn plus(self, other: Self) -> Self {
+        Self {
+            horizontal_m: self.horizontal_m + other.horizontal_m,
+            down_m: self.down_m + other.down_m,
+            up_m: self.up_m + other.up_m,
+        }
+    }
+}
+
 /// A scene's atmosphere and what its message says of it.
 pub(super) struct Atmosphere<'r> {
     run: &'r Run,
@@ -35,7 +69,7 @@ pub(super) struct Atmosphere<'r> {
     /// When the page has come, seconds from sample 0.
     page_s: f64,
     /// Sample of the epoch that was asked for last, and the answer.
-    last: Option<(u64, (f64, f64))>,
+    last: Option<(u64, Moved)>,
 }
 
 impl<'r> Atmosphere<'r> {
@@ -50,11 +84,11 @@ impl<'r> Atmosphere<'r> {
         Ok(Self { run, sent, page_s: start.map_or(f64::INFINITY, page), last: None })
     }
 
-    /// Metres, horizontally and vertically, by which positions at a sample may be moved.
+    /// By how much positions at a sample may be moved.
     ///
     /// # Errors
     /// [`JudgeError::Read`] where spilled rows cannot be read.
-    pub fn moves_m(&mut self, sample: u64) -> Result<(f64, f64), JudgeError> {
+    pub fn moves_m(&mut self, sample: u64) -> Result<Moved, JudgeError> {
         // The sky moves slowly: one answer for ten seconds.
         let step = (10.0 * self.run.scene.sample_rate_hz) as u64;
         if let Some((_, moved)) = self.last.filter(|(at, _)| sample.abs_diff(*at) < step) {
@@ -65,19 +99,20 @@ impl<'r> Atmosphere<'r> {
         Ok(moved)
     }
 
-    fn moved(&self, sample: u64) -> Result<(f64, f64), JudgeError> {
+    fn moved(&self, sample: u64) -> Result<Moved, JudgeError> {
         let mut rows = Vec::new();
         for sv in self.run.in_the_sky() {
             let found = self.run.seen_at(sv)?.and_then(|mut sky| sky.get(sample));
             rows.extend(found.filter(|row| row.elevation_deg >= MASK_DEG));
         }
         let place = self.run.trajectory.finder()?.get(sample);
-        let Some(place) = place.filter(|_| rows.len() >= 4) else { return Ok((0.0, 0.0)) };
+        let Some(place) = place.filter(|_| rows.len() >= 4) else { return Ok(Moved::default()) };
         let user = Geodetic::from_ecef(&place.position_m());
-        let by = |row: &SkyRow, model: &Coefficients| {
+        // What a model leaves of a range's delay.
+        let left_m = |row: &SkyRow, model: &Coefficients| {
             let carrier_hz = row.signal.carrier_hz(row.sv);
             let delay_s = model.delay_s((user, look(row)), &Vector3::zeros(), place.time(), carrier_hz);
-            SPEED_OF_LIGHT_MPS * delay_s - row.ionosphere_m
+            row.ionosphere_m - SPEED_OF_LIGHT_MPS * delay_s
         };
         let default = Coefficients::Klobuchar(DEFAULT);
         let solve = |of: &dyn Fn(&SkyRow) -> f64| {
@@ -89,24 +124,17 @@ impl<'r> Atmosphere<'r> {
                 normal += h * h.transpose();
                 right += h * of(row);
             }
-            normal.try_inverse().map_or((0.0, 0.0), |inverse| {
-                let moved = inverse * right;
-                (moved.xy().norm(), moved.z.abs())
-            })
+            normal.try_inverse().map_or_else(Vector3::zeros, |inverse| (inverse * right).xyz())
         };
         let by_ionosphere = match self.sent.as_ref().filter(|_| self.run.time_s(sample) >= self.page_s) {
-            Some(sent) => solve(&|row| by(row, sent)),
+            Some(sent) => Moved::any(&[solve(&|row| left_m(row, sent))]),
             // Nothing, or the receiver's own coefficients.
-            None => {
-                let (none, own) = (solve(&|row| row.ionosphere_m), solve(&|row| by(row, &default)));
-                (none.0.max(own.0), none.1.max(own.1))
-            }
+            None => Moved::any(&[solve(&|row| row.ionosphere_m), solve(&|row| left_m(row, &default))]),
         };
-        let missing_m = |row: &SkyRow| {
-            if row.troposphere_m == 0.0 { ZENITH_M / libm::sin(row.elevation_deg.to_radians()) } else { 0.0 }
+        let too_much_m = |row: &SkyRow| {
+            if row.troposphere_m == 0.0 { -ZENITH_M / libm::sin(row.elevation_deg.to_radians()) } else { 0.0 }
         };
-        let by_troposphere = solve(&missing_m);
-        Ok((by_ionosphere.0 + by_troposphere.0, by_ionosphere.1 + by_troposphere.1))
+        Ok(by_ionosphere.plus(Moved::any(&[solve(&too_much_m)])))
     }
 }
 

@@ -63,6 +63,7 @@ impl Verdict {
         if let Some(measured) = measured {
             verdict.observations(&scene, measured, summary);
             verdict.span("observations", &scene, &observed_s, begin.observation_s);
+            verdict.stated_interval(measured.stated_interval_s, &observed_s);
             let signals: BTreeSet<&str> = labels.of_links.keys().map(|link| link.signal.name).collect();
             let others: BTreeSet<&str> = expected.satellites.keys().map(|link| link.signal.name).collect();
             for name in others.difference(&signals) {

@@ -7,7 +7,7 @@
 
 use std::collections::HashMap;
 
-use super::atmosphere::Atmosphere;
+use super::atmosphere::{Atmosphere, Moved};
 use super::plain::{self, Scene};
 use super::times::Labels;
 use crate::error::JudgeError;
@@ -40,7 +40,14 @@ const COARSE_M: f64 = 0.2;
 struct Judged<'p> {
     row: &'p FixError,
     dilutions: (f64, f64),
-    air_m: (f64, f64),
+    air: Moved,
+}
+
+impl Judged<'_> {
+    /// What the atmosphere may add to its error.
+    fn air_m(&self) -> f64 {
+        libm::hypot(self.air.horizontal_m, self.air.vertical_m(self.row.up_m))
+    }
 }
 
 impl Verdict {
@@ -64,8 +71,8 @@ impl Verdict {
         for row in places.rows.iter().filter(|row| judged(row)) {
             let Some(sample) = labels.sample_at(row.label_s) else { continue };
             let Some(due) = dues.get(&sample).filter(|due| due.pdop() <= MOST_PDOP) else { continue };
-            let air_m = air.moves_m(sample)?;
-            rows.push(Judged { row, dilutions: due.dilutions(), air_m });
+            let air = air.moves_m(sample)?;
+            rows.push(Judged { row, dilutions: due.dilutions(), air });
         }
         if rows.is_empty() {
             let why = "none where satellites are placed well and the scene lets noise and reflections decide";
@@ -80,7 +87,7 @@ impl Verdict {
         let all: Vec<f64> = rows.iter().map(|one| one.row.length_m()).collect();
         let limit = |one: &Judged<'_>, factor: f64| {
             let pdop = libm::hypot(one.dilutions.0, one.dilutions.1);
-            factor * THEORY * pdop * range_m + libm::hypot(one.air_m.0, one.air_m.1)
+            factor * THEORY * pdop * range_m + one.air_m()
         };
         let limits: Vec<f64> = rows.iter().map(|one| limit(one, largest(3, 20))).collect();
         if let (Some(value), Some(limit)) = (percentile(&all, 0.95), percentile(&limits, 0.95)) {
@@ -102,8 +109,10 @@ impl Verdict {
     fn lasting(&mut self, rows: &[Judged<'_>], lasting_m: f64, source: &str) {
         let of = |of: &dyn Fn(&Judged<'_>) -> f64| mean(&rows.iter().map(of).collect::<Vec<_>>()).unwrap_or(0.0);
         let (east_m, north_m, up_m) = (of(&|one| one.row.east_m), of(&|one| one.row.north_m), of(&|one| one.row.up_m));
-        let horizontal = largest(2, 1) * THEORY * of(&|one| one.dilutions.0) * lasting_m + of(&|one| one.air_m.0);
-        let vertical = largest(1, 1) * THEORY * of(&|one| one.dilutions.1) * lasting_m + of(&|one| one.air_m.1);
+        let horizontal =
+            largest(2, 1) * THEORY * of(&|one| one.dilutions.0) * lasting_m + of(&|one| one.air.horizontal_m);
+        let vertical =
+            largest(1, 1) * THEORY * of(&|one| one.dilutions.1) * lasting_m + of(&|one| one.air.vertical_m(up_m));
         for (figure, value, limit) in [
             ("horizontal position error, mean", libm::hypot(east_m, north_m), horizontal),
             ("vertical position error, mean", up_m.abs(), vertical),

@@ -5,7 +5,7 @@
 //! ephemerides whole, the ionosphere's page where that comes at once, and a reserve. Observations that come
 //! before any orbit can be whole show when satellites were locked, and then that lock counts. From its own
 //! first epoch on it must go on to within seconds of the scene's end. Limits: a receiver that writes every
-//! second epoch alone is one of twice the interval.
+//! second epoch alone is one of twice the interval, unless its header states the interval.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -161,7 +161,20 @@ impl Begin {
     }
 }
 
+/// By how much the usual interval of epochs may differ from the header's, as a share: clocks that are set by
+/// milliseconds, and labels that are rounded.
+const INTERVAL: f64 = 0.02;
+
 impl Verdict {
+    /// Whether epochs come as often as the file's header says.
+    pub(super) fn stated_interval(&mut self, stated_s: Option<f64>, labels: &[f64]) {
+        let (Some(stated_s), Some(found_s)) = (stated_s, interval_s(labels)) else { return };
+        let source = "the header states the interval of the epochs";
+        let value = (found_s / stated_s - 1.0).abs();
+        self.judge("interval of epochs against the header's", "", value, "of 1", Bound::Max(INTERVAL), source);
+        self.explain(vec![format!("{found_s:.3} s, stated {stated_s:.3} s")]);
+    }
+
     /// When observations begin and end, and whether epochs lack.
     pub(super) fn span(&mut self, what: &str, scene: &Scene<'_>, labels: &[f64], begin_s: Option<f64>) {
         let (Some(first_s), Some(last_s)) = (labels.first().copied(), labels.last().copied()) else { return };
