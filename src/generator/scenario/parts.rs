@@ -18,6 +18,7 @@ use gnss::klobuchar::Klobuchar;
 use gnss::message::Common;
 use gnss::rinex::{self, Navigation};
 use gnss::satellite::{Sv, System};
+use gnss::signal::Signal;
 use gnss::time::{Epoch, TimePolynomial, WEEK_S};
 
 /// How long before a change of UTC's whole seconds it is announced, and sent: about half a year (IERS,
@@ -158,6 +159,10 @@ pub(super) fn sky(
         }
         excluded.extend(missing);
     }
+    // The program's own files are of a version without them.
+    if !scenario.navigation.is_empty() {
+        warnings.extend(scenario.signals.iter().filter_map(|signal| without_delays(&catalogue, signal, start)));
+    }
     catalogue.depart(satellite::departures(scenario));
     warnings.extend(satellite::strangers(scenario, &catalogue));
     excluded.sort();
@@ -185,6 +190,25 @@ fn unsendable(scenario: &Scenario, set: &Ephemeris) -> Option<String> {
             set.sv, set.toe, message.name
         ))
     })
+}
+
+/// Which satellites have no group delay of a signal by a record of its own message; `None` where all have.
+fn without_delays(catalogue: &Catalogue, signal: &Signal, at: Epoch) -> Option<String> {
+    let sends = |sv: &Sv| sv.system == signal.system && (signal.sent)(sv.number, at);
+    let sets: Vec<&Ephemeris> =
+        catalogue.satellites().filter(sends).filter_map(|sv| catalogue.sent_at(sv, at)).collect();
+    let without: Vec<String> = sets.iter().filter(|set| !set.serves(signal)).map(|set| set.sv.to_string()).collect();
+    let message = signal.components.iter().find_map(|component| component.message)?.name;
+    let who = match without.len() {
+        0 => return None,
+        count if count == sets.len() => "any satellite".to_owned(),
+        _ => without.join(", "),
+    };
+    let form = sets.first()?.form.name;
+    Some(format!(
+        "{}: the navigation file has no record of {message} of {who}: the group delay of {form} stands for its own, as 1/f²",
+        signal.name
+    ))
 }
 
 /// Galileo's time against GPS time: as the scene gives it, or else as the file does.
