@@ -46,8 +46,8 @@ fn records(text: &str) -> Vec<Record> {
         .collect()
 }
 
-/// The signal of a message that a record is of, its delay and that of the data; IS-GPS-705J, 20.3.3.3.1.2, and
-/// BDS-SIS-ICD-B1C 1.0, 7.6.
+/// The signal of a message that a record is of, its delay and that of the data; IS-GPS-705J, 20.3.3.3.1.2,
+/// and BDS-SIS-ICD-B1C 1.0, 7.6.
 fn broadcast(record: &Record) -> Vec<(&'static Signal, f64, Option<f64>)> {
     let v = |row: usize, place: usize| record.rows.get(row).and_then(|row| row[place]);
     let gps = record.satellite.starts_with('G');
@@ -137,8 +137,8 @@ fn over_a_day_of_all_satellites_delays_are_those_of_the_hour_to_the_step() {
         let counts = compare(&text, &sets.ephemerides);
         assert!(counts.len() >= 7, "{name}: {counts:?}");
         for (signal, (count, equal, worst_s, _)) in &counts {
-            // A satellite changes its delays once a day, by a few steps, and sets of both messages do so within the
-            // hour.
+            // A satellite changes its delays once a day, by a few steps, and sets of both messages do so
+            // within the hour.
             assert!(100 * equal >= 97 * count && *worst_s < 1e-9, "{name} {signal}: {equal} of {count}, {worst_s:e} s");
         }
     }

@@ -7,16 +7,16 @@
 //! beyond what comes with S4 is added as Gaussian noise of the same spectrum, which represents larger
 //! structures.
 //!
-//! Carriers: the strength is that on L1, 1575.42 MHz. Behind a phase screen the phase is as 1/f, and S4 of weak
-//! scatter as f^−1.5 where the spectrum of the structures falls with the third power (Rino 1979, "A power law
-//! phase screen model for ionospheric scintillation", p = 3; ITU-R P.531, 4.2), up to one, where it saturates.
-//! ξ of two carriers have the correlation (f₁/f₂)^(1/2 + S4²), f₁ < f₂. The half is that screen's: of
-//! ∫ sin(aq²)·sin(bq²)·q⁻³ dq with a and b as the wavelengths √(a/b) is left. That deep fades come on one band at a
-//! time is measured (Jiao, Xu, Morton and Rino 2016, "Equatorial scintillation amplitude fading characteristics
-//! across the GPS frequency bands"); S4² for it is a choice. What is added to the phase is the same on all
-//! carriers, but for 1/f.
+//! Carriers: the strength is that on L1, 1575.42 MHz. Behind a phase screen the phase is as 1/f, and S4 of
+//! weak scatter as f^−1.5 where the spectrum of the structures falls with the third power (Rino 1979, "A
+//! power law phase screen model for ionospheric scintillation", p = 3; ITU-R P.531), up to one, where it
+//! saturates. ξ of two carriers have the correlation (f₁/f₂)^(1/2 + S4²), f₁ < f₂. The half is that screen's:
+//! of ∫ sin(aq²)·sin(bq²)·q⁻³ dq with a and b as the wavelengths √(a/b) is left. That deep fades come on one
+//! band at a time is measured (Jiao, Xu, Morton and Rino 2016, "Equatorial scintillation amplitude fading
+//! characteristics across the GPS frequency bands"); S4² for it is a choice. What is added to the phase is
+//! the same on all carriers, but for 1/f.
 //!
-//! Limits: the decorrelation time is the same on all carriers; carriers within 1 % of each other have one ξ;
+//! Limits: the decorrelation time is the same on all carriers; each has the ξ of the nearest of eleven bands;
 //! satellites fade independently; elevation does not matter.
 
 use std::collections::BTreeMap;
@@ -188,8 +188,8 @@ impl Scintillation {
         Self { strength, step, response, stream, fades: Mutex::new(BTreeMap::new()) }
     }
 
-    /// Amplitude factor and phase in rad of `sv` on a carrier at node number `node`; `None` for a satellite that
-    /// does not scintillate.
+    /// Amplitude factor and phase in rad of `sv` on a carrier at node number `node`; `None` for a satellite
+    /// that does not scintillate.
     pub fn at(&self, sv: Sv, carrier_hz: f64, node: u64) -> Option<(f64, f64)> {
         if self.strength.satellites.as_ref().is_some_and(|satellites| !satellites.contains(&sv)) {
             return None;
@@ -261,8 +261,8 @@ impl Scintillation {
 
     /// Three independent unit noises of the model's spectrum at `count` nodes from `first` on.
     ///
-    /// From one band to the next ξ keeps the correlation of the two and takes the rest from a noise of its own: the
-    /// correlation of any two is then the product of those between them, as a power of the ratio is.
+    /// From one band to the next ξ keeps the correlation of the two and takes the rest from a noise of its
+    /// own: the correlation of any two is then the product of those between them, as a power of the ratio is.
     fn noise(&self, stream: Stream, fade: &Fade, first: u64, count: u64) -> Vec<[f64; 3]> {
         let (pairs, singles) = (stream.part(0), stream.part(1));
         let way: Vec<usize> = match fade.band {
@@ -373,8 +373,8 @@ mod tests {
     fn weaker_carriers_fade_more_turn_more_and_not_at_once() {
         const L2_HZ: f64 = 1_227.6e6;
         const L5_HZ: f64 = 1_176.45e6;
-        // 800 s are some 2000 independent intensities. Their variance scatters by √(8/2000) at most, 6 %, S4 by half of
-        // it; correlations of them by √(5/2000), 5 %: the bars are more than three of these.
+        // 800 s are some 2000 independent intensities. Their variance scatters by √(8/2000) at most, 6 %, S4
+        // by half of it; correlations of them by √(5/2000), 5 %: the bars are more than three of these.
         for (s4, sigma, saturated) in [(0.25, Some(0.5), false), (0.8, None, true)] {
             let strength = Strength { s4, sigma_phi_rad: sigma, decorrelation_s: 0.2, satellites: None };
             let fading = Scintillation::new(strength, Rate::from_hz(2.6e6).unwrap(), Stream::new(11, "test"));
@@ -402,13 +402,24 @@ mod tests {
                 let ((first_a, spread_a), (first_b, spread_b)) = (moments(a), moments(b));
                 (mean(&|i| intensity(a, i) * intensity(b, i)) - first_a * first_b) / (spread_a * spread_b)
             };
+            // Of z + ξ with z² and ξ's power of each band: 2z₁z₂·ρ√(ξ₁ξ₂) + ρ²ξ₁ξ₂ over both spreads, the
+            // indices.
+            let expected = |one_hz: f64, other_hz: f64| {
+                let share = |hz: f64| strength.on(hz).share();
+                let [one, other] = [share(one_hz), share(other_hz)];
+                let rho = (other_hz / one_hz).powf(0.5 + s4 * s4);
+                let scattered = (1.0 - one) * (1.0 - other);
+                let spreads = strength.on(one_hz).s4 * strength.on(other_hz).s4;
+                (2.0 * (one * other * scattered).sqrt() * rho + rho * rho * scattered) / spreads
+            };
             let [l1, l2, l5] = &bands;
             let (across, near) = (correlation(&l1.1, &l2.1), correlation(&l2.1, &l5.1));
-            // Weak: ξ along the mean alone counts, (1227.6/1575.42)^(0.5 + 0.0625) = 0.87. Strong: 0.78^(0.5 + 0.64)
-            // = 0.75 of ξ, of the intensity of Rayleigh's law its square, 0.57, and of a mean on L1 more.
-            let expected = if saturated { 0.45..0.75 } else { 0.75..0.95 };
             println!("S4 {s4}: L1 with L2 {across:.3}, L2 with L5 {near:.3}");
-            assert!(expected.contains(&across) && near > across + 0.05, "{s4}: {across} {near}");
+            for (found, expected) in [(across, expected(l1.0, l2.0)), (near, expected(l2.0, l5.0))] {
+                assert!((found - expected).abs() < 0.15, "{s4}: {found} of {expected}");
+            }
+            // Deep fades come on one band at a time, on near carriers together.
+            assert!(near > across + 0.05 && (across < 0.45) == saturated, "{s4}: {across} {near}");
         }
     }
 }

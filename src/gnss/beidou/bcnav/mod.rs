@@ -1,11 +1,12 @@
-//! What the messages of B1C, B2a and B2b have alike: blocks of fields, sets of elements that are carried
-//! from D1, and, of the last two, messages of one length with a type each.
+//! What the messages of B1C, B2a and B2b have alike: blocks of fields, sets of elements that are carried from
+//! D1, and, of the last two, messages of one length with a type each.
 //!
 //! Sources: BDS-SIS-ICD-B1C 1.0, BDS-SIS-ICD-B2a 1.0 and BDS-SIS-ICD-B2b 1.0, section 7. A set of D1 is
 //! carried to the nearest reference time that the messages can express, and to their steps. Group delays, all
-//! against B3I, are those that a file has of the signal's own message; without them those of the three signals
-//! follow from D1's as delays that are as 1/f². A signal is sent with the delay of its pilot; the correction of
-//! its data is the satellite's, and who follows the data alone meets what real satellites have between the two.
+//! against B3I, are those that a file has of the signal's own message; without them those of the three
+//! signals follow from D1's as delays that are as 1/f². A signal is sent with the delay of its pilot; the
+//! correction of its data is the satellite's, and who follows the data alone meets what real satellites have
+//! between the two.
 //!
 //! Nine coefficients of BDGIM that are all zero are none: they are sent where the scene has none, and are not
 //! reported.
@@ -119,8 +120,8 @@ pub(super) fn blank(set: Ephemeris) -> Content {
 }
 
 /// A set in one of the messages: carried to the nearest multiple of 300 s of BDT, with the delays of the
-/// signals that have the first and the second place in that message; `data` are the codes of the message's own
-/// signal, data and pilot, whose difference it has too.
+/// signals that have the first and the second place in that message; `data` are the codes of the message's
+/// own signal, data and pilot, whose difference it has too.
 pub(super) fn carried(
     set: &Ephemeris,
     form: &'static SetForm,

@@ -3,15 +3,15 @@
 //!
 //! Source: IS-GPS-705J, 20.3, and IS-GPS-200N, 30.3, of L2C the same bits at half the rate ([`CNAV_L2C`]). A
 //! message is 300 bits with their check, coded without a break from one to the next ([`Convolutional`]). Sent
-//! are messages 10 and 11 (orbit), 30 (clock, group delays, ionosphere) and 33 (clock, UTC) in turn.
-//! Limits: no almanacs, no offsets of other systems, no Earth orientation, no corrections; of UTC nothing
-//! is used. A set of LNAV is carried to the nearest reference time that CNAV can express, and to its
-//! steps, by which the orbit departs by 3 cm (`tests/witness`). T_GD and the corrections between signals are
-//! those that a file has of the satellite's own CNAV; without them the one delay of LNAV gives all, as delays
-//! that are as 1/f². L1 C/A is sent with the delay of LNAV, its own message, so that its correction here is
-//! what T_GD of both messages leave. A signal is sent with the delay of its pilot; the correction of I5 is the
-//! satellite's, and who follows I5 alone meets what real satellites have between the two. Health is that of
-//! all signals, where real satellites call L5 unhealthy until it is declared operational.
+//! are messages 10 and 11 (orbit), 30 (clock, group delays, ionosphere) and 33 (clock, UTC) in turn. Limits:
+//! no almanacs, no offsets of other systems, no Earth orientation, no corrections; of UTC nothing is used. A
+//! set of LNAV is carried to the nearest reference time that CNAV can express, and to its steps, by which the
+//! orbit departs by 3 cm (`tests/witness`). T_GD and the corrections between signals are those that a file
+//! has of the satellite's own CNAV; without them the one delay of LNAV gives all, as delays that are as 1/f².
+//! L1 C/A is sent with the delay of LNAV, its own message, so that its correction here is what T_GD of both
+//! messages leave. A signal is sent with the delay of its pilot; the correction of I5 is the satellite's, and
+//! who follows I5 alone meets what real satellites have between the two. Health is that of all signals, where
+//! real satellites call L5 unhealthy until it is declared operational.
 
 mod fields;
 mod on_l2c;

@@ -163,7 +163,8 @@ impl Form {
         read.map_or((System::Gps, 32), |(_, system, most)| (*system, *most))
     }
 
-    /// The fields of each line: three beside satellite and epoch, which are as wide as one, four of the others.
+    /// The fields of each line: three beside satellite and epoch, which are as wide as one, four of the
+    /// others.
     pub(super) fn lines(&self, record: &[Line<'_>]) -> Result<Vec<Vec<Option<f64>>>, String> {
         let margin = self.margin();
         let title = record.first().map_or("", |(_, title)| *title);
