@@ -11,6 +11,7 @@ use crate::message::Senders;
 use crate::ray::Effect;
 use crate::vehicle::Trajectory;
 use gnss::bdgim::Bdgim;
+use gnss::beidou::d1d2::issue;
 use gnss::broadcast::Ephemeris;
 use gnss::gps::lnav::{LeapEvent, UtcData};
 use gnss::ionosphere::NAVIC_HZ;
@@ -19,11 +20,13 @@ use gnss::message::Common;
 use gnss::rinex::{self, Navigation};
 use gnss::satellite::{Sv, System};
 use gnss::signal::Signal;
-use gnss::time::{Epoch, TimePolynomial, WEEK_S};
+use gnss::time::{BDT, Epoch, TimePolynomial, WEEK_S};
 
 /// How long before a change of UTC's whole seconds it is announced, and sent: about half a year (IERS,
 /// Bulletin C, which comes out in January and July).
 const ANNOUNCED_S: f64 = 26.0 * WEEK_S as f64;
+/// Seconds of a day.
+const DAY_S: i64 = 86_400;
 /// Warnings of one kind that are listed in full.
 const LISTED: usize = 4;
 
@@ -48,6 +51,11 @@ pub(super) fn navigation(
     for path in &scenario.navigation {
         let bytes = scenario.load("navigation.file", directory, path, overrides)?;
         files.push(rinex::read(&bytes, &path.display().to_string()).map_err(refuse)?);
+    }
+    if let Some(day) = scenario.moved_to {
+        let first = files.iter().filter_map(middle).map(|middle| middle.seconds().div_euclid(DAY_S)).min();
+        let days = first.map_or(0, |first| day.seconds().div_euclid(DAY_S) - first);
+        files.iter_mut().for_each(|file| move_days(file, days));
     }
     files.sort_by(|a, b| far_s(a, scenario.start).total_cmp(&far_s(b, scenario.start)));
     let mut navigation = Navigation::default();
@@ -85,12 +93,31 @@ pub(super) fn navigation(
     Ok(navigation)
 }
 
-/// How far a file is from a time: the middle one of the reference times of its sets, for a day's file begins
-/// and ends with a few of its neighbours'.
-fn far_s(file: &Navigation, at: Epoch) -> f64 {
+/// The middle one of the reference times of a file's sets, for a day's file begins and ends with a few of its
+/// neighbours'.
+fn middle(file: &Navigation) -> Option<Epoch> {
     let mut times: Vec<i64> = file.ephemerides.iter().map(|set| set.toe.seconds()).collect();
     times.sort_unstable();
-    times.get(times.len() / 2).map_or(f64::INFINITY, |middle| at.since(Epoch::new(*middle, 0.0)).abs())
+    times.get(times.len() / 2).map(|middle| Epoch::new(*middle, 0.0))
+}
+
+/// How far a file is from a time.
+fn far_s(file: &Navigation, at: Epoch) -> f64 {
+    middle(file).map_or(f64::INFINITY, |middle| at.since(middle).abs())
+}
+
+/// Moves a file by whole days; what it says of leap seconds belongs to its own.
+fn move_days(file: &mut Navigation, days: i64) {
+    for set in &mut file.ephemerides {
+        *set = set.moved(days);
+        if set.sv.system == System::BeiDou {
+            // That of BeiDou is a number of the reference time.
+            set.iode = issue(BDT.label(set.toe).tow_s());
+        }
+    }
+    let times = [&mut file.utc, &mut file.galileo].into_iter().flatten();
+    times.for_each(|time| time.reference = time.reference.plus_s((days * DAY_S) as f64));
+    (file.leap_seconds, file.leap_event) = (None, None);
 }
 
 /// The systems of a scene's signals, each once or more.
@@ -149,6 +176,10 @@ pub(super) fn sky(
         excluded.extend(sick);
     }
     if let Some(orbits) = &scenario.orbits {
+        if scenario.moved_to.is_some() {
+            let reason = "with [orbits]: expected one of them, because precise orbits are those of their own day";
+            return Err(scenario.conflict("navigation.moved_to", reason.to_owned()));
+        }
         let missing = orbits.follow(scenario, files, &mut catalogue, end_s)?;
         let missing = missing.into_iter().filter(|sv| catalogue.sent_at(*sv, start).is_some());
         let missing: Vec<Sv> = missing.filter(|sv| !excluded.contains(sv)).collect();
@@ -206,7 +237,8 @@ fn without_delays(catalogue: &Catalogue, signal: &Signal, at: Epoch) -> Option<S
     };
     let form = sets.first()?.form.name;
     Some(format!(
-        "{}: the navigation file has no record of {message} of {who}: the group delay of {form} stands for its own, as 1/f²",
+        "{}: the navigation file has no record of {message} of {who}: the group delay of {form} stands for its own, as \
+         1/f^2",
         signal.name
     ))
 }
