@@ -377,7 +377,7 @@ mod tests {
         // by half of it; correlations of them by √(5/2000), 5 %: the bars are more than three of these.
         for (s4, sigma, saturated) in [(0.25, Some(0.5), false), (0.8, None, true)] {
             let strength = Strength { s4, sigma_phi_rad: sigma, decorrelation_s: 0.2, satellites: None };
-            let fading = Scintillation::new(strength, Rate::from_hz(2.6e6).unwrap(), Stream::new(11, "test"));
+            let fading = Scintillation::new(strength.clone(), Rate::from_hz(2.6e6).unwrap(), Stream::new(11, "test"));
             let of = |hz: f64| -> Vec<(f64, f64)> {
                 (0..1_000_000).map(|node| fading.at(Sv::gps(7), hz, node).unwrap()).collect()
             };
