@@ -414,16 +414,6 @@ impl Ephemeris {
         self.delay_of_code_s(signal.rinex).unwrap_or_else(|| (self.form.group_delay_s)(self, signal))
     }
 
-    /// The group delay of a code of RINEX, where another message of the satellite says it.
-    pub fn delay_of_code_s(&self, code: &str) -> Option<f64> {
-        self.signal_delays_s.iter().find(|(own, _)| *own == code).map(|(_, delay_s)| *delay_s)
-    }
-
-    /// Whether the set is enough for ranges of a signal: with delays of its own or of another message.
-    pub fn serves(&self, signal: &Signal) -> bool {
-        (self.form.serves)(signal) || self.delay_of_code_s(signal.rinex).is_some()
-    }
-
     /// What a delay as 1/f² on another carrier of BeiDou makes of the one that the message gives on
     /// `given_hz`: zero on B3I, whose clock it is.
     pub(crate) fn group_delay_on_s(&self, given_hz: f64, carrier_hz: f64) -> f64 {
