@@ -25,6 +25,8 @@ use gnss::time::{BDT, Epoch, TimePolynomial, WEEK_S};
 /// How long before a change of UTC's whole seconds it is announced, and sent: about half a year (IERS,
 /// Bulletin C, which comes out in January and July).
 const ANNOUNCED_S: f64 = 26.0 * WEEK_S as f64;
+/// Step of the reference time of UTC's polynomial (IS-GPS-200N, table 20-IX).
+const UTC_STEP_S: i64 = 4096;
 /// Seconds of a day.
 const DAY_S: i64 = 86_400;
 /// Warnings of one kind that are listed in full.
@@ -115,8 +117,17 @@ fn move_days(file: &mut Navigation, days: i64) {
             set.iode = issue(BDT.label(set.toe).tow_s());
         }
     }
-    let times = [&mut file.utc, &mut file.galileo].into_iter().flatten();
-    times.for_each(|time| time.reference = time.reference.plus_s((days * DAY_S) as f64));
+    let later_s = (days * DAY_S) as f64;
+    if let Some(time) = &mut file.galileo {
+        time.reference = time.reference.plus_s(later_s);
+    }
+    if let Some(time) = &mut file.utc {
+        // Its reference time counts in steps of the message, of which a day has no whole number.
+        let later = time.reference.plus_s(later_s);
+        let of_week_s = later.tow_whole_s().div_euclid(UTC_STEP_S) * UTC_STEP_S;
+        let reference = Epoch::new(later.week() * WEEK_S + of_week_s, 0.0);
+        *time = TimePolynomial { a0_s: time.at_s(reference.plus_s(-later_s)), a1_sps: time.a1_sps, reference };
+    }
     (file.leap_seconds, file.leap_event) = (None, None);
 }
 
