@@ -208,6 +208,8 @@ pub struct Scenario {
     pub signals: Vec<&'static Signal>,
     /// Relative to the scenario's directory; none means the embedded file.
     pub navigation: Vec<PathBuf>,
+    /// The day to which the first day of the files is moved; none leaves them as they are.
+    pub moved_to: Option<Epoch>,
     /// By how much Galileo's time is ahead of GPS time; none means what the navigation file says, or zero.
     pub galileo_ahead_s: Option<f64>,
     /// Elevation below which satellites are left out.
@@ -326,6 +328,8 @@ impl Scenario {
         let signals = refusals.take(signals(root));
         let ahead_ns = navigation.as_ref().map(|t| t.number("galileo_ahead_ns")).transpose();
         let ahead_ns = refusals.take(ahead_ns);
+        let moved_to = navigation.as_ref().map(moved_to).transpose();
+        let moved_to = refusals.take(moved_to).flatten().flatten();
         let files = navigation.map(|t| t.texts("file")).transpose();
         let files = refusals.take(files).flatten().flatten().unwrap_or_default();
         let chosen = refusals.take(satellites(of_satellites.as_ref()));
@@ -364,6 +368,7 @@ impl Scenario {
             seed: seed?,
             signals: signals?,
             navigation: files.iter().map(PathBuf::from).collect(),
+            moved_to,
             galileo_ahead_s: ahead_ns?.flatten().map(|ns: f64| ns * 1e-9),
             mask_rad,
             excluded,
@@ -407,6 +412,13 @@ fn each<T>(
 fn start(root: &Table<'_>) -> Result<Epoch, ScenarioError> {
     let text = root.instant("start")?.ok_or_else(|| root.bad("start", "GPS time like \"2010-07-01T08:12:30\""))?;
     Epoch::parse(&text).map_err(|e| root.bad("start", e))
+}
+
+/// A day alone, or a time in it.
+fn moved_to(table: &Table<'_>) -> Result<Option<Epoch>, ScenarioError> {
+    let Some(text) = table.instant("moved_to")? else { return Ok(None) };
+    let whole = if text.contains(['T', ' ']) { text } else { format!("{text}T00:00:00") };
+    Epoch::parse(&whole).map(Some).map_err(|e| table.bad("moved_to", e))
 }
 
 fn name(root: &Table<'_>) -> Result<String, ScenarioError> {

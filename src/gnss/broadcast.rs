@@ -24,6 +24,10 @@ pub use kepler::solve_kepler;
 use kepler::wrap;
 pub use vector::StateVector;
 
+/// The code whose delay is T_GD itself: P(Y) on L1, against the clock of P(Y) on L1 and L2 together
+/// (IS-GPS-200N, 20.3.3.3.3.2).
+pub const GPS_CLOCK_CODE: &str = "1W";
+
 /// A set of broadcast elements of one satellite, in SI units and radians.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ephemeris {
@@ -108,7 +112,8 @@ pub struct Ephemeris {
     /// Which carriers the clock is of, where a message says it: of NavIC on L1 0 for L1 and L5, 1 for S and
     /// L5; 0 of others.
     pub reference_flag: u8,
-    /// Group delays of signals that have one of their own, by the signal's name; others follow from `tgd_s`.
+    /// Group delays that another message of the satellite says, by the code of RINEX to which they belong
+    /// ("5Q"), that of GPS's clock, T_GD, by [`GPS_CLOCK_CODE`]; others follow from `tgd_s`.
     pub signal_delays_s: Vec<(&'static str, f64)>,
     /// State and forces at the reference time, of messages without elements, whose own here are zero.
     pub vector: Option<StateVector>,
@@ -406,8 +411,7 @@ impl Ephemeris {
     /// By how much less than [`Self::clock`] the clock reads for a user of `signal` alone: its own delay
     /// where the set has one, or else what its message makes of the delays that it has.
     pub fn group_delay_s(&self, signal: &Signal) -> f64 {
-        let own = self.signal_delays_s.iter().find(|(name, _)| *name == signal.name);
-        own.map_or_else(|| (self.form.group_delay_s)(self, signal), |(_, delay_s)| *delay_s)
+        self.delay_of_code_s(signal.rinex).unwrap_or_else(|| (self.form.group_delay_s)(self, signal))
     }
 
     /// What a delay as 1/f² on another carrier of BeiDou makes of the one that the message gives on
@@ -665,8 +669,8 @@ mod tests {
     #[test]
     fn every_signal_has_the_clock_less_its_own_group_delay() {
         static L2: Signal = Signal { name: "on L2", carrier: Carrier::Common(1_227.6e6), ..L1_CA };
-        static OWN: Signal = Signal { name: "own", ..L2 };
-        let set = Ephemeris { signal_delays_s: vec![("own", 3.5e-9)], ..example() };
+        static OWN: Signal = Signal { rinex: "2L", ..L2 };
+        let set = Ephemeris { signal_delays_s: vec![("2L", 3.5e-9)], ..example() };
         let at = set.toe.plus_s(1234.0);
         let (l1, bare) = (set.clock_l1(at).unwrap(), set.clock(at).unwrap());
         assert_eq!(set.clock_of_signal(at, &L1_CA).unwrap(), l1);
@@ -674,7 +678,7 @@ mod tests {
         let (gamma, l2) = (77.0 * 77.0 / 3600.0, set.clock_of_signal(at, &L2).unwrap());
         assert!((l2.offset_s - (bare.offset_s - gamma * set.tgd_s)).abs() < 1e-19);
         assert_eq!(set.group_delay_s(&OWN), 3.5e-9);
-        let wrong = Ephemeris { signal_delays_s: vec![("own", f64::NAN)], ..example() };
+        let wrong = Ephemeris { signal_delays_s: vec![("2L", f64::NAN)], ..example() };
         assert!(wrong.state(at).is_err());
     }
 

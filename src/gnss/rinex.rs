@@ -1,5 +1,6 @@
 //! RINEX navigation files, versions 2 to 4: ephemerides of GPS LNAV, Galileo I/NAV (or F/NAV of
-//! satellites that have no I/NAV), NavIC, BeiDou D1 or D2, GLONASS, LNAV of QZSS and SBAS, the
+//! satellites that have no I/NAV), NavIC, BeiDou D1 or D2, GLONASS, LNAV of QZSS and SBAS, group delays of
+//! the signals that came after these by the records of their own messages (CNAV, CNAV-2, B-CNAV1 to 3), the
 //! coefficients of these systems' ionosphere but of the last two (of BeiDou those of BDGIM too), times of GPS
 //! and Galileo against each other and UTC, and the leap seconds.
 //!
@@ -12,6 +13,7 @@
 //! a comment, and tests no element's range.
 
 mod columns;
+mod delays;
 mod elements;
 
 use std::collections::BTreeSet;
@@ -144,6 +146,7 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
     let contents = columns::read(&text).map_err(|detail| NavigationError::Damaged { name: name.to_owned(), detail })?;
     let columns::Contents {
         mut records,
+        delays,
         klobuchar,
         klobuchar_navic,
         klobuchar_beidou,
@@ -213,6 +216,7 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
             _ => navigation.ephemerides.push(set),
         }
     }
+    delays::give(&mut navigation.ephemerides, &delays);
     let near = navigation.ephemerides.first().map(|first| first.toe);
     let mut offset = |line: Option<columns::Polynomial>, allowed| {
         let found = polynomial(line?, near?, allowed);

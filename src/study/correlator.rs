@@ -64,9 +64,16 @@ pub fn signals() -> Vec<&'static Signal> {
 }
 
 impl Case {
-    /// Code periods that carry a symbol, or that are grouped without one.
+    /// Code periods whose signs are known among each other in steady tracking: those of a symbol, of symbols
+    /// that are chips of a known code those of a bit, of BeiDou that of D1, and of a pilot as many as are
+    /// grouped.
     fn group(&self) -> u32 {
-        self.component.periods_per_symbol().unwrap_or_else(|| pilot_group(self.period_s()))
+        let symbol = self.component.message.zip(self.component.periods_per_symbol());
+        let known = symbol.map(|(message, periods)| {
+            let signs = self.signal.satellites().map(|sv| (message.bit)(sv).len() as u32).max();
+            if periods == 1 { signs.unwrap_or(1) } else { periods }
+        });
+        known.unwrap_or_else(|| pilot_group(self.period_s()))
     }
 
     fn period_s(&self) -> f64 {
@@ -281,7 +288,13 @@ impl<'a> Channel<'a> {
         let mut loops = Loops::new(&case.settings, shape, case.has_symbols(), case.motion.doppler_hz);
         loops.design(&case.settings, case.mode, false, update_s);
         loops.carrier = Rates { acceleration: case.motion.rate_hz_s, ..loops.carrier };
-        let mut cn0 = Cn0::new(group, period_s, case.settings.cn0_average_s);
+        // As a channel of the receiver estimates it: of prompts each of which has a sign of its own by their
+        // power.
+        let mut cn0 = if case.has_symbols() && group == 1 {
+            Cn0::of_single_periods(period_s, case.settings.cn0_average_s)
+        } else {
+            Cn0::new(group, period_s, case.settings.cn0_average_s)
+        };
         if case.mode == Mode::Phase {
             cn0.know_symbols();
         }

@@ -8,7 +8,7 @@ use crate::tally::{End, Tally, cases};
 const FAMILY: &str = "Other files";
 
 fn options() -> Options {
-    Options { start: Epoch::parse("2010-07-01T08:05:58").unwrap(), max_gap_s: 2.0 }
+    Options { start: Epoch::parse("2010-07-01T08:05:58").unwrap(), max_gap_s: 2.0, tolerance_m: None }
 }
 
 /// Rows of a walk; `damage` changes the fields of one of them, or all rows.
@@ -71,7 +71,7 @@ fn a_damaged_trajectory_is_refused_at_its_row() {
         }
     }
     let good = format!("{HEADER}\n{}\n", walk().join("\n"));
-    let whole = read_csv(good.as_bytes(), "ride.csv", &options()).unwrap().0;
+    let whole = read_csv(good.as_bytes(), "ride.csv", &options()).unwrap().trajectory;
     let forms: [(&str, Vec<u8>); 4] = [
         ("CRLF", good.replace('\n', "\r\n").into_bytes()),
         ("byte order mark", [b"\xef\xbb\xbf", good.as_bytes()].concat()),
@@ -88,7 +88,7 @@ fn a_damaged_trajectory_is_refused_at_its_row() {
         tally.case(
             || form.to_owned(),
             || match read_csv(bytes.as_slice(), "ride.csv", &options()) {
-                Ok((found, _)) if found.at(20.3).position_m == whole.at(20.3).position_m => Ok(End::Accepted),
+                Ok(found) if found.trajectory.at(20.3).position_m == whole.at(20.3).position_m => Ok(End::Accepted),
                 other => Err(format!("{:?}", other.err())),
             },
         );

@@ -202,7 +202,7 @@ fn moves(trajectory: &Trajectory) -> Result<u64, String> {
 
 fn targets() -> Vec<Target<'static>> {
     const MANY: (usize, usize) = (1_000_000, 300);
-    let options = || Options { start: Epoch::parse("2010-07-01T08:05:58").unwrap(), max_gap_s: 2.0 };
+    let options = || Options { start: Epoch::parse("2010-07-01T08:05:58").unwrap(), max_gap_s: 2.0, tolerance_m: None };
     let navigation = |bytes: &[u8]| {
         let found = rinex::read(bytes, "file").map_err(text)?;
         ranges(&found)?;
@@ -273,7 +273,7 @@ fn targets() -> Vec<Target<'static>> {
             "trajectory, CSV",
             kept(&["ride.csv", "ecef.csv"]),
             Box::new(move |bytes| {
-                read_csv(bytes, "file", &options()).map_err(text).and_then(|(found, _)| moves(&found))
+                read_csv(bytes, "file", &options()).map_err(text).and_then(|found| moves(&found.trajectory))
             }),
         ),
         simple(

@@ -59,7 +59,7 @@ fn inputs_of_absurd_size_are_refused_in_little_time_and_memory() {
     let directory = tempfile::tempdir().unwrap();
     let text = bases()[1].1.clone();
     let (head, body) = text.split_at(text.find("END OF HEADER").unwrap() + 21);
-    let options = Options { start: Epoch::parse("2010-07-01T08:05:58").unwrap(), max_gap_s: 2.0 };
+    let options = Options { start: Epoch::parse("2010-07-01T08:05:58").unwrap(), max_gap_s: 2.0, tolerance_m: None };
     let ten_mb = vec![b'7'; 10 << 20];
     let nav = |bytes: &[u8]| rinex::read(bytes, "file").map(drop).map_err(|e| e.to_string());
     let bombs = long()

@@ -31,6 +31,8 @@ mod fnav;
 mod galileo_e6;
 #[path = "../witness/glonass.rs"]
 mod glonass;
+#[path = "../witness/group_delays.rs"]
+mod group_delays;
 #[path = "../witness/inav.rs"]
 mod inav;
 #[path = "../witness/lnav.rs"]

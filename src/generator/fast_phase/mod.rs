@@ -75,7 +75,9 @@ impl Sources<'_> {
             found.carrier_cycles += carrier_hz * quick_s;
         }
         let scintillation = self.scintillation.zip(fading);
-        if let Some((gain, phase_rad)) = scintillation.and_then(|(scintillation, sv)| scintillation.at(sv, node)) {
+        if let Some((gain, phase_rad)) =
+            scintillation.and_then(|(scintillation, sv)| scintillation.at(sv, carrier_hz, node))
+        {
             // A phase that runs ahead is a shorter path of the carrier.
             found.carrier_cycles -= phase_rad / std::f64::consts::TAU;
             found.gain *= gain;

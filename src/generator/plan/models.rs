@@ -50,7 +50,7 @@ pub(super) fn models(scene: &Scene) -> Vec<Model> {
             .satellites
             .as_ref()
             .map_or("all satellites".to_owned(), |list| format!("{} satellites", list.len()));
-        format!("S4 {}, decorrelation {} s, {who}", strength.s4, strength.decorrelation_s)
+        format!("S4 {} on L1, as f^-1.5 on others, decorrelation {} s, {who}", strength.s4, strength.decorrelation_s)
     });
     let absent = || "the scenario has no [scintillation]".to_owned();
     add("scintillation", fading.is_some(), fading.unwrap_or_else(absent));

@@ -38,6 +38,8 @@ pub enum MotionSpec {
         kind: FileKind,
         /// Longest time between two rows.
         max_gap_s: f64,
+        /// How far the motion may be from its rows.
+        tolerance_m: Option<f64>,
     },
     /// A powered flight.
     Rocket(Rocket),
@@ -163,7 +165,7 @@ fn file(table: &Table<'_>) -> Result<MotionSpec, ScenarioError> {
     let formats = [("csv", FileKind::Csv), ("nmea", FileKind::Nmea)];
     let kind = table.choice("format", &formats)?.unwrap_or(by_name);
     let max_gap_s = table.need("max_gap_s")?;
-    Ok(MotionSpec::File { path, kind, max_gap_s })
+    Ok(MotionSpec::File { path, kind, max_gap_s, tolerance_m: table.number("tolerance_m")? })
 }
 
 fn rocket(table: &Table<'_>) -> Result<Rocket, ScenarioError> {

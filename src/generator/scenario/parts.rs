@@ -11,6 +11,7 @@ use crate::message::Senders;
 use crate::ray::Effect;
 use crate::vehicle::Trajectory;
 use gnss::bdgim::Bdgim;
+use gnss::beidou::d1d2::issue;
 use gnss::broadcast::Ephemeris;
 use gnss::gps::lnav::{LeapEvent, UtcData};
 use gnss::ionosphere::NAVIC_HZ;
@@ -18,11 +19,16 @@ use gnss::klobuchar::Klobuchar;
 use gnss::message::Common;
 use gnss::rinex::{self, Navigation};
 use gnss::satellite::{Sv, System};
-use gnss::time::{Epoch, TimePolynomial, WEEK_S};
+use gnss::signal::Signal;
+use gnss::time::{BDT, Epoch, TimePolynomial, WEEK_S};
 
 /// How long before a change of UTC's whole seconds it is announced, and sent: about half a year (IERS,
 /// Bulletin C, which comes out in January and July).
 const ANNOUNCED_S: f64 = 26.0 * WEEK_S as f64;
+/// Step of the reference time of UTC's polynomial (IS-GPS-200N, table 20-IX).
+const UTC_STEP_S: i64 = 4096;
+/// Seconds of a day.
+const DAY_S: i64 = 86_400;
 /// Warnings of one kind that are listed in full.
 const LISTED: usize = 4;
 
@@ -47,6 +53,11 @@ pub(super) fn navigation(
     for path in &scenario.navigation {
         let bytes = scenario.load("navigation.file", directory, path, overrides)?;
         files.push(rinex::read(&bytes, &path.display().to_string()).map_err(refuse)?);
+    }
+    if let Some(day) = scenario.moved_to {
+        let first = files.iter().filter_map(middle).map(|middle| middle.seconds().div_euclid(DAY_S)).min();
+        let days = first.map_or(0, |first| day.seconds().div_euclid(DAY_S) - first);
+        files.iter_mut().for_each(|file| move_days(file, days));
     }
     files.sort_by(|a, b| far_s(a, scenario.start).total_cmp(&far_s(b, scenario.start)));
     let mut navigation = Navigation::default();
@@ -84,12 +95,40 @@ pub(super) fn navigation(
     Ok(navigation)
 }
 
-/// How far a file is from a time: the middle one of the reference times of its sets, for a day's file begins
-/// and ends with a few of its neighbours'.
-fn far_s(file: &Navigation, at: Epoch) -> f64 {
+/// The middle one of the reference times of a file's sets, for a day's file begins and ends with a few of its
+/// neighbours'.
+fn middle(file: &Navigation) -> Option<Epoch> {
     let mut times: Vec<i64> = file.ephemerides.iter().map(|set| set.toe.seconds()).collect();
     times.sort_unstable();
-    times.get(times.len() / 2).map_or(f64::INFINITY, |middle| at.since(Epoch::new(*middle, 0.0)).abs())
+    times.get(times.len() / 2).map(|middle| Epoch::new(*middle, 0.0))
+}
+
+/// How far a file is from a time.
+fn far_s(file: &Navigation, at: Epoch) -> f64 {
+    middle(file).map_or(f64::INFINITY, |middle| at.since(middle).abs())
+}
+
+/// Moves a file by whole days; what it says of leap seconds belongs to its own.
+fn move_days(file: &mut Navigation, days: i64) {
+    for set in &mut file.ephemerides {
+        *set = set.moved(days);
+        if set.sv.system == System::BeiDou {
+            // That of BeiDou is a number of the reference time.
+            set.iode = issue(BDT.label(set.toe).tow_s());
+        }
+    }
+    let later_s = (days * DAY_S) as f64;
+    if let Some(time) = &mut file.galileo {
+        time.reference = time.reference.plus_s(later_s);
+    }
+    if let Some(time) = &mut file.utc {
+        // Its reference time counts in steps of the message, of which a day has no whole number.
+        let later = time.reference.plus_s(later_s);
+        let of_week_s = later.tow_whole_s().div_euclid(UTC_STEP_S) * UTC_STEP_S;
+        let reference = Epoch::new(later.week() * WEEK_S + of_week_s, 0.0);
+        *time = TimePolynomial { a0_s: time.at_s(reference.plus_s(-later_s)), a1_sps: time.a1_sps, reference };
+    }
+    (file.leap_seconds, file.leap_event) = (None, None);
 }
 
 /// The systems of a scene's signals, each once or more.
@@ -148,6 +187,10 @@ pub(super) fn sky(
         excluded.extend(sick);
     }
     if let Some(orbits) = &scenario.orbits {
+        if scenario.moved_to.is_some() {
+            let reason = "with [orbits]: expected one of them, because precise orbits are those of their own day";
+            return Err(scenario.conflict("navigation.moved_to", reason.to_owned()));
+        }
         let missing = orbits.follow(scenario, files, &mut catalogue, end_s)?;
         let missing = missing.into_iter().filter(|sv| catalogue.sent_at(*sv, start).is_some());
         let missing: Vec<Sv> = missing.filter(|sv| !excluded.contains(sv)).collect();
@@ -157,6 +200,10 @@ pub(super) fn sky(
                 .push(format!("without a precise orbit and clock over the scene and left out: {}", names.join(", ")));
         }
         excluded.extend(missing);
+    }
+    // The program's own files are of a version without them.
+    if !scenario.navigation.is_empty() {
+        warnings.extend(scenario.signals.iter().filter_map(|signal| without_delays(&catalogue, signal, start)));
     }
     catalogue.depart(satellite::departures(scenario));
     warnings.extend(satellite::strangers(scenario, &catalogue));
@@ -185,6 +232,26 @@ fn unsendable(scenario: &Scenario, set: &Ephemeris) -> Option<String> {
             set.sv, set.toe, message.name
         ))
     })
+}
+
+/// Which satellites have no group delay of a signal by a record of its own message; `None` where all have.
+fn without_delays(catalogue: &Catalogue, signal: &Signal, at: Epoch) -> Option<String> {
+    let sends = |sv: &Sv| sv.system == signal.system && (signal.sent)(sv.number, at);
+    let sets: Vec<&Ephemeris> =
+        catalogue.satellites().filter(sends).filter_map(|sv| catalogue.sent_at(sv, at)).collect();
+    let without: Vec<String> = sets.iter().filter(|set| !set.serves(signal)).map(|set| set.sv.to_string()).collect();
+    let message = signal.components.iter().find_map(|component| component.message)?.name;
+    let who = match without.len() {
+        0 => return None,
+        count if count == sets.len() => "any satellite".to_owned(),
+        _ => without.join(", "),
+    };
+    let form = sets.first()?.form.name;
+    Some(format!(
+        "{}: the navigation file has no record of {message} of {who}: the group delay of {form} stands for its own, as \
+         1/f^2",
+        signal.name
+    ))
 }
 
 /// Galileo's time against GPS time: as the scene gives it, or else as the file does.

@@ -32,7 +32,8 @@ const WAYPOINTS: &str = "[motion]\nkind = \"waypoints\"\nacceleration_mps2 = 2\n
                          turn_acceleration_mps2 = 3\n\
     [[motion.point]]\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\nspeed_mps = 0\nhold_s = 1\n\
     [[motion.point]]\nlatitude_deg = 26.51\nlongitude_deg = 80.2\nheight_m = 130\nspeed_mps = 20\n";
-const FILE: &str = "[motion]\nkind = \"file\"\nfile = \"ride.csv\"\nformat = \"csv\"\nmax_gap_s = 3\n";
+const FILE: &str = "[motion]\nkind = \"file\"\nfile = \"ride.csv\"\nformat = \"csv\"\nmax_gap_s = 3\n\
+                    tolerance_m = 0.1\n";
 const ORBIT: &str = "[motion]\nkind = \"orbit\"\nsemi_major_axis_m = 6.9e6\neccentricity = 0.01\ninclination_deg = 51\n\
     node_longitude_deg = 60\nargument_of_perigee_deg = 10\nmean_anomaly_deg = 20\n";
 const PUSHED: &str = "[motion]\nkind = \"pushed\"\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n\

@@ -7,6 +7,7 @@ use std::path::Path;
 use super::motion::{FileKind, MotionSpec};
 use super::{Overrides, Scenario, ScenarioError};
 use crate::vehicle::attitude::Nose;
+use crate::vehicle::file::Digits;
 use crate::vehicle::{Trajectory, file, route};
 
 impl Scenario {
@@ -35,8 +36,8 @@ impl Scenario {
                 orbit.trajectory(-reach_s, until_s).map_err(|e| self.conflict("motion", e.to_string()))
             }
             MotionSpec::Pushed { .. } | MotionSpec::Ticks { .. } => self.growing(motion, directory, overrides),
-            MotionSpec::File { path, kind, max_gap_s } => {
-                let options = file::Options { start: self.start, max_gap_s: *max_gap_s };
+            MotionSpec::File { path, kind, max_gap_s, tolerance_m } => {
+                let options = file::Options { start: self.start, max_gap_s: *max_gap_s, tolerance_m: *tolerance_m };
                 let full = self.resolve("motion.file", directory, path, overrides)?;
                 let input = File::open(&full).map_err(|e| self.unreadable("motion.file", path, e))?;
                 let name = path.display().to_string();
@@ -46,11 +47,13 @@ impl Scenario {
                 };
                 match kind {
                     FileKind::Csv => {
-                        let (trajectory, ignored) = file::read_csv(input, &name, &options).map_err(refuse)?;
-                        if !ignored.is_empty() {
-                            warnings.push(format!("{name}: columns not used: {}", ignored.join(", ").escape_debug()));
+                        let found = file::read_csv(input, &name, &options).map_err(refuse)?;
+                        if !found.ignored.is_empty() {
+                            let ignored = found.ignored.join(", ");
+                            warnings.push(format!("{name}: columns not used: {}", ignored.escape_debug()));
                         }
-                        Ok(trajectory)
+                        warnings.extend(rough(&name, found.digits));
+                        Ok(found.trajectory)
                     }
                     FileKind::Nmea => {
                         let found = file::read_nmea(input, &name, &options).map_err(refuse)?;
@@ -65,6 +68,7 @@ impl Scenario {
                                 found.separations_assumed
                             ));
                         }
+                        warnings.extend(rough(&name, found.digits));
                         Ok(found.trajectory)
                     }
                 }
@@ -107,4 +111,18 @@ impl Scenario {
         }
         Ok(())
     }
+}
+
+/// Accelerations that nobody means, from which a warning is due: a tenth of g.
+const ROUGH_MPS2: f64 = 1.0;
+
+/// What to say of positions whose digits shake the motion.
+fn rough(name: &str, digits: Option<Digits>) -> Option<String> {
+    let Digits { step_m, interval_s, acceleration_mps2 } =
+        digits.filter(|digits| digits.acceleration_mps2 > ROUGH_MPS2)?;
+    Some(format!(
+        "{name}: the last digit of its positions, {step_m:.2e} m every {interval_s:.3} s, makes accelerations of \
+         {acceleration_mps2:.1} m/s2 rms: motion.tolerance_m = {:.2e} takes the smoothest motion within it",
+        0.5 * step_m
+    ))
 }

@@ -8,6 +8,7 @@
 
 mod nmea;
 mod rows;
+mod smooth;
 
 use std::io::{BufRead, BufReader, Read};
 
@@ -21,6 +22,8 @@ use gnss::nmea::read::sentences;
 use gnss::time::Epoch;
 pub use nmea::{Gga, Rmc, gga, rising, rmc};
 use rows::Rows;
+pub use smooth::Digits;
+use smooth::decimals;
 
 /// Rows read at most: eleven hours at 25 Hz. They become 80 MB of knots, and take three times that while
 /// read.
@@ -32,6 +35,9 @@ const MAX_ROW_BYTES: usize = 1 << 16;
 /// Nearest to the Earth's centre: 50 km below the poles.
 const LEAST_RADIUS_M: f64 = 6.3e6;
 
+/// A degree along a meridian.
+const DEGREE_M: f64 = 111_195.0;
+
 /// Where a file's times lie and how far apart its rows may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
@@ -39,6 +45,8 @@ pub struct Options {
     pub start: Epoch,
     /// Longest time between two rows.
     pub max_gap_s: f64,
+    /// How far the motion may be from rows with positions alone; `None` for a motion that passes all.
+    pub tolerance_m: Option<f64>,
 }
 
 /// Why a trajectory file is refused, and where.
@@ -162,6 +170,9 @@ pub enum Fault {
         /// The acceleration.
         acceleration_mps2: f64,
     },
+    /// A tolerance for rows whose velocities say how the motion goes.
+    #[error("velocities beside tolerance_m: expected positions alone, or no tolerance_m")]
+    Velocities,
     /// Fewer rows than a motion needs.
     #[error("{have} rows: expected at least 2")]
     TooFew {
@@ -270,6 +281,16 @@ impl Columns {
         Ok(Self { names, time, geodetic, position, velocity, ignored })
     }
 
+    /// What the last digit of each coordinate is worth, to the north for both angles.
+    fn steps_m(&self, record: &csv::StringRecord) -> [f64; 3] {
+        let unit_m = if self.geodetic { [DEGREE_M, DEGREE_M, 1.0] } else { [1.0; 3] };
+        let worth =
+            |(at, unit_m): (usize, f64)| unit_m * libm::pow(0.1, f64::from(decimals(record.get(at).unwrap_or(""))));
+        let [a, b, c] = self.position;
+        let [u, v, w] = unit_m;
+        [worth((a, u)), worth((b, v)), worth((c, w))]
+    }
+
     fn row(&self, record: &csv::StringRecord, start: Epoch) -> Result<Row, Fault> {
         let field = |i: usize| (self.names.get(i).map_or("", String::as_str), record.get(i).unwrap_or(""));
         let read = |i: usize, limit: f64| {
@@ -366,8 +387,22 @@ impl<R: Read> Read for ShortRows<R> {
     }
 }
 
-/// Reads a CSV trajectory; also returns the names of columns that it did not use. `file` names it in errors.
-pub fn read_csv(input: impl Read, file: &str, options: &Options) -> Result<(Trajectory, Vec<String>), FileError> {
+/// A trajectory of a table.
+#[derive(Clone, Debug)]
+pub struct CsvTrajectory {
+    /// The motion.
+    pub trajectory: Trajectory,
+    /// Columns that were not used.
+    pub ignored: Vec<String>,
+    /// What the digits of positions make of it, where they have no tolerance.
+    pub digits: Option<Digits>,
+}
+
+/// Reads a CSV trajectory. `file` names it in errors.
+///
+/// # Errors
+/// [`FileError`] with the first line that is not as it must be.
+pub fn read_csv(input: impl Read, file: &str, options: &Options) -> Result<CsvTrajectory, FileError> {
     let error = |line, fault| FileError { file: file.to_owned(), line, fault };
     let mut reader =
         csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(ShortRows::of(input.take(MAX_BYTES + 1)));
@@ -392,11 +427,13 @@ pub fn read_csv(input: impl Read, file: &str, options: &Options) -> Result<(Traj
         let line = record.position().map_or(0, csv::Position::line);
         let row = columns.row(&record, options.start).map_err(|f| error(line, f))?;
         rows.push(line, row).map_err(|f| error(line, f))?;
+        rows.written(columns.steps_m(&record));
         if record.position().is_some_and(|p| p.byte() > MAX_BYTES) {
             return Err(error(line, Fault::TooLong));
         }
     }
-    Ok((rows.finish(file)?, columns.ignored))
+    let digits = rows.digits();
+    Ok(CsvTrajectory { trajectory: rows.finish(file)?, ignored: columns.ignored, digits })
 }
 
 /// A trajectory of NMEA sentences, and what was passed over or assumed.
@@ -408,6 +445,8 @@ pub struct NmeaTrajectory {
     pub without_fix: usize,
     /// GGA sentences without a geoid separation, for which EGM96's was added.
     pub separations_assumed: usize,
+    /// What the digits of positions make of it, where they have no tolerance.
+    pub digits: Option<Digits>,
 }
 
 /// Reads the GGA sentences of an NMEA file. Of several talkers in one epoch the first is taken.
@@ -449,11 +488,18 @@ pub fn read_nmea(input: impl Read, file: &str, options: &Options) -> Result<Nmea
             talker = found.talker;
             separations_assumed += usize::from(found.separation_assumed);
             rows.push(line, found.row).map_err(|f| error(line, f))?;
+            // Minutes of latitude and longitude, and metres.
+            let fields: Vec<&str> = text.split(',').collect();
+            let worth = |at: usize, unit_m: f64| {
+                fields.get(at).map_or(unit_m, |field| unit_m * libm::pow(0.1, f64::from(decimals(field))))
+            };
+            rows.written([worth(2, DEGREE_M / 60.0), worth(4, DEGREE_M / 60.0), worth(9, 1.0)]);
         }
     }
     let what = match (rows.last_s(), found_any, of_rmc) {
         (Some(_), ..) => {
-            return Ok(NmeaTrajectory { trajectory: rows.finish(file)?, without_fix, separations_assumed });
+            let digits = rows.digits();
+            return Ok(NmeaTrajectory { trajectory: rows.finish(file)?, without_fix, separations_assumed, digits });
         }
         (None, ..) if without_fix > 0 => "no GGA sentence with a fix",
         (None, false, _) => "no sentence of NMEA",

@@ -49,6 +49,18 @@ fn plain_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
     }
 }
 
+impl Ephemeris {
+    /// The group delay of a code of RINEX, where another message of the satellite says it.
+    pub fn delay_of_code_s(&self, code: &str) -> Option<f64> {
+        self.signal_delays_s.iter().find(|(own, _)| *own == code).map(|(_, delay_s)| *delay_s)
+    }
+
+    /// Whether the set is enough for ranges of a signal: with delays of its own or of another message.
+    pub fn serves(&self, signal: &Signal) -> bool {
+        (self.form.serves)(signal) || self.delay_of_code_s(signal.rinex).is_some()
+    }
+}
+
 impl fmt::Debug for SetForm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name)

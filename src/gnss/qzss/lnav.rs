@@ -19,7 +19,7 @@ pub static LNAV: Message = Message {
     sender: |common| Ok(Box::new(Broadcast::of(&Common { almanac: Vec::new(), ..common.clone() })?)),
     elements: |sv, raw, near| (lnav::LNAV.elements)(sv, raw, near).map(|set| named(set, &LNAV)),
     reader: |sv| OwnReader::boxed(&lnav::LNAV, &LNAV, sv),
-    form: |set| named(set.clone(), &LNAV),
+    form: |set| named(Ephemeris { signal_delays_s: Vec::new(), ..set.clone() }, &LNAV),
     sets: &LNAV_SETS,
     quantised: |set| (lnav::LNAV.quantised)(&as_gps(set)).map(|set| named(set, &LNAV)),
     ..lnav::LNAV

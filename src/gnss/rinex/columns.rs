@@ -9,22 +9,20 @@
 //! other systems and messages are counted and not read. `record` has the names of fields.
 
 mod corrections;
+mod delays;
 mod numbers;
 mod record;
 
 use crate::bdgim::Bdgim;
 use crate::klobuchar::Klobuchar;
-use crate::satellite::{Sv, System};
+use crate::satellite::System;
 use crate::time::Epoch;
 use corrections::{Thirds, delta_utc, leap_event, system_time};
-use numbers::{digits, fields, numbers};
+pub(super) use delays::Delays;
+use numbers::{digits, numbers};
 pub(super) use record::Record;
-use record::{CLOCK_FNAV, FIELDS, MESSAGES, READ, is_spare};
+use record::{CLOCK_FNAV, MESSAGES, READ, is_spare};
 
-/// Lines of a record: satellite, epoch and clock, then seven lines of the orbit.
-const LINES: usize = 8;
-/// The same of GLONASS: without and with the line of later versions.
-const LINES_OF_GLONASS: std::ops::RangeInclusive<usize> = 4..=5;
 const FIELD: usize = 19;
 /// Width of a coefficient in the header, whose lines end in a label from this column on.
 const HEADER_FIELD: usize = 12;
@@ -67,6 +65,8 @@ const GALILEO_OLD: &str = "GPGA";
 #[derive(Default)]
 pub(super) struct Contents {
     pub records: Vec<Record>,
+    /// Of the messages whose orbits are not read.
+    pub delays: Vec<Delays>,
     pub klobuchar: Option<Klobuchar>,
     /// As NavIC sends them.
     pub klobuchar_navic: Option<Klobuchar>,
@@ -136,6 +136,7 @@ pub(super) fn read(text: &[u8]) -> Result<Contents, String> {
     for group in body.chunk_by(|_, next| !form.begins(next.1)) {
         match form.group(group) {
             Ok(Group::Record(record)) => contents.records.push(*record),
+            Ok(Group::Delays(delays)) => contents.delays.push(delays),
             Ok(Group::Ionosphere(System::Navic, age, found)) => keep_first(&mut navic, age, found),
             Ok(Group::Ionosphere(System::BeiDou, age, found)) => keep_first(&mut beidou, age, found),
             Ok(Group::Ionosphere(_, age, found)) => keep_first(&mut ionosphere, age, found),
@@ -173,6 +174,8 @@ fn label(line: &str) -> &str {
 /// Lines that belong together.
 enum Group {
     Record(Box<Record>),
+    /// Group delays of one of the newer messages.
+    Delays(Delays),
     /// Of which system, when and by which satellite, in an order that sorts, and what it said.
     Ionosphere(System, String, Klobuchar),
     /// The same of BDGIM's coefficients.
@@ -328,12 +331,17 @@ impl Form {
             ("EPH", message) if !messages.contains(&message) => {
                 refuse(&format!("message '{message}': expected {}", messages.join(" or ")))
             }
-            ("EPH", message @ ("LNAV" | "INAV" | "FNAV" | "D1" | "D2" | "FDMA" | "SBAS"))
-                if READ.iter().any(|(read, ..)| *read == letter) && !is_spare(satellite) =>
-            {
+            (
+                "EPH",
+                message
+                @ ("LNAV" | "INAV" | "FNAV" | "D1" | "D2" | "FDMA" | "SBAS" | "CNAV" | "CNV1" | "CNV2" | "CNV3"),
+            ) if READ.iter().any(|(read, ..)| *read == letter) && !is_spare(satellite) => {
                 let rest = group.get(1..).unwrap_or_default();
                 if rest.first().is_none_or(|(_, line)| line.get(..3) != Some(satellite)) {
                     return refuse("expected the same satellite and its epoch in the line after this one");
+                }
+                if let Some(layout) = delays::layout(letter, message) {
+                    return self.delays(rest, layout).map(Group::Delays);
                 }
                 let is_fnav = message == "FNAV";
                 self.record(rest).map(|record| Group::Record(Box::new(Record { is_fnav, ..record })))
@@ -348,59 +356,6 @@ impl Form {
             ("EPH" | "STO" | "EOP" | "ION", _) => Ok(Group::Other),
             (kind, _) => refuse(&format!("'{kind}': expected EPH, STO, EOP or ION")),
         }
-    }
-
-    fn record(&self, record: &[Line<'_>]) -> Result<Record, String> {
-        let margin = self.margin();
-        let (first, title) = record.first().copied().unwrap_or_default();
-        let label: String = title.chars().take(23).collect();
-        let refuse = |line: usize, what: String| Err(format!("line {line} ({}): {what}", label.trim_end()));
-        // Version 2 leaves the letter of the only system out.
-        let read = READ.iter().find(|(letter, ..)| {
-            title.starts_with(*letter) || (self.version < 3 && self.system == 'R' && *letter == 'R')
-        });
-        let (system, most) = read.map_or((System::Gps, 32), |(_, system, most)| (*system, *most));
-        let (is_whole, expected) = match system {
-            System::Glonass => (LINES_OF_GLONASS.contains(&record.len()), "4 or 5".to_owned()),
-            System::Sbas => (record.len() == *LINES_OF_GLONASS.start(), LINES_OF_GLONASS.start().to_string()),
-            _ => (record.len() == LINES, LINES.to_string()),
-        };
-        if !is_whole {
-            return refuse(first, format!("a record of {} lines: expected {expected}", record.len()));
-        }
-        let mut values = Vec::with_capacity(FIELDS);
-        for (row, &(number, line)) in record.iter().enumerate() {
-            // Satellite and epoch are as wide as one field.
-            let (start, count) = if row == 0 { (margin + FIELD, 3) } else { (margin, 4) };
-            if row > 0 && line.get(..start).is_some_and(|margin| !margin.trim().is_empty()) {
-                return refuse(number, format!("column 1: expected {start} blanks"));
-            }
-            if self.cut == Some(number) && !line.trim_end().len().saturating_sub(start).is_multiple_of(FIELD) {
-                return refuse(number, "the file ends within a number".to_owned());
-            }
-            match fields(line, start, FIELD, count) {
-                Ok(found) => values.extend(found),
-                Err(reason) => return refuse(number, reason),
-            }
-        }
-        let letter = usize::from(self.version > 2 || title.starts_with('G'));
-        let number = title.get(letter..margin - usize::from(letter == 0 || self.version > 2)).unwrap_or("");
-        let Some(number) = digits::<u8>(number.trim()).filter(|number| (1..=most).contains(number)) else {
-            return refuse(first, format!("column {}: PRN '{}': expected 1 to {most}", letter + 1, number.trim()));
-        };
-        if title.get(margin - 1..margin) != Some(" ") && !(self.version < 3 && letter == 1) {
-            return refuse(first, format!("column {margin}: expected a blank after the satellite"));
-        }
-        let date = title.get(margin..margin + FIELD).unwrap_or("");
-        let Some(toc) = self.epoch(date) else {
-            return refuse(
-                first,
-                format!("column {}: '{}': expected an epoch from 1980 to 2180", margin + 1, date.trim()),
-            );
-        };
-        values.resize(FIELDS, None);
-        let Ok(values) = values.try_into() else { return refuse(first, "expected 31 fields".to_owned()) };
-        Ok(Record { is_fnav: false, line: first, sv: Sv { system, number }, toc, values })
     }
 
     /// Year, month, day, hour, minute and second, of GPS time.

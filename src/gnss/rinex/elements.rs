@@ -7,7 +7,7 @@
 use nalgebra::Vector3;
 
 use super::columns::Record;
-use crate::beidou::d1d2::issue;
+use crate::beidou::d1d2::{D1_SETS, issue};
 use crate::broadcast::{Ephemeris, STRING_3_UNHEALTHY, StateVector, status_of_record};
 use crate::galileo::fnav::FNAV_SETS;
 use crate::galileo::inav::{INAV_SETS, sisa_index};
@@ -104,6 +104,7 @@ fn beidou(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
         return Err(format!("toe = {}: expected within 4 h of the record's epoch, {}", common.toe, common.toc));
     }
     Ok(Ephemeris {
+        form: &D1_SETS,
         transmitted: transmitted(record, common.toe, common.toe),
         iode: issue(common.toe.tow_s()),
         iodc: whole(record, "aodc", 31)? as u16,

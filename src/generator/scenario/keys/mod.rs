@@ -102,6 +102,12 @@ const NAVIGATION: &[Key] = &[
          together they have to cover the scene's time",
     )
     .or_else("embedded: GPS of 2010-07-01; GPS and Galileo of 2020-11-29, 10:10 to 16:00"),
+    time(
+        "moved_to",
+        "a day, to which the first day of the files is moved: satellites go over the same ground at the same hour, and \
+         messages say the new week",
+    )
+    .or_else("the files' own"),
     number("galileo_ahead_ns", -900.0, 900.0, "ns", "by which Galileo's time is ahead of GPS time; it is broadcast")
         .or_else("the navigation file's at the start, or 0"),
 ];

@@ -50,6 +50,15 @@ pub(crate) const MOTION: &[Key] = &[
     text("file", A_PATH, "a trajectory, CSV (`t_s` and a place a row) or NMEA GGA").required().of(FROM_FILE),
     word("format", || vec!["csv", "nmea"], "of the file").or_else("by the file's name").of(FROM_FILE),
     number("max_gap_s", 0.001, 3600.0, "s", "longest time between rows that is interpolated").or(2.0).of(FROM_FILE),
+    number(
+        "tolerance_m",
+        1e-6,
+        100.0,
+        "m",
+        "how far positions may be from the true motion, half their last digit: the smoothest motion within it is taken",
+    )
+    .or_else("the motion passes every row")
+    .of(FROM_FILE),
     text("file", A_PATH, "`ticks.csv` of a live run's record, which is sent again").required().of(TICKS),
     text("events", A_PATH, "`events.csv` beside it, where anything was switched").of(TICKS),
     number("tick_s", 0.001, 0.1, "s", "length of a tick, to the sample; 4096 samples at least")

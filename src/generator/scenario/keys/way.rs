@@ -114,8 +114,10 @@ pub(crate) const OBSTRUCTION: &[Key] = &[
 ];
 
 pub(crate) const SCINTILLATION: &[Key] = &[
-    number("s4", 0.0, 1.0, "", "index of the amplitude's fading").required(),
-    number("sigma_phi_rad", 0.0, 3.0, "rad", "spread of the phase").or_else("what comes with s4"),
+    number("s4", 0.0, 1.0, "", "index of the amplitude's fading on 1575.42 MHz; on others as f^-1.5, up to 1")
+        .required(),
+    number("sigma_phi_rad", 0.0, 3.0, "rad", "spread of the phase on 1575.42 MHz; on others as 1/f")
+        .or_else("what comes with s4"),
     number("decorrelation_s", 0.05, 30.0, "s", "time after which fading is another").required(),
     words("satellites", SATELLITES, "whose signals").or_else("all"),
 ];

@@ -127,3 +127,40 @@ fn refusals_name_spans_that_do_not_hold_what_is_refused() {
     let none = refused(&format!("signals = [\"Galileo E1\"]\n{}", at("2010-07-01T12:00:00")));
     assert!(none.contains("has no ephemeris of Galileo") && !none.contains("nowhere"), "{none}");
 }
+
+#[test]
+fn a_file_moved_to_another_day_has_the_same_sky_at_the_same_hour_and_says_the_new_week() {
+    let base = format!("{MINIMAL}{STATIC}");
+    let compose = |text: &str| parse(text).unwrap().compose(Path::new("."), &Overrides::default()).unwrap();
+    let (then, _) = compose(&base);
+    let moved =
+        format!("{}\n[navigation]\nmoved_to = 2031-03-05\n", replaced(&base, "", "start", "2031-03-05T10:00:00"));
+    let (now, warnings) = compose(&moved);
+    assert!(warnings.iter().all(|warning| warning.contains("left out")), "{warnings:?}");
+    let starts = [then.clock.start, now.clock.start];
+    let mut seen = 0;
+    for sv in then.catalogue.satellites() {
+        let [Some((was, clock)), Some((is, same))] =
+            [(&then, starts[0]), (&now, starts[1])].map(|(scene, at)| scene.catalogue.truth(sv, at).unwrap())
+        else {
+            continue;
+        };
+        // Rounding of the node: 1e-15 rad of 26 560 km, and of times.
+        assert!((was.position_m - is.position_m).norm() < 1e-5 && (was.velocity_mps - is.velocity_mps).norm() < 1e-8);
+        assert!((clock.offset_s - same.offset_s).abs() < 1e-16, "{sv}");
+        let sets =
+            [(&then, starts[0]), (&now, starts[1])].map(|(scene, at)| scene.catalogue.sent_at(sv, at).unwrap().clone());
+        assert_eq!(sets[1].toe.week() - starts[1].week(), sets[0].toe.week() - starts[0].week());
+        seen += 1;
+    }
+    assert!(seen > 25, "{seen}");
+    // UTC is that of the new day: 18 s, not the 15 s of the file.
+    let leap_s = |text: &str| {
+        let scenario = parse(text).unwrap();
+        let read = parts::navigation(&scenario, Path::new("."), &Overrides::default(), &mut Vec::new());
+        parts::utc(&scenario, &read.unwrap()).leap_s
+    };
+    assert_eq!((leap_s(&base), leap_s(&moved)), (15, 18));
+    let refused = |text: &str| parse(text).map(|_| ()).unwrap_err().to_string();
+    assert!(refused(&moved.replace("2031-03-05\n", "\"soon\"\n")).contains("moved_to"));
+}

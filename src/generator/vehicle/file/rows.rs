@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::smooth::{Digits, smooth};
 use super::{Fault, FileError, LEAST_RADIUS_M, MAX_ROWS, Options};
 use crate::vehicle::Trajectory;
 use crate::vehicle::spline::{self, Row};
@@ -23,11 +24,15 @@ pub(super) struct Rows {
     rows: Vec<Row>,
     lines: Vec<u32>,
     max_gap_s: f64,
+    tolerance_m: Option<f64>,
+    /// What the last digit of each coordinate is worth, where any row has most digits.
+    steps_m: [f64; 3],
 }
 
 impl Rows {
     pub fn new(options: &Options) -> Self {
-        Self { rows: Vec::new(), lines: Vec::new(), max_gap_s: options.max_gap_s }
+        let Options { max_gap_s, tolerance_m, .. } = *options;
+        Self { rows: Vec::new(), lines: Vec::new(), max_gap_s, tolerance_m, steps_m: [f64::INFINITY; 3] }
     }
 
     /// Time of the last one.
@@ -63,13 +68,32 @@ impl Rows {
         Ok(())
     }
 
-    /// The spline through the rows, with a break at each of them.
-    pub fn finish(self, file: &str) -> Result<Trajectory, FileError> {
+    /// What the last digits of the newest row's coordinates are worth. Numbers lose zeros at their end, so
+    /// that the most digits count.
+    pub fn written(&mut self, steps_m: [f64; 3]) {
+        self.steps_m.iter_mut().zip(steps_m).for_each(|(least, step_m)| *least = least.min(step_m));
+    }
+
+    /// What the digits make of the motion; `None` where the tolerance takes it away.
+    pub fn digits(&self) -> Option<Digits> {
+        let step_m = self.steps_m.iter().fold(0.0, |most: f64, step_m| most.max(*step_m));
+        if self.tolerance_m.is_some() { None } else { Digits::of(&self.rows, step_m) }
+    }
+
+    /// The spline through the rows, or as near to them as the tolerance says, with a break at each of them.
+    pub fn finish(mut self, file: &str) -> Result<Trajectory, FileError> {
         let error = |line, fault| FileError { file: file.to_owned(), line, fault };
         let last = self.lines.last().map_or(1, |line| u64::from(*line));
-        let too_few = || error(last, Fault::TooFew { have: self.rows.len() });
-        if self.rows.len() < 2 {
+        let have = self.rows.len();
+        let too_few = || error(last, Fault::TooFew { have });
+        if have < 2 {
             return Err(too_few());
+        }
+        if let Some(tolerance_m) = self.tolerance_m {
+            if self.rows.iter().all(|row| row.velocity_mps.is_some()) {
+                return Err(error(1, Fault::Velocities));
+            }
+            smooth(&mut self.rows, tolerance_m);
         }
         let knots = spline::knots(&self.rows);
         if let Some(bent) = knots.iter().position(|knot| knot.motion.acceleration_mps2.norm() > MAX_ACCELERATION_MPS2) {

@@ -3,11 +3,11 @@
 use super::*;
 
 fn options() -> Options {
-    Options { start: Epoch::parse("2010-07-01T10:00:00").unwrap(), max_gap_s: 2.0 }
+    Options { start: Epoch::parse("2010-07-01T10:00:00").unwrap(), max_gap_s: 2.0, tolerance_m: None }
 }
 
 fn csv(text: &str) -> Result<(Trajectory, Vec<String>), FileError> {
-    read_csv(text.as_bytes(), "ride.csv", &options())
+    read_csv(text.as_bytes(), "ride.csv", &options()).map(|found| (found.trajectory, found.ignored))
 }
 
 const HEADER: &str = "time_s,x_m,y_m,z_m\n";
@@ -161,7 +161,8 @@ fn a_written_truth_flies_again_as_it_was() {
         writer.serialize(row).unwrap();
     }
     let text = writer.into_inner().unwrap();
-    let (again, ignored) = read_csv(text.as_slice(), "trajectory.csv", &options()).unwrap();
+    let found = read_csv(text.as_slice(), "trajectory.csv", &options()).unwrap();
+    let (again, ignored) = (found.trajectory, found.ignored);
     assert_eq!(ignored, ["sample", "clock_bias_s", "clock_drift"]);
     for k in 0..1_000 {
         let t_s = f64::from(k) * 0.01;
@@ -181,7 +182,7 @@ fn sentence(body: &str) -> String {
 #[test]
 fn gga_gives_ellipsoidal_height_and_crosses_midnight() {
     let start = Epoch::parse("2010-07-01T23:59:59Z").unwrap();
-    let options = Options { start, max_gap_s: 2.0 };
+    let options = Options { start, max_gap_s: 2.0, tolerance_m: None };
     let rmc = sentence("GPRMC,235958.50,A,2630.0,N,08012.0,E,0,0,010710,,");
     let text = [
         rmc,
@@ -207,7 +208,7 @@ fn a_height_without_a_separation_is_above_the_sea_and_a_second_talker_is_no_seco
         sentence(&format!("{talker}GGA,10000{second},4800.0,N,01100.00{second},E,1,08,0.9,500.0,M,,M,,"))
     };
     let text = format!("log 1: {}{}{}{}", gga("GP", 0), gga("GN", 0), gga("GP", 1), gga("GN", 1));
-    let found = read_nmea(text.as_bytes(), "ride.nmea", &Options { start, max_gap_s: 2.0 }).unwrap();
+    let found = read_nmea(text.as_bytes(), "ride.nmea", &Options { start, max_gap_s: 2.0, tolerance_m: None }).unwrap();
     assert_eq!((found.trajectory.span_s(), found.separations_assumed), ((0.0, 1.0), 2));
     let expected_m = Geodetic::from_degrees(48.0, 11.0, 500.0 + 45.956).to_ecef();
     assert!((found.trajectory.at(0.0).position_m - expected_m).norm() < 0.01);
@@ -254,4 +255,32 @@ proptest::proptest! {
         let _ = read_nmea(format!("$GPGGA,{tail}").as_bytes(), "any", &options());
         let _ = read_nmea(sentence(&format!("GPGGA,{tail}")).as_bytes(), "any", &options());
     }
+}
+
+#[test]
+fn the_worth_of_the_last_digit_is_read_and_a_tolerance_smooths_what_it_makes() {
+    // Ten times a second: 1e-6° are 0.11 m, √3·0.11/0.01 = 19 m/s2.
+    let rows = |decimals: usize| -> String {
+        let place = |k: u32| {
+            format!("{:.1},{:.*},80,130.00\n", 0.1 * f64::from(k), decimals, 26.5 + 1e-6 * 1.37 * f64::from(k))
+        };
+        format!("time_s,latitude_deg,longitude_deg,height_m\n{}", (0..200).map(place).collect::<String>())
+    };
+    // Longitudes that are written as "80" may be that to a degree, which no other row says better.
+    let text = |decimals| rows(decimals).replace(",80,", ",80.000000,");
+    let read =
+        |text: &str, tolerance_m| read_csv(text.as_bytes(), "ride.csv", &Options { tolerance_m, ..options() }).unwrap();
+    let hardest = |found: &CsvTrajectory| {
+        let knots = found.trajectory.knots();
+        knots.iter().map(|knot| knot.motion.acceleration_mps2.norm()).fold(0.0, f64::max)
+    };
+    let rough = read(&text(6), None);
+    let digits = rough.digits.unwrap();
+    assert!((digits.step_m - 0.1112).abs() < 1e-4 && (digits.interval_s - 0.1).abs() < 1e-12, "{digits:?}");
+    assert!((digits.acceleration_mps2 - 19.3).abs() < 0.1 && hardest(&rough) > 10.0, "{digits:?} {}", hardest(&rough));
+    let smoothed = read(&text(6), Some(0.5 * digits.step_m));
+    assert!(smoothed.digits.is_none() && hardest(&smoothed) < 0.2, "{}", hardest(&smoothed));
+    let with_velocity = "time_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps\n0,6400000,0,0,1,0,0\n1,6400001,0,0,1,0,0\n";
+    let error = read_csv(with_velocity.as_bytes(), "v.csv", &Options { tolerance_m: Some(1.0), ..options() });
+    assert!(error.unwrap_err().to_string().contains("tolerance_m"));
 }

@@ -1,9 +1,12 @@
-//! What the messages of B1C, B2a and B2b have alike: blocks of fields, sets of elements that are carried
-//! from D1, and, of the last two, messages of one length with a type each.
+//! What the messages of B1C, B2a and B2b have alike: blocks of fields, sets of elements that are carried from
+//! D1, and, of the last two, messages of one length with a type each.
 //!
 //! Sources: BDS-SIS-ICD-B1C 1.0, BDS-SIS-ICD-B2a 1.0 and BDS-SIS-ICD-B2b 1.0, section 7. A set of D1 is
-//! carried to the nearest reference time that the messages can express, and to their steps; its two group
-//! delays are against B3I, and those of the three signals follow as delays that are as 1/f².
+//! carried to the nearest reference time that the messages can express, and to their steps. Group delays, all
+//! against B3I, are those that a file has of the signal's own message; without them those of the three
+//! signals follow from D1's as delays that are as 1/f². A signal is sent with the delay of its pilot; the
+//! correction of its data is the satellite's, and who follows the data alone meets what real satellites have
+//! between the two.
 //!
 //! Nine coefficients of BDGIM that are all zero are none: they are sent where the scene has none, and are not
 //! reported.
@@ -14,9 +17,9 @@ pub(super) mod blocks;
 pub(super) mod typed;
 
 use crate::bdgim::Bdgim;
-use crate::beidou::d1d2::issue;
+use crate::beidou::d1d2::{D1_SETS, issue};
 use crate::bits::{Field, FieldError, Store, add_to, integers, quantise_all, read_all};
-use crate::broadcast::{Ephemeris, PLAIN, SetForm};
+use crate::broadcast::{Ephemeris, SetForm};
 use crate::exchange::modern;
 use crate::ionosphere::{Coefficients, Model};
 use crate::message::{Common, IonosphereForm, Parameters, Raw, RecordLine, UtcNumbers};
@@ -117,20 +120,31 @@ pub(super) fn blank(set: Ephemeris) -> Content {
 }
 
 /// A set in one of the messages: carried to the nearest multiple of 300 s of BDT, with the delays of the
-/// signals that have the first and the second place in that message.
-pub(super) fn carried(set: &Ephemeris, form: &'static SetForm, signals: &[&Signal]) -> Ephemeris {
+/// signals that have the first and the second place in that message; `data` are the codes of the message's
+/// own signal, data and pilot, whose difference it has too.
+pub(super) fn carried(
+    set: &Ephemeris,
+    form: &'static SetForm,
+    signals: &[&Signal],
+    data: Option<[&str; 2]>,
+) -> Ephemeris {
     if *set.form == *form {
         return set.clone();
     }
     let mut delays_s = signals.iter().map(|signal| set.group_delay_s(signal));
+    let apart_s = data.and_then(|codes| {
+        let [data_s, pilot_s] = codes.map(|code| set.delay_of_code_s(code));
+        Some(data_s? - pilot_s?)
+    });
     let own = Ephemeris {
         form,
         tgd_s: delays_s.next().unwrap_or(0.0),
         tgd2_s: delays_s.next().unwrap_or(0.0),
-        isc_s: [0.0; 6],
+        isc_s: [apart_s.unwrap_or(0.0), 0.0, 0.0, 0.0, 0.0, 0.0],
+        signal_delays_s: Vec::new(),
         ..set.clone()
     };
-    if *set.form != PLAIN {
+    if *set.form != D1_SETS {
         return own;
     }
     let label_s = BDT.label(set.toe).seconds() as f64;

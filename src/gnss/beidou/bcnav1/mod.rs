@@ -97,7 +97,7 @@ fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
 
 /// A set as B-CNAV1 has it.
 fn form(set: &Ephemeris) -> Ephemeris {
-    bcnav::carried(set, &B_CNAV1_SETS, &[&B1C, &B2A])
+    bcnav::carried(set, &B_CNAV1_SETS, &[&B1C, &B2A], Some(["1D", "1P"]))
 }
 
 /// Seconds of a frame, and of the hours in which frames are counted.

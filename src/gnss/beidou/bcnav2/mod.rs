@@ -124,7 +124,7 @@ static SET: &Tables = &[&BEGIN, &FIRST_HALF, &HEADER, &SECOND_HALF, &CLOCK, &DEL
 
 /// A set as B-CNAV2 has it.
 fn form(set: &Ephemeris) -> Ephemeris {
-    bcnav::carried(set, &B_CNAV2_SETS, &[&B1C, &B2A])
+    bcnav::carried(set, &B_CNAV2_SETS, &[&B1C, &B2A], Some(["5D", "5P"]))
 }
 
 /// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.

@@ -114,7 +114,7 @@ fn numbered(set: Ephemeris) -> Option<Ephemeris> {
 
 /// A set as B-CNAV3 has it.
 fn form(set: &Ephemeris) -> Ephemeris {
-    bcnav::carried(set, &B_CNAV3_SETS, &[&B2B])
+    bcnav::carried(set, &B_CNAV3_SETS, &[&B2B], None)
 }
 
 /// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.

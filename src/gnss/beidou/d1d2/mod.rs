@@ -18,7 +18,7 @@ mod fields;
 mod reader;
 
 use crate::bits::{Bits, FieldError, Store, add_to, integers, quantise_all, read_all, write_all};
-use crate::broadcast::{Ephemeris, PLAIN};
+use crate::broadcast::{Ephemeris, PLAIN, SetForm};
 use crate::ionosphere::{Coefficients, Model};
 use crate::klobuchar::Klobuchar;
 use crate::message::{IonosphereForm, Message, Records, Sender};
@@ -68,8 +68,8 @@ pub static D1_D2: Message = Message {
     },
     parameters: |symbols| parameters(symbols).map(|found| (true, found)),
     reader: |sv| Box::new(D1D2Reader::new(sv)),
-    form: Ephemeris::clone,
-    sets: &PLAIN,
+    form,
+    sets: &D1_SETS,
     quantised,
     adjustable,
     alert: None,
@@ -81,6 +81,14 @@ pub static D1_D2: Message = Message {
         lines: None,
     }),
 };
+
+/// Sets of D1 and D2: two group delays against B3I, of B1I and B2I (BDS-SIS-ICD-B1I 3.0, 5.2.4.8).
+pub static D1_SETS: SetForm = SetForm { name: "D1/D2", serves: |signal| signal.carries(&D1_D2), ..PLAIN };
+
+/// A set as D1 and D2 have it.
+fn form(set: &Ephemeris) -> Ephemeris {
+    Ephemeris { form: &D1_SETS, signal_delays_s: Vec::new(), ..set.clone() }
+}
 
 /// Seconds of a unit, of a subframe of D1 and of a frame of D2.
 const UNIT_S: i64 = 30;
@@ -132,7 +140,7 @@ pub fn issue(toe_of_week_s: f64) -> u16 {
 
 impl Orbit {
     fn blank(sv: Sv, near: Epoch) -> Self {
-        Self { ephemeris: Ephemeris::blank(sv, near), klobuchar: Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] } }
+        Self { ephemeris: form(&Ephemeris::blank(sv, near)), klobuchar: Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] } }
     }
 
     /// The set, numbered.
@@ -326,7 +334,7 @@ fn parameters(symbols: &[bool]) -> Option<Vec<(&'static str, i64)>> {
 /// # Errors
 /// A value that the message cannot carry.
 pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    let mut orbit = Orbit { ephemeris: ephemeris.clone(), ..Orbit::blank(ephemeris.sv, ephemeris.toe) };
+    let mut orbit = Orbit { ephemeris: form(ephemeris), ..Orbit::blank(ephemeris.sv, ephemeris.toe) };
     quantise_all(&D1_SET, &mut orbit)?;
     Ok(orbit.ephemeris)
 }

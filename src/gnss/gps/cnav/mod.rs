@@ -3,19 +3,22 @@
 //!
 //! Source: IS-GPS-705J, 20.3, and IS-GPS-200N, 30.3, of L2C the same bits at half the rate ([`CNAV_L2C`]). A
 //! message is 300 bits with their check, coded without a break from one to the next ([`Convolutional`]). Sent
-//! are messages 10 and 11 (orbit), 30 (clock, group delays, ionosphere) and 33 (clock, UTC) in turn.
-//! Limits: no almanacs, no offsets of other systems, no Earth orientation, no corrections; of UTC nothing
-//! is used. A set of LNAV is carried to the nearest reference time that CNAV can express, and to its
-//! steps, by which the orbit departs by 3 cm (`tests/witness`). Its one group delay gives all corrections
-//! between signals, as delays that are as 1/f²; its health is that of all signals, where real satellites
-//! call L5 unhealthy until it is declared operational.
+//! are messages 10 and 11 (orbit), 30 (clock, group delays, ionosphere) and 33 (clock, UTC) in turn. Limits:
+//! no almanacs, no offsets of other systems, no Earth orientation, no corrections; of UTC nothing is used. A
+//! set of LNAV is carried to the nearest reference time that CNAV can express, and to its steps, by which the
+//! orbit departs by 3 cm (`tests/witness`). T_GD and the corrections between signals are those that a file
+//! has of the satellite's own CNAV; without them the one delay of LNAV gives all, as delays that are as 1/f².
+//! L1 C/A is sent with the delay of LNAV, its own message, so that its correction here is what T_GD of both
+//! messages leave. A signal is sent with the delay of its pilot; the correction of I5 is the satellite's, and
+//! who follows I5 alone meets what real satellites have between the two. Health is that of all signals, where
+//! real satellites call L5 unhealthy until it is declared operational.
 
 mod fields;
 mod on_l2c;
 mod reader;
 
 use crate::bits::{Element, FieldError, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
-use crate::broadcast::{Ephemeris, SetForm};
+use crate::broadcast::{Ephemeris, GPS_CLOCK_CODE, SetForm};
 use crate::crc::crc24q;
 use crate::exchange::modern;
 use crate::fec::convolutional::Convolutional;
@@ -141,7 +144,7 @@ pub fn type_at(message: &Message, start: Epoch) -> u8 {
 }
 
 /// The set as CNAV has it: carried to the nearest multiple of 300 s, with the corrections between signals
-/// that agree with the one delay of LNAV, whose delays are as 1/f².
+/// that the set has of it, or that agree with the one delay of LNAV, whose delays are as 1/f².
 pub(super) fn form(set: &Ephemeris) -> Ephemeris {
     if *set.form == CNAV_SETS {
         return set.clone();
@@ -149,21 +152,27 @@ pub(super) fn form(set: &Ephemeris) -> Ephemeris {
     let toe_s = (set.toe.seconds() as f64 / STEP_S as f64).round() as i64 * STEP_S;
     let toe = Epoch::new(toe_s, 0.0);
     let issue = (toe.tow_whole_s() / STEP_S) as u16;
-    let isc_s = |hz: f64| {
-        let ratio = L1_HZ / hz;
-        set.tgd_s - set.tgd_s * ratio * ratio
-    };
+    let tgd_s = set.delay_of_code_s(GPS_CLOCK_CODE).unwrap_or(set.tgd_s);
+    let isc_s = |code: &str, hz: f64| tgd_s - delay_s(set, code, hz);
     Ephemeris {
         form: &CNAV_SETS,
         iode: issue,
         iodc: issue,
         health: if set.health == 0 { 0 } else { L1 | L2 | L5 },
-        isc_s: [0.0, isc_s(L2_HZ), isc_s(L5_HZ), isc_s(L5_HZ), 0.0, 0.0],
+        tgd_s,
+        isc_s: [tgd_s - set.tgd_s, isc_s("2L", L2_HZ), isc_s("5I", L5_HZ), isc_s("5Q", L5_HZ), 0.0, 0.0],
+        signal_delays_s: Vec::new(),
         ..set.carried_to(toe)
     }
 }
 
-const L1_HZ: f64 = 1_575.42e6;
+/// The delay of a code in a set of LNAV: its own, or T_GD as 1/f².
+pub(super) fn delay_s(set: &Ephemeris, code: &str, hz: f64) -> f64 {
+    let ratio = L1_HZ / hz;
+    set.delay_of_code_s(code).unwrap_or(set.tgd_s * ratio * ratio)
+}
+
+pub(super) const L1_HZ: f64 = 1_575.42e6;
 const L2_HZ: f64 = 1_227.60e6;
 const L5_HZ: f64 = 1_176.45e6;
 

@@ -9,7 +9,7 @@
 //! send others, too, a set is whole once page 1 has come. Left out are page 2 (other systems' times, the
 //! Earth's orientation), 3 and 4 (almanacs), 5 (corrections), 6 (text) and those that QZSS alone sends.
 //! Of UTC nothing is used. Sets of LNAV become those of CNAV-2 as they become those of CNAV
-//! ([`super::cnav`]), with delays of both parts of L1C that are those of L1.
+//! ([`super::cnav`]), with delays of both parts of L1C that are those of L1 where the file has none.
 
 mod fields;
 mod reader;
@@ -225,7 +225,10 @@ fn form(set: &Ephemeris) -> Ephemeris {
         return set.clone();
     }
     let civil = cnav::form(set);
-    Ephemeris { form: &CNAV2_SETS, health: u16::from(civil.health != 0), ..civil }
+    let delay_s = |code| cnav::delay_s(set, code, cnav::L1_HZ);
+    let [l1ca_s, l2c_s, i5_s, q5_s, ..] = civil.isc_s;
+    let isc_s = [l1ca_s, l2c_s, i5_s, q5_s, civil.tgd_s - delay_s("1L"), civil.tgd_s - delay_s("1S")];
+    Ephemeris { form: &CNAV2_SETS, health: u16::from(civil.health != 0), isc_s, ..civil }
 }
 
 /// T_GD less the correction of the signal (3.5.3.9.1); of L1C that of the pilot, which receivers follow.

@@ -71,7 +71,7 @@ pub static LNAV: Message = Message {
     elements: of_integers,
     parameters: opened,
     reader: |sv| Box::new(LnavReader::new(sv)),
-    form: |set| Ephemeris { form: &LNAV_SETS, ..set.clone() },
+    form: |set| Ephemeris { form: &LNAV_SETS, signal_delays_s: Vec::new(), ..set.clone() },
     sets: &LNAV_SETS,
     quantised,
     adjustable,

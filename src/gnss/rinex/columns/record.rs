@@ -2,6 +2,8 @@
 //!
 //! Source: RINEX 3.05, tables A6, A8, A10, A14, A16 and A18; RINEX 4.02, table A9.
 
+use super::numbers::{digits, fields};
+use super::{FIELD, Form, Line};
 use crate::glonass::fdma::SLOTS;
 use crate::qzss::satellites::SATELLITES;
 use crate::satellite::{Sv, System};
@@ -9,7 +11,11 @@ use crate::sbas::l1::SATELLITES as SBAS_SATELLITES;
 use crate::time::Epoch;
 
 /// Fields of a record.
-pub(super) const FIELDS: usize = 31;
+const FIELDS: usize = 31;
+/// Lines of a record: satellite, epoch and clock, then seven lines of the orbit.
+const LINES: usize = 8;
+/// The same of GLONASS: without and with the line of later versions.
+const LINES_OF_GLONASS: std::ops::RangeInclusive<usize> = 4..=5;
 /// Those with which records begin, in their order, …
 const FIRST: [&str; 20] = [
     "af0", "af1", "af2", "iode", "crs", "deltaN", "m0", "cuc", "e", "cus", "sqrta", "toe", "cic", "omega0", "cis",
@@ -119,6 +125,80 @@ impl Record {
         }
         let expected = "bit 0, 1 or 2 for the signal, and bit 8 or 9 for the clock";
         Err(format!("line {} ({} {}): data sources = {sources}: expected {expected}", self.line, self.sv, self.toc))
+    }
+}
+
+/// Why a record is left out: at which line, and by its first line's columns.
+fn refusal(line: usize, title: &str, what: &str) -> String {
+    let label: String = title.chars().take(23).collect();
+    format!("line {line} ({}): {what}", label.trim_end())
+}
+
+impl Form {
+    /// A record of eight lines, of GLONASS and SBAS of fewer.
+    pub(super) fn record(&self, record: &[Line<'_>]) -> Result<Record, String> {
+        let (first, title) = record.first().copied().unwrap_or_default();
+        let (system, _) = self.system_of(title);
+        let (is_whole, expected) = match system {
+            System::Glonass => (LINES_OF_GLONASS.contains(&record.len()), "4 or 5".to_owned()),
+            System::Sbas => (record.len() == *LINES_OF_GLONASS.start(), LINES_OF_GLONASS.start().to_string()),
+            _ => (record.len() == LINES, LINES.to_string()),
+        };
+        if !is_whole {
+            return Err(refusal(first, title, &format!("a record of {} lines: expected {expected}", record.len())));
+        }
+        let mut values: Vec<Option<f64>> = self.lines(record)?.concat();
+        let (sv, toc) = self.head((first, title))?;
+        values.resize(FIELDS, None);
+        let Ok(values) = values.try_into() else { return Err(refusal(first, title, "expected 31 fields")) };
+        Ok(Record { is_fnav: false, line: first, sv, toc, values })
+    }
+
+    /// The system of a record by its first line, and the largest number of its satellites. Version 2 leaves
+    /// the letter of the only system out.
+    fn system_of(&self, title: &str) -> (System, u8) {
+        let read = READ.iter().find(|(letter, ..)| {
+            title.starts_with(*letter) || (self.version < 3 && self.system == 'R' && *letter == 'R')
+        });
+        read.map_or((System::Gps, 32), |(_, system, most)| (*system, *most))
+    }
+
+    /// The fields of each line: three beside satellite and epoch, which are as wide as one, four of the
+    /// others.
+    pub(super) fn lines(&self, record: &[Line<'_>]) -> Result<Vec<Vec<Option<f64>>>, String> {
+        let margin = self.margin();
+        let title = record.first().map_or("", |(_, title)| *title);
+        let one = |(row, &(number, line)): (usize, &Line<'_>)| {
+            let (start, count) = if row == 0 { (margin + FIELD, 3) } else { (margin, 4) };
+            if row > 0 && line.get(..start).is_some_and(|margin| !margin.trim().is_empty()) {
+                return Err(refusal(number, title, &format!("column 1: expected {start} blanks")));
+            }
+            if self.cut == Some(number) && !line.trim_end().len().saturating_sub(start).is_multiple_of(FIELD) {
+                return Err(refusal(number, title, "the file ends within a number"));
+            }
+            fields(line, start, FIELD, count).map_err(|reason| refusal(number, title, &reason))
+        };
+        record.iter().enumerate().map(one).collect()
+    }
+
+    /// The satellite and the epoch in the first line of a record.
+    pub(super) fn head(&self, (first, title): Line<'_>) -> Result<(Sv, Epoch), String> {
+        let margin = self.margin();
+        let (system, most) = self.system_of(title);
+        let refuse = |what: &str| Err(refusal(first, title, what));
+        let letter = usize::from(self.version > 2 || title.starts_with('G'));
+        let number = title.get(letter..margin - usize::from(letter == 0 || self.version > 2)).unwrap_or("");
+        let Some(number) = digits::<u8>(number.trim()).filter(|number| (1..=most).contains(number)) else {
+            return refuse(&format!("column {}: PRN '{}': expected 1 to {most}", letter + 1, number.trim()));
+        };
+        if title.get(margin - 1..margin) != Some(" ") && !(self.version < 3 && letter == 1) {
+            return refuse(&format!("column {margin}: expected a blank after the satellite"));
+        }
+        let date = title.get(margin..margin + FIELD).unwrap_or("");
+        let Some(toc) = self.epoch(date) else {
+            return refuse(&format!("column {}: '{}': expected an epoch from 1980 to 2180", margin + 1, date.trim()));
+        };
+        Ok((Sv { system, number }, toc))
     }
 }
 
