@@ -2,7 +2,7 @@
 //!
 //! A scene names a level or single knobs ([`Wishes`]); [`choices`] says what was picked and what it is worth:
 //! errors of codes by the signals' waveforms ([`bias`]), costs as multiples that the kernels' bench measures
-//! (`cargo bench -p gnss-twin-generator`). Limits: a knob's figure assumes that every other knob is at its best.
+//! (`cargo bench --bench kernels`). Limits: a knob's figure assumes that every other knob is at its best.
 
 mod bias;
 
@@ -148,8 +148,8 @@ impl Fidelity {
     }
 
     /// The knobs of a level for `signals` at `rate_hz`. `balanced` takes area edges, which cost less than
-    /// band-limited ones at every rate, where the error of every signal's code is below `allowed_m`, for which
-    /// see [`allowed_m`]; never nearest ones, whose spurs are those of `fast`.
+    /// band-limited ones at every rate, where the error of every signal's code is below `allowed_m`, for
+    /// which see [`allowed_m`]; never nearest ones, whose spurs are those of `fast`.
     pub fn suited(grade: Grade, rate_hz: f64, allowed_m: f64, signals: &[&Signal]) -> Self {
         let level = Self { allowed_m, ..Self::of(grade) };
         let too_much = |signal: &&Signal| code_bias_m(level.code_edge, signal, rate_hz) >= allowed_m;

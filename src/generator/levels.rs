@@ -95,7 +95,8 @@ pub struct Levels {
     /// Largest share of a stretch's components that is clipped, and when that stretch begins in s.
     pub worst: (f64, f64),
     stretches: u64,
-    /// Time of this machine for a sample of all that the scene sends, on one core: the median of the stretches.
+    /// Time of this machine for a sample of all that the scene sends, on one core: the median of the
+    /// stretches.
     pub sample_s: f64,
 }
 

@@ -12,7 +12,7 @@ use gnss_twin::receiver::track::{Channel, Report, TrackingSettings};
 
 const RATE_HZ: f64 = 4.103e6;
 /// GLONASS ICD L1, L2 (5.1), 3.3.1.1 and 3.3.2.1: channel −7, and a code of 511 chips.
-const CARRIER_HZ: f64 = 1_598.0625e6;
+const CARRIER_HZ: f64 = 1_598.062_5e6;
 const CHIP_HZ: f64 = 0.511e6;
 const CHIPS: f64 = 511.0;
 const IF_HZ: f64 = 213e3;
@@ -48,7 +48,7 @@ fn codes_of_glonass_are_aided_by_the_carriers_of_their_own_channels() {
             let t_s = n as f64 / RATE_HZ;
             let chips = first_chips + t_s * CHIP_HZ * ratio;
             // The meander of a message of zeros: a sign lasts ten periods.
-            let sign = if (chips / (10.0 * CHIPS)) as u64 % 2 == 0 { 1.0 } else { -1.0 };
+            let sign = if ((chips / (10.0 * CHIPS)) as u64).is_multiple_of(2) { 1.0 } else { -1.0 };
             let chip = sign * amplitude * f64::from(code[(chips % CHIPS) as usize]);
             let (sin, cos) = libm::sincos(TAU * ((IF_HZ + DOPPLER_HZ) * t_s + 0.2).fract());
             i.push((chip * cos + noise()) as f32);

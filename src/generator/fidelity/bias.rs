@@ -39,11 +39,11 @@ pub(super) fn moving_bias_m(edge: CodeEdge, signal: &Signal, rate_hz: f64, doppl
 
 /// Error of a component's code at rest, root mean square over codes and phases, in metres.
 ///
-/// An early-minus-late correlator of spacing d weighs the frequency f by `w = 2 sin(πfd)`. The code's lines are
-/// 1/T apart, T its period, with the powers of the waveform's density `p(f)`, and those that fold back,
+/// An early-minus-late correlator of spacing d weighs the frequency f by `w = 2 sin(πfd)`. The code's lines
+/// are 1/T apart, T its period, with the powers of the waveform's density `p(f)`, and those that fold back,
 /// `p(f + k·fs)` times what the edge leaves of them, have the phases of a random code: they add up by power.
-/// `σ² = 1/T ∫ 2w² p(f) Σ_k p(f + k·fs) H²(f + k·fs) df` from zero to half the rate, against the slope
-/// `∫ 2w · 2πf · H(f) p(f) df`; H is 1 for nearest edges and sinc(f/fs) for area edges. d is half a step of the
+/// `σ² = 1/T ∫ 2w² p(f) Σ_k p(f + k·fs) H²(f + k·fs) df` from zero to half the rate, against the slope `∫ 2w
+/// · 2πf · H(f) p(f) df`; H is 1 for nearest edges and sinc(f/fs) for area edges. d is half a step of the
 /// strongest layer: half a chip without a sub-carrier. An independent correlator on real codes of C/A found
 /// 0.14 m at 2.6 and 0.20 m at 2.048 Msps with area edges, where this gives 0.15 and 0.33: near a multiple of
 /// the chip rate it is a bound.
@@ -136,8 +136,8 @@ mod tests {
     fn area_edges_err_by_what_folds_back_and_less_as_the_code_moves() {
         let component = &L1_CA.components[0];
         // The sum over the lines of C/A in another language, whose integral this is; and figures of an
-        // independent correlator on real codes, 0.14 and 0.02 m, within what five codes scatter about the mean
-        // of all.
+        // independent correlator on real codes, 0.14 and 0.02 m, within what five codes scatter about the
+        // mean of all.
         for (rate_hz, expected_m) in [(2.048e6, 0.3273), (2.6e6, 0.1515), (5e6, 0.0563), (10e6, 0.0202), (25e6, 0.0038)]
         {
             let found_m = aliased_bias_m(CodeEdge::Area, component, rate_hz);

@@ -16,6 +16,7 @@ use super::{CODE_BITS, CODE_ONE, Edge, Run, dense};
 /// Most steps a sample that are read from a window for each half of a group, which then spans 30 of its 32,
 /// two of which an area looks back.
 const DENSEST: u64 = 29 * CODE_ONE / 15;
+const DENSER: u64 = DENSEST + 1;
 
 /// The sequences of a ray made ready.
 #[derive(Default)]
@@ -169,9 +170,9 @@ impl Layer {
     fn new<const AREA: bool>(run: &Run<'_>) -> Self {
         let unit = (1_u64 << (CODE_BITS - LANE_BITS)) as f64;
         let density = match run.step {
+            DENSER.. => Density::Densest,
             ..=CODE_ONE => Density::Sparse,
-            ..=DENSEST => Density::Dense,
-            _ => Density::Densest,
+            _ => Density::Dense,
         };
         let span = run.step as f64 / unit * if density == Density::Dense { 1.0 } else { 0.5 };
         // The area of a sample ends half a step after its instant.

@@ -3,10 +3,10 @@
 //! A [`Run`] is up to 4096 samples of one sequence of a ray with constant carrier and code steps, both phases
 //! as fixed-point integers anchored at its first sample, so nothing accumulates from run to run.
 //! [`mod@reference`] evaluates each sample in `f64`, [`exact`] the same at speed; [`lanes`] is the fast
-//! kernel. Both take all rays of a stretch at once, as [`bank`] gathers them, and what the layers and zeros of
-//! a ray's components come to as several sequences of ±1 ([`waveform`]), a run each. They are plain lane-array
-//! code that [`isa`] compiles for each instruction set with the same bits on all. Limits: 15 code steps a
-//! sample.
+//! kernel. Both take all rays of a stretch at once, as [`bank`] gathers them, and what the layers and zeros
+//! of a ray's components come to as several sequences of ±1 ([`waveform`]), a run each. They are plain
+//! lane-array code that [`isa`] compiles for each instruction set with the same bits on all. Limits: 15 code
+//! steps a sample.
 
 pub(crate) mod angle;
 pub mod band;

@@ -218,8 +218,8 @@ impl Waveform {
         layers.iter().map(|layer| of((self.steps(layer, layer.pulse.len()), rate(layer)), layer)).collect()
     }
 
-    /// The same behind a filter: layers of one phase are one sequence of chips with a pulse where the response
-    /// to a chip costs less than those to its edges.
+    /// The same behind a filter: layers of one phase are one sequence of chips with a pulse where the
+    /// response to a chip costs less than those to its edges.
     fn filtered(&self, layers: &[Layer], filter: &Filter, rate_hz: f64) -> Vec<Sequence> {
         if self.chips.contains(&0) || layers.iter().any(|layer| !layer.chips.is_empty()) {
             return self.sequences(layers);

@@ -73,8 +73,8 @@ impl Waves {
             }
             waveform(edge, &of_tile, &mut own.0, responses);
             let amplitude = amplitude(run);
-            for k in 0..TILE {
-                sum[k] += amplitude * own.0[k];
+            for (sum, own) in sum.iter_mut().zip(&own.0) {
+                *sum += amplitude * own;
             }
         }
     }

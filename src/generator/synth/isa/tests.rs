@@ -185,8 +185,8 @@ fn rays_of_several_runs_are_the_sums_of_their_twins_at_every_length_and_offset()
                 |level, i, q| accumulate(level, edge, &[&runs, some], i, q, &mut Buffers::default()),
                 |i, q| check(i, q, amplitude * bar),
             );
-            // The definition sums runs in single precision: half a last place of numbers below four for each, and
-            // one for all. A pulse has corners, 6e-7 of its edges.
+            // The definition sums runs in single precision: half a last place of numbers below four for each,
+            // and one for all. A pulse has corners, 6e-7 of its edges.
             let roundings = (runs.len() + some.len() + 1) as f64;
             let corners = if is_filtered { 6e-7 * amplitude } else { 0.0 };
             everywhere(

@@ -1,21 +1,22 @@
-//! What a sample of a satellite costs in the kernels, strips included: `cargo bench -p gnss-twin-generator`
-//! prints a row for every signal, rate, edge and arithmetic.
+//! What a sample of a satellite costs in the kernels, strips included: `cargo bench --bench kernels` prints a
+//! row for every signal and rate with the time in ns of every edge and arithmetic; `-- NAME` those of the
+//! signals whose names hold that. Least of fifteen runs of six satellites, on one core.
 
 use std::time::Instant;
 
-use generator::fidelity::{Arithmetic, CodeEdge};
-use generator::synth::band::Filter;
-use generator::synth::bank::Bank;
-use generator::synth::isa::Level;
-use generator::synth::waveform::{Voice, Waveform};
-use generator::synth::{CODE_ONE, Edge, Kernel, RUN_SAMPLES, Run};
-use gnss::satellite::Sv;
-use gnss::signal::{Layers, SIGNALS, Signal};
-use gnss::time::Epoch;
+use gnss_twin::generator::fidelity::{Arithmetic, CodeEdge};
+use gnss_twin::generator::synth::band::Filter;
+use gnss_twin::generator::synth::bank::Bank;
+use gnss_twin::generator::synth::isa::Level;
+use gnss_twin::generator::synth::waveform::{Voice, Waveform};
+use gnss_twin::generator::synth::{CODE_ONE, Edge, Kernel, RUN_SAMPLES, Run};
+use gnss_twin::gnss::signal::{Layers, SIGNALS, Signal};
+use gnss_twin::gnss::time::Epoch;
 
 const RATES_MSPS: [f64; 8] = [2.6, 4.092, 4.1, 6.5, 10.23, 12.5, 25.0, 65.0];
 const SATELLITES: usize = 6;
 
+/// Cycles modulo one, in 2^-64 turn.
 fn turns(cycles: f64) -> u64 {
     ((cycles - cycles.floor()) * 18_446_744_073_709_551_616.0) as u64
 }
@@ -23,10 +24,10 @@ fn turns(cycles: f64) -> u64 {
 /// The sequences of some satellites; `None` where the rate does not do.
 fn sequences(signal: &'static Signal, edge: Edge<'_>, rate_hz: f64) -> Option<Vec<Vec<(Voice, u64, f64)>>> {
     let mut found = Vec::new();
-    for sv in signal.satellites().into_iter().take(SATELLITES) {
+    for sv in signal.satellites().take(SATELLITES) {
         let mut own = Vec::new();
         for (index, component) in signal.components.iter().enumerate() {
-            let waveform = Waveform::new(signal.link(Sv { ..sv }), index).ok()??;
+            let waveform = Waveform::new(signal.link(sv), index).ok()??;
             for voice in waveform.voices(Layers::Whole, edge, rate_hz).ok()? {
                 let cycles = component.phase_cycles + voice.phase_cycles;
                 let amplitude = component.power_share.sqrt() * voice.amplitude;
@@ -40,6 +41,7 @@ fn sequences(signal: &'static Signal, edge: Edge<'_>, rate_hz: f64) -> Option<Ve
     Some(found)
 }
 
+/// Time for a sample of a satellite, once.
 fn once_ns(satellites: &[Vec<(Voice, u64, f64)>], kernel: Kernel<'_>, rate_hz: f64, bank: &mut Bank) -> f64 {
     const BLOCKS: usize = 2;
     let (mut i, mut q) = (vec![0.0; RUN_SAMPLES], vec![0.0; RUN_SAMPLES]);
@@ -72,7 +74,7 @@ fn main() {
     let wanted = std::env::args().skip(1).find(|argument| !argument.starts_with('-'));
     let filter = Filter::new(0.45);
     let mut bank = Bank::default();
-    println!("signal,rate_msps,sequences,{}", "nearest_f32,area_f32,band_f32,nearest_f64,area_f64,band_f64");
+    println!("signal,rate_msps,sequences,nearest_f32,area_f32,band_f32,nearest_f64,area_f64,band_f64");
     for signal in SIGNALS.into_iter().filter(|signal| wanted.as_ref().is_none_or(|name| signal.name.contains(name))) {
         for rate_msps in RATES_MSPS {
             let rate_hz = 1e6 * rate_msps;
