@@ -409,6 +409,39 @@ mod tests {
     }
 
     #[test]
+    fn strings_of_two_sets_make_none_where_one_follows_the_other() {
+        let sender = (GNAV.sender)(&Common::default()).unwrap();
+        let sv = Sv { system: System::Glonass, number: 5 };
+        // By the time of GLONASS less three hours: from 12:30 on the set of 12:45 is sent.
+        let change = Epoch::parse("2020-11-29T12:30:00").unwrap();
+        let sets = [-900.0, 900.0].map(|from_s| {
+            let toe = change.plus_s(from_s);
+            let mut set = Ephemeris { form: &GNAV_SETS, toe, toc: toe, ..Ephemeris::blank(sv, toe) };
+            assert!(["x_km", "y_km", "z_km"].into_iter().all(|name| adjust(&mut set, name, from_s)));
+            set
+        });
+        let mut reader = (GNAV.reader)(sv);
+        let mut read = Vec::new();
+        for second in (-60..60).step_by(2) {
+            let set = &sets[usize::from(second >= 0)];
+            let symbols = sender.unit(set, change.plus_s(f64::from(second))).unwrap();
+            let news = symbols.into_iter().flat_map(|one| reader.take(if one { -1.0 } else { 1.0 }, change));
+            read.extend(news.filter_map(|read| if let Read::Ephemeris(set) = read { Some(*set) } else { None }));
+        }
+        assert_eq!(read.iter().map(|set| set.toe).collect::<Vec<_>>(), sets.each_ref().map(|set| set.toe));
+        for (read, set) in read.iter().zip(&sets) {
+            let raw = |of: &Ephemeris| {
+                of_set().map(|table| {
+                    let mut string = GlonassString::default();
+                    write_all(table, of, &mut string).unwrap();
+                    string
+                })
+            };
+            assert_eq!(raw(read), raw(set));
+        }
+    }
+
+    #[test]
     fn all_odd_strings_from_the_fifth_on_repeat_the_flag_of_the_third() {
         let near = Epoch::parse("2023-09-19T11:45:00").unwrap();
         let sender = (GNAV.sender)(&Common::default()).unwrap();

@@ -106,9 +106,9 @@ impl GnavReader {
         let (Some(one), Some(two), Some(three), Some(four)) = (one, two, three, four) else { return };
         let sent = |placed: &Placed| start.plus_s((placed.0 as f64 - begin as f64) / RATE_HZ);
         let set = elements(self.sv, [&one.1, &two.1, &three.1, &four.1], sent(one));
-        // Sets change where their half hours end: all four were sent within that of the set.
+        // Sets change where their half hours end, which belongs to the next: all four were sent before.
         let half_s = 0.5 * set.fit_interval_s();
-        let is_of_set = |placed: &Placed| sent(placed).since(set.toe).abs() <= half_s;
+        let is_of_set = |placed: &Placed| (-half_s..half_s).contains(&sent(placed).since(set.toe));
         if ![one, two, three, four].into_iter().all(is_of_set) {
             return;
         }
