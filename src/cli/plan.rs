@@ -44,6 +44,7 @@ pub fn execute(arguments: &args::Plan) -> Result<(), CliError> {
         loops.warning().iter().for_each(|warning| scenario::warn(&format!("{of_it}{warning}")));
         texts.push(format!("{plan}\n{}", loops.text()));
         objects.push(json!({ "plan": plan, "loops": loops.object() }));
+        scenario::note(&format!("{of_it}{}", plan.speed()));
         plans.push(plan);
     }
     let together = if plans.len() > 1 { format!("{}\n", Together(&plans)) } else { String::new() };

@@ -97,6 +97,7 @@ pub struct Levels {
     stretches: u64,
     /// Time of this machine for a sample of all that the scene sends, on one core: the median of the
     /// stretches.
+    #[serde(skip)]
     pub sample_s: f64,
 }
 

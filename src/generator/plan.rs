@@ -90,8 +90,10 @@ pub struct Plan {
     /// The level of fidelity.
     pub level: &'static str,
     /// Time for a sample of all that is sent, in ns on one core of this machine, measured.
+    #[serde(skip)]
     pub sample_ns: f64,
     /// The same for each signal of each satellite.
+    #[serde(skip)]
     pub signal_sample_ns: f64,
     /// What was chosen for each knob of fidelity.
     pub knobs: Vec<Choice>,
@@ -104,6 +106,7 @@ pub struct Plan {
     /// Memory of a batch and of the motion.
     pub memory_bytes: u64,
     /// Processor time to generate them, from what was measured.
+    #[serde(skip)]
     pub time_s: f64,
     /// What the synthesiser will do.
     pub machinery: Machinery,
@@ -147,6 +150,17 @@ impl Plan {
             levels,
             machinery,
         })
+    }
+}
+
+impl Plan {
+    /// What was measured of this machine: apart from the plan, which is the same on all.
+    pub fn speed(&self) -> String {
+        let Self { time_s, sample_ns, signal_sample_ns, .. } = self;
+        format!(
+            "this machine needs about {time_s:.1} s of one core for the samples: {sample_ns:.1} ns for each, \
+             {signal_sample_ns:.2} ns for each signal of a satellite in it"
+        )
     }
 }
 
@@ -260,7 +274,7 @@ impl fmt::Display for Plan {
         } else {
             writeln!(f, "knots      every {knot_spacing_s:.4} to {longest_knot_spacing_s:.4} s: {knot_reason}")?;
         }
-        writeln!(f, "needs      {} of memory, about {:.1} s of one core", size(self.memory_bytes), self.time_s)?;
+        writeln!(f, "needs      {} of memory", size(self.memory_bytes))?;
         if self.in_space {
             writeln!(f, "\n{} satellites not behind the Earth", self.satellites.len())?;
         } else {
@@ -291,12 +305,7 @@ impl fmt::Display for Plan {
             writeln!(f)?;
         }
         write!(f, "\n{}", self.levels)?;
-        let (ns, each_ns) = (self.sample_ns, self.signal_sample_ns);
-        writeln!(
-            f,
-            "\nfidelity {}: {ns:.2} ns for a sample on one core here, {each_ns:.2} ns for each signal of a satellite",
-            self.level
-        )?;
+        writeln!(f, "\nfidelity {}", self.level)?;
         for Choice { knob, value, own, error, cost } in &self.knobs {
             let value = if *own { format!("{value} (own)") } else { value.clone() };
             writeln!(f, "  {knob:21}  {value:12}  {cost:24}  {error}")?;
@@ -323,17 +332,11 @@ impl fmt::Display for Together<'_> {
         let Self(plans) = self;
         let bytes = plans.iter().fold(0, |sum: u64, plan| sum.saturating_add(plan.bytes));
         let memory_bytes: u64 = plans.iter().map(|plan| plan.memory_bytes).sum();
-        let time_s: f64 = plans.iter().map(|plan| plan.time_s).sum();
         writeln!(f, "{} front ends that share a clock", plans.len())?;
         for plan in *plans {
             let name = plan.front_end.as_deref().unwrap_or_default();
             writeln!(f, "  {name:14}  {}: {}, {}", plan.sampling, size(plan.bytes), plan.signals.join(", "))?;
         }
-        writeln!(
-            f,
-            "together   {} of samples, {} of memory, about {time_s:.1} s of one core",
-            size(bytes),
-            size(memory_bytes)
-        )
+        writeln!(f, "together   {} of samples, {} of memory", size(bytes), size(memory_bytes))
     }
 }

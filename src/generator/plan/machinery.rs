@@ -25,6 +25,7 @@ pub struct Machinery {
     /// Memory of the generator's blocks, which does not grow with the scene.
     pub block_bytes: u64,
     /// Time of this machine for all knots of the scene, on one core.
+    #[serde(skip)]
     pub knots_s: f64,
 }
 
