@@ -73,6 +73,8 @@ fn real_sets_are_whole_steps_of_the_fields_and_are_sent_and_read_again() {
                 _ => None,
             });
             let back = back.unwrap();
+            // Delays of other signals' messages are not LNAV's.
+            let sent = Ephemeris { signal_delays_s: Vec::new(), ..sent };
             assert_eq!(Ephemeris { transmitted: sent.transmitted, ..back }, sent, "{name} {}", set.sv);
         }
     }

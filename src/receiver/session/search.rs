@@ -37,6 +37,13 @@ const WORTH: f64 = 1.5;
 const SAME_CHIPS: f64 = 0.75;
 const SAME_CYCLES: f64 = 0.5;
 
+/// How far below a signal another code of its family may pass for one: three times the root mean square of
+/// what random codes of the length have in common, which C/A's have nowhere more of.
+fn apart_db(hit: &Acquired) -> f64 {
+    let chips = lead(hit.signal).map_or(1.0, |component| f64::from(component.code_chips));
+    10.0 * libm::log10(chips / 9.0)
+}
+
 /// A row for a candidate, and where it was found.
 type Found = (AcquisitionRow, Option<Acquired>);
 
@@ -202,7 +209,17 @@ impl FrontEnd {
         if sought.is_empty() && !self.candidates.is_empty() {
             return Ok(false);
         }
-        let results = searcher.search_stretch(&Stretch::Packed(packed), &sought, &known)?;
+        let mut results = searcher.search_stretch(&Stretch::Packed(packed), &sought, &known)?;
+        for (row, found) in &mut results {
+            let Some(hit) = *found else { continue };
+            // What is left of a strong signal that was taken out lies no higher than it would in another
+            // code.
+            let others = known.iter().filter(|one| one.link().carrier_hz() == hit.link().carrier_hz());
+            let strongest_dbhz = others.map(|one| one.cn0_dbhz).fold(f64::NEG_INFINITY, f64::max);
+            if hit.cn0_dbhz < strongest_dbhz - apart_db(&hit) {
+                (row.acquired, *found) = (false, None);
+            }
+        }
         self.start_channels(results, packed.first, shared, sink)?;
         Ok(true)
     }

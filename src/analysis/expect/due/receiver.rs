@@ -3,7 +3,7 @@
 //!
 //! Search and loops are those of theory as `rx/receiver.json` states them of each signal: a receiver that
 //! states none is taken to have the defaults of a common one. Losses of the search are its worst: half a cell
-//! of code, half a step of Doppler, and signs that turn within its sums ([`Search`]).
+//! of code, half a step of Doppler, and signs that turn within its sums.
 
 use serde_json::Value;
 
