@@ -131,12 +131,12 @@ pub struct Placed {
 impl Placed {
     /// Amplitude at a frequency in the samples.
     pub fn amplitude(&self, f_hz: f64) -> f64 {
-        let upper = self.response.amplitude(f_hz - self.middle_hz);
-        let lower = || self.response.amplitude(f_hz + self.middle_hz);
+        let upper = self.response.gain(f_hz - self.middle_hz);
         if self.real && self.middle_hz != 0.0 {
-            if lower().abs() > upper.abs() { lower() } else { upper }
+            // Each side reaches over to the other one.
+            (upper + self.response.gain(f_hz + self.middle_hz)).norm()
         } else {
-            upper
+            upper.norm()
         }
     }
 

@@ -448,22 +448,25 @@ mod tests {
         let filter = FilterSpec { shape, bandwidth_hz, group_delay_s: 0.0, middle_hz: Some(0.0) };
         let adc = ConverterSpec { bits: 2, step_sigma: 0.9957, nominal_lsb: 28.0, gain_control: true, whole: false };
         run.scene.front_end = vec![StageSpec::Filter(filter), StageSpec::Adc(adc)];
-        // The response of a first order is a decaying exponential, which a recursion makes.
-        let keeps = libm::exp(-std::f64::consts::PI * bandwidth_hz / rate_hz);
-        let sigma = 28.0 * ((1.0 - keeps) / (1.0 + keeps)).sqrt();
-        let mut draw = Draw(11);
-        let mut component = || {
-            let mut value = 0.0;
-            let level = |value: f64| {
-                let step = 0.9957 * sigma;
-                2.0 * (value / step).floor().clamp(-2.0, 1.0) + 1.0
+        // Taps of the first order's response 1/(1 + jf/f₀) within the samples' band; with 0.564 of a sample of
+        // delay its ends meet, and lags beyond a hundred have 1e-4 of the sum.
+        let tap = |lag: i32| -> f64 {
+            let line = |n: u32| {
+                let cycles = (f64::from(n) + 0.5) / 4000.0 - 0.5;
+                let (gain_re, gain_im) = (1.0, -cycles * rate_hz / (0.5 * bandwidth_hz));
+                let (sin, cos) = libm::sincos(std::f64::consts::TAU * cycles * (f64::from(lag) - 0.564));
+                (gain_re * cos - gain_im * sin) / (gain_im * gain_im + 1.0)
             };
-            (0..1 << 20)
-                .map(|_| {
-                    value = keeps * value + (1.0 - keeps) * 28.0 * draw.normal();
-                    level(value) as f32
-                })
-                .collect::<Vec<f32>>()
+            (0..4000).map(line).sum::<f64>() / 4000.0
+        };
+        let taps: Vec<f64> = (-100..=100).map(tap).collect();
+        let sigma = 28.0 * taps.iter().map(|tap| tap * tap).sum::<f64>().sqrt();
+        let mut draw = Draw(11);
+        let level = |value: f64| 2.0 * (value / (0.9957 * sigma)).floor().clamp(-2.0, 1.0) + 1.0;
+        let mut component = || {
+            let noise: Vec<f64> = (0..(1 << 20) + taps.len()).map(|_| 28.0 * draw.normal()).collect();
+            let behind = |window: &[f64]| taps.iter().zip(window).map(|(tap, x)| tap * x).sum::<f64>();
+            noise.windows(taps.len()).map(|window| level(behind(window)) as f32).collect::<Vec<f32>>()
         };
         let (i, q) = (component(), component());
         let mut psd = Psd::new(rate_hz, false, 128);

@@ -1,15 +1,15 @@
 //! The front end's band-pass filter, as a finite response around the signal's IF.
 //!
-//! A `brick_wall` is a sinc under a Kaiser window of 80 dB (Kaiser 1974), of linear phase; a `butterworth` is
-//! the impulse response of the analogue prototype of its order sampled at the scene's rate and cut off at
-//! −100 dB. In a real format the filter acts on the real samples, on both sides of zero. Limits: a filter
-//! delays code and carrier's envelope by its group delay, which every satellite shares; an ideal wall has
-//! edges of a twentieth of its width.
+//! A `brick_wall` is a sinc under a Kaiser window of 80 dB (Kaiser 1974), of linear phase; a `butterworth` has
+//! the analogue filter's response within the samples' band ([`super::butterworth`]). In a real format the
+//! filter acts on the real samples, on both sides of zero. Limits: a filter delays code and carrier's envelope
+//! by its group delay, which every satellite shares; an ideal wall has edges of a twentieth of its width.
 
 use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
+use crate::stage::butterworth::{self, Analogue};
 use crate::stage::{Block, Stage};
 use gnss::facts::{FilterShape, FilterSpec, StageSpec};
 
@@ -29,8 +29,6 @@ pub enum Shape {
 const KAISER_DB: f64 = 80.0;
 /// Width of a wall's edge against the filter's width.
 const EDGE: f64 = 0.05;
-/// What is left out of an endless response, against its largest value.
-const CUT: f64 = 1e-5;
 /// Longest response.
 const MAX_TAPS: usize = 8192;
 
@@ -89,25 +87,21 @@ impl Filter {
             return Err(FilterError::Wide { bandwidth_hz, rate_hz, limit_hz });
         }
         let width = bandwidth_hz / rate_hz;
-        // Before the response is made: that of a hertz in a wide band would have millions of taps.
-        let taps = match shape {
-            Shape::BrickWall => wall_taps(width),
-            Shape::Butterworth { order } => butterworth_taps(order, width),
+        let middle = if_hz / rate_hz;
+        // The length is checked first, because one hertz of a wide band takes millions of taps.
+        let (taps, delay) = match shape {
+            Shape::BrickWall => {
+                let taps = short_enough(wall_taps(width), bandwidth_hz, rate_hz)?;
+                (brick_wall(width, middle, taps, real), 0.5 * (taps - 1) as f64)
+            }
+            Shape::Butterworth { order } => {
+                let filter = Analogue::new(order, width);
+                short_enough(filter.length(), bandwidth_hz, rate_hz)?;
+                butterworth::taps(&filter, middle, real)
+            }
         };
-        if taps > MAX_TAPS {
-            return Err(FilterError::Narrow { bandwidth_hz, rate_hz, taps });
-        }
-        let (low_pass, delay) = match shape {
-            Shape::BrickWall => brick_wall(width, taps),
-            Shape::Butterworth { order } => butterworth(order, width, taps),
-        };
-        // Around the IF; a real filter keeps both sides, each at full strength.
-        let turn = std::f64::consts::TAU * if_hz / rate_hz;
-        let phase = |k: usize| libm::sincos(turn * (k as f64 - delay));
-        let scale = if real { 2.0 } else { 1.0 };
-        let re = low_pass.iter().enumerate().map(|(k, h)| (scale * h * phase(k).1) as f32).collect();
-        let im =
-            if real { Vec::new() } else { low_pass.iter().enumerate().map(|(k, h)| (h * phase(k).0) as f32).collect() };
+        let re = taps.iter().map(|tap| tap.re as f32).collect();
+        let im = if real { Vec::new() } else { taps.iter().map(|tap| tap.im as f32).collect() };
         Ok(Self { shape, bandwidth_hz, group_delay_s: delay / rate_hz, middle_hz: if_hz, re, im, real })
     }
 
@@ -131,66 +125,36 @@ fn wall_taps(width: f64) -> usize {
     ((KAISER_DB - 7.95) / (14.36 * EDGE * width)).ceil() as usize | 1
 }
 
-/// A sinc of `width` cycles a sample under a Kaiser window, of unit gain in the middle, and its delay in
-/// samples.
-fn brick_wall(width: f64, length: usize) -> (Vec<f64>, f64) {
+/// The number of taps, if it is one that a filter may have.
+fn short_enough(taps: usize, bandwidth_hz: f64, rate_hz: f64) -> Result<usize, FilterError> {
+    if taps > MAX_TAPS { Err(FilterError::Narrow { bandwidth_hz, rate_hz, taps }) } else { Ok(taps) }
+}
+
+/// A sinc of `width` cycles a sample under a Kaiser window, of unit gain in the middle of its band, which is
+/// at `middle` cycles a sample.
+fn brick_wall(width: f64, middle: f64, length: usize, real: bool) -> Vec<Complex64> {
     let beta = 0.1102 * (KAISER_DB - 8.7);
-    let middle = 0.5 * (length - 1) as f64;
-    let taps: Vec<f64> = (0..length)
+    let half = 0.5 * (length - 1) as f64;
+    let low_pass: Vec<f64> = (0..length)
         .map(|k| {
-            let x = k as f64 - middle;
+            let x = k as f64 - half;
             let sinc = if x == 0.0 { width } else { libm::sin(PI * width * x) / (PI * x) };
-            let u = x / (middle + 0.5);
-            sinc * bessel_i0(beta * (1.0 - u * u).sqrt()) / bessel_i0(beta)
+            sinc * kaiser(x / (half + 0.5), beta)
         })
         .collect();
-    (normal(taps), middle)
+    let sum = low_pass.iter().fold(0.0, |sum, h| sum + h);
+    // A real filter keeps both sides, each at full strength.
+    let scale = if real { 2.0 } else { 1.0 } / sum;
+    let carried = low_pass.iter().enumerate().map(|(k, h)| {
+        let (sin, cos) = libm::sincos(std::f64::consts::TAU * middle * (k as f64 - half));
+        Complex64::new(cos, sin) * h * scale
+    });
+    carried.collect()
 }
 
-/// Poles of an analogue Butterworth low-pass with half-power points at ±`width`/2 cycles a sample.
-fn butterworth_poles(order: u32, width: f64) -> impl Iterator<Item = Complex64> {
-    (0..order)
-        .map(move |k| PI * (2.0 * f64::from(k) + f64::from(order) + 1.0) / (2.0 * f64::from(order)))
-        .map(move |angle| PI * width * Complex64::new(libm::cos(angle), libm::sin(angle)))
-}
-
-/// Until its slowest pole has died out.
-fn butterworth_taps(order: u32, width: f64) -> usize {
-    let slowest = butterworth_poles(order, width).fold(f64::MAX, |least, pole| least.min(-pole.re));
-    (-libm::log(CUT) / slowest).ceil() as usize + 1
-}
-
-/// The response of that low-pass as a sum of its poles' exponentials, and its delay in samples at zero
-/// frequency.
-fn butterworth(order: u32, width: f64, length: usize) -> (Vec<f64>, f64) {
-    let omega = PI * width;
-    let poles: Vec<Complex64> = butterworth_poles(order, width).collect();
-    let residues: Vec<Complex64> = poles
-        .iter()
-        .enumerate()
-        .map(|(k, pole)| {
-            let others = poles.iter().enumerate().filter(|(j, _)| *j != k);
-            others.fold(Complex64::new(libm::pow(omega, f64::from(order)), 0.0), |product, (_, p)| product / (pole - p))
-        })
-        .collect();
-    let at = |t: f64| {
-        poles.iter().zip(&residues).fold(0.0, |sum, (pole, residue)| {
-            let (sin, cos) = libm::sincos(pole.im * t);
-            sum + (residue * Complex64::new(cos, sin) * libm::exp(pole.re * t)).re
-        })
-    };
-    // Sampled at the middles of intervals, so that a first-order filter's step at zero counts half on each
-    // side.
-    let taps = normal((0..length).map(|k| at(k as f64 + 0.5)).collect());
-    let delay = taps.iter().enumerate().fold(0.0, |sum, (k, h)| sum + k as f64 * h);
-    (taps, delay)
-}
-
-/// With unit gain at zero frequency.
-fn normal(mut taps: Vec<f64>) -> Vec<f64> {
-    let sum = taps.iter().fold(0.0, |sum, h| sum + h);
-    taps.iter_mut().for_each(|h| *h /= sum);
-    taps
+/// Kaiser's window at `x` of its half width, 0 beyond it.
+pub(super) fn kaiser(x: f64, beta: f64) -> f64 {
+    if x.abs() < 1.0 { bessel_i0(beta * (1.0 - x * x).sqrt()) / bessel_i0(beta) } else { 0.0 }
 }
 
 /// Modified Bessel function of the first kind and order zero, by its series.
@@ -277,29 +241,16 @@ mod tests {
     }
 
     #[test]
-    fn half_power_is_where_the_filter_says_and_a_wall_keeps_its_edges() {
-        for (shape, rate_hz, if_hz, real) in [
-            (Shape::BrickWall, 10e6, 0.0, false),
-            (Shape::BrickWall, 10e6, 1.1e6, false),
-            (Shape::Butterworth { order: 4 }, 20e6, 0.0, false),
-            (Shape::BrickWall, 12e6, 3e6, true),
-        ] {
-            let filter = Filter::new(shape, 2.5e6, rate_hz, if_hz, real).unwrap();
+    fn a_wall_halves_the_amplitude_where_the_filter_says_and_keeps_its_edges() {
+        for (rate_hz, if_hz, real) in [(10e6, 0.0, false), (10e6, 1.1e6, false), (12e6, 3e6, true)] {
+            let filter = Filter::new(Shape::BrickWall, 2.5e6, rate_hz, if_hz, real).unwrap();
             let gain = |hz: f64| filter.response((if_hz + hz) / rate_hz).norm();
-            // Half power of the sampled prototype moves by its aliases: order 4 at a sixteenth of the rate,
-            // 0.5 %.
             for edge_hz in [-1.25e6, 1.25e6] {
-                let expected = if shape == Shape::BrickWall { 0.5 } else { 0.5_f64.sqrt() };
-                assert!((gain(edge_hz) - expected).abs() < 0.01, "{shape:?} {if_hz}: {}", gain(edge_hz));
+                assert!((gain(edge_hz) - 0.5).abs() < 0.01, "{if_hz}: {}", gain(edge_hz));
             }
-            assert!((gain(0.0) - 1.0).abs() < 1e-3, "{}", gain(0.0));
-            if shape == Shape::BrickWall {
-                // 80 dB of ripple and of side lobes.
-                assert!((gain(1.15e6) - 1.0).abs() < 2e-4 && gain(1.35e6) < 2e-4);
-            } else {
-                // Order 4: 24 dB an octave beyond the edge; aliases of a sampled response add to it.
-                assert!((gain(2.5e6) - 1.0 / 257_f64.sqrt()).abs() < 0.01, "{}", gain(2.5e6));
-            }
+            // 80 dB of ripple and of side lobes.
+            assert!((gain(0.0) - 1.0).abs() < 2e-4, "{}", gain(0.0));
+            assert!((gain(1.15e6) - 1.0).abs() < 2e-4 && gain(1.35e6) < 2e-4);
         }
     }
 

@@ -5,6 +5,7 @@
 //! the hardware: what the antenna receives, thermal noise, then the front end. Limits: before sample 0 there
 //! is silence.
 
+mod butterworth;
 pub mod converter;
 pub mod filter;
 pub mod interference;
