@@ -2,9 +2,9 @@
 //!
 //! A Butterworth filter has the analogue prototype's response within the samples' band: H = Π ω/(jf·2π − p)
 //! over the prototype's poles p. A wall is a sinc under a Kaiser window of 80 dB with an edge of a twentieth
-//! of its width (Kaiser 1974: length 1 + (80 − 7.95)/(14.36·edge), β = 0.1102·(80 − 8.7)). Limits: a sampled
-//! Butterworth filter's window, which counts within a fiftieth of the rate from the ends of the samples' band,
-//! and roundings of taps are left out.
+//! of its width (Kaiser 1974: length 1 + (80 − 7.95)/(14.36·edge), β = 0.1102·(80 − 8.7)). Limits: the window
+//! of a sampled Butterworth filter, which counts within a fiftieth of the rate from the ends of the samples'
+//! band, and roundings of taps are left out.
 
 use num_complex::Complex;
 

@@ -448,8 +448,8 @@ mod tests {
         let filter = FilterSpec { shape, bandwidth_hz, group_delay_s: 0.0, middle_hz: Some(0.0) };
         let adc = ConverterSpec { bits: 2, step_sigma: 0.9957, nominal_lsb: 28.0, gain_control: true, whole: false };
         run.scene.front_end = vec![StageSpec::Filter(filter), StageSpec::Adc(adc)];
-        // Taps of the first order's response 1/(1 + jf/f₀) within the samples' band; with 0.564 of a sample of
-        // delay its ends meet, and lags beyond a hundred have 1e-4 of the sum.
+        // Taps of the first order's response 1/(1 + jf/f₀) within the samples' band. With 0.564 of a sample
+        // of delay its ends meet, and lags beyond a hundred have 1e-4 of the sum.
         let tap = |lag: i32| -> f64 {
             let line = |n: u32| {
                 let cycles = (f64::from(n) + 0.5) / 4000.0 - 0.5;

@@ -1,12 +1,12 @@
-//! A Butterworth filter whose response within the samples' band is that of the analogue filter, with its phase.
+//! A Butterworth filter with the analogue filter's response, amplitude and phase, within the samples' band.
 //!
 //! The taps are the inverse Fourier transform of the analogue response over the samples' band, under a Kaiser
 //! window (Kaiser 1974) as far as they differ from the analogue impulse response: what lies beyond half the
 //! sample rate does not fold into the band. A part of a sample of delay lets the phases of both ends of the
-//! band meet. Limits: within 0.02 dB where the response is above −40 dB and the frequency at least a
-//! fiftieth of the rate from the band's ends, within 0.6 dB at the ends of a filter about zero; taps below
-//! −100 dB are left out; the ends of a band that is not in the middle of the samples' differ, and the filter
-//! leads from one to the other within a fiftieth of the rate.
+//! band meet. Limits: the gain is within 0.0015 of the analogue one, of 1 in the middle, up to a fiftieth of
+//! the rate from the ends of the samples' band; at the ends the window rounds its corner. Where the filter is
+//! not about the middle of that band, its gains at both ends differ, and the last fiftieth leads from one to
+//! the other. Taps below −100 dB are left out.
 
 use std::f64::consts::{PI, TAU};
 
