@@ -553,8 +553,7 @@ fn components_of_a_signal_share_the_power_of_its_samples_as_they_are_sent() {
 
 #[test]
 fn a_butterworth_filter_passes_half_of_the_power_at_the_edges_of_its_band() {
-    // |H|² = 1/(1 + (f/f_c)^2n) of the analogue one; at fifty times its width aliases are 1e-3 of it and
-    // less.
+    // |H|² = 1/(1 + (f/f_c)^2n) of the analogue one.
     for order in [2, 4, 6] {
         let shape = FilterShape::Butterworth { order };
         let filter = FilterSpec { shape, bandwidth_hz: 2e6, group_delay_s: 0.0, middle_hz: None };
