@@ -176,3 +176,24 @@ fn the_plan_shows_every_front_end() {
     let (wide, narrow) = text.split_once("front end  narrow").unwrap();
     assert!(!wide.contains("2 bits, step") && narrow.contains("2 bits, step"), "{text}");
 }
+
+#[test]
+fn a_filter_delays_carriers_with_codes_whatever_their_doppler() {
+    let here = workplace();
+    let (shared, _) = TWO.split_once("[[front_end]]").unwrap();
+    let shared = shared.replace("duration_s = 2", "duration_s = 24");
+    // Both delay by more than ten microseconds, in which 3 kHz turn by 0.03 cycle.
+    for (name, kind) in [("wall", "\"brick_wall\""), ("butter", "\"butterworth\"\norder = 4")] {
+        let filter = format!("[front_end]\nsample_rate_hz = 2.6e6\n[filter]\nkind = {kind}\nbandwidth_hz = 2.2e6\n");
+        fs::write(here.path().join("filtered.toml"), format!("{shared}{filter}")).unwrap();
+        done(&["run", "filtered.toml", "--out", name], here.path());
+        let verdict = fs::read_to_string(here.path().join(name).join("verdict.csv")).unwrap();
+        let row = verdict.lines().find(|row| row.starts_with("carrier bias,"));
+        assert!(row.is_some_and(|row| row.contains(",pass,")), "{name}: {row:?}");
+        let scene = fs::read_to_string(here.path().join(name).join("truth/scene.json")).unwrap();
+        let scene: serde_json::Value = serde_json::from_str(&scene).unwrap();
+        let stages = scene["front_end"].as_array().unwrap();
+        let delay_s = stages.iter().filter_map(|stage| stage["group_delay_s"].as_f64()).sum::<f64>();
+        assert!(delay_s > 1e-5, "{name}: {delay_s}");
+    }
+}

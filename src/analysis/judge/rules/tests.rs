@@ -160,7 +160,7 @@ fn an_oscillator_s_offset_and_a_front_end_s_delay_are_no_errors() {
         for row in run.truth.rows(link).unwrap().iter().filter(|row| row.sample >= OBSERVED * TICK) {
             let sent = row.sent().plus_s(-2.4e-7);
             let (sent_s, sent_fraction_s) = (sent.seconds(), sent.fraction());
-            let carrier_cycles = row.carrier_cycles - 5.0 * run.time_s(row.sample);
+            let carrier_cycles = row.carrier_cycles + 2.4e-7 * row.doppler_hz - 5.0 * run.time_s(row.sample);
             let row = Observation {
                 sent_s,
                 sent_fraction_s,

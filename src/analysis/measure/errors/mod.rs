@@ -220,7 +220,9 @@ impl Errors {
                 continue;
             };
             let common = &run.common;
-            let true_cycles = true_row.carrier_cycles + common.carrier_cycles(estimate.sample);
+            // A filter delays the carrier with the code; its cycles grow with the range.
+            let delayed_cycles = true_row.doppler_hz * common.code_delay_s(link.signal);
+            let true_cycles = true_row.carrier_cycles + delayed_cycles + common.carrier_cycles(estimate.sample);
             let raw_cycles = estimate.carrier_cycles - true_cycles;
             rows.push(SignalError {
                 sample: estimate.sample,
