@@ -1,7 +1,7 @@
 //! The front end's band-pass filter, as a finite response around the signal's IF.
 //!
 //! A `brick_wall` is a sinc under a Kaiser window of 80 dB (Kaiser 1974), of linear phase; a `butterworth`
-//! has the analogue filter's response within the samples' band ([`super::butterworth`]). In a real format the
+//! has the analogue filter's response, amplitude and phase, within the samples' band. In a real format the
 //! filter acts on the real samples, on both sides of zero. Limits: a filter delays code and carrier's
 //! envelope by its group delay, which every satellite shares; an ideal wall has edges of a twentieth of its
 //! width.
