@@ -204,12 +204,14 @@ fn without_position(reason: Option<&NoFix>, length: &str) -> Vec<String> {
                 None => "position.require_ionosphere = true: false fixes without them, and worse".to_owned(),
             },
         ],
-        Some(NoFix::Inconsistent { .. } | NoFix::Ambiguous { .. }) => vec![
+        Some(NoFix::Inconsistent { .. } | NoFix::Ambiguous { .. } | NoFix::Nowhere) => vec![
             "the satellites' agreement: a spoofed or replayed signal, or a false satellite, contradicts the others"
                 .to_owned(),
             "the number of satellites: two more than four locate one that is wrong, four more locate two".to_owned(),
         ],
-        Some(NoFix::TooFew { .. } | NoFix::Singular { .. } | NoFix::Diverged { .. }) => vec![sky],
+        Some(NoFix::TooFew { .. } | NoFix::Singular { .. } | NoFix::Diverged { .. } | NoFix::TwoPlaces { .. }) => {
+            vec![sky]
+        }
         None => vec![
             format!(
                 "the length: the message's time is known a subframe of 6 s after the ephemerides; there are {length}"

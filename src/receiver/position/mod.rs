@@ -36,6 +36,7 @@ pub mod least_squares;
 mod ranges;
 mod records;
 mod reduced;
+mod roots;
 mod sets;
 pub mod smooth;
 #[cfg(test)]
@@ -251,6 +252,20 @@ pub enum NoFix {
         /// Length of the last step.
         step_m: f64,
     },
+    /// As many ranges as unknowns, and two places that explain them.
+    #[error(
+        "the ranges agree on two places, {separation_m:.0} m apart, and one more satellite is needed to tell which"
+    )]
+    TwoPlaces {
+        /// Distance of both.
+        separation_m: f64,
+    },
+    /// As many ranges as unknowns, and no place to receive them.
+    #[error(
+        "the ranges agree on no place that sees its satellites past the Earth and moves at less than 12 km/s: at \
+         least one of them is wrong"
+    )]
+    Nowhere,
     /// A fault without a satellite that explains it.
     #[error(
         "the ranges contradict each other and no satellite is singled out: chi-square {chi_square:.1} above \
@@ -415,7 +430,7 @@ impl Solver {
         // An integral along the line of sight wants to know where that is.
         let start_m = match (self.last_m, sent) {
             (None, Some(Coefficients::NequickG(_))) => {
-                least_squares::position(&ranges, Vector3::zeros(), &corrections)?.position_m
+                roots::first(&ranges, Vector3::zeros(), &corrections)?.position_m
             }
             (last_m, _) => last_m.unwrap_or_else(Vector3::zeros),
         };
@@ -425,11 +440,12 @@ impl Solver {
             None => (ionosphere, model),
         };
         corrections.ionosphere = ionosphere;
-        let first = least_squares::position(&ranges, start_m, &corrections);
-        // A stale estimate may be too far away for its atmosphere.
-        let first = match (first, self.last_m) {
-            (Err(NoFix::Diverged { .. }), Some(_)) => least_squares::position(&ranges, Vector3::zeros(), &corrections)?,
-            (other, _) => other?,
+        let first = match self.last_m.map(|last_m| least_squares::position(&ranges, last_m, &corrections)) {
+            None => roots::first(&ranges, start_m, &corrections)?,
+            Some(Ok(near)) if roots::is_possible(&ranges, &near) => near,
+            // A stale estimate may be too far away, also for its atmosphere.
+            Some(Ok(_) | Err(NoFix::Diverged { .. })) => roots::first(&ranges, Vector3::zeros(), &corrections)?,
+            Some(Err(error)) => return Err(error),
         };
         let in_space = Geodetic::from_ecef(&first.position_m).height_m >= SPACE_M;
         let mask_rad = if in_space { f64::NEG_INFINITY } else { self.settings.mask_deg.to_radians() };

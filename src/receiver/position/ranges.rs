@@ -9,7 +9,7 @@ use super::combination::{Combination, Used, paired};
 use super::least_squares::{self, Corrections, Ionosphere, Range, freedom};
 use super::reduced::InShort;
 use super::smooth::Smoothed;
-use super::{IonosphereChoice, Sets, Solver, SystemClocks};
+use super::{IonosphereChoice, Sets, Solver, SystemClocks, roots};
 use gnss::broadcast::Ephemeris;
 use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::gps::l1ca::L1_CA;
@@ -136,7 +136,7 @@ impl Solver {
             troposphere: false,
             model_sigma_m: self.settings.model_sigma_m,
         };
-        let first_m = || Some(least_squares::position(&plain, Vector3::zeros(), &bare).ok()?.position_m);
+        let first_m = || Some(roots::first(&plain, Vector3::zeros(), &bare).ok()?.position_m);
         let place_m = self.last_m.or_else(first_m);
         let mask_rad = self.settings.mask_deg.to_radians();
         let dilution = |ranges: &[Range]| least_squares::dilution(ranges, &place_m?, mask_rad);

@@ -31,16 +31,21 @@ pub(super) fn place() -> Geodetic {
 
 /// Ranges to satellites in these directions, with unit noise and a receiver clock ahead by `bias_s`.
 pub(super) fn ranges(sky: &[(f64, f64)], bias_s: f64) -> Vec<Range> {
+    let sky: Vec<_> = sky.iter().zip(1..).map(|(&(az, el), prn)| (az, el, 2.2e7 + 1e5 * f64::from(prn))).collect();
+    ranges_at(&sky, bias_s)
+}
+
+/// The same to satellites in these directions and distances.
+pub(super) fn ranges_at(sky: &[(f64, f64, f64)], bias_s: f64) -> Vec<Range> {
     let here_m = place().to_ecef();
     let axes = place().ecef_to_enu().transpose();
     sky.iter()
         .zip(1..)
-        .map(|(&(azimuth_deg, elevation_deg), prn)| {
+        .map(|(&(azimuth_deg, elevation_deg, distance_m), prn)| {
             let (azimuth, elevation) = (f64::to_radians(azimuth_deg), f64::to_radians(elevation_deg));
             let level = libm::cos(elevation);
             let direction =
                 axes * Vector3::new(level * libm::sin(azimuth), level * libm::cos(azimuth), libm::sin(elevation));
-            let distance_m = 2.2e7 + 1e5 * f64::from(prn);
             let travel_s = distance_m / SPEED_OF_LIGHT_MPS;
             let clock = ClockState { offset_s: 1e-4 * f64::from(prn), drift: 0.0 };
             Range {
