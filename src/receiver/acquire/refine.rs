@@ -10,6 +10,7 @@ use fft::Planner;
 use num_complex::Complex;
 
 use super::grid::Grid;
+use super::settings::sign_turns_often;
 use crate::correlate::{self, Nco, TURN, chips_to_units, steps_of_chip, units_to_chips};
 use crate::source::Block;
 use gnss::signal::{Component, Layer, Shape};
@@ -53,7 +54,7 @@ pub(super) fn refine(
     let code_chips = f64::from(component.code_chips);
     let correlators = Correlators { grid, block, replica, code_chips, periods };
     let mut phase = coarse.code_phase_chips.rem_euclid(code_chips);
-    let doppler_hz = if component.overlay.periods() > 1 {
+    let doppler_hz = if sign_turns_often(component) {
         correlators.unsplit_doppler_hz(phase, coarse.doppler_hz)
     } else {
         coarse.doppler_hz

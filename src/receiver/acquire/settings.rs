@@ -50,6 +50,13 @@ pub const ALL: &str = "all";
 /// Code periods of a symbol that are too few to sum more than one coherently before its edges are known.
 const FEW: u32 = 3;
 
+/// Whether the sign may turn after every code period, or nearly: by an overlay, or by symbols of few periods.
+/// Sums as long all straddle an edge if one does, and half of the power is then found beside the Doppler.
+pub(super) fn sign_turns_often(component: &Component) -> bool {
+    let few = |periods: Option<u32>| periods.is_none_or(|periods| periods <= FEW);
+    component.overlay.periods() > 1 || (component.message.is_some() && few(component.periods_per_symbol()))
+}
+
 impl Default for AcquisitionSettings {
     fn default() -> Self {
         Self {
@@ -93,12 +100,10 @@ impl AcquisitionSettings {
     /// Code periods of a component that are summed coherently: not beyond what keeps its sign.
     pub fn periods(&self, component: &Component) -> u32 {
         let whole = 1e-3 * f64::from(self.coherent_periods) / component.period_s();
-        let steady = match component.message {
-            _ if component.overlay.periods() > 1 => 1,
-            // Sums as long as a symbol of few periods all straddle an edge if one does: half of the power is
-            // then found beside the Doppler.
-            Some(_) => component.periods_per_symbol().filter(|periods| *periods > FEW).unwrap_or(1),
-            None => u32::MAX,
+        let steady = if sign_turns_often(component) {
+            1
+        } else {
+            component.message.map_or(u32::MAX, |_| component.periods_per_symbol().unwrap_or(1))
         };
         // Beyond rounding of the quotient a period that has begun counts.
         ((whole - 1e-9).ceil() as u32).clamp(1, steady)

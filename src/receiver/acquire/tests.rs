@@ -352,3 +352,37 @@ fn a_spectrum_that_dopplers_share_is_that_of_each_by_itself() {
         }
     }
 }
+
+#[test]
+fn a_sign_that_turns_every_period_leaves_the_doppler_where_it_is() {
+    let signal = Signal::find("BeiDou B1I").unwrap();
+    let settings = AcquisitionSettings { signals: vec![signal.name.to_owned()], ..Default::default() };
+    let rate_hz = 4.1e6;
+    let metadata = IfMetadata { center_hz: signal.centre_hz(), ..metadata(Format::Ci8, rate_hz, 0.0, false) };
+    let samples = samples_needed(&metadata, &settings).unwrap() as usize + 1000;
+    let mut searcher = Searcher::new(&metadata, &settings).unwrap();
+    let mut random = Noise(35);
+    let mut found = 0;
+    for number in (6..=58).step_by(2) {
+        let link = signal.link(Sv { system: signal.system, number });
+        let code = signal.code(number).unwrap();
+        let (doppler_hz, start_chips) = (9000.0 * (random.uniform() - 0.5), 2046.0 * random.uniform());
+        let signs: Vec<f64> = (0..40).map(|_| (random.uniform() - 0.5).signum()).collect();
+        let amplitude = (libm::pow(10.0, 4.0) / rate_hz).sqrt();
+        let step = 2.046e6 * (1.0 + doppler_hz / signal.centre_hz()) / rate_hz;
+        let mut recording = record(metadata.clone(), samples, &[], u64::from(number));
+        for (n, (i, q)) in recording.i.iter_mut().zip(&mut recording.q).enumerate() {
+            let chips = start_chips + n as f64 * step;
+            let chip = f64::from(code[chips as usize % 2046]) * signs[chips as usize / 2046];
+            let (sin, cos) = libm::sincos(TAU * (doppler_hz / rate_hz * n as f64));
+            *i += (amplitude * chip * cos) as f32;
+            *q += (amplitude * chip * sin) as f32;
+        }
+        let block = Block { first: 0, i: &recording.i, q: &recording.q };
+        let [(_, Some(hit))] = &searcher.search(&block, &[link]).unwrap()[..] else { continue };
+        found += 1;
+        // Neighbours by the squares' ambiguity are 500 Hz away.
+        assert!((hit.doppler_hz - doppler_hz).abs() < 10.0, "{number} {doppler_hz} {}", hit.doppler_hz);
+    }
+    assert!(found > 24, "{found}");
+}
