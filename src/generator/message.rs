@@ -110,6 +110,8 @@ pub struct Sent {
     pub encoded: Vec<bool>,
     /// … and as they left the antenna.
     pub symbols: Vec<bool>,
+    /// Other units that its redundancy restores.
+    pub restored: Vec<Vec<bool>>,
 }
 
 /// A unit that a satellite sends: its form of message, by whose clock, and its number since that clock's
@@ -210,7 +212,9 @@ pub fn unit(
         changed.timed(|at| time.label(at))
     };
     let before = sent(before, &Slot { unit: unit - 1, ..*slot });
-    let encoded = sender.unit_after(&before, &sent(ephemeris, slot), message.unit_start(unit))?;
+    let (set, start) = (sent(ephemeris, slot), message.unit_start(unit));
+    let encoded = sender.unit_after(&before, &set, start)?;
+    let restored = sender.restored(&set, start)?;
     let is_alert = |fault: &MessageFault| fault.kind == Kind::Alert && fault.on.contains(&slot.start());
     let alert = faults.iter().any(|fault| fault.concerns(sv) && is_alert(fault));
     let encoded = if alert { message.alert.and_then(|of| of(&encoded)).unwrap_or(encoded) } else { encoded };
@@ -220,7 +224,7 @@ pub fn unit(
             *symbol ^= fault.flips(sv, slot, number);
         }
     }
-    Ok(Sent { encoded, symbols })
+    Ok(Sent { encoded, symbols, restored })
 }
 
 impl MessageFault {

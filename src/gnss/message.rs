@@ -199,6 +199,16 @@ pub trait Sender: Send + Sync {
         let _ = before;
         self.unit(ephemeris, start)
     }
+
+    /// Other units that a receiver can find out of the one that begins at `start`, beside some of their like;
+    /// none of a unit without redundancy.
+    ///
+    /// # Errors
+    /// As [`Self::unit`].
+    fn restored(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<Vec<bool>>, FieldError> {
+        let _ = (ephemeris, start);
+        Ok(Vec::new())
+    }
 }
 
 /// What a symbol completed.

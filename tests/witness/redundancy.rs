@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 
 use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::galileo::inav::{self, InavReader, redundancy};
-use gnss_twin::gnss::message::{Read, Reader};
+use gnss_twin::gnss::galileo::inav::{self, INAV, InavReader, redundancy};
+use gnss_twin::gnss::message::{Common, Read, Reader};
 use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::gnss::time::Epoch;
 
@@ -85,6 +85,24 @@ fn read(sv: Sv, words: impl Iterator<Item = u128>) -> Vec<Ephemeris> {
         }
     }
     sets
+}
+
+#[test]
+fn pages_with_redundancy_restore_the_real_words_1_to_4_and_others_none() {
+    let sender = (INAV.sender)(&Common::default()).unwrap();
+    // Seconds of a sub-frame at which words 2, 17 and 19 begin.
+    for (of_subframe_s, restored) in [(1.0, false), (11.0, true), (13.0, true)] {
+        for (sv, words) in shipped() {
+            let of_set = [1, 2, 3, 4].map(|number| words[&number]);
+            let sets = read(sv, of_set.into_iter().chain([words[&5]]));
+            let units = sender.restored(&sets[0], Epoch::from_week(2353, 579_600.0 + of_subframe_s)).unwrap();
+            let parameters = |unit: &Vec<bool>| (INAV.parameters)(unit).unwrap();
+            let ours: Vec<_> = units.iter().map(parameters).collect();
+            let start = Epoch::from_week(2353, 579_601.0);
+            let real = of_set.map(|word| parameters(&inav::encode_page(&inav::page(&word, start))));
+            assert_eq!(ours, if restored { real.to_vec() } else { Vec::new() }, "{sv}");
+        }
+    }
 }
 
 #[test]

@@ -81,11 +81,13 @@ impl Symbols {
                 };
                 let earlier = Slot { unit: unit - 1, ..slot }.set_chosen();
                 let before = scene.catalogue.sent_at(sv, earlier).unwrap_or(ephemeris);
-                let SentSymbols { encoded, symbols } = message::unit(faults, sender, [before, ephemeris], &slot)?;
+                let SentSymbols { encoded, symbols, restored } =
+                    message::unit(faults, sender, [before, ephemeris], &slot)?;
                 // What was meant and, where wrong symbols pass for right ones, what was sent.
                 let both = [&encoded, &symbols];
                 let distinct = if symbols == encoded { 1 } else { 2 };
-                for (of_set, parameters) in both.iter().take(distinct).filter_map(|sent| (message.parameters)(sent)) {
+                let sent = both.into_iter().take(distinct).chain(&restored);
+                for (of_set, parameters) in sent.filter_map(|sent| (message.parameters)(sent)) {
                     let issue = if of_set { u32::from((message.form)(ephemeris).iode) } else { 0 };
                     self.navigation.extend(NavigationRow::each(sv, message.name, issue, parameters));
                 }

@@ -35,6 +35,7 @@ use fields::{Orbit, Utc, WORD_1, WORD_2, WORD_3, WORD_4, WORD_5, WORD_6};
 pub use reader::InavReader;
 pub use reduced::VALID_S as REDUCED_VALID_S;
 use reduced::{Reduced, WORD_16};
+use redundancy::REDUNDANT;
 pub use redundancy::redundancy;
 
 /// I/NAV as signals name it.
@@ -198,6 +199,12 @@ impl Sender for Pages {
         }
         let word = self.word(word_at(start), ephemeris, start)?;
         Ok(encode_page(&page_with(&word, rest(start))))
+    }
+
+    fn restored(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<Vec<bool>>, FieldError> {
+        let On { word_at, rest, .. } = self.carrier;
+        let of_set = WORDS_OF_SET.into_iter().filter(|_| REDUNDANT.contains(&word_at(start)));
+        of_set.map(|number| Ok(encode_page(&page_with(&self.word(number, ephemeris, start)?, rest(start))))).collect()
     }
 }
 
