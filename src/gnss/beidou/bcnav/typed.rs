@@ -225,7 +225,11 @@ impl TypedReader {
         let mut news = vec![Read::Unit { symbols: layout.symbols() as u64, of_week_s, inverted }];
         news.extend(layout.sent_at(&bits, near).map(Read::Time));
         let all = integers_in(layout.of_type(layout.type_of(&bits)), &bits);
-        news.extend(electrons_in(&all).map(|(sent, _)| Read::Ionosphere(sent)));
+        if let Some((coefficients, raws)) = electrons_in(&all) {
+            news.push(Read::Ionosphere(coefficients));
+            let rows = |issue| NavigationRow::each(self.sv, layout.message.name, issue as u32, raws);
+            news.extend(layout.issue(&bits).map(|issue| Read::Parameters(rows(issue).collect())));
+        }
         self.keep(bits, of_week_s);
         self.look_for_set(near, &mut news);
         news

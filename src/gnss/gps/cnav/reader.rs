@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::fields::DELAY;
 use super::{BITS, IONOSPHERE, MESSAGE_S, elements, ionosphere, is_message, message_type, parameters};
 use crate::bits::number;
 use crate::fec::running::Running;
@@ -46,6 +47,12 @@ impl CnavReader {
             let all = parameters(&bits).unwrap_or_default();
             let raw = |name: &str| all.iter().find(|(other, _)| *other == name).map(|(_, raw)| *raw);
             news.extend(ionosphere(&raw).map(Read::Ionosphere));
+            // Its reference time is that of its set, by which sets are numbered.
+            if let Some(issue) = raw("toc_5min") {
+                let own = all.iter().filter(|(name, _)| DELAY.iter().any(|element| element.field.name == *name));
+                let rows = NavigationRow::each(self.sv, self.message.name, issue as u32, own.copied().collect());
+                news.push(Read::Parameters(rows.collect()));
+            }
         }
         if OF_SET.contains(&kind) {
             self.messages.insert(kind, bits);
