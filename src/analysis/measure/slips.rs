@@ -30,6 +30,11 @@ pub const FADE_DB: f64 = 6.0;
 pub const JAMMED_DB: f64 = 3.0;
 /// How far back a cause is looked for.
 const BEFORE_S: f64 = 0.5;
+/// How long before a break is declared its cause may lie.
+pub fn noticed_s(run: &Run) -> f64 {
+    BEFORE_S + run.tracking_setting("loss_s").unwrap_or(0.0)
+}
+
 /// Rows on either side that fix the constant.
 const SIDE: usize = 10;
 
@@ -292,7 +297,7 @@ impl<'r> Evidence<'r> {
     /// Times at which the cause of what happened at a time is looked for: the channel notices after its own
     /// loss time.
     fn before_s(&self, time_s: f64) -> RangeInclusive<f64> {
-        time_s - (BEFORE_S + self.run.tracking_setting("loss_s").unwrap_or(0.0))..=time_s
+        time_s - noticed_s(self.run)..=time_s
     }
 
     fn slip(&self, link: Link, found: &Break, known: Option<&Known>) -> Slip {

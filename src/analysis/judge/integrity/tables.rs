@@ -4,7 +4,7 @@
 //! the one before where all measured values are the same to the last bit, or where one is that noise has
 //! changed in a tenth of a second: what is frozen is not measured.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 use super::{Finding, Found};
 use crate::error::JudgeError;
@@ -181,15 +181,15 @@ fn short(run: &Run, rows: &mut Rows) {
             rows.doubled.add(|| format!("{} of {} in navigation", row.parameter, row.sv));
         }
     }
-    let mut searched = HashSet::new();
+    // A search is written when it ends and bears the sample of its beginning: those of one front end follow one
+    // another, those of two overlap.
+    let (mut searched, mut begun) = (HashSet::new(), HashMap::new());
     for row in &run.acquisition {
         if !searched.insert((row.sample, row.sv, row.signal.name)) {
             rows.doubled.add(|| format!("acquisition of {} at sample {}", row.sv, row.sample));
         }
-    }
-    for two in run.acquisition.windows(2) {
-        if two[1].sample < two[0].sample {
-            rows.disordered.add(|| format!("acquisition of {} at sample {}", two[1].sv, two[1].sample));
+        if begun.insert(row.signal.name, row.sample).is_some_and(|before| row.sample < before) {
+            rows.disordered.add(|| format!("acquisition of {} at sample {}", row.sv, row.sample));
         }
     }
     let mut events = HashSet::new();

@@ -4,7 +4,7 @@
 //! Each kind of error has three rows ([`super::kind`]). Stated sigmas lie within a factor of the ones that
 //! follow from settings, true C/N0 and geometry, on both sides.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Vector3, Vector4};
 
@@ -23,9 +23,10 @@ use crate::judge::judgement::Bound;
 use crate::judge::summary::Summary;
 use crate::judge::verdict::Verdict;
 use crate::measure::errors::Errors;
+use crate::measure::slips::noticed_s;
 use crate::read::{Emission, Numbers, Run, Table};
 use crate::statistics::{Sum, larger};
-use gnss::record::{Event, Fix};
+use gnss::record::{Event, EventRow, Fix};
 use gnss::signal::Link;
 
 /// How far dilutions and condition may be from the true geometry's: elevations seen from a fix metres away.
@@ -74,10 +75,17 @@ impl Verdict {
             return self.geometry(&all);
         }
         self.satellites_of_fixes(run, &all, &bounded)?;
-        let mut fading = 0;
-        cases.each(|case| fading += usize::from(case.expected.fading))?;
+        let (mut fading, mut slipping) = (0, 0);
+        let breaks = Breaks::of(run);
+        cases.each(|case| {
+            fading += usize::from(case.expected.fading);
+            slipping += usize::from(!case.expected.fading && breaks.follow(case.sample));
+        })?;
         if fading > 0 {
             self.not_judged.push(format!("velocity of {fading} fixes in which a signal fades by {FADE_DB} dB"));
+        }
+        if slipping > 0 {
+            self.not_judged.push(format!("velocity of {slipping} fixes right before a loop says that it slips"));
         }
         let slow = self.kinds(run, &scene.choices, &cases)?;
         self.scales(run, &scales, &bounded, slow)?;
@@ -153,12 +161,7 @@ impl Verdict {
     /// Whether fixes use the satellites that are observed, know their ionosphere, and pass their own test.
     fn satellites_of_fixes(&mut self, run: &Run, cases: &Table<Case>, bounded: &Bounded<'_>) -> Result<(), JudgeError> {
         let away = (RETURN_S * run.scene.sample_rate_hz) as u64;
-        let breaks: Vec<u64> = run
-            .events
-            .iter()
-            .filter(|row| matches!(row.event, Event::LossOfLock | Event::CycleSlip))
-            .map(|row| row.sample)
-            .collect();
+        let breaks = Breaks::of(run).samples;
         let before = (LOOK_BACK_S * run.scene.sample_rate_hz) as u64;
         let excused = |sample: u64| {
             let around = |at: &u64| (at.saturating_sub(before)..*at + 3 * away).contains(&sample);
@@ -237,6 +240,7 @@ impl Verdict {
     /// The five kinds of error; gives the number of independent fixes.
     fn kinds(&mut self, run: &Run, choices: &Choices, cases: &Table<Case>) -> Result<f64, JudgeError> {
         let motion = Motion::new(run, choices)?;
+        let breaks = Breaks::of(run);
         let allowed_mps = motion.allowed_mps();
         let oscillator_mps = oscillator_mps(run, choices);
         let (mut memory_s, mut before_s, mut steps) = (0.0_f64, None, Vec::new());
@@ -271,13 +275,13 @@ impl Verdict {
             value(case, error, e.noise.m44.sqrt(), of(&e.allowed, 3))
         };
         let velocity = |case: &Case| {
-            let e = Some(&case.expected).filter(|e| !e.fading)?;
+            let e = Some(&case.expected).filter(|e| !e.fading && !breaks.follow(case.sample))?;
             let sigma = largest_axis(&e.rate_noise).max(e.rate_noise.m33.sqrt());
             let allowed = e.rate_allowed.fixed_rows::<3>(0).norm() + allowed_mps(case.sample);
             value(case, case.error.velocity_enu_mps, sigma, allowed)
         };
         let drift = |case: &Case| {
-            let e = Some(&case.expected).filter(|e| !e.fading)?;
+            let e = Some(&case.expected).filter(|e| !e.fading && !breaks.follow(case.sample))?;
             let error = Vector3::new(case.drift_mps, 0.0, 0.0);
             let allowed = of(&e.rate_allowed, 3) + allowed_mps(case.sample);
             value(case, error, libm::hypot(e.rate_noise.m44.sqrt(), oscillator_mps), allowed)
@@ -296,6 +300,27 @@ impl Verdict {
         all.iter().try_for_each(|kind| self.kind(kind, cases))?;
         motion.sound()?;
         Ok(slow)
+    }
+}
+
+/// Slips and losses that the receiver declares. A loop that lets go has a wrong rate before it knows.
+struct Breaks {
+    samples: BTreeSet<u64>,
+    noticed: u64,
+}
+
+impl Breaks {
+    fn of(run: &Run) -> Self {
+        let is_break = |row: &&EventRow| matches!(row.event, Event::LossOfLock | Event::CycleSlip);
+        Self {
+            samples: run.events.iter().filter(is_break).map(|row| row.sample).collect(),
+            noticed: (noticed_s(run) * run.scene.sample_rate_hz) as u64,
+        }
+    }
+
+    /// Whether one follows a sample so soon that the loop may have been letting go there.
+    fn follow(&self, sample: u64) -> bool {
+        self.samples.range(sample..=sample + self.noticed).next().is_some()
     }
 }
 
