@@ -56,6 +56,8 @@ struct Sky {
     duration_s: f64,
     vanish_s: f64,
     first_edge: u64,
+    /// Symbols before this one are equal.
+    first_symbol: u64,
 }
 
 impl Default for Sky {
@@ -72,6 +74,7 @@ impl Default for Sky {
             duration_s: 3.0,
             vanish_s: f64::INFINITY,
             first_edge: 7,
+            first_symbol: 0,
         }
     }
 }
@@ -118,7 +121,8 @@ impl Sky {
         let noise = if self.cn0_dbhz.is_some() { 0.5_f64.sqrt() } else { 0.0 };
         let sign = |chip: i64| {
             let period = chip.div_euclid(1023);
-            let bit = sent_bit(((period + 40 - self.first_edge as i64) / 20) as u64);
+            let symbol = ((period + 40 - self.first_edge as i64) / 20) as u64;
+            let bit = sent_bit(symbol.max(self.first_symbol));
             if chips[chip.rem_euclid(1023) as usize] ^ bit { -1.0 } else { 1.0 }
         };
         // Mean power of area edges: 1 − δ/3, one chip boundary in two being an edge.
@@ -258,6 +262,20 @@ fn weak_signals_are_pulled_in_from_120_hz_and_a_sixth_of_a_chip_and_their_symbol
         let (wrong, all) = (wrong.count(), report.symbols.len());
         // Bits are wrong with 4e-7 at 28 dB-Hz, a little more with the loop's own 11°.
         assert!(all > 40 && wrong.min(all - wrong) <= most_wrong, "{dbhz}: {wrong} of {all}");
+    }
+}
+
+#[test]
+fn a_weak_signal_whose_message_is_silent_at_first_is_held_until_its_symbols_show() {
+    for (first_symbol, first_edge, dbhz) in
+        [(35, 0, 37.0), (35, 4, 36.0), (35, 8, 37.0), (40, 12, 36.0), (40, 16, 37.0), (60, 2, 33.0), (90, 17, 30.0)]
+    {
+        let duration_s = 0.02 * first_symbol as f64 + if dbhz < 32.0 { 4.0 } else { 2.0 };
+        let sky = Sky { cn0_dbhz: Some(dbhz), duration_s, first_symbol, first_edge, ..Default::default() };
+        let hit = of_strength(sky.hit(40.0, 0.16), dbhz);
+        let (channel, report) = sky.follow(&TrackingSettings::default(), 100_000, &hit);
+        assert_eq!(events(&report)[..2], [Event::PhaseLocked, Event::BitSynchronised], "{dbhz} {:?}", report.events);
+        assert!(!channel.is_lost() && report.symbols.iter().all(|symbol| symbol.first_period % 20 == first_edge));
     }
 }
 

@@ -10,7 +10,7 @@
 //! Two bands of a satellite that the receiver combines are one range here too, with a₁ = f₁²/(f₁²−f₂²) and
 //! a₂ = 1 − a₁: what the ionosphere adds to either cancels, noise grows to √(a₁²σ₁² + a₂²σ₂²).
 
-use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Matrix4, Vector4};
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix4, Vector4};
 
 use super::air::Air;
 use super::ranges::{Forecast, Scene};
@@ -368,16 +368,15 @@ impl Expected {
         (self.satellites.0..=self.satellites.1).contains(&satellites)
     }
 
-    /// Longest axis of the horizontal noise.
+    /// Deviation along the longest axis of the horizontal noise.
     pub fn flat_sigma_m(&self) -> f64 {
-        largest_axis(&self.noise)
+        self.noise.fixed_view::<2, 2>(0, 0).symmetric_eigenvalues().max().max(0.0).sqrt()
     }
-}
 
-/// Standard deviation along the longest axis of the first two coordinates.
-pub fn largest_axis(covariance: &Matrix4<f64>) -> f64 {
-    let flat = Matrix2::new(covariance.m11, covariance.m12, covariance.m21, covariance.m22);
-    flat.symmetric_eigenvalues().max().max(0.0).sqrt()
+    /// Deviation along the longest axis of the noise of a velocity, which no axis of the coordinates need be near.
+    pub fn rate_sigma_mps(&self) -> f64 {
+        self.rate_noise.fixed_view::<3, 3>(0, 0).symmetric_eigenvalues().max().max(0.0).sqrt()
+    }
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ use crate::expect::due::satellite::FADE_DB;
 use crate::expect::loops::Theory;
 use crate::expect::quantile::mean_square;
 use crate::judge::forecast::ranges::{Choices, Scene};
-use crate::judge::forecast::solution::{Expected, largest_axis};
+use crate::judge::forecast::solution::Expected;
 use crate::judge::judgement::Bound;
 use crate::judge::summary::Summary;
 use crate::judge::verdict::Verdict;
@@ -276,9 +276,8 @@ impl Verdict {
         };
         let velocity = |case: &Case| {
             let e = Some(&case.expected).filter(|e| !e.fading && !breaks.follow(case.sample))?;
-            let sigma = largest_axis(&e.rate_noise).max(e.rate_noise.m33.sqrt());
             let allowed = e.rate_allowed.fixed_rows::<3>(0).norm() + allowed_mps(case.sample);
-            value(case, case.error.velocity_enu_mps, sigma, allowed)
+            value(case, case.error.velocity_enu_mps, e.rate_sigma_mps(), allowed)
         };
         let drift = |case: &Case| {
             let e = Some(&case.expected).filter(|e| !e.fading && !breaks.follow(case.sample))?;

@@ -123,15 +123,22 @@ impl Channel {
             self.batch = self.new_batch();
             return;
         };
-        // Edges that a random message does not show yet are waited for: wrong ones cost the channel.
-        if self.has_symbols && self.group > 1 && !found.changes && self.batch.extend() {
+        // Edges that a message does not show yet are waited for, as long as a pull-in may last: wrong ones cost
+        // the channel.
+        let rate = self.loops.carrier.rate + found.cycles / self.period_s;
+        if self.has_symbols && self.group > 1 && !found.changes {
+            if !self.batch.extend() {
+                self.loops.carrier.rate = rate;
+                self.batch = self.new_batch();
+                self.limit_pull_in(self.pull_in_since, report);
+            }
             return;
         }
         // Batches grow until they end where a symbol does.
         if !(self.batch.periods() - found.offset).is_multiple_of(self.group as usize) {
             return;
         }
-        self.loops.carrier = Rates { rate: self.loops.carrier.rate + found.cycles / self.period_s, acceleration: 0.0 };
+        self.loops.carrier = Rates { rate, acceleration: 0.0 };
         self.carrier += (found.phase_cycles * TURN) as i128;
         if self.overlay.is_some() && self.overlay_phase.is_none() {
             self.enter(Stage::Assisted);
