@@ -12,7 +12,7 @@ use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
-use super::filter::kaiser;
+use crate::synth::band::kaiser;
 
 /// What is left out of an endless response, against its largest value.
 const CUT: f64 = 1e-5;
@@ -99,10 +99,11 @@ pub(super) fn taps(filter: &Analogue, middle: f64, real: bool) -> (Vec<Complex64
     let mut taps: Vec<Complex64> = (0..=REACH + length)
         .map(|k| {
             let t = k as f64 - REACH as f64 - part;
-            match kaiser(t / REACH as f64, BETA) {
-                0.0 => at(t),
-                window => window * within_band(t) + (1.0 - window) * at(t),
+            if t.abs() >= REACH as f64 {
+                return at(t);
             }
+            let window = kaiser(t / REACH as f64, BETA);
+            window * within_band(t) + (1.0 - window) * at(t)
         })
         .collect();
     let most = taps.iter().fold(0.0, |most: f64, tap| most.max(tap.norm()));

@@ -12,6 +12,7 @@ use num_complex::Complex64;
 
 use crate::stage::butterworth::{self, Analogue};
 use crate::stage::{Block, Stage};
+use crate::synth::band::kaiser;
 use gnss::facts::{FilterShape, FilterSpec, StageSpec};
 
 /// Shapes of filters, by the name that a scenario uses.
@@ -151,23 +152,6 @@ fn brick_wall(width: f64, middle: f64, length: usize, real: bool) -> Vec<Complex
         Complex64::new(cos, sin) * h * scale
     });
     carried.collect()
-}
-
-/// Kaiser's window at `x` of its half width, 0 beyond it.
-pub(super) fn kaiser(x: f64, beta: f64) -> f64 {
-    if x.abs() < 1.0 { bessel_i0(beta * (1.0 - x * x).sqrt()) / bessel_i0(beta) } else { 0.0 }
-}
-
-/// Modified Bessel function of the first kind and order zero, by its series.
-fn bessel_i0(x: f64) -> f64 {
-    let quarter = 0.25 * x * x;
-    let (mut sum, mut term, mut k) = (1.0, 1.0, 1.0);
-    while term > 1e-17 * sum {
-        term *= quarter / (k * k);
-        sum += term;
-        k += 1.0;
-    }
-    sum
 }
 
 impl Stage for Filter {

@@ -226,21 +226,22 @@ pub(super) fn cubic(value: impl Fn(f64) -> f64) -> [f64; 4] {
 pub(crate) fn windowed_sinc(x: f64, cutoff_cps: f64, half_width: f64, beta: f64) -> f64 {
     let angle = 2.0 * PI * cutoff_cps * x;
     let sinc = if angle.abs() < 1e-9 { 1.0 } else { libm::sin(angle) / angle };
-    let place = x / half_width;
-    2.0 * cutoff_cps * sinc * bessel_i0(beta * (1.0 - place * place).max(0.0).sqrt()) / bessel_i0(beta)
+    2.0 * cutoff_cps * sinc * kaiser(x / half_width, beta)
 }
 
-/// Modified Bessel function of order zero by its power series.
+/// Kaiser's window at `x` of its half width.
+pub(crate) fn kaiser(x: f64, beta: f64) -> f64 {
+    bessel_i0(beta * (1.0 - x * x).max(0.0).sqrt()) / bessel_i0(beta)
+}
+
+/// Modified Bessel function of the first kind and order zero, by its series.
 fn bessel_i0(x: f64) -> f64 {
     let quarter = 0.25 * x * x;
-    let (mut term, mut sum) = (1.0, 1.0);
-    for k in 1..30 {
-        term *= quarter / f64::from(k * k);
+    let (mut sum, mut term, mut k) = (1.0, 1.0, 1.0);
+    while term > 1e-17 * sum {
+        term *= quarter / (k * k);
         sum += term;
-        // Terms fall from here on: none changes the sum any more.
-        if term < 1e-17 * sum {
-            break;
-        }
+        k += 1.0;
     }
     sum
 }
