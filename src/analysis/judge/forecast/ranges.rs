@@ -20,6 +20,7 @@ use crate::expect::multipath::{self, Rays};
 use crate::expect::smoothing::Smoothing;
 use crate::expect::stated::Stated;
 use crate::expect::theory::edges;
+use crate::judge::forecast::heard::Heard;
 use crate::judge::forecast::links::CN0_DB;
 use crate::measure::errors::{Errors, SignalError};
 use crate::measure::jitter::{Loop, Settings};
@@ -29,8 +30,7 @@ use crate::waveform::Edge;
 use gnss::broadcast::Ephemeris;
 use gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, rotate_earth};
 use gnss::ionosphere::Model;
-use gnss::message::Message as Form;
-use gnss::record::{Event, Fix, IonosphereModel, Observation, SkyRow, TrajectoryRow};
+use gnss::record::{Fix, IonosphereModel, Observation, SkyRow, TrajectoryRow};
 use gnss::satellite::Sv;
 use gnss::signal::{Link, Signal};
 use gnss::time::GPST;
@@ -170,11 +170,8 @@ pub struct Scene<'r> {
     pub message: Message,
     /// Names of the time scales of the run's signals, GPS time first.
     pub scales: Vec<&'static str>,
-    /// From when on each satellite's message is known, in short or whole, and while it says that it is
-    /// unhealthy.
-    known: BTreeMap<(Sv, &'static str), (u64, &'static Form)>,
-    whole: BTreeMap<Sv, u64>,
-    health: BTreeMap<Link, Vec<(u64, bool)>>,
+    /// What the receiver knows of satellites.
+    pub(in crate::judge) heard: Heard,
     stated: &'r Stated,
     /// Error of chip edges with a code at rest, root mean square.
     edges_m: BTreeMap<&'static Signal, f64>,
@@ -183,49 +180,18 @@ pub struct Scene<'r> {
 impl<'r> Scene<'r> {
     /// `None` without the receiver's settings.
     pub fn new(run: &'r Run, stated: &'r Stated) -> Option<Self> {
-        let (mut known, mut whole, mut health) = (BTreeMap::new(), BTreeMap::new(), BTreeMap::<_, Vec<_>>::new());
-        for row in &run.events {
-            let message = row.signal.components.iter().find_map(|component| component.message);
-            let mut know = || {
-                if let Some(message) = message {
-                    known.entry((row.sv, message.name)).or_insert((row.sample, message));
-                }
-            };
-            match row.event {
-                Event::EphemerisComplete => {
-                    know();
-                    whole.entry(row.sv).or_insert(row.sample);
-                }
-                Event::ReducedElements => {
-                    know();
-                }
-                Event::Unhealthy => health.entry(row.link()).or_default().push((row.sample, false)),
-                Event::Healthy => health.entry(row.link()).or_default().push((row.sample, true)),
-                _ => {}
-            }
-        }
         Some(Self {
             run,
             choices: Choices::of(run)?,
             message: Message::of(run),
             scales: scales(run),
-            known,
-            whole,
-            health,
+            heard: Heard::of(run),
             stated,
             edges_m: (run.signals.iter())
                 .filter(|_| run.scene.code_edge == Edge::Area)
                 .map(|&signal| (signal, edges::averaged_m(signal, run.scene.waveform, run.rate_hz(signal))))
                 .collect(),
         })
-    }
-
-    /// Whether a fix at that sample may use the signal of the satellite, by its messages.
-    pub(in crate::judge) fn usable(&self, link: Link, sample: u64) -> bool {
-        let mut own = self.known.iter().filter(|((sv, _), _)| *sv == link.sv).map(|(_, known)| known);
-        let known = own.any(|(since, message)| *since <= sample && (message.sets.serves)(link.signal));
-        let last = self.health.get(&link).and_then(|all| all.iter().rev().find(|(since, _)| *since <= sample));
-        known && last.is_none_or(|(_, healthy)| *healthy)
     }
 
     /// The ranges of a satellite's signal, fix by fix; none where the settings make no loop that holds it.
@@ -312,7 +278,7 @@ impl<'r> Scene<'r> {
 
     /// Variance of what elements in short leave, while nothing better is known; receivers weight by it.
     fn short_m2(&self, sv: Sv, sample: u64) -> f64 {
-        if self.whole.get(&sv).is_some_and(|since| *since <= sample) { 0.0 } else { IN_SHORT_M * IN_SHORT_M }
+        if self.heard.is_whole(sv, sample) { 0.0 } else { IN_SHORT_M * IN_SHORT_M }
     }
 
     /// C/N0 that the scene allows, hertz; and whether the receiver found that.
@@ -395,7 +361,7 @@ impl Ranges<'_, '_> {
         };
         let smooth = self.parting.take(row.time_s, row.locked_s, parted_m + ray_m);
         let bounced = self.reflected.take(row.time_s, row.locked_s, ray_m.abs());
-        let Some(place) = place.filter(|_| row.sample == fix.sample && scene.usable(link, row.sample)) else {
+        let Some(place) = place.filter(|_| row.sample == fix.sample && scene.heard.usable(link, row.sample)) else {
             return Ok(None);
         };
         let Some((one, phase_m)) = scene.one(theory, row, (&true_row, &sky), (fix.ionosphere, place)) else {

@@ -128,7 +128,7 @@ impl Measured {
         let before = self.cases.len();
         expected(scene, errors, sv, |one: Dispersion| {
             let is_due =
-                fixes.get(one.sample).is_some() && one.links.iter().all(|link| scene.usable(*link, one.sample));
+                fixes.get(one.sample).is_some() && one.links.iter().all(|link| scene.heard.usable(*link, one.sample));
             self.due += u64::from(is_due);
             let Some(row) = rows.get(one.sample) else {
                 if is_due {

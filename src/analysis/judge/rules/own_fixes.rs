@@ -1,8 +1,8 @@
 //! Fixes that the receiver's own tables allow: where it observes satellites whose orbits it says it knows, it
 //! must give a position, whenever the message's timetable would make one due.
 //!
-//! Limits: satellites with a fault, an alert or an ephemeris in short are not counted; fixes of receivers
-//! that must have the ionosphere's parameters are due from the event on that says they are decoded.
+//! Limits: satellites with a fault or an alert are not counted; fixes of receivers that must have the
+//! ionosphere's parameters are due from the event on that says they are decoded.
 
 use std::collections::BTreeMap;
 
@@ -10,6 +10,7 @@ use crate::error::JudgeError;
 use crate::expect::due::receiver::Receiver;
 use crate::expect::due::satellite::LOCK_S;
 use crate::expect::due::{Due, LARGEST_PDOP};
+use crate::judge::forecast::heard::Heard;
 use crate::judge::judgement::Bound;
 use crate::judge::verdict::Verdict;
 use crate::read::Run;
@@ -34,54 +35,19 @@ struct Seen<'r> {
     sky: Option<Finder<'r, Link, SkyRow>>,
 }
 
-/// When the receiver knew what a fix needs, by its own events: samples.
-struct Known {
-    orbits: BTreeMap<Sv, Vec<(u64, Link)>>,
-    unfit: BTreeMap<Link, Vec<(u64, bool)>>,
-    ionosphere: Option<u64>,
-}
-
-impl Known {
-    fn of(run: &Run) -> Self {
-        let mut known = Self { orbits: BTreeMap::new(), unfit: BTreeMap::new(), ionosphere: None };
-        for row in &run.events {
-            match row.event {
-                Event::EphemerisComplete => known.orbits.entry(row.sv).or_default().push((row.sample, row.link())),
-                Event::Unhealthy => known.unfit.entry(row.link()).or_default().push((row.sample, true)),
-                Event::Healthy => known.unfit.entry(row.link()).or_default().push((row.sample, false)),
-                Event::IonosphereDecoded => {
-                    known.ionosphere.get_or_insert(row.sample);
-                }
-                _ => {}
-            }
-        }
-        known
-    }
-
-    /// Whether a satellite's signal may be used at a sample.
-    fn serves(&self, link: Link, sample: u64) -> bool {
-        let serves = |brought: &Link| {
-            let mut messages = brought.signal.components.iter().filter_map(|component| component.message);
-            messages.any(|message| (message.sets.serves)(link.signal))
-        };
-        let mut orbits = self.orbits.get(&link.sv).into_iter().flatten();
-        let last = self.unfit.get(&link).and_then(|all| all.iter().rev().find(|(since, _)| *since <= sample));
-        orbits.any(|(since, brought)| *since <= sample && serves(brought)) && !last.is_some_and(|(_, unfit)| *unfit)
-    }
-}
-
 impl Verdict {
     /// Epochs at which the receiver observes what a fix needs and gives none.
     ///
     /// # Errors
     /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub(super) fn own_fixes(&mut self, run: &Run, receiver: &Receiver) -> Result<(), JudgeError> {
-        let known = Known::of(run);
+        let heard = Heard::of(run);
         let faulty = |sv: Sv| {
             run.scene.faults.iter().any(|fault| fault.satellites.as_ref().is_none_or(|list| list.contains(&sv)))
         };
         let rate_hz = run.scene.sample_rate_hz;
-        let ionosphere = if receiver.requires_ionosphere { known.ionosphere.unwrap_or(u64::MAX) } else { 0 };
+        let decoded = run.events.iter().find(|row| row.event == Event::IonosphereDecoded).map(|row| row.sample);
+        let ionosphere = if receiver.requires_ionosphere { decoded.unwrap_or(u64::MAX) } else { 0 };
         let mut all = Vec::new();
         for link in run.observations.keys().filter(|link| !faulty(link.sv)) {
             let sky = run.seen_at(link.sv)?;
@@ -98,7 +64,7 @@ impl Verdict {
                 let (Some(row), link) = (row.transpose()?, seen.link) else { continue };
                 let sky = seen.sky.as_mut().and_then(|sky| sky.get(row.sample));
                 let above = sky.filter(|sky| sky.elevation_deg > receiver.mask_deg + ABOVE_DEG);
-                if let Some(sky) = above.filter(|_| !used.contains(&link.sv) && known.serves(link, sample)) {
+                if let Some(sky) = above.filter(|_| !used.contains(&link.sv) && heard.usable(link, sample)) {
                     used.push(link.sv);
                     let system = systems.entry(link.signal.time.name).or_default();
                     system.add(sky.azimuth_deg.to_radians(), sky.elevation_deg.to_radians());
