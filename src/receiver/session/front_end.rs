@@ -391,21 +391,36 @@ mod tests {
     use gnss::samples::Format;
     use gnss::time::Rate;
 
+    fn of(signal: &'static Signal) -> CodeNoise {
+        let (rate, center_hz) = (Rate::from_hz(25e6).unwrap(), signal.centre_hz());
+        let metadata = IfMetadata { format: Format::Ci8, rate, center_hz, inverted: false, start: None };
+        noise(signal, &metadata, &Settings::default())
+    }
+
     /// Shares of the pilots: half of L5's power (IS-GPS-705, 3.3.1.6), half of E1's (OS SIS ICD 2.1, 2.3.3)
     /// less the eleventh that BOC(6,1) has and a replica of BOC(1,1) has not.
     #[test]
     fn a_code_is_as_noisy_as_what_its_loop_follows_of_the_signal() {
-        let of = |signal: &'static Signal| {
-            let (rate, center_hz) = (Rate::from_hz(25e6).unwrap(), signal.centre_hz());
-            let metadata = IfMetadata { format: Format::Ci8, rate, center_hz, inverted: false, start: None };
-            noise(signal, &metadata, &Settings::default())
-        };
         for (signal, share, within) in [(&L1_CA, 1.0, 0.01), (&L5, 0.5, 0.01), (&E1, 5.0 / 11.0, 0.05)] {
             let own = of(signal);
             assert!((own.share - share).abs() < within, "{}: {}", signal.name, own.share);
             let whole = CodeNoise { share: 1.0, ..own };
             let (found_m, expected_m) = (own.sigma_m(1e4), whole.sigma_m(1e4 * own.share));
             assert!((found_m / expected_m - 1.0).abs() < 1e-12, "{}", signal.name);
+        }
+    }
+
+    /// Squaring in the discriminator adds as much noise as the integration is short: ranges of different symbols
+    /// weigh differently.
+    #[test]
+    fn a_code_is_as_noisy_as_its_loop_s_own_integration_makes_it() {
+        for (name, integration_s) in [("GPS L1 C/A", 0.004), ("GLONASS G1", 0.002), ("BeiDou B2b", 0.001)] {
+            let own = of(Signal::find(name).unwrap());
+            assert!((own.integration_s - integration_s).abs() < 1e-12, "{name}: {}", own.integration_s);
+            let four = CodeNoise { integration_s: 0.004, ..own };
+            // Below 30 dB-Hz a sum of 1 ms has less signal than noise.
+            let ratio = own.sigma_m(1e3) / four.sigma_m(1e3);
+            assert!(if integration_s < 0.004 { ratio > 1.05 } else { ratio == 1.0 }, "{name}: {ratio}");
         }
     }
 }
