@@ -279,9 +279,9 @@ pub(crate) mod tests {
         }
     }
 
-    /// Satellites with the semi-major axis and eccentricity of their orbits, kilometres: nominal orbits of each
-    /// kind, Galileo's two on the orbits of a failed launch, the first of QZSS, and an inclined one of BeiDou
-    /// whose number the program does not know.
+    /// Satellites with the semi-major axis and eccentricity of their orbits, kilometres: nominal orbits of
+    /// each kind, Galileo's two on the orbits of a failed launch, the first of QZSS, and an inclined one of
+    /// BeiDou whose number the program does not know.
     const ORBITS: [(&str, f64, f64); 11] = [
         ("G05", 26_559.7, 0.02),
         ("E11", 29_600.3, 0.0005),

@@ -7,8 +7,8 @@
 //! raised there brings Niell's hydrostatic factor to that of rays traced through the standard atmosphere,
 //! within 0.4 % at sea level, and the wet one to within 7 % of vapour whose density falls in 2 km to 2.5 km
 //! by 1/e. One over the sine, in the height correction and in the cosecant, is bounded there. Limits: no
-//! factor is defined below the horizon; a grid's coefficients are held for the whole scene. Those of VMF3's grids and of GPT3 under VMF1's closed form depart from VMF3, by 2 cm of delay at 5°
-//! and 2 mm at 10°.
+//! factor is defined below the horizon; a grid's coefficients are held for the whole scene. Those of VMF3's
+//! grids and of GPT3 under VMF1's closed form depart from VMF3, by 2 cm of delay at 5° and 2 mm at 10°.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -21,8 +21,9 @@ use gnss::vmf3::{MappingBc, Vmf3};
 const FITTED_SIN: f64 = 0.052_335_956;
 /// By how much the sine is raised at the horizon, so that Niell's hydrostatic factor at 45° is 33.4 there.
 const RAISED_SIN: f64 = 0.0034;
-/// What stands for a sine of zero in one over it: the hydrostatic factor of rays traced along the horizon of the standard
-/// atmosphere grows by 0.5 a kilometre of height up to 10 km, and [`height_correction`] has that at 0.56°.
+/// What stands for a sine of zero in one over it: the hydrostatic factor of rays traced along the horizon of
+/// the standard atmosphere grows by 0.5 a kilometre of height up to 10 km, and [`height_correction`] has that
+/// at 0.56°.
 const LEAST_SIN: f64 = 0.009_77;
 const YEAR_DAYS: f64 = 365.25;
 /// Day of the year about which seasons turn (Niell 1996; Böhm et al. 2006).

@@ -5,11 +5,12 @@
 //! Magnus formula with 237.3 °C; mapping functions are in [`super::mapping`]. Weather is the scene's, which
 //! follows the standard atmosphere from a reference height, or GPT3's by place and season with the wet delay
 //! of Askne & Nordius 1987. A ray that comes from below the horizon passes a lowest point: its delay is twice
-//! that along the horizon there less that of the ray which leaves upwards at the same angle, which is exact for
-//! air in spherical layers and a straight ray. Against traced rays, which bend, the delay is 3 % high at −1°, 7 %
-//! at −2° and 12 % at −3° for users at 5 km and 10 km, and within 1 % at and above the horizon. Where the Earth stands in the way the lowest point
-//! stays near the ground, for the scene's mask decides what is received. Limits: above 44.3 km the pressure of
-//! the standard atmosphere, and so the zenith delay, is zero; GPT3's fades there.
+//! that along the horizon there less that of the ray which leaves upwards at the same angle, which is exact
+//! for air in spherical layers and a straight ray. Against traced rays, which bend, the delay is 3 % high at
+//! −1°, 7 % at −2° and 12 % at −3° for users at 5 km and 10 km, and within 1 % at and above the horizon.
+//! Where the Earth stands in the way the lowest point stays near the ground, for the scene's mask decides
+//! what is received. Limits: above 44.3 km the pressure of the standard atmosphere, and so the zenith delay,
+//! is zero; GPT3's fades there.
 
 use crate::effect::ionosphere::smooth;
 use crate::effect::mapping::{Mapping, season_day};
@@ -140,8 +141,8 @@ impl Troposphere {
     }
 }
 
-/// Of a ray from below the horizon the angle below it, bounded, and the height of its lowest point. Beyond the
-/// ray that grazes the ground the angle comes to rest within [`BENT_RAD`].
+/// Of a ray from below the horizon the angle below it, bounded, and the height of its lowest point. Beyond
+/// the ray that grazes the ground the angle comes to rest within [`BENT_RAD`].
 fn lowest_point(height_m: f64, below_rad: f64) -> (f64, f64) {
     let radius_m = EARTH_RADIUS_M + height_m;
     let grazing_rad = libm::acos((EARTH_RADIUS_M / radius_m).min(1.0));
@@ -223,9 +224,10 @@ mod tests {
     }
 
     /// Height, elevation, and by how many metres a ray through the dry standard atmosphere is longer than the
-    /// straight line. Another program traced them: Snell's law in spherical layers (n r cos e is constant), n − 1
-    /// = 77.604e-6 p/T, 6371 km, 20 000 steps to 100 km, the elevation at the user iterated until the ray leaves in
-    /// the straight line's direction. The last column is by what part the model may depart, as its module says.
+    /// straight line. Another program traced them: Snell's law in spherical layers (n r cos e is constant), n
+    /// − 1 = 77.604e-6 p/T, 6371 km, 20 000 steps to 100 km, the elevation at the user iterated until the ray
+    /// leaves in the straight line's direction. The last column is by what part the model may depart, as its
+    /// module says.
     const TRACED: [(f64, f64, f64, f64); 25] = [
         (0.0, 10.0, 12.7820, 0.005),
         (0.0, 5.0, 23.3291, 0.005),
