@@ -291,6 +291,14 @@ impl<T> Element<T> {
     pub const fn at(&self, pieces: &'static [(u16, u8)]) -> Self {
         Self { field: Field { pieces, ..self.field }, get: self.get, set: self.set }
     }
+
+    /// The integer that is sent.
+    ///
+    /// # Errors
+    /// A value outside the field, or between two of its steps.
+    pub(crate) fn raw_of(&self, from: &T) -> Result<i64, FieldError> {
+        self.field.raw((self.get)(from))
+    }
 }
 
 /// A field and how it is taken from, and put into, what carries it.
@@ -314,7 +322,7 @@ pub(crate) use plain;
 /// Writes every field of `table` into `data`.
 pub fn write_all<T, S: Store>(table: &[Element<T>], from: &T, data: &mut S) -> Result<(), FieldError> {
     table.iter().try_for_each(|element| {
-        element.field.write(data, element.field.raw((element.get)(from))?);
+        element.field.write(data, element.raw_of(from)?);
         Ok(())
     })
 }

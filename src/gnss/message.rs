@@ -142,6 +142,17 @@ pub struct Common {
     pub network: Option<Arc<dyn Network>>,
 }
 
+/// Step of an almanac's reference time, and the last one inside a week (IS-GPS-200N, table 20-VI;
+/// IS-GPS-800J, 3.5.4.3.2; BDS-SIS-ICD-B1C 1.0, 7.9).
+pub(crate) const ALMANAC_STEP_S: i64 = 4096;
+const TOA_LAST_S: i64 = 602_112;
+
+/// The reference time of almanacs: the multiple of 4096 s nearest to `reference` inside its week.
+pub(crate) fn almanac_time(reference: Epoch) -> Epoch {
+    let tow_s = ((reference.tow_whole_s() + ALMANAC_STEP_S / 2) / ALMANAC_STEP_S * ALMANAC_STEP_S).min(TOA_LAST_S);
+    Epoch::new(reference.week() * WEEK_S + tow_s, 0.0)
+}
+
 /// What messages newer than LNAV and D1 say of UTC: a polynomial and a change of leap seconds, in numbers of
 /// their system's own time (IS-GPS-705J, 20.3.3.6; BDS-SIS-ICD-B2a 1.0, 7.12).
 #[derive(Clone, Copy, Debug, Default)]
@@ -349,12 +360,12 @@ mod tests {
         let within_s = |signal: &Signal| {
             signal.components.iter().find_map(|component| component.message).and_then(super::Message::set_within_s)
         };
-        // Frames of 30 s in subframes of 6 s (IS-GPS-200N, 20.3.3), of 18 s in one piece (IS-GPS-800J,
-        // 3.2.3), of 30 s in strings of 2 s (GLONASS ICD L1, L2 5.1, 4.3); subframes of 30 s in pages of 2 s
-        // and of 50 s in pages of 10 s (Galileo OS SIS ICD 2.1, 4.3 and 4.2). A unit of BeiDou's is what D1
-        // and D2 have in common, 30 s.
+        // Frames of 30 s in subframes of 6 s (IS-GPS-200N, 20.3.3), of 18 s in one piece, of which every
+        // other one has page 1 (IS-GPS-800J, 3.2.3), of 30 s in strings of 2 s (GLONASS ICD L1, L2 5.1, 4.3);
+        // subframes of 30 s in pages of 2 s and of 50 s in pages of 10 s (Galileo OS SIS ICD 2.1, 4.3 and
+        // 4.2). A unit of BeiDou's is what D1 and D2 have in common, 30 s.
         assert_eq!(within_s(&gps::l1ca::L1_CA), Some(30 + 6));
-        assert_eq!(within_s(&gps::l1c::L1C), Some(18 + 18));
+        assert_eq!(within_s(&gps::l1c::L1C), Some(2 * 18 + 18));
         assert_eq!(within_s(&galileo::e1::E1), Some(30 + 2));
         assert_eq!(within_s(&galileo::e5::E5A), Some(50 + 10));
         assert_eq!(within_s(&beidou::in_phase::B1I), Some(30 + 30));

@@ -1,6 +1,7 @@
 //! B-CNAV1 and B1C against codes of another program and the subframes of a satellite that a receiver's maker
 //! prints.
 
+use gnss_twin::gnss::bdgim::Bdgim;
 use gnss_twin::gnss::beidou::b1c::{self, Code};
 use gnss_twin::gnss::beidou::bcnav1::{self, B_CNAV1, Frame};
 use gnss_twin::gnss::bits::{bits_of, number};
@@ -10,7 +11,7 @@ use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss_twin::gnss::fec::ldpc64::product;
 use gnss_twin::gnss::message::{Common, Read};
 use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::time::{BDT, Epoch};
+use gnss_twin::gnss::time::{BDT, BDT_WEEK, Epoch};
 use gnss_twin::gnss::{inflate, rinex};
 
 use super::codes::holds;
@@ -223,4 +224,92 @@ fn satellites_that_send_b1c_are_those_that_broadcast_b_cnav1() {
     let at = Epoch::parse("2020-11-29T12:40:00").unwrap();
     assert!([21, 22, 26, 36].iter().all(|number| b1c::sent(*number, at)));
     assert!(![5, 7, 10, 11, 14].iter().any(|number| b1c::sent(*number, at)));
+}
+
+/// The values of a field of a page, one for each satellite in it.
+fn values(page: u128, name: &str, three: &Vec<bool>) -> Vec<f64> {
+    let table = format!("subframe 3, page {page}");
+    let (_, fields) = bcnav1::tables().into_iter().find(|(own, _)| *own == table).unwrap();
+    fields.into_iter().filter(|field| field.name == name).map(|field| field.value(field.read(three))).collect()
+}
+
+/// Where a satellite is by radius, argument of latitude, inclination, and node against Greenwich.
+fn placed_m([radius_m, latitude, inclination, node]: [f64; 4]) -> [f64; 3] {
+    let (x, y) = (radius_m * latitude.cos(), radius_m * latitude.sin());
+    let level = y * inclination.cos();
+    [x * node.cos() - level * node.sin(), x * node.sin() + level * node.cos(), y * inclination.sin()]
+}
+
+#[test]
+fn pages_take_turns_and_almanacs_are_near_the_orbits_of_their_satellites() {
+    const ROTATION_RADPS: f64 = 7.292_115e-5;
+    let mut almanac = rinex::embedded_two_systems().unwrap().ephemerides;
+    almanac.retain(|set| set.sv.system == System::BeiDou);
+    almanac.sort_by_key(|set| set.sv);
+    almanac.dedup_by_key(|set| set.sv);
+    let set = almanac.iter().find(|set| b1c::sent(set.sv.number, set.toe)).unwrap();
+    let carried = (B_CNAV1.form)(set).timed(|at| BDT.label(at));
+    let begin = Epoch::new(carried.toe.seconds().div_euclid(36) * 36, 0.0);
+    let (count, places) = (almanac.len(), almanac.len().div_ceil(4));
+    let pages = |bdgim: Option<Bdgim>, frames: usize| -> Vec<Vec<bool>> {
+        let common = Common { bdgim, almanac: almanac.clone(), reference: Some(set.toe), ..Common::default() };
+        let sender = (B_CNAV1.sender)(&common).unwrap();
+        let unit = |frame: usize| sender.unit(&carried, begin.plus_s(18.0 * frame as f64)).unwrap();
+        let three = |symbols: Vec<bool>| {
+            bcnav1::decode(carried.sv.number, &soft(&symbols, false).collect::<Vec<f32>>()).unwrap().three.unwrap()
+        };
+        (0..frames).map(|frame| three(unit(frame))).collect()
+    };
+    let page = |three: &Vec<bool>| number(&three[..6]);
+    // With the ionosphere every other frame is page 1, the others are a round of all satellites.
+    let electrons = Some(Bdgim { alpha_tecu: [20.0, 1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0] });
+    let all = pages(electrons, 2 * (count + places));
+    assert!(all.iter().skip(1).step_by(2).all(|three| page(three) == 1));
+    let others: Vec<&Vec<bool>> = all.iter().step_by(2).collect();
+    assert_eq!(others.iter().filter(|three| page(three) == 2).count(), places);
+    assert_eq!(others.iter().filter(|three| page(three) == 4).count(), count);
+    // Without it these take all frames.
+    assert!(pages(None, count + places).iter().all(|three| [2, 4].contains(&page(three))));
+    let mut seen = 0;
+    for three in others {
+        let page = page(three);
+        let of = |name: &str| values(page, name, three);
+        let (week, toa_s) = (of("almanac_week")[0], 4096.0 * of("toa_4096s")[0]);
+        let toa = Epoch::from_week((week as i64 + BDT_WEEK) as u32, toa_s);
+        for (place, prn) in of("almanac_prn").into_iter().enumerate().filter(|(_, prn)| *prn > 0.0) {
+            let one = |name: &str| of(name)[place];
+            let own = almanac.iter().find(|set| f64::from(set.sv.number) == prn).unwrap();
+            let is_medium = one("almanac_orbit_kind") == 3.0;
+            assert_eq!(is_medium, own.sv.orbit_m() < 35e6);
+            let is_geo = one("almanac_orbit_kind") == 1.0;
+            let semicircles = if is_geo { 0.0 } else { 0.3 };
+            // The node counts from Greenwich at the beginning of the week of BDT.
+            let node = one("almanac_omega0_rad") - ROTATION_RADPS * toa_s;
+            let (elements, bound_m) = if page == 4 {
+                let (e, m) = (one("almanac_eccentricity"), one("almanac_m0_rad"));
+                let anomaly = (0..20).fold(m, |anomaly, _| m + e * anomaly.sin());
+                let axis_m = one("almanac_sqrt_a_sqrtm").powi(2);
+                let truth = ((1.0 - e * e).sqrt() * anomaly.sin()).atan2(anomaly.cos() - e);
+                let inclination = semicircles * std::f64::consts::PI + one("almanac_delta_i_rad");
+                let elements =
+                    [axis_m * (1.0 - e * anomaly.cos()), truth + one("almanac_omega_rad"), inclination, node];
+                // Angles to half of 2⁻¹⁵ semicircles are 2 km each at 42 000 km, and harmonics are left out.
+                (elements, 15e3)
+            } else {
+                let axis_m = if is_medium { 27_906_100.0 } else { 42_162_200.0 } + one("almanac_delta_a_m");
+                let inclination: f64 = if is_geo { 0.0 } else { 55_f64.to_radians() };
+                // Half of 2⁻⁶ semicircles are 1.0e6 m each at 42 000 km. The eccentricity is left out, up to
+                // 0.01 (twice of it in the anomaly), and the inclination is off by some 2.5°.
+                ([axis_m, one("almanac_phi0_rad"), inclination, node], 4.2e6)
+            };
+            let at = BDT.instant(toa);
+            // As the message has it: geostationary orbits without their tilt of 5° against the equator.
+            let Some(true_m) = (!is_geo).then(|| own.state(at).unwrap().position_m) else { continue };
+            let placed = placed_m(elements);
+            let apart_m = (0..3).map(|axis| (placed[axis] - true_m[axis]).powi(2)).sum::<f64>().sqrt();
+            assert!(apart_m < bound_m, "page {page} C{prn}: {apart_m}");
+            seen += 1;
+        }
+    }
+    assert!(seen >= 30, "{seen}");
 }

@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use gnss_twin::gnss::bits::number;
+use gnss_twin::gnss::bits::{Field, number};
 use gnss_twin::gnss::broadcast::Ephemeris;
 use gnss_twin::gnss::crc::crc24q;
 use gnss_twin::gnss::gps::cnav2::{self, CNAV2, Frame};
 use gnss_twin::gnss::inflate;
 use gnss_twin::gnss::message::{Common, Message, Read};
 use gnss_twin::gnss::qzss::civil;
+use gnss_twin::gnss::rinex;
 use gnss_twin::gnss::satellite::{Sv, System};
 use gnss_twin::gnss::time::Epoch;
 
@@ -196,4 +197,136 @@ fn subframes_of_a_gps_satellite_are_sent_again_by_us_bit_by_bit() {
         seen += 1;
     }
     assert!(seen >= 4, "{seen}");
+}
+
+/// Subframe 3 without its check as J02 sent it on 2025-08-21: two pages 3 and five pages 4.
+const ALMANACS: [&str; 7] = [
+    "c20d29a0001555555c201c5446380005a30fe82ac189e2a04000aaaaaa80000",
+    "c20d29a019000010000aaaaaa80555555402aaaaaa0155555500aaaaaa80000",
+    "c21129a01841fae2bfed95d6c399bff6e169ffa000000000000000000000000",
+    "c21129a018e00800700595d781e90535d33a000000000000000000000000000",
+    "c21129a01861da655ff595d20a8bbf7f98cdffe000000000000000000000000",
+    "c21129a01881da519fef95ce4f5dbf805050000000000000000000000000000",
+    "c21129a019000480600795d840f44716b846000000000000000000000000000",
+];
+
+fn fields_of(page: u128) -> Vec<&'static Field> {
+    let name = format!("subframe 3, page {page}");
+    cnav2::tables().into_iter().find(|(table, _)| *table == name).map(|(_, fields)| fields).unwrap()
+}
+
+/// The values of a field that a page has once for each satellite.
+fn values(page: u128, name: &str, three: &Vec<bool>) -> Vec<f64> {
+    let own = fields_of(page).into_iter().filter(|field| field.name == name);
+    own.map(|field| field.value(field.read(three))).collect()
+}
+
+#[test]
+fn almanacs_of_real_pages_are_all_read_and_their_two_kinds_are_of_the_same_orbits() {
+    use std::f64::consts::{PI, TAU};
+    let mut reduced = BTreeMap::new();
+    let mut compared = 0;
+    for hex in ALMANACS {
+        let three = bits(hex, 250);
+        let page = number(&three[8..14]);
+        // What the fields hold, written again, is the page; the rest is reserved and zero.
+        let mut again = vec![false; 250];
+        again[..14].copy_from_slice(&three[..14]);
+        fields_of(page).iter().for_each(|field| field.write(&mut again, field.read(&three)));
+        assert_eq!(again, three, "{hex}");
+        let of = |name: &str| values(page, name, &three);
+        assert_eq!((of("almanac_week"), of("toa_4096s")), (vec![2381.0], vec![0.0]));
+        if page == 3 {
+            let angles = [of("almanac_omega0_rad"), of("almanac_phi0_rad"), of("almanac_delta_a_m")];
+            for (place, prn) in of("almanac_prn").into_iter().enumerate() {
+                reduced.insert(prn as u8, angles.each_ref().map(|values| values[place]));
+                // A packet without satellite alternates, as ours does.
+                assert!(prn != 0.0 || angles[2][place] == -86.0 * 512.0);
+            }
+            continue;
+        }
+        let one = |name: &str| of(name)[0];
+        let [node, latitude, axis_m] = reduced[&(one("almanac_prn") as u8)];
+        // Geostationary satellites have no node in the short one.
+        let is_inclined = one("almanac_eccentricity") > 1e-3;
+        let own_node = if is_inclined { one("almanac_omega0_rad") } else { 0.0 };
+        let step = PI / 64.0;
+        assert!(libm::remainder(node - own_node, TAU).abs() <= step, "{hex}");
+        let own = one("almanac_omega0_rad") - own_node + one("almanac_omega_rad") + one("almanac_m0_rad");
+        assert!(libm::remainder(latitude - own, TAU).abs() <= step, "{hex}");
+        // Steps of 1/16 of the root's unit are 0.8 km, and of the axis 0.5 km.
+        let root = one("almanac_sqrt_a_sqrtm");
+        assert!((axis_m + 42_164_200.0 - root * root).abs() < 1.5e3, "{hex}");
+        compared += 1;
+    }
+    assert_eq!((compared, reduced.len()), (5, 6));
+}
+
+#[test]
+fn almanacs_that_we_send_of_qzss_are_those_that_its_satellites_sent() {
+    let Some(path) = external("navbits/233h_rnx.nav.gz") else { return };
+    let packed = std::fs::read(path).unwrap();
+    let mut almanac = rinex::read(&packed, "233h_rnx.nav.gz").unwrap().ephemerides;
+    almanac.retain(|set| set.sv.system == System::Qzss && set.form.name.starts_with("LNAV"));
+    almanac.reverse();
+    almanac.sort_by_key(|set| set.sv);
+    almanac.dedup_by_key(|set| set.sv);
+    let reference = Some(Epoch::from_week(2381, 0.0));
+    let sender = (civil::CNAV2.sender)(&Common { almanac: almanac.clone(), reference, ..Common::default() }).unwrap();
+    let own = |frame: i64| {
+        let set = (civil::CNAV2.form)(&almanac[0]);
+        let symbols = sender.unit(&set, Epoch::from_week(2380, 370_800.0 + 18.0 * frame as f64)).unwrap();
+        cnav2::decode(&soft(&symbols, false)).unwrap().three.unwrap()
+    };
+    let pages: Vec<Vec<bool>> = (0..14).map(own).collect();
+    // 370 800 s are 20 600 frames. Odd frames are page 1; a round of six others is one of five satellites and
+    // five of one.
+    let numbers: Vec<u128> = pages.iter().map(|three| number(&three[8..14])).collect();
+    assert!(numbers.iter().skip(1).step_by(2).all(|page| *page == 1), "{numbers:?}");
+    assert_eq!(numbers.iter().step_by(2).filter(|page| **page == 4).count(), 6 - 1 + usize::from(numbers[0] == 4));
+    let mut compared = 0;
+    for real in ALMANACS.map(|hex| bits(hex, 250)) {
+        let page = number(&real[8..14]);
+        let prns = |three: &Vec<bool>| values(page, "almanac_prn", three);
+        for three in pages.iter().filter(|three| number(&three[8..14]) == page) {
+            for (place, prn) in prns(three).into_iter().enumerate().filter(|(_, prn)| *prn > 0.0) {
+                let Some(other) = prns(&real).iter().position(|other| *other == prn) else { continue };
+                // The operator predicts orbits for days, a set is of hours: Moon and Sun move the axis by a
+                // kilometre and the inclination by hundredths of a degree; a day's drift of the axis is along
+                // the track. The node's rate of hours has their short periods too. Perigee and node of a
+                // round orbit near the equator mean little.
+                let round = values(page, "almanac_eccentricity", &real).first().is_some_and(|e| *e < 1e-3);
+                for (name, bound) in [
+                    ("almanac_omega0_rad", if round { 0.2 } else { 0.06 }),
+                    ("almanac_phi0_rad", 0.06),
+                    ("almanac_delta_a_m", 2100.0),
+                    ("almanac_health", 0.0),
+                    ("almanac_eccentricity", 2e-4),
+                    ("almanac_delta_i_rad", 1.5e-3),
+                    ("almanac_sqrt_a_sqrtm", 0.2),
+                    ("almanac_omega_rad", if round { 7.0 } else { 0.01 }),
+                    ("almanac_m0_rad", if round { 7.0 } else { 0.01 }),
+                    ("almanac_omega_dot_radps", 4e-9),
+                    ("almanac_af0_s", 2e-6),
+                    ("almanac_af1_sps", 8e-12),
+                ] {
+                    let [Some(ours), Some(theirs)] = [(three, place), (&real, other)]
+                        .map(|(three, place)| values(page, name, three).get(place).copied())
+                    else {
+                        continue;
+                    };
+                    let apart = (ours - theirs).abs();
+                    let apart = if name.ends_with("0_rad") || name.ends_with("omega_rad") {
+                        libm::remainder(apart, std::f64::consts::TAU).abs()
+                    } else {
+                        apart
+                    };
+                    println!("page {page} {prn} {name}: {ours} {theirs}");
+                    assert!(apart <= bound, "page {page} {prn} {name}: {ours} {theirs}");
+                    compared += 1;
+                }
+            }
+        }
+    }
+    assert!(compared >= 65, "{compared}");
 }

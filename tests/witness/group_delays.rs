@@ -143,3 +143,43 @@ fn over_a_day_of_all_satellites_delays_are_those_of_the_hour_to_the_step() {
         }
     }
 }
+
+/// A day of all systems in RINEX 4, whose records of BeiDou's newer messages say how accurate signals are.
+const DAY: &str = "nav/BRD400DLR_S_20230710000_01D_MN.rnx.gz";
+
+#[test]
+fn records_of_the_newer_messages_of_beidou_are_read_where_their_accuracies_are_blank() {
+    let Some(path) = external(DAY) else { return };
+    let packed = std::fs::read(path).unwrap();
+    let text = String::from_utf8(inflate::inflate(&packed, 1 << 28).unwrap()).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    let header: Vec<&str> = lines.iter().copied().take_while(|line| !line.contains("END OF HEADER")).collect();
+    let of = |number: &str, message: &str, count: usize| -> Vec<String> {
+        let is_head =
+            |line: &&str| line.starts_with("> EPH C") && line[7..9] == *number && line.trim_end().ends_with(message);
+        let at = lines.iter().position(|line| is_head(line)).unwrap();
+        lines[at..at + count].iter().map(|line| (*line).to_owned()).collect()
+    };
+    let read = |records: &[Vec<String>]| {
+        let own = records.iter().flatten().map(String::as_str);
+        let end = ["                                                            END OF HEADER"];
+        let all: Vec<&str> = header.iter().copied().chain(end).chain(own).collect();
+        rinex::read((all.join("\n") + "\n").as_bytes(), "blank").unwrap().ephemerides
+    };
+    let old = of("29", "D1", 9);
+    for (message, count, signal) in [("CNV1", 11, &B1C), ("CNV2", 11, &B2A)] {
+        let whole = of("29", message, count);
+        let expected = read(&[old.clone(), whole.clone()]);
+        let delays = |sets: &[Ephemeris]| -> Vec<(bool, f64)> {
+            sets.iter().map(|set| (set.serves(signal), set.group_delay_s(signal))).collect()
+        };
+        assert!(delays(&expected).iter().all(|(own, _)| *own), "{message}");
+        // The seventh line of the record: blanks, or nothing at all where an editor cut them.
+        for blank in [" ".repeat(80), String::new()] {
+            let mut without = whole.clone();
+            without[7] = blank;
+            let found = read(&[old.clone(), without]);
+            assert_eq!(delays(&found), delays(&expected), "{message}");
+        }
+    }
+}

@@ -2,10 +2,13 @@
 //!
 //! Sources: Niell 1996 (NMF); Böhm, Werl & Schuh 2006 (VMF1: b and c in closed form); Landskron & Böhm 2018
 //! (VMF3: b and c by place and season). VMF1 and VMF3 take a from a Vienna grid or GPT3, at zero height, and
-//! add Niell's height correction to the hydrostatic factor. Limits: elevations below [`LOWEST_RAD`] take its
-//! mapping, where the continued fractions still make sense; a grid's coefficients are held for the whole
-//! scene. Those of VMF3's grids and of GPT3 under VMF1's closed form depart from VMF3, by 2 cm of delay at 5°
-//! and 2 mm at 10°.
+//! add Niell's height correction to the hydrostatic factor. All were fitted from 3° of elevation without
+//! refraction up. Below, their continued fractions would be 10 % too high at the horizon: a sine that is
+//! raised there brings Niell's hydrostatic factor to that of rays traced through the standard atmosphere,
+//! within 0.4 % at sea level, and the wet one to within 7 % of vapour whose density falls in 2 km to 2.5 km
+//! by 1/e. One over the sine, in the height correction and in the cosecant, is bounded there. Limits: no
+//! factor is defined below the horizon; a grid's coefficients are held for the whole scene. Those of VMF3's
+//! grids and of GPT3 under VMF1's closed form depart from VMF3, by 2 cm of delay at 5° and 2 mm at 10°.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -14,8 +17,14 @@ use gnss::time::Epoch;
 use gnss::vienna::{Gpt3, MappingA, MappingGrid, Vienna};
 use gnss::vmf3::{MappingBc, Vmf3};
 
-/// Elevation below which the mapping no longer grows: 1°. NMF was fitted from 3° up.
-pub const LOWEST_RAD: f64 = PI / 180.0;
+/// Sine of the elevation from which on the functions were fitted: 3° (Niell 1996).
+const FITTED_SIN: f64 = 0.052_335_956;
+/// By how much the sine is raised at the horizon, so that Niell's hydrostatic factor at 45° is 33.4 there.
+const RAISED_SIN: f64 = 0.0034;
+/// What stands for a sine of zero in one over it: the hydrostatic factor of rays traced along the horizon of
+/// the standard atmosphere grows by 0.5 a kilometre of height up to 10 km, and [`height_correction`] has that
+/// at 0.56°.
+const LEAST_SIN: f64 = 0.009_77;
 const YEAR_DAYS: f64 = 365.25;
 /// Day of the year about which seasons turn (Niell 1996; Böhm et al. 2006).
 const WINTER_DAY: f64 = 28.0;
@@ -52,12 +61,12 @@ impl Coefficients {
 }
 
 impl Mapping {
-    /// Hydrostatic and wet mapping factors.
+    /// Hydrostatic and wet mapping factors; below the horizon those of the horizon.
     pub fn factors(&self, user: Geodetic, elevation_rad: f64, at: Epoch) -> (f64, f64) {
         let day = season_day(at);
         match self {
             Self::Cosecant => {
-                let factor = 1.0 / libm::sin(elevation_rad.clamp(LOWEST_RAD, FRAC_PI_2));
+                let factor = 1.0 / bounded(sin(elevation_rad));
                 (factor, factor)
             }
             Self::Niell => niell(user, elevation_rad, day),
@@ -86,9 +95,9 @@ impl Mapping {
 
 /// Niell's hydrostatic and wet mapping factors at an elevation, by place and day of year (from 1.0).
 ///
-/// Niell 1996, equations 4 to 6 and tables 3 and 4; the factors hold still below [`LOWEST_RAD`].
+/// Niell 1996, equations 4 to 6 and tables 3 and 4; the factors hold still below the horizon.
 pub fn niell(user: Geodetic, elevation_rad: f64, day_of_year: f64) -> (f64, f64) {
-    let sin = libm::sin(elevation_rad.clamp(LOWEST_RAD, FRAC_PI_2));
+    let sin = sin(elevation_rad);
     let south_days = if user.latitude_rad < 0.0 { YEAR_DAYS / 2.0 } else { 0.0 };
     let season = libm::cos(TAU * (day_of_year - WINTER_DAY + south_days) / YEAR_DAYS);
     let latitude_deg = user.latitude_rad.abs().to_degrees();
@@ -97,35 +106,58 @@ pub fn niell(user: Geodetic, elevation_rad: f64, day_of_year: f64) -> (f64, f64)
             - interpolate(&HYDROSTATIC_AMPLITUDE[k], latitude_deg) * season
     });
     let wet = [0, 1, 2].map(|k| interpolate(&WET[k], latitude_deg));
-    (herring(sin, dry) + height_correction(sin, user.height_m), herring(sin, wet))
+    (mapped(sin, dry) + height_correction(sin, user.height_m), mapped(sin, wet))
+}
+
+/// The sine of an elevation above the horizon.
+fn sin(elevation_rad: f64) -> f64 {
+    libm::sin(elevation_rad.clamp(0.0, FRAC_PI_2))
+}
+
+/// How far a sine is below what was fitted: 1 at the horizon, 0 at 3° and above.
+fn below(sin: f64) -> f64 {
+    ((FITTED_SIN - sin) / FITTED_SIN).max(0.0)
+}
+
+/// The sine that the continued fractions take. Value and three derivatives go on at the seam.
+fn raised(sin: f64) -> f64 {
+    let square = below(sin) * below(sin);
+    sin + RAISED_SIN * square * square
+}
+
+/// A sine that does not reach zero. Value and two derivatives go on at the seam.
+fn bounded(sin: f64) -> f64 {
+    let below = below(sin);
+    sin + LEAST_SIN * below * below * below
 }
 
 /// What height adds to the hydrostatic factor (Niell 1996, equation 6).
 fn height_correction(sin: f64, height_m: f64) -> f64 {
+    let sin = bounded(sin);
     (1.0 / sin - herring(sin, HEIGHT)) * height_m * 1e-3
 }
 
 /// VMF1's hydrostatic and wet mapping factors with coefficients `a` at zero height, by day of year (from
 /// 1.0).
 ///
-/// Böhm et al. 2006, equations 3 to 6 and table 1; the factors hold still below [`LOWEST_RAD`].
+/// Böhm et al. 2006, equations 3 to 6 and table 1; the factors hold still below the horizon.
 pub fn vmf1(a: MappingA, user: Geodetic, elevation_rad: f64, day_of_year: f64) -> (f64, f64) {
-    let sin = libm::sin(elevation_rad.clamp(LOWEST_RAD, FRAC_PI_2));
+    let sin = sin(elevation_rad);
     let (phase_rad, c10, c11) = if user.latitude_rad < 0.0 { (PI, 0.002, 0.007) } else { (0.0, 0.001, 0.005) };
     let season = libm::cos(TAU * (day_of_year - WINTER_DAY) / YEAR_DAYS + phase_rad);
     let c = 0.062 + ((season + 1.0) * c11 / 2.0 + c10) * (1.0 - libm::cos(user.latitude_rad));
-    let dry = herring(sin, [a.hydrostatic, 0.0029, c]) + height_correction(sin, user.height_m);
-    (dry, herring(sin, [a.wet, 0.00146, 0.04391]))
+    let dry = mapped(sin, [a.hydrostatic, 0.0029, c]) + height_correction(sin, user.height_m);
+    (dry, mapped(sin, [a.wet, 0.00146, 0.04391]))
 }
 
 /// VMF3's hydrostatic and wet mapping factors with coefficients `a` at zero height, and `bc` of the place and
 /// day.
 ///
-/// Landskron & Böhm 2018; the factors hold still below [`LOWEST_RAD`].
+/// Landskron & Böhm 2018; the factors hold still below the horizon.
 pub fn vmf3(a: MappingA, bc: MappingBc, user: Geodetic, elevation_rad: f64) -> (f64, f64) {
-    let sin = libm::sin(elevation_rad.clamp(LOWEST_RAD, FRAC_PI_2));
-    let dry = herring(sin, [a.hydrostatic, bc.b_hydrostatic, bc.c_hydrostatic]);
-    (dry + height_correction(sin, user.height_m), herring(sin, [a.wet, bc.b_wet, bc.c_wet]))
+    let sin = sin(elevation_rad);
+    let dry = mapped(sin, [a.hydrostatic, bc.b_hydrostatic, bc.c_hydrostatic]);
+    (dry + height_correction(sin, user.height_m), mapped(sin, [a.wet, bc.b_wet, bc.c_wet]))
 }
 
 /// Columns are latitudes 15°, 30°, 45°, 60°, 75°; rows a, b, c.
@@ -154,6 +186,11 @@ fn interpolate(row: &[f64; 5], latitude_deg: f64) -> f64 {
         (Some(a), Some(b)) => a * (1.0 - share) + b * share,
         _ => f64::NAN,
     }
+}
+
+/// A factor by its coefficients.
+fn mapped(sin: f64, coefficients: [f64; 3]) -> f64 {
+    herring(raised(sin), coefficients)
 }
 
 fn herring(sin: f64, [a, b, c]: [f64; 3]) -> f64 {

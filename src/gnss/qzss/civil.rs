@@ -3,14 +3,15 @@
 //!
 //! Source: IS-QZSS-PNT-005, 4.3 (CNAV) and 4.2 (CNAV-2). The number in CNAV is that of the satellite, in
 //! CNAV-2 that of its codes; bits of health are those of LNAV by signal. Limits: messages are those of
-//! GPS in their order (10, 11, 30, 33; page 1). Real satellites send 60 and 61 and page 61 for Japan, 32,
-//! 37, and others.
+//! GPS in their order (10, 11, 30, 33; pages 1, 3 and 4). Real satellites send 60 and 61 and page 61 for
+//! Japan, 32, 37, and others.
 
 use crate::broadcast::{Ephemeris, SetForm};
 use crate::gps::{cnav, cnav2};
-use crate::message::Message;
+use crate::message::{Common, Message};
 use crate::qzss::lnav::{LNAV_SETS, unhealthy};
 use crate::qzss::own::{OwnReader, as_gps, like, named};
+use crate::satellite::System;
 
 /// CNAV as L5 of QZSS names it.
 pub static CNAV: Message = Message {
@@ -41,6 +42,14 @@ pub static CNAV_L2C: Message = Message {
 /// CNAV-2 as L1C of QZSS names it.
 pub static CNAV2: Message = Message {
     name: "CNAV-2 of QZSS",
+    // Almanacs have health by carrier, as CNAV has.
+    sender: |common| {
+        let almanac = common.almanac.iter().map(|set| match set.sv.system {
+            System::Qzss => as_gps(&(CNAV.form)(set)),
+            _ => set.clone(),
+        });
+        (cnav2::CNAV2.sender)(&Common { almanac: almanac.collect(), ..common.clone() })
+    },
     elements: |sv, raw, near| (cnav2::CNAV2.elements)(sv, raw, near).map(|set| named(set, &CNAV2)),
     reader: |sv| OwnReader::boxed(&cnav2::CNAV2, &CNAV2, sv),
     form: |set| form(set, &cnav2::CNAV2, &CNAV2),

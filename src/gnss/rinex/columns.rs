@@ -132,9 +132,11 @@ pub(super) fn read(text: &[u8]) -> Result<Contents, String> {
     let mut nequick: Option<(String, [f64; 3])> = None;
     let mut utc: Option<(String, Polynomial)> = None;
     let mut galileo: Option<(String, Polynomial)> = None;
-    let body: Vec<Line<'_>> = body.iter().filter(|(_, line)| !line.trim().is_empty()).copied().collect();
-    for group in body.chunk_by(|_, next| !form.begins(next.1)) {
-        match form.group(group) {
+    let is_blank = |(_, line): &&Line<'_>| line.trim().is_empty();
+    let body = body.get(body.iter().take_while(is_blank).count()..).unwrap_or_default();
+    for whole in body.chunk_by(|_, next| is_blank(&next) || !form.begins(next.1)) {
+        let group: Vec<Line<'_>> = whole.iter().filter(|line| !is_blank(line)).copied().collect();
+        match form.group(&group, whole) {
             Ok(Group::Record(record)) => contents.records.push(*record),
             Ok(Group::Delays(delays)) => contents.delays.push(delays),
             Ok(Group::Ionosphere(System::Navic, age, found)) => keep_first(&mut navic, age, found),
@@ -289,7 +291,8 @@ impl Form {
         contents.bdgim = thirds.first();
     }
 
-    fn group(&self, group: &[Line<'_>]) -> Result<Group, String> {
+    /// What a record holds, by its lines without and with blank ones.
+    fn group(&self, group: &[Line<'_>], whole: &[Line<'_>]) -> Result<Group, String> {
         let Some((first, title)) = group.first() else { return Ok(Group::Other) };
         let refuse = |what: &str| {
             Err(format!("line {first} ({}): {what}", title.chars().take(23).collect::<String>().trim_end()))
@@ -341,7 +344,7 @@ impl Form {
                     return refuse("expected the same satellite and its epoch in the line after this one");
                 }
                 if let Some(layout) = delays::layout(letter, message) {
-                    return self.delays(rest, layout).map(Group::Delays);
+                    return self.delays(layout.lines_of(rest, whole), layout).map(Group::Delays);
                 }
                 let is_fnav = message == "FNAV";
                 self.record(rest).map(|record| Group::Record(Box::new(Record { is_fnav, ..record })))

@@ -2,6 +2,7 @@
 //! count from 0, the first bit of a message or subframe (BDS-SIS-ICD-B1C 1.0, BDS-SIS-ICD-B2a 1.0 and
 //! BDS-SIS-ICD-B2b 1.0, section 7; clauses are those of B1C's).
 
+use crate::beidou::bcnav1::almanac::{Entry, PLACES};
 use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
 use crate::bits::{Element, Field, element, plain};
 use crate::broadcast::Ephemeris;
@@ -23,6 +24,7 @@ const ORBIT: &str = "7.4, table 7-5";
 const CLOCK: &str = "7.5, table 7-6";
 const UTC: &str = "7.12, table 7-16";
 const ELECTRONS: &str = "7.8";
+const ACCURACY: &str = "7.15 and 7.16";
 const HEALTH: &str = "7.14 to 7.17";
 
 /// What messages say.
@@ -40,6 +42,12 @@ pub(in crate::beidou) struct Content {
     /// Coefficients of BDGIM; nine zeros say nothing.
     pub alpha_tecu: [f64; 9],
     pub reserved: f64,
+    /// Predicted accuracies of the signal in space: the time of the prediction, of the orbit along and across
+    /// the track, and the clock's three.
+    pub accuracies: [f64; 5],
+    /// Reference time of almanacs, and their satellites.
+    pub toa: Epoch,
+    pub entries: [Entry; PLACES],
 }
 
 pub(in crate::beidou) type Of = Element<Content>;
@@ -49,7 +57,7 @@ fn steps(at: Epoch) -> f64 {
 }
 
 /// The kind of a satellite's orbit.
-pub(super) fn kind(sv: Sv) -> f64 {
+pub(in crate::beidou) fn kind(sv: Sv) -> f64 {
     match sv.orbit_m() {
         axis_m if axis_m < 35e6 => MEDIUM,
         _ if sv.is_geostationary() => 1.0,
@@ -57,8 +65,13 @@ pub(super) fn kind(sv: Sv) -> f64 {
     }
 }
 
+/// Semi-major axis from which the elements of a kind of orbit count.
+pub(in crate::beidou) fn reference_axis_of_m(kind: f64) -> f64 {
+    if kind == MEDIUM { MEDIUM_AXIS_M } else { HIGH_AXIS_M }
+}
+
 fn reference_axis_m(content: &Content) -> f64 {
-    if content.kind == MEDIUM { MEDIUM_AXIS_M } else { HIGH_AXIS_M }
+    reference_axis_of_m(content.kind)
 }
 
 /// The week of BDT.
@@ -203,4 +216,20 @@ pub(in crate::beidou) const fn sismai<const AT: u16>() -> Of {
         |c| f64::from(c.set.ura_index),
         |c, v| c.set.ura_index = v as u8,
     )
+}
+
+/// Predicted accuracies of the clock, 22 bits. Records of RINEX have the indices with a sign.
+#[rustfmt::skip]
+pub(in crate::beidou) const fn accuracies<const AT: u16>() -> [Of; 4] {
+    [
+        plain!("top_5min", const { [(AT, 11)] }, Whole, 0, ACCURACY, accuracies[0]),
+        plain!("sisai_ocb", const { [(AT + 11, 5)] }, Signed, 0, ACCURACY, accuracies[2]),
+        plain!("sisai_oc1", const { [(AT + 16, 3)] }, Signed, 0, ACCURACY, accuracies[3]),
+        plain!("sisai_oc2", const { [(AT + 19, 3)] }, Signed, 0, ACCURACY, accuracies[4]),
+    ]
+}
+
+/// Predicted accuracy of the orbit along and across the track.
+pub(in crate::beidou) const fn accuracy_along<const AT: u16>() -> Of {
+    plain!("sisai_oe", const { [(AT, 5)] }, Signed, 0, ACCURACY, accuracies[1])
 }

@@ -11,7 +11,8 @@
 //! Nine coefficients of BDGIM that are all zero are none: they are sent where the scene has none, and are not
 //! reported.
 //!
-//! Limits: nothing of other systems, of the Earth's orientation and no almanacs; nothing of UTC is read.
+//! Limits: nothing of other systems and of the Earth's orientation; almanacs are sent in B-CNAV1 alone, and
+//! none is read; nothing of UTC is read.
 
 pub(super) mod blocks;
 pub(super) mod typed;
@@ -52,6 +53,34 @@ pub(super) fn electrons_in(all: &Parameters) -> Option<(Coefficients, Parameters
     Some((coefficients(&raw)?, own.copied().collect()))
 }
 
+/// Names of the predicted accuracies, which are of no set.
+const ACCURACIES: [&str; 5] = ["top_5min", "sisai_oe", "sisai_ocb", "sisai_oc1", "sisai_oc2"];
+
+/// The predicted accuracies among the parameters of a unit.
+pub(super) fn accuracies_in(all: &Parameters) -> Parameters {
+    all.iter().filter(|(name, _)| ACCURACIES.contains(name)).copied().collect()
+}
+
+/// Predicted accuracies as they were reported last, and of which issue.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Accuracies {
+    issue: u32,
+    said: Parameters,
+}
+
+impl Accuracies {
+    /// Takes those of a unit. What is new of the issue, if something is.
+    pub fn take(&mut self, issue: u32, found: &Parameters) -> Option<Parameters> {
+        if issue != self.issue {
+            *self = Self { issue, said: Parameters::new() };
+        }
+        let new: Parameters = found.iter().filter(|one| !self.said.contains(one)).copied().collect();
+        self.said.retain(|(name, _)| !new.iter().any(|(other, _)| other == name));
+        self.said.extend(&new);
+        (!new.is_empty()).then_some(new)
+    }
+}
+
 /// Refuses coefficients of BDGIM that the fields cannot carry.
 pub(super) fn check(common: &Common) -> Result<(), FieldError> {
     let alpha_tecu = common.bdgim.map_or([0.0; 9], |model| model.alpha_tecu);
@@ -68,8 +97,8 @@ pub(super) fn fields(all: &[(&'static str, &'static Tables)]) -> Vec<(&'static s
     all.iter().map(|(name, tables)| (*name, of(tables))).collect()
 }
 
-/// The lines of a record of RINEX of B-CNAV1 and B-CNAV2 with their delays; what is not read (the time of the
-/// prediction and its accuracies) is blank.
+/// The lines of a record of RINEX of B-CNAV1 and B-CNAV2 with their delays; predicted accuracies that were
+/// not received are blank.
 pub(super) fn record_lines(set: &Ephemeris, raw: Raw<'_>, delays: RecordLine) -> Vec<RecordLine> {
     let mut lines = first_lines(set, raw);
     let [accuracy, health, flags] = status(raw);
@@ -92,8 +121,10 @@ pub(super) fn record_lines_of_b2b(set: &Ephemeris, raw: Raw<'_>) -> Vec<RecordLi
 fn first_lines(set: &Ephemeris, raw: Raw<'_>) -> Vec<RecordLine> {
     let mut lines = modern::orbit(set, Some(set.toe.tow_s()));
     let kind = raw("orbit_kind").map(|raw| raw as f64);
-    lines.push([Some(set.idot_radps), Some(set.delta_n_rate_radps2), kind, None]);
-    lines.push([None; 4]);
+    let [top, along, clock @ ..] = ACCURACIES.map(|name| raw(name).map(|raw| raw as f64));
+    lines.push([Some(set.idot_radps), Some(set.delta_n_rate_radps2), kind, top.map(|steps| STEP_S as f64 * steps)]);
+    let [offset, drift, ageing] = clock;
+    lines.push([along, offset, drift, ageing]);
     lines
 }
 
@@ -116,6 +147,9 @@ pub(super) fn blank(set: Ephemeris) -> Content {
         utc: UtcNumbers::default(),
         alpha_tecu: [0.0; 9],
         reserved: 0.0,
+        accuracies: [0.0; 5],
+        toa: sent,
+        entries: Default::default(),
     }
 }
 

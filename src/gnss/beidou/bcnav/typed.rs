@@ -10,7 +10,7 @@ use std::fmt;
 use std::sync::LazyLock;
 
 use super::blocks::Content;
-use super::{Tables, blank, electrons_in, integers_in, of_integers, sent_at};
+use super::{Accuracies, Tables, accuracies_in, blank, electrons_in, integers_in, of_integers, sent_at};
 use crate::bits::{Field, FieldError, bits_of, read_all, write_all};
 use crate::broadcast::Ephemeris;
 use crate::crc::crc24q;
@@ -210,12 +210,14 @@ pub(in crate::beidou) struct TypedReader {
     parts: Vec<Part>,
     /// What the set that was reported last said.
     complete: Option<Parameters>,
+    accuracies: Accuracies,
 }
 
 impl TypedReader {
     /// A reader that has read nothing.
     pub fn new(layout: &'static Layout, sv: Sv) -> Self {
-        Self { layout, sv, frames: Frames::new(layout.symbols()), parts: Vec::new(), complete: None }
+        let frames = Frames::new(layout.symbols());
+        Self { layout, sv, frames, parts: Vec::new(), complete: None, accuracies: Accuracies::default() }
     }
 
     /// Takes a message that ends with the newest symbol.
@@ -225,10 +227,19 @@ impl TypedReader {
         let mut news = vec![Read::Unit { symbols: layout.symbols() as u64, of_week_s, inverted }];
         news.extend(layout.sent_at(&bits, near).map(Read::Time));
         let all = integers_in(layout.of_type(layout.type_of(&bits)), &bits);
+        let rows = |issue: i64, raws| {
+            Read::Parameters(NavigationRow::each(self.sv, layout.message.name, issue as u32, raws).collect())
+        };
+        let issue = layout.issue(&bits);
         if let Some((coefficients, raws)) = electrons_in(&all) {
             news.push(Read::Ionosphere(coefficients));
-            let rows = |issue| NavigationRow::each(self.sv, layout.message.name, issue as u32, raws);
-            news.extend(layout.issue(&bits).map(|issue| Read::Parameters(rows(issue).collect())));
+            news.extend(issue.map(|issue| rows(issue, raws)));
+        }
+        // Those in messages of a set are reported with it.
+        let beside = !layout.set.contains(&layout.type_of(&bits));
+        if let Some(issue) = issue.filter(|_| beside) {
+            let accuracies = self.accuracies.take(issue as u32, &accuracies_in(&all));
+            news.extend(accuracies.map(|raws| rows(issue, raws)));
         }
         self.keep(bits, of_week_s);
         self.look_for_set(near, &mut news);
@@ -283,8 +294,9 @@ impl TypedReader {
             let tables = layout.of_type(*kind);
             tables.iter().for_each(|table| read_all(table, bits, &mut content));
             let found = integers_in(tables, bits);
-            // Coefficients of the ionosphere bear the issue of their message.
-            let beside = electrons_in(&found).map(|(_, electrons)| electrons).unwrap_or_default();
+            // Coefficients of the ionosphere and predicted accuracies bear the issue of their message.
+            let electrons = electrons_in(&found).map(|(_, electrons)| electrons).unwrap_or_default();
+            let beside: Parameters = electrons.into_iter().chain(accuracies_in(&found)).collect();
             for (name, raw) in found.into_iter().filter(|(name, _)| own.contains(name)).chain(beside) {
                 all.retain(|(other, _)| *other != name);
                 all.push((name, raw));

@@ -1,6 +1,7 @@
 //! The field tables of B-CNAV1: places count from 0, the first bit of a subframe (BDS-SIS-ICD-B1C 1.0,
 //! figures 6-5 to 6-9, tables 7-2 to 7-7).
 
+use super::almanac::{OF_MEDIUM, OF_REDUCED};
 use crate::beidou::bcnav::blocks::{self, Of};
 use crate::beidou::bcnav::{self, Tables};
 use crate::bits::Kind::{Signed, Whole};
@@ -35,6 +36,8 @@ static HEADER: [Of; 4] = [
 ];
 
 /// What page 1 has beside it.
+static ALONG: [Of; 1] = [blocks::accuracy_along::<15>()];
+static ACCURACIES: [Of; 4] = blocks::accuracies::<20>();
 static ELECTRONS: [Of; 9] = blocks::electrons::<42>();
 static UTC: [Of; 9] = blocks::utc::<116>();
 
@@ -44,9 +47,15 @@ pub(super) static THREE: &Tables = &[&HEADER];
 pub(super) static SET: &Tables = &[&BEGIN, &FIRST_HALF, &SECOND_HALF, &CLOCK, &DELAY, &HEADER];
 
 /// Of page 1 of subframe 3 beside what is of a set.
-pub(super) static BESIDE: &Tables = &[&ELECTRONS, &UTC];
+pub(super) static BESIDE: &Tables = &[&ALONG, &ACCURACIES, &ELECTRONS, &UTC];
 
 /// Every field by the subframe that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
-    bcnav::fields(&[("subframe 2", TWO), ("subframe 3", THREE), ("subframe 3, page 1", BESIDE)])
+    bcnav::fields(&[
+        ("subframe 2", TWO),
+        ("subframe 3", THREE),
+        ("subframe 3, page 1", BESIDE),
+        ("subframe 3, page 2", &OF_REDUCED),
+        ("subframe 3, page 4", &OF_MEDIUM),
+    ])
 }

@@ -6,12 +6,15 @@
 //! interleaved together. The matrices of the codes are those of the document's section 6.2.2, packed in
 //! `ldpc_2.bin` and `ldpc_3.bin`.
 //!
-//! Subframe 3 is page 1 (ionosphere, UTC) where BDGIM's coefficients are known, and else page 2, whose
-//! almanacs are empty (number 0); the document leaves the order open.
+//! Of subframe 3 page 1 (ionosphere, UTC) is sent where BDGIM's coefficients are known, and pages 2 and 4
+//! (almanacs) of the satellites that are known: odd frames are page 1, where that is sent, and the others go
+//! through the almanacs.
 //!
-//! Limits: those of [`super::bcnav`]; page 1 has zeros for predicted accuracies. Of other pages than 1 health
-//! alone is read.
+//! Limits: those of [`super::bcnav`]; predicted accuracies are sent as zeros. Page 3 has the Earth's
+//! orientation, of which a scene knows nothing, and is not sent. Of other pages than 1 health and predicted
+//! accuracies alone are read.
 
+pub(super) mod almanac;
 mod fields;
 mod reader;
 
@@ -20,7 +23,7 @@ use std::sync::LazyLock;
 use crate::beidou::b1c::{B1C, CARRIER_HZ as B1C_HZ};
 use crate::beidou::b2a::B2A;
 use crate::beidou::bcnav::blocks::Content;
-use crate::beidou::bcnav::{self, blank, integers_in, record_lines, sent_at};
+use crate::beidou::bcnav::{self, Tables, blank, integers_in, record_lines, sent_at};
 use crate::beidou::bcnav2::B_CNAV2;
 use crate::bits::{FieldError, bits_of, number, read_all, write_all};
 use crate::broadcast::{Ephemeris, SetForm};
@@ -32,6 +35,7 @@ use crate::message::{Common, Message, Parameters, Records, Sender, UtcNumbers};
 use crate::satellite::Sv;
 use crate::signal::Signal;
 use crate::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
+use almanac::{Almanacs, OF_ACCURACIES, OF_MEDIUM, OF_REDUCED, is_first};
 pub use fields::tables;
 use fields::{BESIDE, SET, THREE, TWO};
 pub use reader::BCnav1Reader;
@@ -44,13 +48,16 @@ pub static B_CNAV1: Message = Message {
     unit_s: FRAME_S,
     set_s: FRAME_S,
     first_s: 0,
-    sender: |common| bcnav::check(common).map(|()| Box::new(Frames { common: common.clone() }) as _),
+    sender: |common| {
+        bcnav::check(common)?;
+        Ok(Box::new(Frames { common: common.clone(), almanacs: Almanacs::of(common) }))
+    },
     number: |_| 1,
     timed: &[1],
     dated: &[],
     set: &[1],
     reduced: &[],
-    ionosphere: bcnav::ionosphere(|_| true),
+    ionosphere: bcnav::ionosphere(is_first),
     set_parameters: || bcnav::set_parameters(SET),
     elements: |sv, raw, near| bcnav::of_integers((SET, &B_CNAV1_SETS), sv, raw, near),
     parameters: opened,
@@ -111,9 +118,10 @@ const CHECK_BITS: usize = 24;
 const NUMBER_SYMBOLS: usize = 21;
 const SYMBOLS_1: usize = 72;
 const SYMBOLS: usize = SYMBOLS_1 + 2 * BITS_2 + 2 * BITS_3;
-/// Pages of subframe 3: of the ionosphere and UTC, and of almanacs.
+/// Pages of subframe 3: of the ionosphere and UTC, of four almanacs, and of one.
 const WITH_ELECTRONS: u8 = 1;
 const WITH_ALMANACS: u8 = 2;
+const WITH_ONE: u8 = 4;
 
 /// The codes of subframe 1 (6.2.1).
 const NUMBER_CODE: RegisterCode = RegisterCode { stages: 6, feedback: 0b11_1010, symbols: NUMBER_SYMBOLS };
@@ -216,6 +224,7 @@ pub fn decode(number: u8, soft: &[f32]) -> Option<Frame> {
 /// Makes the frames of satellites.
 struct Frames {
     common: Common,
+    almanacs: Almanacs,
 }
 
 impl Sender for Frames {
@@ -224,23 +233,32 @@ impl Sender for Frames {
             let expected = "a multiple of 18 s of BDT";
             return Err(FieldError::Start { message: B_CNAV1.name, start_s: start.tow_s(), expected });
         }
-        let [two, three] = subframes(set, &self.common, start)?.map(checked);
+        let [two, three] = self.subframes(set, start)?.map(checked);
         let time = start.tow_whole_s() % HOUR_S / FRAME_S;
         Ok(encoded(set.sv.number, time as u32, &two, &three))
     }
 }
 
-/// The bits of subframes 2 and 3 of a set without their checks.
-fn subframes(set: &Ephemeris, common: &Common, start: Epoch) -> Result<[Vec<bool>; 2], FieldError> {
-    let page = if common.bdgim.is_some() { WITH_ELECTRONS } else { WITH_ALMANACS };
-    let utc = UtcNumbers::of(common, start, &BDT, (BDT_WEEK, 0));
-    let alpha_tecu = common.bdgim.map_or([0.0; 9], |model| model.alpha_tecu);
-    let content = Content { sent: start, page: f64::from(page), utc, alpha_tecu, ..blank(set.clone()) };
-    let [mut two, mut three] = [BITS_2, BITS_3].map(|bits| vec![false; bits - CHECK_BITS]);
-    TWO.iter().try_for_each(|table| write_all(table, &content, &mut two))?;
-    let beside = if page == WITH_ELECTRONS { BESIDE } else { &[] };
-    THREE.iter().chain(beside).try_for_each(|table| write_all(table, &content, &mut three))?;
-    Ok([two, three])
+impl Frames {
+    /// The bits of subframes 2 and 3 of a set without their checks.
+    fn subframes(&self, set: &Ephemeris, start: Epoch) -> Result<[Vec<bool>; 2], FieldError> {
+        let common = &self.common;
+        let (page, entries) = self.almanacs.page_at(common.bdgim.is_some(), start);
+        let utc = UtcNumbers::of(common, start, &BDT, (BDT_WEEK, 0));
+        let alpha_tecu = common.bdgim.map_or([0.0; 9], |model| model.alpha_tecu);
+        let toa = self.almanacs.toa;
+        let content =
+            Content { sent: start, page: f64::from(page), utc, alpha_tecu, toa, entries, ..blank(set.clone()) };
+        let [mut two, mut three] = [BITS_2, BITS_3].map(|bits| vec![false; bits - CHECK_BITS]);
+        TWO.iter().try_for_each(|table| write_all(table, &content, &mut two))?;
+        let beside: &Tables = match page {
+            WITH_ELECTRONS => BESIDE,
+            WITH_ONE => &OF_MEDIUM,
+            _ => &OF_REDUCED,
+        };
+        THREE.iter().chain(beside).try_for_each(|table| write_all(table, &content, &mut three))?;
+        Ok([two, three])
+    }
 }
 
 /// The bits of a subframe with their check.
@@ -276,10 +294,13 @@ fn of_set_in(two: &Vec<bool>, three: &Vec<bool>) -> Parameters {
     found
 }
 
-/// The raw integers of page 1 that are of no set; none of another page.
+/// The raw integers of a page that are of no set, but almanacs.
 fn beside_in(three: &Vec<bool>) -> Parameters {
-    let page = number(three.get(..6).unwrap_or_default());
-    if page == u128::from(WITH_ELECTRONS) { integers_in(BESIDE, three) } else { Parameters::new() }
+    match number(three.get(..6).unwrap_or_default()) as u8 {
+        WITH_ELECTRONS => integers_in(BESIDE, three),
+        WITH_ALMANACS | WITH_ONE => integers_in(&OF_ACCURACIES, three),
+        _ => Parameters::new(),
+    }
 }
 
 /// The set in subframes 2 and 3, sent at `sent`.

@@ -4,7 +4,7 @@
 //! check of subframe 2 decides.
 
 use super::{B_CNAV1, Frame, SYMBOLS, SYMBOLS_1, beside_in, decode, elements, likely_time, of_set_in};
-use crate::beidou::bcnav::electrons_in;
+use crate::beidou::bcnav::{Accuracies, accuracies_in, electrons_in};
 use crate::fec::frames::Frames;
 use crate::message::{Parameters, Read, Reader};
 use crate::record::NavigationRow;
@@ -25,12 +25,13 @@ pub struct BCnav1Reader {
     complete: Option<Parameters>,
     /// The coefficients of the ionosphere that were reported last, and of which issue.
     electrons: Option<(u32, Parameters)>,
+    accuracies: Accuracies,
 }
 
 impl BCnav1Reader {
     /// A reader that has read nothing.
     pub fn new(sv: Sv) -> Self {
-        Self { sv, frames: Frames::new(SYMBOLS), complete: None, electrons: None }
+        Self { sv, frames: Frames::new(SYMBOLS), complete: None, electrons: None, accuracies: Accuracies::default() }
     }
 
     /// Takes a frame that ends with the newest symbol.
@@ -43,7 +44,10 @@ impl BCnav1Reader {
         let set = elements(self.sv, &frame.two, beside, sent);
         // A frame is of one set, and what it says besides bears its issue.
         let issue = u32::from(set.iode);
-        if let Some((coefficients, raws)) = electrons_in(&beside_in(beside)) {
+        let beside = beside_in(beside);
+        let accuracies = self.accuracies.take(issue, &accuracies_in(&beside));
+        news.extend(accuracies.map(|raws| Read::Parameters(self.rows(issue, raws))));
+        if let Some((coefficients, raws)) = electrons_in(&beside) {
             news.push(Read::Ionosphere(coefficients));
             let own = Some((issue, raws));
             if self.electrons != own {

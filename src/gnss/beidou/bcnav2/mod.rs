@@ -111,6 +111,7 @@ static DELAY: [Of; 4] = [
     plain!("isc_b2ad_s", [(133, 12)], Signed, -34, DELAYS, set.isc_s[0]),
     plain!("tgd_b1cp_s", [(219, 12)], Signed, -34, DELAYS, set.tgd_s),
 ];
+static ACCURACIES_34: [Of; 4] = blocks::accuracies::<42>();
 static CLOCK_34: [Of; 4] = blocks::clock::<64>();
 static ISSUE_34: [Of; 1] = [blocks::iodc::<133>()];
 static UTC: [Of; 9] = blocks::utc::<143>();
@@ -118,7 +119,7 @@ static UTC: [Of; 9] = blocks::utc::<143>();
 static TEN: &Tables = &[&BEGIN, &FIRST_HALF];
 static ELEVEN: &Tables = &[&HEADER, &SECOND_HALF];
 static THIRTY: &Tables = &[&HEADER, &CLOCK, &DELAY, &ELECTRONS];
-static THIRTY_FOUR: &Tables = &[&HEADER, &CLOCK_34, &ISSUE_34, &UTC];
+static THIRTY_FOUR: &Tables = &[&HEADER, &ACCURACIES_34, &CLOCK_34, &ISSUE_34, &UTC];
 /// Those with parameters of a set.
 static SET: &Tables = &[&BEGIN, &FIRST_HALF, &HEADER, &SECOND_HALF, &CLOCK, &DELAY];
 

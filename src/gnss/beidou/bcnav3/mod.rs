@@ -99,10 +99,12 @@ static ELECTRONS: [Of; 9] = blocks::electrons::<124>();
 static CLOCK: [Of; 4] = blocks::clock::<43>();
 static DELAY: [Of; 1] = [plain!("tgd_b2bi_s", [(112, 12)], Signed, -34, DELAYS, set.tgd_s)];
 static UTC: [Of; 9] = blocks::utc::<198>();
+static ACCURACIES: [Of; 4] = blocks::accuracies::<433>();
+static ALONG: [Of; 1] = [blocks::accuracy_along::<455>()];
 static HEALTH: [Of; 1] = [blocks::health::<460>()];
 
 static TEN: &Tables = &[&FIRST_HALF, &SECOND_HALF, &STATUS];
-static THIRTY: &Tables = &[&TIME, &CLOCK, &DELAY, &ELECTRONS, &UTC, &HEALTH];
+static THIRTY: &Tables = &[&TIME, &CLOCK, &DELAY, &ELECTRONS, &UTC, &ACCURACIES, &ALONG, &HEALTH];
 /// Those with parameters of a set.
 static SET: &Tables = &[&FIRST_HALF, &SECOND_HALF, &STATUS, &TIME, &CLOCK, &DELAY, &HEALTH];
 

@@ -20,9 +20,9 @@ pub(in crate::gps) const REFERENCE_NODE_RADPS: f64 = -2.6e-9 * GPS_PI;
 /// Step of reference times.
 pub(in crate::gps) const STEP_S: i64 = 300;
 /// Bits of health, by carrier.
-pub(super) const L1: u16 = 1;
-pub(super) const L2: u16 = 2;
-pub(super) const L5: u16 = 4;
+pub(in crate::gps) const L1: u16 = 1;
+pub(in crate::gps) const L2: u16 = 2;
+pub(in crate::gps) const L5: u16 = 4;
 
 const HEAD: &str = "20.3.2";
 const ORBIT: &str = "20.3.3.1, table 20-I";

@@ -30,8 +30,8 @@ use crate::satellite::Sv;
 use crate::signal::Signal;
 use crate::time::{Epoch, GPST};
 pub use fields::tables;
-use fields::{CLOCKS, DELAY, HEADER, L1, L2, L5, ORBIT_1, ORBIT_2, TIME};
-pub(super) use fields::{REFERENCE_NODE_RADPS, STEP_S, reference_axis_m};
+use fields::{CLOCKS, DELAY, HEADER, ORBIT_1, ORBIT_2, TIME};
+pub(super) use fields::{L1, L2, L5, REFERENCE_NODE_RADPS, STEP_S, reference_axis_m};
 pub use on_l2c::CNAV_L2C;
 pub use reader::CnavReader;
 

@@ -2,6 +2,7 @@
 //! to 3.5-2, tables 3.5-1 to 3.5-3).
 
 use super::Content;
+use super::almanac::{OF_MEDIUM, OF_REDUCED};
 use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
 use crate::bits::{Element, Field, element, plain};
 use crate::gps::cnav::{REFERENCE_NODE_RADPS, STEP_S, reference_axis_m};
@@ -118,5 +119,10 @@ pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
     fn of(tables: &[&'static [Of]]) -> Vec<&'static Field> {
         tables.iter().flat_map(|table| table.iter()).map(|element| &element.field).collect()
     }
-    vec![("subframe 2", of(&[&SET])), ("subframe 3, page 1", of(&[&HEADER, &OF_UTC, &DELAY]))]
+    vec![
+        ("subframe 2", of(&[&SET])),
+        ("subframe 3, page 1", of(&[&HEADER, &OF_UTC, &DELAY])),
+        ("subframe 3, page 3", of(&OF_REDUCED)),
+        ("subframe 3, page 4", of(&OF_MEDIUM)),
+    ]
 }

@@ -5,12 +5,14 @@
 //! 274. The last two have checks, are coded at rate one half and interleaved together. The matrices of the
 //! codes are those of 6.2, packed in `ldpc_2.bin` and `ldpc_3.bin`.
 //!
-//! Limits: subframe 3 is always page 1 (UTC, ionosphere, corrections between signals); of satellites that
-//! send others, too, a set is whole once page 1 has come. Left out are page 2 (other systems' times, the
-//! Earth's orientation), 3 and 4 (almanacs), 5 (corrections), 6 (text) and those that QZSS alone sends.
-//! Of UTC nothing is used. Sets of LNAV become those of CNAV-2 as they become those of CNAV
-//! ([`super::cnav`]), with delays of both parts of L1C that are those of L1 where the file has none.
+//! Sent are page 1 (UTC, ionosphere, corrections between signals), 3 and 4 (almanacs) of subframe 3: odd
+//! frames are page 1, even ones go through the almanacs. A set is whole once page 1 has come, and changes
+//! with a frame that has it. Limits: left out are page 2, which has the Earth's orientation, of which a scene
+//! knows nothing, beside other systems' times, 5 (corrections), 6 (text) and those that QZSS alone sends.
+//! Almanacs are not read. Of UTC nothing is used. Sets of LNAV become those of CNAV-2 as they become those of
+//! CNAV ([`super::cnav`]), with delays of both parts of L1C that are those of L1 where the file has none.
 
+mod almanac;
 mod fields;
 mod reader;
 
@@ -31,6 +33,7 @@ use crate::message::{Common, IonosphereForm, Message, Parameters, Raw, RecordLin
 use crate::satellite::Sv;
 use crate::signal::Signal;
 use crate::time::{Epoch, GPST, WEEK_S};
+use almanac::{Almanacs, Entry, MEDIUM, OF_MEDIUM, OF_REDUCED, PACKETS, REDUCED, is_first};
 pub use fields::tables;
 use fields::{DELAY, HEADER, OF_UTC, SET};
 pub use reader::Cnav2Reader;
@@ -41,15 +44,16 @@ pub static CNAV2: Message = Message {
     symbol_s: 0.01,
     bit: |_| &[1],
     unit_s: FRAME_S,
-    set_s: FRAME_S,
-    first_s: 0,
-    sender: |common| Ok(Box::new(Frames(common.clone()))),
-    number: |_| 1,
-    timed: &[1],
+    // A new set begins with page 1.
+    set_s: 2 * FRAME_S,
+    first_s: FRAME_S,
+    sender: |common| Ok(Box::new(Frames { common: common.clone(), almanacs: Almanacs::of(common) })),
+    number: |start| if is_first(start) { 1 } else { 2 },
+    timed: &[1, 2],
     dated: &[],
     set: &[1],
     reduced: &[],
-    ionosphere: IonosphereForm { model: Model::Klobuchar, unit: |_| true, coefficients: ionosphere },
+    ionosphere: IonosphereForm { model: Model::Klobuchar, unit: is_first, coefficients: ionosphere },
     set_parameters,
     elements: of_integers,
     parameters: opened,
@@ -90,7 +94,7 @@ const CHECK_BITS: usize = 24;
 /// Symbols of subframe 1, and of a frame.
 const SYMBOLS_1: usize = 52;
 const SYMBOLS: usize = SYMBOLS_1 + 2 * BITS_2 + 2 * BITS_3;
-/// The page that is sent and read.
+/// The page that is read.
 const PAGE: f64 = 1.0;
 
 static CODE_2: LazyLock<Ldpc> = LazyLock::new(|| Ldpc::packed(BITS_2, include_bytes!("ldpc_2.bin")));
@@ -121,6 +125,9 @@ struct Content {
     page: f64,
     klobuchar: Klobuchar,
     utc: UtcNumbers,
+    toa: Epoch,
+    /// Satellites of page 3; the first is that of page 4.
+    entries: [Entry; PACKETS],
 }
 
 /// A frame as decoded: its checks are right.
@@ -183,7 +190,10 @@ pub fn decode(soft: &[f32]) -> Option<Frame> {
 }
 
 /// Makes the frames of satellites.
-struct Frames(Common);
+struct Frames {
+    common: Common,
+    almanacs: Almanacs,
+}
 
 impl Sender for Frames {
     fn unit(&self, set: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
@@ -191,21 +201,36 @@ impl Sender for Frames {
             let expected = "a multiple of 18 s";
             return Err(FieldError::Start { message: CNAV2.name, start_s: start.tow_s(), expected });
         }
+        let (page, entries) = self.almanacs.page_at(set.sv.system, start);
         let content = Content {
+            page,
+            entries,
+            toa: self.almanacs.toa,
             week: start.week().rem_euclid(8192) as f64,
             itow: (start.tow_whole_s() / INTERVAL_S) as f64,
             // Predicted for the reference time itself.
             top: set.toe.tow_s() / STEP_S as f64,
             op_week: set.toe.week().rem_euclid(256) as f64,
-            klobuchar: self.0.klobuchar.unwrap_or(Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] }),
-            utc: UtcNumbers::of(&self.0, start, &GPST, (0, 1)),
+            klobuchar: self.common.klobuchar.unwrap_or(Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] }),
+            utc: UtcNumbers::of(&self.common, start, &GPST, (0, 1)),
             ..blank(set.clone())
         };
         let two = checked(&[&SET], &content, BITS_2)?;
-        let three = checked(&[&HEADER, &OF_UTC, &DELAY], &content, BITS_3)?;
+        let three = checked(&of_page(page), &content, BITS_3)?;
         let time = (start.tow_whole_s() / FRAME_S + 1) % FRAMES;
         Ok(interleaved(&coded(time as u32, &two, &three)))
     }
+}
+
+/// The tables of a page of subframe 3.
+fn of_page(page: f64) -> Vec<&'static [Element<Content>]> {
+    let header: &[Element<Content>] = &HEADER;
+    let rest: &[&[Element<Content>]] = match page {
+        REDUCED => &OF_REDUCED,
+        MEDIUM => &OF_MEDIUM,
+        _ => &[&OF_UTC, &DELAY],
+    };
+    [&[header], rest].concat()
 }
 
 /// The bits of a subframe with their check.
@@ -253,21 +278,29 @@ fn set_parameters() -> Vec<&'static str> {
     names.filter(|name| !PASSING.contains(name)).collect()
 }
 
-/// The raw integers of the set in subframe 2 and in page 1.
-fn of_set_in(two: &Vec<bool>, page_1: &Vec<bool>) -> Parameters {
+/// The raw integers of the set in subframe 2.
+fn of_two(two: &Vec<bool>) -> Parameters {
     let mut found = integers(&SET, two);
     found.retain(|(name, _)| !PASSING.contains(name));
+    found
+}
+
+/// The same with those in page 1.
+fn of_set_in(two: &Vec<bool>, page_1: &Vec<bool>) -> Parameters {
+    let mut found = of_two(two);
     found.extend(integers(&DELAY, page_1));
     found
 }
 
-/// The parameters of a unit's symbols.
+/// The parameters of a unit's symbols: of subframe 2, and of page 1 where that is there.
 fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
     let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
     let frame = decode(&soft)?;
-    let page_1 = frame.page_1()?;
-    let mut found = of_set_in(&frame.two, page_1);
-    found.extend(integers(&OF_UTC, page_1));
+    let mut found = of_two(&frame.two);
+    if let Some(page_1) = frame.page_1() {
+        found.extend(integers(&DELAY, page_1));
+        found.extend(integers(&OF_UTC, page_1));
+    }
     Some((true, found))
 }
 
@@ -284,7 +317,14 @@ fn blank(set: Ephemeris) -> Content {
         page: PAGE,
         klobuchar: Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] },
         utc: UtcNumbers::default(),
+        toa: Epoch::new(0, 0.0),
+        entries: [Entry::EMPTY; PACKETS],
     }
+}
+
+/// The same of no satellite in particular.
+fn nothing() -> Content {
+    blank(Ephemeris::blank(Sv::gps(1), Epoch::new(0, 0.0)))
 }
 
 /// The elements that raw integers give, as if they had been sent at `near`.
@@ -311,7 +351,7 @@ fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
 
 /// The coefficients in the bits of page 1.
 fn klobuchar(page_1: &Vec<bool>) -> Klobuchar {
-    let mut content = blank(Ephemeris::blank(Sv::gps(1), Epoch::new(0, 0.0)));
+    let mut content = nothing();
     read_all(&DELAY, page_1, &mut content);
     content.klobuchar
 }

@@ -8,16 +8,13 @@ use crate::bits::{FieldError, write_all};
 use crate::broadcast::Ephemeris;
 use crate::earth::GPS_PI;
 use crate::klobuchar::Klobuchar;
+use crate::message::{ALMANAC_STEP_S, almanac_time};
 use crate::satellite::{Sv, System};
-use crate::time::{Epoch, TimePolynomial, WEEK_S};
+use crate::time::{Epoch, TimePolynomial};
 
 /// The inclination from which the almanac counts, in semicircles (IS-GPS-200N, table 20-VI).
 pub const ALMANAC_INCLINATION_SEMICIRCLES: f64 = 0.30;
-/// Step of an almanac's reference time (IS-GPS-200N, table 20-VI).
-const TOA_STEP_S: i64 = 4096;
 const DAY_S: i64 = 86_400;
-/// The last reference time inside a week (IS-GPS-200N, table 20-VI).
-const TOA_LAST_S: i64 = 602_112;
 /// "Data ID" of the present structure, 01, in bits 61 and 62 (IS-GPS-200N, 20.3.3.5.1.1).
 const DATA_ID: u32 = 1;
 /// Reserved bits alternate (IS-GPS-200N, 20.3.3.5.1).
@@ -152,12 +149,6 @@ impl LeapEvent {
     }
 }
 
-/// The multiple of 4096 s nearest to `reference` inside its week.
-fn reference_time(reference: Epoch) -> Epoch {
-    let tow_s = ((reference.tow_whole_s() + TOA_STEP_S / 2) / TOA_STEP_S * TOA_STEP_S).min(TOA_LAST_S);
-    Epoch::new(reference.week() * WEEK_S + tow_s, 0.0)
-}
-
 /// A page of reserved or dummy content: everything after the SV ID alternates.
 fn blank(sv_id: u8) -> [u32; 10] {
     let mut data = [ALTERNATING; 10];
@@ -207,7 +198,7 @@ pub(super) fn pages(
         let value = f64::from(stranger.sv.number);
         return Err(FieldError::OutOfRange { name: "sv_id", value, minimum: 1.0, maximum: 32.0 });
     }
-    let toa = reference_time(reference);
+    let toa = almanac_time(reference);
     let almanac: Vec<Almanac> = ephemerides.iter().map(|e| Almanac::derive(e, toa)).collect();
     let mut all = Vec::with_capacity(50);
     for id in SUBFRAME_4_IDS {
@@ -282,7 +273,7 @@ fn configuration(ephemerides: &[Ephemeris]) -> [u32; 10] {
 /// Page 25 of subframe 5: reference time, health of 1 to 24 (figure 20-1, sheet 5).
 fn health(ephemerides: &[Ephemeris], toa: Epoch) -> [u32; 10] {
     let mut data = blank(HEALTH_ID);
-    put(&mut data, 8, &[(toa.tow_whole_s() / TOA_STEP_S) as u32, toa.week().rem_euclid(256) as u32], 8);
+    put(&mut data, 8, &[(toa.tow_whole_s() / ALMANAC_STEP_S) as u32, toa.week().rem_euclid(256) as u32], 8);
     put(&mut data, 24, &(1..=24).map(|number| health_of(number, ephemerides)).collect::<Vec<_>>(), 6);
     data
 }

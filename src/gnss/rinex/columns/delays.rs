@@ -57,6 +57,17 @@ static B_CNAV2: Layout = Layout {
 };
 static B_CNAV3: Layout = Layout { lines: 9, common: None, delays: &[("7D", (7, 3), None, true)] };
 
+impl Layout {
+    /// The lines of a record after its heading. A line of four blank fields is one of them: predicted
+    /// accuracies that a converter does not know. Blank lines of a whole record are not.
+    pub(super) fn lines_of<'a, 't>(&self, lines: &'a [Line<'t>], whole: &'a [Line<'t>]) -> &'a [Line<'t>] {
+        match whole.get(1..).and_then(|whole| whole.split_at_checked(self.lines)) {
+            Some((own, rest)) if lines.len() < self.lines && rest.iter().all(|(_, line)| line.trim().is_empty()) => own,
+            _ => lines,
+        }
+    }
+}
+
 /// The layout of a system's message, if it is one of these.
 pub(super) fn layout(letter: char, message: &str) -> Option<&'static Layout> {
     match (letter, message) {
