@@ -146,7 +146,7 @@ pub const ORDER: Order<'static> = &[
             &["rules"],
         ],
     ),
-    ("analysis/judge/forecast", &[&["air", "settled"], &["links"], &["ranges"], &["dispersion", "solution"]]),
+    ("analysis/judge/forecast", &[&["air", "heard", "settled"], &["links"], &["ranges"], &["dispersion", "solution"]]),
     (
         "analysis/judge/foreign",
         &[&["fit", "pairs"], &["measured", "place"], &["carriers", "judged"], &["observables", "report"]],

@@ -2,12 +2,12 @@
 //!
 //! As many ranges as unknowns are quadratic equations: they have two solutions, and an iteration ends at
 //! either. With x = (r, b), the product ⟨x, y⟩ = r·r' − b b' and dᵢ = (sᵢ − r, ρᵢ − b) of a solution, another
-//! one x + λu has ⟨dᵢ, dᵢ⟩ − 2λ⟨dᵢ, u⟩ + λ²⟨u, u⟩ = 0 for every i, the first term being zero: ⟨dᵢ, u⟩ = 1 gives
-//! u by linear equations, and λ = 2 / ⟨u, u⟩. Source: S. Bancroft, "An algebraic solution of the GPS
+//! one x + λu has ⟨dᵢ, dᵢ⟩ − 2λ⟨dᵢ, u⟩ + λ²⟨u, u⟩ = 0 for every i, the first term being zero: ⟨dᵢ, u⟩ = 1
+//! gives u by linear equations, and λ = 2 / ⟨u, u⟩. Source: S. Bancroft, "An algebraic solution of the GPS
 //! equations", IEEE Transactions on Aerospace and Electronic Systems 21 (1985), whose two roots these are. A
-//! root with a distance below zero is none. What the algebra leaves out (the Earth's rotation, the atmosphere,
-//! clocks of several systems) the iteration from there puts right. With more ranges both are minima of the
-//! residuals, and the larger one is dropped.
+//! root with a distance below zero is none. What the algebra leaves out (the Earth's rotation, the
+//! atmosphere, clocks of several systems) the iteration from there puts right. With more ranges both are
+//! minima of the residuals, and the larger one is dropped.
 
 use nalgebra::{Cholesky, Matrix4, Vector3, Vector4};
 
@@ -24,8 +24,8 @@ const DECIDING: f64 = 30.0;
 /// Solutions closer than this are the same one, reached twice.
 const SAME_M: f64 = 1.0;
 
-/// Solves from a first estimate that is not a position of the same receiver, such as the Earth's centre: of two
-/// places that the ranges agree on, the one where the receiver can be.
+/// Solves from a first estimate that is not a position of the same receiver, such as the Earth's centre: of
+/// two places that the ranges agree on, the one where the receiver can be.
 ///
 /// # Errors
 /// As [`position`]; two places where it can be, or, without a range to spare, none.

@@ -410,8 +410,8 @@ mod tests {
         }
     }
 
-    /// Squaring in the discriminator adds as much noise as the integration is short: ranges of different symbols
-    /// weigh differently.
+    /// Squaring in the discriminator adds as much noise as the integration is short: ranges of different
+    /// symbols weigh differently.
     #[test]
     fn a_code_is_as_noisy_as_its_loop_s_own_integration_makes_it() {
         for (name, integration_s) in [("GPS L1 C/A", 0.004), ("GLONASS G1", 0.002), ("BeiDou B2b", 0.001)] {

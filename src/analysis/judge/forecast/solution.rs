@@ -373,7 +373,8 @@ impl Expected {
         self.noise.fixed_view::<2, 2>(0, 0).symmetric_eigenvalues().max().max(0.0).sqrt()
     }
 
-    /// Deviation along the longest axis of the noise of a velocity, which no axis of the coordinates need be near.
+    /// Deviation along the longest axis of the noise of a velocity, which no axis of the coordinates need be
+    /// near.
     pub fn rate_sigma_mps(&self) -> f64 {
         self.rate_noise.fixed_view::<3, 3>(0, 0).symmetric_eigenvalues().max().max(0.0).sqrt()
     }

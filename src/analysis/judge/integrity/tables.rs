@@ -181,8 +181,8 @@ fn short(run: &Run, rows: &mut Rows) {
             rows.doubled.add(|| format!("{} of {} in navigation", row.parameter, row.sv));
         }
     }
-    // A search is written when it ends and bears the sample of its beginning: those of one front end follow one
-    // another, those of two overlap.
+    // A search is written when it ends and bears the sample of its beginning: those of one front end follow
+    // one another, those of two overlap.
     let (mut searched, mut begun) = (HashSet::new(), HashMap::new());
     for row in &run.acquisition {
         if !searched.insert((row.sample, row.sv, row.signal.name)) {

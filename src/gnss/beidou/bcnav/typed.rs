@@ -227,8 +227,9 @@ impl TypedReader {
         let mut news = vec![Read::Unit { symbols: layout.symbols() as u64, of_week_s, inverted }];
         news.extend(layout.sent_at(&bits, near).map(Read::Time));
         let all = integers_in(layout.of_type(layout.type_of(&bits)), &bits);
+        let sv = self.sv;
         let rows = |issue: i64, raws| {
-            Read::Parameters(NavigationRow::each(self.sv, layout.message.name, issue as u32, raws).collect())
+            Read::Parameters(NavigationRow::each(sv, layout.message.name, issue as u32, raws).collect())
         };
         let issue = layout.issue(&bits);
         if let Some((coefficients, raws)) = electrons_in(&all) {

@@ -123,8 +123,8 @@ impl Channel {
             self.batch = self.new_batch();
             return;
         };
-        // Edges that a message does not show yet are waited for, as long as a pull-in may last: wrong ones cost
-        // the channel.
+        // Edges that a message does not show yet are waited for, as long as a pull-in may last: wrong ones
+        // cost the channel.
         let rate = self.loops.carrier.rate + found.cycles / self.period_s;
         if self.has_symbols && self.group > 1 && !found.changes {
             if !self.batch.extend() {
