@@ -360,8 +360,8 @@ mod tests {
         let within_s = |signal: &Signal| {
             signal.components.iter().find_map(|component| component.message).and_then(super::Message::set_within_s)
         };
-        // Frames of 30 s in subframes of 6 s (IS-GPS-200N, 20.3.3), of 18 s in one piece, of which every
-        // other one has page 1 (IS-GPS-800J, 3.2.3), of 30 s in strings of 2 s (GLONASS ICD L1, L2 5.1, 4.3);
+        // Frames of 30 s in subframes of 6 s (IS-GPS-200N, 20.3.3), of 18 s in one piece, of which two of
+        // three have page 1 (IS-GPS-800J, 3.2.3), of 30 s in strings of 2 s (GLONASS ICD L1, L2 5.1, 4.3);
         // subframes of 30 s in pages of 2 s and of 50 s in pages of 10 s (Galileo OS SIS ICD 2.1, 4.3 and
         // 4.2). A unit of BeiDou's is what D1 and D2 have in common, 30 s.
         assert_eq!(within_s(&gps::l1ca::L1_CA), Some(30 + 6));

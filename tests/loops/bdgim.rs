@@ -65,7 +65,8 @@ fn heard(scene: &Scene, signal: &'static Signal, rows: &[Observation]) -> (Sets,
         let carried = (message.form)(set).timed(|at| BDT.label(at));
         let begin = BDT.label(scene.clock.start).seconds().div_euclid(36) * 36;
         let mut reader = (message.reader)(row.sv);
-        for second in (0..message.set_s).step_by(message.unit_s as usize) {
+        // Every other frame of B-CNAV1 has the ionosphere.
+        for second in (0..2 * message.set_s).step_by(message.unit_s as usize) {
             let start = Epoch::new(begin + second, 0.0);
             for one in sender.unit(&carried, start).unwrap() {
                 for read in reader.take(if one { -1.0 } else { 1.0 }, start) {

@@ -278,12 +278,14 @@ fn almanacs_that_we_send_of_qzss_are_those_that_its_satellites_sent() {
         let symbols = sender.unit(&set, Epoch::from_week(2380, 370_800.0 + 18.0 * frame as f64)).unwrap();
         cnav2::decode(&soft(&symbols, false)).unwrap().three.unwrap()
     };
-    let pages: Vec<Vec<bool>> = (0..14).map(own).collect();
-    // 370 800 s are 20 600 frames. Odd frames are page 1; a round of six others is one of five satellites and
-    // five of one.
+    let pages: Vec<Vec<bool>> = (0..18).map(own).collect();
+    // 370 800 s are 20 600 frames, and one of three in a week has almanacs: the second. A round
+    // of six of them is one of five satellites and five of one.
     let numbers: Vec<u128> = pages.iter().map(|three| number(&three[8..14])).collect();
-    assert!(numbers.iter().skip(1).step_by(2).all(|page| *page == 1), "{numbers:?}");
-    assert_eq!(numbers.iter().step_by(2).filter(|page| **page == 4).count(), 6 - 1 + usize::from(numbers[0] == 4));
+    let almanacs: Vec<u128> = numbers.iter().copied().filter(|page| *page != 1).collect();
+    assert!((0..18).all(|frame| (numbers[frame] == 1) != ((20_600 + frame) % 3 == 1)), "{numbers:?}");
+    assert_eq!(almanacs.iter().filter(|page| **page == 3).count(), 1, "{numbers:?}");
+    assert_eq!(almanacs.iter().filter(|page| **page == 4).count(), 5, "{numbers:?}");
     let mut compared = 0;
     for real in ALMANACS.map(|hex| bits(hex, 250)) {
         let page = number(&real[8..14]);

@@ -2,8 +2,8 @@
 //!
 //! Source: IS-GPS-800J, 3.5.4.3; for QZSS IS-QZSS-PNT-005, 4.2.2.4. Page 3 has six reduced almanacs, page 4
 //! one almanac of medium length; both are those of CNAV ([`super::cnav`]) with eight bits of number. The
-//! documents leave the order of the pages open. Odd frames of a week are page 1, so that a set is whole
-//! after two frames at most; even ones go through the almanacs of all satellites of the system that are
+//! documents leave the order of the pages open. Two of three frames are page 1, so that a set is whole
+//! after two frames at most; the others go through the almanacs of all satellites of the system that are
 //! known. Who knows no satellite sends page 1 alone. In the reduced almanac a geostationary satellite has no
 //! node: its angle counts from that of longitude zero at the beginning of the week, as in real pages.
 
@@ -18,6 +18,8 @@ use crate::satellite::System;
 use crate::time::Epoch;
 
 const ALMANAC: &str = "3.5.4.3, figures 3.5-4 and 3.5-5";
+/// Frames of which one has almanacs, the second of a round that begins with the week.
+pub(super) const ROUND: i64 = 3;
 /// Packets of page 3.
 pub(super) const PACKETS: usize = 6;
 /// Pages of almanacs.
@@ -137,7 +139,7 @@ impl Almanacs {
             return (PAGE, entries);
         }
         let reduced = own.len().div_ceil(PACKETS);
-        let turn = start.seconds().div_euclid(2 * FRAME_S).rem_euclid((reduced + own.len()) as i64) as usize;
+        let turn = start.seconds().div_euclid(ROUND * FRAME_S).rem_euclid((reduced + own.len()) as i64) as usize;
         let (page, first, count) =
             if turn < reduced { (REDUCED, turn * PACKETS, PACKETS) } else { (MEDIUM, turn - reduced, 1) };
         entries.iter_mut().zip(own.into_iter().skip(first).take(count)).for_each(|(place, entry)| *place = entry);
@@ -147,7 +149,7 @@ impl Almanacs {
 
 /// Whether the frame that begins then is page 1 for sure.
 pub(super) fn is_first(start: Epoch) -> bool {
-    start.seconds().div_euclid(FRAME_S).rem_euclid(2) == 1
+    start.seconds().div_euclid(FRAME_S).rem_euclid(ROUND) != 1
 }
 
 type Of = Element<Content>;

@@ -5,12 +5,13 @@
 //! 274. The last two have checks, are coded at rate one half and interleaved together. The matrices of the
 //! codes are those of 6.2, packed in `ldpc_2.bin` and `ldpc_3.bin`.
 //!
-//! Sent are page 1 (UTC, ionosphere, corrections between signals), 3 and 4 (almanacs) of subframe 3: odd
-//! frames are page 1, even ones go through the almanacs. A set is whole once page 1 has come, and changes
-//! with a frame that has it. Limits: left out are page 2, which has the Earth's orientation, of which a scene
-//! knows nothing, beside other systems' times, 5 (corrections), 6 (text) and those that QZSS alone sends.
-//! Almanacs are not read. Of UTC nothing is used. Sets of LNAV become those of CNAV-2 as they become those of
-//! CNAV ([`super::cnav`]), with delays of both parts of L1C that are those of L1 where the file has none.
+//! Sent are page 1 (UTC, ionosphere, corrections between signals), 3 and 4 (almanacs) of subframe 3: two of
+//! three frames are page 1, the third goes through the almanacs. A set is whole once page 1 has come, and
+//! changes with a frame that has it. Limits: left out are page 2, which has the Earth's orientation, of which
+//! a scene knows nothing, beside other systems' times, 5 (corrections), 6 (text) and those that QZSS alone
+//! sends. Almanacs are not read. Of UTC nothing is used. Sets of LNAV become those of CNAV-2 as they become
+//! those of CNAV ([`super::cnav`]), with delays of both parts of L1C that are those of L1 where the file has
+//! none.
 
 mod almanac;
 mod fields;
@@ -33,7 +34,7 @@ use crate::message::{Common, IonosphereForm, Message, Parameters, Raw, RecordLin
 use crate::satellite::Sv;
 use crate::signal::Signal;
 use crate::time::{Epoch, GPST, WEEK_S};
-use almanac::{Almanacs, Entry, MEDIUM, OF_MEDIUM, OF_REDUCED, PACKETS, REDUCED, is_first};
+use almanac::{Almanacs, Entry, MEDIUM, OF_MEDIUM, OF_REDUCED, PACKETS, REDUCED, ROUND, is_first};
 pub use fields::tables;
 use fields::{DELAY, HEADER, OF_UTC, SET};
 pub use reader::Cnav2Reader;
@@ -44,9 +45,9 @@ pub static CNAV2: Message = Message {
     symbol_s: 0.01,
     bit: |_| &[1],
     unit_s: FRAME_S,
-    // A new set begins with page 1.
-    set_s: 2 * FRAME_S,
-    first_s: FRAME_S,
+    // A new set begins with page 1, after the frame of almanacs.
+    set_s: ROUND * FRAME_S,
+    first_s: 2 * FRAME_S,
     sender: |common| Ok(Box::new(Frames { common: common.clone(), almanacs: Almanacs::of(common) })),
     number: |start| if is_first(start) { 1 } else { 2 },
     timed: &[1, 2],
