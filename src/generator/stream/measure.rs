@@ -25,7 +25,8 @@ pub(crate) struct Stretch {
     pub sample_s: f64,
 }
 
-/// A stretch is made again as long as that: the first time meets cold caches, and a moment of another program.
+/// A stretch is made again as long as that: the first time meets cold caches, and a moment of another
+/// program.
 const REPEATED_S: f64 = 3e-3;
 
 /// Makes the samples of `stretches`, which ascend, as the stream does, and measures them.
