@@ -235,9 +235,10 @@ fn values(page: u128, name: &str, three: &Vec<bool>) -> Vec<f64> {
 
 /// Where a satellite is by radius, argument of latitude, inclination, and node against Greenwich.
 fn placed_m([radius_m, latitude, inclination, node]: [f64; 4]) -> [f64; 3] {
-    let (x, y) = (radius_m * latitude.cos(), radius_m * latitude.sin());
-    let level = y * inclination.cos();
-    [x * node.cos() - level * node.sin(), x * node.sin() + level * node.cos(), y * inclination.sin()]
+    let [latitude, inclination, node] = [latitude, inclination, node].map(libm::sincos);
+    let (x, y) = (radius_m * latitude.1, radius_m * latitude.0);
+    let level = y * inclination.1;
+    [x * node.1 - level * node.0, x * node.0 + level * node.1, y * inclination.0]
 }
 
 #[test]
@@ -287,12 +288,12 @@ fn pages_take_turns_and_almanacs_are_near_the_orbits_of_their_satellites() {
             let node = one("almanac_omega0_rad") - ROTATION_RADPS * toa_s;
             let (elements, bound_m) = if page == 4 {
                 let (e, m) = (one("almanac_eccentricity"), one("almanac_m0_rad"));
-                let anomaly = (0..20).fold(m, |anomaly, _| m + e * anomaly.sin());
+                let anomaly = (0..20).fold(m, |anomaly, _| m + e * libm::sin(anomaly));
                 let axis_m = one("almanac_sqrt_a_sqrtm").powi(2);
-                let truth = ((1.0 - e * e).sqrt() * anomaly.sin()).atan2(anomaly.cos() - e);
+                let truth = libm::atan2((1.0 - e * e).sqrt() * libm::sin(anomaly), libm::cos(anomaly) - e);
                 let inclination = semicircles * std::f64::consts::PI + one("almanac_delta_i_rad");
                 let elements =
-                    [axis_m * (1.0 - e * anomaly.cos()), truth + one("almanac_omega_rad"), inclination, node];
+                    [axis_m * (1.0 - e * libm::cos(anomaly)), truth + one("almanac_omega_rad"), inclination, node];
                 // Angles to half of 2⁻¹⁵ semicircles are 2 km each at 42 000 km, and harmonics are left out.
                 (elements, 15e3)
             } else {

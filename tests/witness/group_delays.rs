@@ -157,7 +157,7 @@ fn records_of_the_newer_messages_of_beidou_are_read_where_their_accuracies_are_b
     let of = |number: &str, message: &str, count: usize| -> Vec<String> {
         let is_head =
             |line: &&str| line.starts_with("> EPH C") && line[7..9] == *number && line.trim_end().ends_with(message);
-        let at = lines.iter().position(|line| is_head(line)).unwrap();
+        let at = lines.iter().position(is_head).unwrap();
         lines[at..at + count].iter().map(|line| (*line).to_owned()).collect()
     };
     let read = |records: &[Vec<String>]| {
