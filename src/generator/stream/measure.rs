@@ -21,13 +21,9 @@ pub(crate) struct Stretch {
     pub square_lsb2: f64,
     /// Those that were clipped.
     pub clipped: u64,
-    /// Time for a sample of all that is made, with what stages look back at, once caches are warm.
+    /// Time for a sample of all that is made, with what stages look back at.
     pub sample_s: f64,
 }
-
-/// A stretch is made again as long as that: the first time meets cold caches, and a moment of another
-/// program.
-const REPEATED_S: f64 = 3e-3;
 
 /// Makes the samples of `stretches`, which ascend, as the stream does, and measures them.
 ///
@@ -41,13 +37,6 @@ pub(crate) fn measured(scene: &Scene, stretches: &[Range<u64>]) -> Result<Vec<St
     let kernel = Kernel { edge, arithmetic: scene.fidelity.carrier, level: Level::detect() };
     let (memory, format) = (scene.memory_samples(), scene.metadata.format);
     let lead = memory.next_multiple_of(RUN_SAMPLES) as u64;
-    let square = |block: &Block<'_>, samples: usize| {
-        let sent = block.lead..block.lead + samples;
-        let of = |plane: &[f32]| {
-            plane.get(sent.clone()).unwrap_or(&[]).iter().fold(0.0, |sum, x| sum + f64::from(*x) * f64::from(*x))
-        };
-        of(block.i) + if format.is_complex() { of(block.q) } else { 0.0 }
-    };
     let (mut worker, mut bytes) = (Worker::default(), Vec::new());
     let mut found = Vec::new();
     for stretch in stretches {
@@ -56,29 +45,31 @@ pub(crate) fn measured(scene: &Scene, stretches: &[Range<u64>]) -> Result<Vec<St
         // On this thread alone: a plan has to work where no other can be started.
         transmitters.iter_mut().try_for_each(|t| t.prepare_alone(scene, needed, made))?;
         let samples = (stretch.end - stretch.start) as usize;
-        bytes.resize(samples * format.bytes(), 0);
-        let mut fastest = Stretch { sample_s: f64::INFINITY, ..Stretch::default() };
-        let first = Instant::now();
-        while fastest.components == 0 || first.elapsed().as_secs_f64() < REPEATED_S {
-            let begin = Instant::now();
-            let mut block = satellites(scene, &transmitters, kernel, (stretch.start, samples, memory), &mut worker);
-            let mut before_lsb2 = None;
-            scene.stages(|stage| {
-                if stage.full_scale_lsb(1.0).is_some() {
-                    before_lsb2 = Some(square(&block, samples));
-                }
-                stage.act(&mut block);
-            });
-            let clipped = block.clipped + pack(&block, samples, format, &mut bytes);
-            let sample_s = begin.elapsed().as_secs_f64() / block.i.len().max(1) as f64;
-            fastest = Stretch {
-                components: if format.is_complex() { 2 } else { 1 } * samples as u64,
-                square_lsb2: before_lsb2.unwrap_or_else(|| square(&block, samples)),
-                clipped,
-                sample_s: sample_s.min(fastest.sample_s),
+        let begin = Instant::now();
+        let mut block = satellites(scene, &transmitters, kernel, (stretch.start, samples, memory), &mut worker);
+        let sent = block.lead..block.lead + samples;
+        let square = |block: &Block<'_>| {
+            let of = |plane: &[f32]| {
+                plane.get(sent.clone()).unwrap_or(&[]).iter().fold(0.0, |sum, x| sum + f64::from(*x) * f64::from(*x))
             };
-        }
-        found.push(fastest);
+            of(block.i) + if format.is_complex() { of(block.q) } else { 0.0 }
+        };
+        let mut before_lsb2 = None;
+        scene.stages(|stage| {
+            if stage.full_scale_lsb(1.0).is_some() {
+                before_lsb2 = Some(square(&block));
+            }
+            stage.act(&mut block);
+        });
+        bytes.resize(samples * format.bytes(), 0);
+        let square_lsb2 = before_lsb2.unwrap_or_else(|| square(&block));
+        let clipped = block.clipped + pack(&block, samples, format, &mut bytes);
+        found.push(Stretch {
+            components: if format.is_complex() { 2 } else { 1 } * samples as u64,
+            square_lsb2,
+            clipped,
+            sample_s: begin.elapsed().as_secs_f64() / block.i.len().max(1) as f64,
+        });
     }
     Ok(found)
 }
