@@ -1,6 +1,8 @@
 //! BDGIM against the program of its authors, its fields against printed places, and its harmonics against a
 //! map of the ionosphere.
 
+use std::collections::BTreeSet;
+
 use gnss_twin::gnss::bdgim::{self, Bdgim, Pierce, UnderSun, forecast_tecu, interval};
 use gnss_twin::gnss::beidou::bcnav1::{self, B_CNAV1};
 use gnss_twin::gnss::beidou::bcnav2::{self, B_CNAV2};
@@ -177,9 +179,9 @@ fn coefficients_have_their_places_signs_and_steps_in_all_three_messages() {
             .filter_map(|read| if let Read::Ionosphere(found) = read { Some(found) } else { None })
             .collect();
         assert!(!found.is_empty() && found.iter().all(|found| **found == Coefficients::Bdgim(model)), "{found:?}");
-        // They are written down with the set.
+        // They are told when they are read, and with the set.
         let rows = news.iter().filter_map(|read| if let Read::Parameters(rows) = read { Some(rows) } else { None });
-        let rows: Vec<_> = rows.flatten().filter(|row| row.parameter.starts_with("alpha_")).collect();
+        let rows: BTreeSet<_> = rows.flatten().filter(|row| row.parameter.starts_with("alpha_")).collect();
         assert_eq!(rows.len(), 9, "{rows:?}");
         let raw = |name: &str| rows.iter().find(|row| row.parameter == name).map(|row| row.raw);
         assert_eq!((message.ionosphere.coefficients)(&raw), Some(Coefficients::Bdgim(model)));
