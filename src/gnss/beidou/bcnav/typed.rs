@@ -53,6 +53,8 @@ pub(in crate::beidou) struct Layout {
     /// Fields that distinguish sets, by their names, and the bits of them that do.
     pub issues: &'static [&'static str],
     pub issue_bits: i64,
+    /// The number that a set has by those.
+    pub number_of: fn(i64) -> u16,
     /// The set if its parts belong together.
     pub complete: fn(Ephemeris) -> Option<Ephemeris>,
 }
@@ -228,10 +230,10 @@ impl TypedReader {
         news.extend(layout.sent_at(&bits, near).map(Read::Time));
         let all = integers_in(layout.of_type(layout.type_of(&bits)), &bits);
         let sv = self.sv;
-        let rows = |issue: i64, raws| {
-            Read::Parameters(NavigationRow::each(sv, layout.message.name, issue as u32, raws).collect())
+        let rows = |issue: u16, raws| {
+            Read::Parameters(NavigationRow::each(sv, layout.message.name, issue.into(), raws).collect())
         };
-        let issue = layout.issue(&bits);
+        let issue = layout.issue(&bits).map(layout.number_of);
         if let Some((coefficients, raws)) = electrons_in(&all) {
             news.push(Read::Ionosphere(coefficients));
             news.extend(issue.map(|issue| rows(issue, raws)));
@@ -239,7 +241,7 @@ impl TypedReader {
         // Those in messages of a set are reported with it.
         let beside = !layout.set.contains(&layout.type_of(&bits));
         if let Some(issue) = issue.filter(|_| beside) {
-            let accuracies = self.accuracies.take(issue as u32, &accuracies_in(&all));
+            let accuracies = self.accuracies.take(issue.into(), &accuracies_in(&all));
             news.extend(accuracies.map(|raws| rows(issue, raws)));
         }
         self.keep(bits, of_week_s);

@@ -88,6 +88,7 @@ static LAYOUT: Layout = Layout {
     issues: &["iode", "iodc"],
     // The issue of the orbit is the low bits of the clock's (7.4.1).
     issue_bits: 0xFF,
+    number_of: |iode| iode as u16,
     complete: Some,
 };
 

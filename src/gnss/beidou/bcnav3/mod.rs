@@ -88,6 +88,7 @@ static LAYOUT: Layout = Layout {
     set: &ORDER,
     issues: &["toe_5min", "toc_5min"],
     issue_bits: 0x7FF,
+    number_of: |fives| issue(300.0 * fives as f64),
     complete: numbered,
 };
 
