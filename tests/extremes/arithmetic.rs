@@ -8,7 +8,7 @@ use gnss_twin::receiver::correlate::sums::{RunningSums, Samples};
 use gnss_twin::receiver::correlate::{Arithmetic, CODE_BITS, Edge, Nco, Replica, chips_to_units};
 use gnss_twin::receiver::source::Block;
 
-use crate::figures::case;
+use crate::figures::{CA, Worst, case};
 use crate::run;
 
 /// Gaussian numbers of unit variance by sums of twelve, from a seeded generator.
@@ -40,10 +40,10 @@ impl Double {
 /// Largest error of the receiver's sums in f64, one sample after the other, in standard deviations of their
 /// noise: against phases by multiplication in 128 bits, sines of a quarter turn at most, and sums in pairs of
 /// doubles.
-pub fn twin_error(count: usize) -> f64 {
+pub fn twin_error(count: usize) -> Worst {
     let code = l1ca::code(9).unwrap();
     let replica = Replica::new(code.clone(), Edge::Nearest).unwrap();
-    let mut worst = 0.0_f64;
+    let mut worst = Worst::default();
     for seed in 1..=3 {
         let (i, q) = (normals(seed, count), normals(seed + 50, count));
         let step = chips_to_units(1.023e6 / 50e6) as u64;
@@ -70,16 +70,16 @@ pub fn twin_error(count: usize) -> f64 {
             im.add_product(i, -sin);
         }
         let apart = libm::hypot((re.0 - found.re) + re.1, (im.0 - found.im) + im.1);
-        worst = worst.max(apart / (count as f64).sqrt());
+        worst.take(apart / (count as f64).sqrt(), || format!("noise of seed {seed}"));
     }
     worst
 }
 
 /// Largest error of a correlation of `count` samples with a constant of `dc` in them, in standard deviations
 /// of its noise.
-pub fn sum_error(arithmetic: Arithmetic, count: usize, dc: f32) -> f64 {
+pub fn sum_error(arithmetic: Arithmetic, count: usize, dc: f32) -> Worst {
     let replica = Replica::new(l1ca::code(9).unwrap(), Edge::Area).unwrap();
-    let mut worst = 0.0_f64;
+    let mut worst = Worst::default();
     for seed in 1..=3 {
         let i: Vec<f32> = normals(seed, count).iter().map(|x| x + dc).collect();
         let q: Vec<f32> = normals(seed + 50, count).iter().map(|x| x + dc).collect();
@@ -93,14 +93,17 @@ pub fn sum_error(arithmetic: Arithmetic, count: usize, dc: f32) -> f64 {
         let exact = replica.slow(&i, &q, &nco, &taps);
         let found = replica.correlate_in(arithmetic, (&i[..], &q[..]), &nco, &taps);
         // Noise of a component of the sum: the square root of the count.
-        worst = exact.iter().zip(&found).fold(worst, |w, (a, b)| w.max((a - b).norm() / (count as f64).sqrt()));
+        for ((exact, found), tap) in exact.iter().zip(&found).zip([0.25, 0.0, -0.25]) {
+            let apart = (exact - found).norm() / (count as f64).sqrt();
+            worst.take(apart, || format!("noise of seed {seed}, tap at {tap} chip"));
+        }
     }
     worst
 }
 
 #[test]
 fn long_sums_of_single_precision_stay_far_below_the_noise() {
-    let the = case(44, "f32 and f64 accumulators");
+    let the = case(44, "f32 and f64 accumulators", CA);
     for (count, dc) in [(50_000, 0.0), (1_000_000, 0.0), (50_000, 10.0), (1_000_000, 10.0)] {
         // Products are rounded to 6e-8 of themselves, in blocks that are added in f64: a walk of 6e-8 · √(1 +
         // DC²) noises, and a carrier within 1e-6 turn of the exact one in a block, 6.3e-6 rad of what the DC
@@ -113,7 +116,7 @@ fn long_sums_of_single_precision_stay_far_below_the_noise() {
 
 #[test]
 fn full_scale_for_a_second_overflows_nothing() {
-    let the = case(45, "integer accumulators at full scale");
+    let the = case(45, "integer accumulators at full scale", CA);
     let replica = Replica::new(l1ca::code(9).unwrap(), Edge::Nearest).unwrap();
     // A replica of no carrier and samples in step with its code at full scale: every product has one sign.
     let count = 2_000_000_usize;
@@ -130,7 +133,7 @@ fn full_scale_for_a_second_overflows_nothing() {
         // integer would miss by all.
         the.at_most(
             &format!("{name}: sum of 2e6 full-scale products, relative"),
-            (sum.re / expected - 1.0).abs(),
+            ((sum.re / expected - 1.0).abs(), "50 Msps"),
             1e-3,
             "",
         );
@@ -142,12 +145,13 @@ fn full_scale_for_a_second_overflows_nothing() {
     assert!(replica.takes_sums(&nco));
     let [sum] = replica.correlate_in(Arithmetic::Sums, samples, &nco, &[0]);
     let less = 1.0 - 512.0 * 0.5 / 50_000.0;
-    the.at_most("sums: sum of 2e6 full-scale samples, relative", (sum.re / expected / less - 1.0).abs(), 3e-3, "");
+    let relative = (sum.re / expected / less - 1.0).abs();
+    the.at_most("sums: sum of 2e6 full-scale samples, relative", (relative, "50 Msps"), 3e-3, "");
 }
 
 #[test]
 fn epochs_of_prime_and_odd_lengths_give_the_same_peaks() {
-    let the = case(46, "FFT lengths");
+    let the = case(46, "FFT lengths", CA);
     let (mut held, mut same, mut of) = (0, 0, 0);
     // 5003 and 2069 are primes, 4092 is the code's, 5000 and 25 000 are powers of five and a little, 4000.9
     // is no whole number.

@@ -12,7 +12,7 @@ use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::receiver::track::TrackingSettings;
 use nalgebra::Vector3;
 
-use crate::figures::{Case, case};
+use crate::figures::{CA, Worst, case};
 use crate::run::{self, Received};
 
 const G: f64 = 9.806_65;
@@ -46,20 +46,21 @@ fn after(&[t, s, v, a]: &[f64; 4], dt: f64, jerk: f64) -> [f64; 4] {
 
 /// Largest departure of the synthesiser's carrier and code (as cycles) from the truth over samples
 /// `from..to`, taken at `count` places.
-fn worst_cycles(scene: &Scene, sv: Sv, (from, to): (u64, u64), count: u64) -> (f64, f64) {
+fn worst_cycles(scene: &Scene, sv: Sv, (from, to): (u64, u64), count: u64) -> (Worst, Worst) {
     let mut transmitter = Transmitter::new(scene, sv, &L1_CA, Edge::Nearest).unwrap().unwrap();
     transmitter.prepare(scene, from, to).unwrap();
-    let (mut carrier, mut code) = (0.0_f64, 0.0_f64);
+    let (mut carrier, mut code) = (Worst::default(), Worst::default());
     for k in 0..count {
         let n = from + (to - from) * k / count;
         let Some((turns, place)) = transmitter.phases(scene, n) else { continue };
         let seen = truth::seen(scene, sv, &L1_CA, scene.clock.epoch(n)).unwrap().unwrap();
         let error = turns as f64 / TURN + seen.arrivals[0].carrier_cycles;
-        carrier = carrier.max((error - error.round()).abs());
+        let at = || format!("{sv}, {:.6} s", scene.clock.rate.elapsed_s(n));
+        carrier.take((error - error.round()).abs(), at);
         let sent = scene.clock.epoch(n).plus_s(-seen.arrivals[0].delay_s);
         let chips = sent.fraction() * 1.023e6 - place.steps();
         let periods = chips / 1023.0;
-        code = code.max((periods - periods.round()).abs() * 1023.0 * 1540.0);
+        code.take((periods - periods.round()).abs() * 1023.0 * 1540.0, at);
     }
     (carrier, code)
 }
@@ -70,7 +71,7 @@ fn front(duration_s: f64) -> Scene {
 
 #[test]
 fn a_step_of_a_hundred_g_falls_between_knots() {
-    let the = case(23, "100 g step");
+    let the = case(23, "100 g step", CA);
     let mut scene = front(4.0);
     let way = towards(&scene);
     // At an instant that is no sample: rest, then 100 g at once; the two knots stand a nanosecond apart.
@@ -100,7 +101,7 @@ fn gun(way: Vector3<f64>, at_s: f64, burst_s: f64, hold_s: f64) -> Trajectory {
 
 #[test]
 fn a_gun_is_followed_by_the_generator_and_told_by_the_receiver() {
-    let the = case(24, "1000 g/s jerk, gun");
+    let the = case(24, "1000 g/s jerk, gun", CA);
     let mut scene = front(4.0);
     let way = towards(&scene);
     scene.trajectory = gun(way, 1.234_567_8, 0.01, 0.5);
@@ -123,7 +124,7 @@ fn a_gun_is_followed_by_the_generator_and_told_by_the_receiver() {
     scene.trajectory = gun(way, shot_s, 0.1, 0.02);
     let received = Received::of(&scene, &run::settings(&whole));
     let events = received.events();
-    let (mut flagged, mut latest_s) = (0, 0.0_f64);
+    let (mut flagged, mut latest_s) = (0, Worst::default());
     for sv in &sharp {
         let first = events.iter().find(|row| {
             row.sv == *sv
@@ -132,7 +133,7 @@ fn a_gun_is_followed_by_the_generator_and_told_by_the_receiver() {
         });
         if let Some(row) = first {
             flagged += 1;
-            latest_s = latest_s.max(row.sample as f64 / rate_hz - shot_s);
+            latest_s.take(row.sample as f64 / rate_hz - shot_s, || sv.to_string());
         }
     }
     the.all("broken carriers told", flagged, sharp.len());
@@ -148,29 +149,31 @@ fn a_gun_is_followed_by_the_generator_and_told_by_the_receiver() {
         }
         wrong += usize::from(error_m > (6.0 * sigma_m).max(10.0));
     }
-    the.at_most("fixes wrong in silence", wrong as f64, 0.0, "");
+    the.none("fixes wrong in silence", wrong);
     // Told in 0.5 s, searched for again after 2 s, 1.5 s to lock and find the symbols, and a frame is
     // believed when the preamble has come back: at worst one just missed, two more of 6 s and two words of
     // 0.6 s.
     let back_s = after.first().copied().unwrap_or(f64::INFINITY);
-    the.at_most("first fix after the shot", back_s, 0.5 + 2.0 + 1.5 + 12.0 + 1.2, "s");
-    the.at_least("fixes from there on, of those due", after.len() as f64 / (10.0 * (20.0 - back_s)), 0.95, "");
+    the.at_most("first fix after the shot", (back_s, "its only shot"), 0.5 + 2.0 + 1.5 + 12.0 + 1.2, "s");
+    let share = after.len() as f64 / (10.0 * (20.0 - back_s));
+    the.at_least("fixes from there on, of those due", (share, "10 fixes a second"), 0.95, "");
 }
 
 #[test]
 fn a_minute_of_twenty_g_ends_at_sixty_kilohertz_with_code_and_carrier_together() {
-    let the = case(25, "20 g for 60 s");
+    let the = case(25, "20 g for 60 s", CA);
     let scene = run::try_scene(&std::fs::read_to_string(run::folder().join("accelerated.toml")).unwrap()).unwrap();
     let speed_mps = scene.trajectory.at(59.9).velocity_mps.norm();
-    the.at_least("speed after it", speed_mps, 11e3, "m/s");
+    the.at_least("speed after it", (speed_mps, "59.9 s"), 11e3, "m/s");
     let first = (59.0 * 2.6e6) as u64;
-    let (mut carrier, mut code, mut most_hz) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let (mut carrier, mut code, mut most_hz) = (Worst::default(), Worst::default(), Worst::default());
     for sv in run::in_view(&scene) {
         let (a, b) = worst_cycles(&scene, sv, (first, first + 2_000_000), 1000);
-        (carrier, code) = (carrier.max(a), code.max(b));
+        carrier.merge(a);
+        code.merge(b);
         let at =
             |n: u64| truth::seen(&scene, sv, &L1_CA, scene.clock.epoch(n)).unwrap().unwrap().arrivals[0].carrier_cycles;
-        most_hz = most_hz.max(((at(first + 26_000) - at(first)) / 0.01).abs());
+        most_hz.take(((at(first + 26_000) - at(first)) / 0.01).abs(), || format!("{sv}, 59 s"));
     }
     the.at_least("largest Doppler", most_hz, 55e3, "Hz");
     the.at_most("carrier between knots", carrier, 1e-4, "cycle");
@@ -208,15 +211,16 @@ fn a_minute_of_twenty_g_ends_at_sixty_kilohertz_with_code_and_carrier_together()
     let sample = first + last.sample;
     the.all("channel at 60 kHz: locked after 2 s", usize::from(!channel.is_lost() && last.locked), 1);
     // A third-order loop has no lag at a constant rate of Doppler; its own noise is 0.4 Hz.
-    the.at_most("channel at 60 kHz: Doppler", (last.doppler_hz - at(fastest, sample).doppler_hz).abs(), 2.0, "Hz");
+    let error_hz = (last.doppler_hz - at(fastest, sample).doppler_hz).abs();
+    the.at_most("channel at 60 kHz: Doppler", (error_hz, fastest.to_string()), 2.0, "Hz");
     // 0.6 m of noise at 45 dB-Hz and 0.5 Hz, three sigma, and what the pull-in leaves.
     let error_m = run::code_error_m(&alone, fastest, sample, last.code_fraction);
-    the.at_most("channel at 60 kHz: code", error_m.abs(), 3.0, "m");
+    the.at_most("channel at 60 kHz: code", (error_m.abs(), fastest.to_string()), 3.0, "m");
 }
 
 #[test]
 fn beyond_a_tenth_of_light_s_speed_a_motion_is_refused() {
-    let the = case(26, "speed above 0.1 c");
+    let the = case(26, "speed above 0.1 c", CA);
     let rocket = |thrust: f64| {
         run::text(
             700.0,
@@ -237,7 +241,7 @@ fn beyond_a_tenth_of_light_s_speed_a_motion_is_refused() {
 
 #[test]
 fn at_the_zero_of_doppler_nothing_divides() {
-    let the = case(27, "Doppler zero crossing");
+    let the = case(27, "Doppler zero crossing", CA);
     // A satellite whose Doppler passes zero: between samples of an hour, then by halves.
     let scene =
         run::scene(3600.0, "[front_end]\nsample_rate_hz = 4.092e6\nformat = \"cf32\"\n[power]\ncn0_dbhz = 45\n");
@@ -261,11 +265,12 @@ fn at_the_zero_of_doppler_nothing_divides() {
     let chips = ((code_b.period - code_a.period) * 1023) as f64 + (code_b.steps() - code_a.steps());
     let seconds = 4_091_999.0 / 4.092e6;
     let cycles = turns_b.wrapping_sub(turns_a) as i64 as f64 / TURN;
-    the.at_most("Doppler at the crossing", doppler_hz(crossing, low).abs(), 1e-3, "Hz");
+    let at_crossing = || format!("{crossing}, sample {low}");
+    the.at_most("Doppler at the crossing", (doppler_hz(crossing, low).abs(), at_crossing()), 1e-3, "Hz");
     // Two places of the code, 1e-10 chip each.
     the.at_most(
         "code rate less 1.023 MHz less f_D/1540",
-        (chips - 1.023e6 * seconds - cycles / 1540.0).abs() / seconds,
+        ((chips - 1.023e6 * seconds - cycles / 1540.0).abs() / seconds, at_crossing()),
         1e-8,
         "chip/s",
     );
@@ -281,7 +286,7 @@ fn at_the_zero_of_doppler_nothing_divides() {
 
 #[test]
 fn a_hundred_turns_a_second_are_a_hundred_cycles() {
-    let the: Case = case(28, "spin of 100 rev/s");
+    let the = case(28, "spin of 100 rev/s", CA);
     let tables = |spin: &str| {
         format!(
             "[attitude]\nkind = \"fixed\"\nyaw_deg = 125\npitch_deg = 80\n{spin}boresight = [1, 0, 0]\n[front_end]\n\
@@ -295,7 +300,7 @@ fn a_hundred_turns_a_second_are_a_hundred_cycles() {
     };
     let turns = (cycles(&spun, 3.0) - cycles(&spun, 1.0)) - (cycles(&still, 3.0) - cycles(&still, 1.0));
     // The satellite moves by 1e-4 rad a second against the nose.
-    the.near("wind-up in 2 s", turns.abs(), 200.0, 1e-3, "cycles");
+    the.near("wind-up in 2 s", (turns.abs(), "G23, from 1 s to 3 s"), 200.0, 1e-3, "cycles");
     let (carrier, _) = worst_cycles(&spun, Sv::gps(23), (2_600_000, 3_900_000), 10_000);
     the.at_most("carrier between knots", carrier, 1e-4, "cycle");
 }

@@ -2,20 +2,29 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::panic::Location;
 use std::path::PathBuf;
 use std::sync::Mutex;
 
-/// A case of the list and where it belongs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+/// A case of the list, where it belongs and what it ran on.
+#[derive(Clone, Copy, Debug)]
 pub struct Case {
     pub number: u32,
     pub subject: &'static str,
+    pub signals: &'static str,
 }
 
 /// Shorthand for a case.
-pub const fn case(number: u32, subject: &'static str) -> Case {
-    Case { number, subject }
+pub const fn case(number: u32, subject: &'static str, signals: &'static str) -> Case {
+    Case { number, subject, signals }
 }
+
+/// What a case ran on that walks the catalogue.
+pub const ALL: &str = "all 25";
+/// What a case ran on that has GPS L1 C/A alone.
+pub const CA: &str = "GPS L1 C/A";
+/// What a case ran on that looks at places, orbits, loops or sums, which know no signal.
+pub const NONE: &str = "none";
 
 /// Families by the number of their first case.
 const FAMILIES: [(u32, &str); 9] = [
@@ -30,46 +39,119 @@ const FAMILIES: [(u32, &str); 9] = [
     (53, "Beyond the list"),
 ];
 
-/// Figure, value and bar of each row, by number of case and order within it.
-type Rows = BTreeMap<(u32, usize), (Case, [String; 3])>;
+/// An extreme of many figures and the input that makes it. The first of equals stays, and a figure that is no
+/// number beats all others, so that its bar is missed.
+#[derive(Clone, Debug)]
+pub struct Worst {
+    value: f64,
+    at: String,
+    least: bool,
+}
 
-static ROWS: Mutex<Rows> = Mutex::new(BTreeMap::new());
+impl Default for Worst {
+    /// The largest; without a figure it is no number.
+    fn default() -> Self {
+        Self { value: f64::NAN, at: String::new(), least: false }
+    }
+}
+
+impl Worst {
+    /// The least.
+    pub fn least() -> Self {
+        Self { least: true, ..Self::default() }
+    }
+
+    /// Takes a figure where none is beyond it.
+    pub fn take(&mut self, value: f64, at: impl FnOnce() -> String) {
+        let beyond = if self.least { value < self.value } else { value > self.value };
+        if self.at.is_empty() || (!self.value.is_nan() && (value.is_nan() || beyond)) {
+            (self.value, self.at) = (value, at());
+            assert!(!self.at.is_empty(), "a figure without its input");
+        }
+    }
+
+    /// Takes the extreme of another.
+    pub fn merge(&mut self, other: Self) {
+        if !other.at.is_empty() {
+            self.take(other.value, || other.at);
+        }
+    }
+
+    /// The figure itself.
+    pub fn value(&self) -> f64 {
+        self.value
+    }
+}
+
+impl<T: Into<String>> From<(f64, T)> for Worst {
+    fn from((value, at): (f64, T)) -> Self {
+        Self { value, at: at.into(), least: false }
+    }
+}
+
+/// Where a row stands: its case, the line of the test that tells it, and how often that line has.
+type Place = (u32, &'static str, u32, usize);
+/// What a row says: subject and signals of its case, figure, value, input, bar.
+type Row = [String; 6];
+
+static ROWS: Mutex<BTreeMap<Place, Row>> = Mutex::new(BTreeMap::new());
 static SECTIONS: Mutex<BTreeMap<&'static str, String>> = Mutex::new(BTreeMap::new());
 
 impl Case {
+    /// The same case on other signals.
+    pub const fn on(self, signals: &'static str) -> Self {
+        Self { signals, ..self }
+    }
+
     /// A figure that may not exceed its bar.
     #[track_caller]
-    pub fn at_most(self, figure: &str, value: f64, bar: f64, unit: &str) {
-        self.row(figure, format!("{} {unit}", short(value)), format!("≤ {} {unit}", short(bar)));
-        assert!(value <= bar, "case {}, {figure}: {value} {unit}, at most {bar}", self.number);
+    pub fn at_most(self, figure: &str, found: impl Into<Worst>, bar: f64, unit: &str) {
+        let Worst { value, at, .. } = found.into();
+        self.row(figure, &format!("{} {unit}", short(value)), &at, &format!("≤ {} {unit}", short(bar)));
+        assert!(value <= bar, "case {}, {figure}: {value} {unit} at {at}, at most {bar}", self.number);
     }
 
     /// A figure that must reach its bar.
     #[track_caller]
-    pub fn at_least(self, figure: &str, value: f64, bar: f64, unit: &str) {
-        self.row(figure, format!("{} {unit}", short(value)), format!("≥ {} {unit}", short(bar)));
-        assert!(value >= bar, "case {}, {figure}: {value} {unit}, at least {bar}", self.number);
+    pub fn at_least(self, figure: &str, found: impl Into<Worst>, bar: f64, unit: &str) {
+        let Worst { value, at, .. } = found.into();
+        self.row(figure, &format!("{} {unit}", short(value)), &at, &format!("≥ {} {unit}", short(bar)));
+        assert!(value >= bar, "case {}, {figure}: {value} {unit} at {at}, at least {bar}", self.number);
     }
 
     /// A figure that must be within `room` of what theory says.
     #[track_caller]
-    pub fn near(self, figure: &str, value: f64, theory: f64, room: f64, unit: &str) {
-        self.row(figure, format!("{} {unit}", short(value)), format!("{} ± {} {unit}", short(theory), short(room)));
-        assert!((value - theory).abs() <= room, "case {}, {figure}: {value} {unit}, {theory} ± {room}", self.number);
+    pub fn near(self, figure: &str, found: impl Into<Worst>, theory: f64, room: f64, unit: &str) {
+        let Worst { value, at, .. } = found.into();
+        let bar = format!("{} ± {} {unit}", short(theory), short(room));
+        self.row(figure, &format!("{} {unit}", short(value)), &at, &bar);
+        let apart = (value - theory).abs();
+        assert!(apart <= room, "case {}, {figure}: {value} {unit} at {at}, {theory} ± {room}", self.number);
     }
 
     /// So many of so many kept to the law.
     #[track_caller]
     pub fn all(self, figure: &str, held: usize, of: usize) {
-        self.row(figure, format!("{held} of {of}"), format!("{of} of {of}"));
+        self.row(figure, &format!("{held} of {of}"), "", &format!("{of} of {of}"));
         assert!(held == of && of > 0, "case {}, {figure}: {held} of {of}", self.number);
     }
 
-    fn row(self, figure: &str, value: String, bar: String) {
+    /// What may not happen at all did so often.
+    #[track_caller]
+    pub fn none(self, figure: &str, count: usize) {
+        self.row(figure, &count.to_string(), "", "0");
+        assert!(count == 0, "case {}, {figure}: {count}, none expected", self.number);
+    }
+
+    /// Rows of a case stand in the order of the lines that tell them: tests in parallel change nothing.
+    #[track_caller]
+    fn row(self, figure: &str, value: &str, at: &str, bar: &str) {
+        let caller = Location::caller();
         let mut rows = ROWS.lock().unwrap_or_else(|broken| broken.into_inner());
-        let order = rows.keys().filter(|(number, _)| *number == self.number).count();
-        let texts = [figure.to_owned(), value.trim_end().to_owned(), bar.trim_end().to_owned()];
-        rows.insert((self.number, order), (self, texts));
+        let line = (self.number, caller.file(), caller.line());
+        let told = rows.range((line.0, line.1, line.2, 0)..=(line.0, line.1, line.2, usize::MAX)).count();
+        let texts = [self.subject, self.signals, figure, value.trim_end(), at, bar.trim_end()].map(str::to_owned);
+        rows.insert((line.0, line.1, line.2, told), texts);
         write(&rows);
     }
 }
@@ -115,32 +197,50 @@ fn short(value: f64) -> String {
     }
 }
 
-fn write(rows: &BTreeMap<(u32, usize), (Case, [String; 3])>) {
+fn write(rows: &BTreeMap<Place, Row>) {
     let Some(path) = report() else { return };
     let mut text = String::from(
-        "# Stability at the edges\n\nEach case with the figure that its test measured beside its bar. Filled by\n\n\
+        "# Stability at the edges\n\nEach case with the signals that it ran on and the figure that its test measured \
+         beside its bar; where a figure is the worst of many, \"at\" is the input that makes it. \"none\" are cases of \
+         places, orbits, loops and sums, which know no signal. Filled by\n\n\
          ```\nGNSS_TWIN_WRITE_STABILITY=$PWD/reports/stability.md cargo test --test extremes\n```\n\n\
          in one run; `bash .ci/long` does the same with a thousand random scenes (`GNSS_TWIN_LONG=1`). A figure that \
          misses its bar fails its test.\n",
     );
-    let mut family = "";
-    let mut last = 0;
-    for ((number, _), (case, [figure, value, bar])) in rows {
+    let (mut family, mut last) = ("", (0, "", ""));
+    for ((number, ..), [subject, signals, figure, value, at, bar]) in rows {
         let now = FAMILIES.iter().rev().find(|(first, _)| first <= number).map_or("", |(_, name)| *name);
         if now != family {
             let _ = write!(
                 text,
-                "\n## {now}\n\n| case | subject | figure | measured | bar |\n| --- | --- | --- | --- | --- |\n"
+                "\n## {now}\n\n| case | subject | signals | figure | measured | at | bar |\n\
+                 | --- | --- | --- | --- | --- | --- | --- |\n"
             );
             family = now;
         }
-        let (number_text, subject) =
-            if *number == last { (String::new(), "") } else { (number.to_string(), case.subject) };
-        last = *number;
-        let _ = writeln!(text, "| {number_text} | {subject} | {figure} | {value} | {bar} |");
+        let same = last.0 == *number && last.1 == subject;
+        let head = if same { String::new() } else { number.to_string() };
+        let subject_text = if same { "" } else { subject };
+        let signals_text = if same && last.2 == signals { "" } else { signals };
+        let _ = writeln!(text, "| {head} | {subject_text} | {signals_text} | {figure} | {value} | {at} | {bar} |");
+        last = (*number, subject, signals);
     }
     for (title, body) in SECTIONS.lock().unwrap_or_else(|broken| broken.into_inner()).iter() {
         let _ = write!(text, "\n## {title}\n\n{body}");
     }
     std::fs::write(path, text).unwrap();
+}
+
+#[test]
+fn the_worst_keeps_its_input_and_what_is_no_number_is_the_worst() {
+    let worst = |values: &[f64], mut of: Worst| {
+        values.iter().for_each(|value| of.take(*value, || format!("{value}")));
+        (of.at, of.value)
+    };
+    assert_eq!(worst(&[1.0, 3.0, 3.0, 2.0], Worst::default()), ("3".to_owned(), 3.0));
+    assert_eq!(worst(&[-1.0, -3.0, 2.0], Worst::least()), ("-3".to_owned(), -3.0));
+    assert!(worst(&[1.0, f64::NAN, 2.0], Worst::default()).1.is_nan());
+    assert!(worst(&[f64::NAN, 2.0], Worst::least()).1.is_nan());
+    assert!(worst(&[], Worst::default()).1.is_nan());
+    assert_eq!(ALL, format!("all {}", gnss_twin::gnss::signal::SIGNALS.len()));
 }

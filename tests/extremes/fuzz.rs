@@ -12,7 +12,7 @@ use num_complex::Complex64;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
 
-use crate::figures::{case, cases};
+use crate::figures::{CA, Worst, case, cases};
 use crate::run;
 
 const TURN: f64 = 18_446_744_073_709_551_616.0;
@@ -234,19 +234,20 @@ fn departures(text: &str, share: f64) -> Result<Option<[f64; 4]>, TestCaseError>
 
 #[test]
 fn random_scenes_keep_the_laws_of_all_scenes() {
-    let the = case(56, "random scenes");
+    let the = case(56, "random scenes", CA);
     let count = cases(50, 1000);
     let mut runner = TestRunner::new_with_rng(
         Config { cases: count, failure_persistence: None, max_shrink_iters: 200, ..Config::default() },
         proptest::test_runner::TestRng::deterministic_rng(proptest::test_runner::RngAlgorithm::ChaCha),
     );
-    let worst = std::sync::Mutex::new(([0.0_f64; 4], 0_usize));
+    let worst = std::sync::Mutex::new((<[Worst; 4]>::default(), 0_usize));
     let found = runner.run(&scenes(), |(text, share)| {
         let Some(found) = departures(&text, share)? else { return Ok(()) };
         let mut worst = worst.lock().unwrap();
         worst.1 += 1;
         for (worst, found) in worst.0.iter_mut().zip(found) {
-            *worst = worst.max(found);
+            // A scene's seed is its own.
+            worst.take(found, || text.lines().find(|line| line.starts_with("seed")).unwrap_or_default().to_owned());
         }
         // Knots leave 1e-4 cycle, single precision 1e-6, a kink of a noisy oscillator within the period some
         // 1e-4. A ri16 signal is 150 LSB high at least: without noise its rounding repeats with the carrier,
@@ -257,9 +258,14 @@ fn random_scenes_keep_the_laws_of_all_scenes() {
     if let Err(error) = found {
         panic!("{error}");
     }
-    let ([carrier, cn0_db, bend_m, parted_m], judged) = *worst.lock().unwrap();
+    let ([carrier, cn0_db, bend_m, parted_m], judged) = worst.into_inner().unwrap();
     the.all("scenes with finite samples", count as usize, count as usize);
-    the.at_least("of those, with a satellite in view and judged", judged as f64, 0.6 * f64::from(count), "");
+    the.at_least(
+        "of those, with a satellite in view and judged",
+        (judged as f64, format!("{count} drawn")),
+        0.6 * f64::from(count),
+        "",
+    );
     the.at_most("carrier against an independent replica, noise-free", carrier, 1e-3, "cycle");
     the.at_most("C/N0 in the samples against the truth's", cn0_db, 0.3, "dB");
     the.at_most("range bends more than the motion", bend_m, 1e-6, "m");

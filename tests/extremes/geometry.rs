@@ -23,22 +23,24 @@ use gnss_twin::receiver::source::Block;
 use gnss_twin::receiver::track::TrackingSettings;
 use nalgebra::Vector3;
 
-use crate::figures::case;
+use crate::figures::{CA, NONE, Worst, case};
 use crate::run;
 
 const L1_HZ: f64 = 1_575.42e6;
 
 #[test]
 fn at_the_poles_every_longitude_is_the_same_place() {
-    let the = case(13, "poles");
-    let (mut worst_m, mut worst_rad, mut finite, mut of) = (0.0_f64, 0.0_f64, 0, 0);
+    let the = case(13, "poles", NONE);
+    let (mut worst_m, mut worst_rad, mut finite, mut of) = (Worst::default(), Worst::default(), 0, 0);
     for latitude in [-90.0, 90.0, 89.999_999_999, -89.999_999_999] {
         for longitude in [-180.0, -33.0, 0.0, 77.0, 180.0] {
             for height_m in [-400.0, 0.0, 9e3, 2e7] {
                 let place = Geodetic::from_degrees(latitude, longitude, height_m);
                 let back = Geodetic::from_ecef(&place.to_ecef());
-                worst_m = worst_m.max((back.to_ecef() - place.to_ecef()).norm()).max((back.height_m - height_m).abs());
-                worst_rad = worst_rad.max((back.latitude_rad - place.latitude_rad).abs());
+                let at = || format!("{latitude}°, {longitude}°, {height_m} m");
+                worst_m.take((back.to_ecef() - place.to_ecef()).norm(), at);
+                worst_m.take((back.height_m - height_m).abs(), at);
+                worst_rad.take((back.latitude_rad - place.latitude_rad).abs(), at);
                 let axes = back.ecef_to_enu();
                 let up = look(back, &place.to_ecef(), &(place.to_ecef() * 4.0));
                 of += 1;
@@ -58,10 +60,10 @@ fn at_the_poles_every_longitude_is_the_same_place() {
 
 #[test]
 fn the_two_names_of_the_antimeridian_are_one_place() {
-    let the = case(14, "antimeridian");
+    let the = case(14, "antimeridian", CA);
     let navigation = rinex::embedded().unwrap();
     let model = navigation.klobuchar.unwrap();
-    let (mut worst_m, mut worst_range_m) = (0.0_f64, 0.0_f64);
+    let (mut worst_m, mut worst_range_m) = (Worst::default(), Worst::default());
     for latitude in [-60.0, 0.0, 10.0, 51.0] {
         for azimuth in [0.1, 1.5, 3.0, 4.7, 6.0] {
             for tow_s in [0.0, 43_199.0, 50_400.0, 302_400.0, 604_799.0] {
@@ -77,7 +79,9 @@ fn the_two_names_of_the_antimeridian_are_one_place() {
                         .iter()
                         .sum::<f64>()
                 };
-                worst_m = worst_m.max((delay_m(180.0) - delay_m(-180.0)).abs());
+                worst_m.take((delay_m(180.0) - delay_m(-180.0)).abs(), || {
+                    format!("latitude {latitude}°, azimuth {azimuth} rad, {tow_s} s of the week")
+                });
             }
         }
     }
@@ -95,7 +99,7 @@ fn the_two_names_of_the_antimeridian_are_one_place() {
     let (east, west) = (run::try_scene(&tables(180.0)).unwrap(), run::try_scene(&tables(-180.0)).unwrap());
     for sv in run::in_view(&east) {
         let delay_s = |scene| truth::seen(scene, sv, &L1_CA, east.clock.start).unwrap().unwrap().arrivals[0].delay_s;
-        worst_range_m = worst_range_m.max((delay_s(&east) - delay_s(&west)).abs() * SPEED_OF_LIGHT_MPS);
+        worst_range_m.take((delay_s(&east) - delay_s(&west)).abs() * SPEED_OF_LIGHT_MPS, || sv.to_string());
     }
     the.at_most("ionospheric delay, 180° against −180°", worst_m, 1e-9, "m");
     // Coordinates of 180° and −180° differ by sin π = 1.2e-16 of 6.3e6 m and their rounding.
@@ -104,19 +108,19 @@ fn the_two_names_of_the_antimeridian_are_one_place() {
 
 #[test]
 fn in_the_earth_s_centre_ranges_are_orbital_radii() {
-    let the = case(15, "geocentre");
+    let the = case(15, "geocentre", CA);
     let centre = Geodetic::from_ecef(&Vector3::zeros());
     assert!(centre.latitude_rad.is_finite() && centre.longitude_rad.is_finite() && centre.height_m.is_finite());
     assert!((centre.height_m + 6_356_752.314).abs() < 1e-3);
     let scene = run::scene(60.0, "[front_end]\nsample_rate_hz = 2.6e6\n[power]\n");
-    let (mut worst_m, mut checked) = (0.0_f64, 0);
+    let (mut worst_m, mut checked) = (Worst::default(), 0);
     for sv in scene.catalogue.satellites() {
         let at = scene.clock.start;
         let Some(found) = sky::emission(&scene.catalogue, sv, at, &Motion::at_rest(Vector3::zeros())).unwrap() else {
             continue;
         };
         let (state, _) = scene.catalogue.truth(sv, at.plus_s(-found.travel_s)).unwrap().unwrap();
-        worst_m = worst_m.max((found.sight.range_m - state.position_m.norm()).abs());
+        worst_m.take((found.sight.range_m - state.position_m.norm()).abs(), || sv.to_string());
         assert!(found.sight.look.elevation_rad.is_finite() && found.sight.off_nadir_rad.is_finite());
         checked += 1;
     }
@@ -126,7 +130,7 @@ fn in_the_earth_s_centre_ranges_are_orbital_radii() {
 
 #[test]
 fn at_and_below_the_horizon_delays_keep_their_sign_and_the_troposphere_grows_to_twice_the_air_at_most() {
-    let the = case(18, "elevation 0, −1, −5°");
+    let the = case(18, "elevation 0, −1, −5°", NONE);
     let user = Geodetic::from_degrees(26.5, 80.2, 100.0);
     let at = Epoch::from_week(1590, 374_400.0);
     let model = rinex::embedded().unwrap().klobuchar.unwrap();
@@ -154,19 +158,22 @@ fn at_and_below_the_horizon_delays_keep_their_sign_and_the_troposphere_grows_to_
     // Where it rests, roundings of 100 m are left.
     let growing = delays_m.windows(2).filter(|two| two[1] >= two[0] - 1e-12).count();
     the.all("steps downwards in which the troposphere does not shrink", growing, delays_m.len() - 1);
-    let most = delays_m.iter().copied().fold(0.0, f64::max);
-    the.at_most("troposphere below the horizon over that at it", most / air.delay_m(user, 0.0, at), 2.0, "");
+    let mut most = Worst::default();
+    for (n, delay_m) in (-9000..=300).rev().zip(delays_m) {
+        most.take(delay_m / air.delay_m(user, 0.0, at), || format!("{:.2}°", 0.01 * f64::from(n)));
+    }
+    the.at_most("troposphere below the horizon over that at it", most, 2.0, "");
 }
 
 #[test]
 fn overhead_there_is_no_azimuth_and_in_the_antenna_no_direction() {
-    let the = case(19, "satellite at the zenith, and at the antenna");
+    let the = case(19, "satellite at the zenith, and at the antenna", CA);
     let scene = run::scene(
         60.0,
         "[front_end]\nsample_rate_hz = 2.6e6\n[power]\n[troposphere]\nmodel = \"saastamoinen\"\n[ionosphere]\nmodel \
          = \"klobuchar\"\n",
     );
-    let (mut finite, mut refused, mut of, mut worst) = (0, 0, 0, 0.0_f64);
+    let (mut finite, mut refused, mut of, mut worst) = (0, 0, 0, Worst::default());
     for sv in scene.catalogue.satellites() {
         let at = scene.clock.start;
         let Some((state, _)) = scene.catalogue.truth(sv, at).unwrap() else { continue };
@@ -193,7 +200,7 @@ fn overhead_there_is_no_azimuth_and_in_the_antenna_no_direction() {
                 && arrival.carrier_cycles.is_finite()
                 && arrival.cn0_hz > 0.0,
         );
-        worst = worst.max((FRAC_PI_2 - towards.elevation_rad).abs());
+        worst.take((FRAC_PI_2 - towards.elevation_rad).abs(), || sv.to_string());
         // In the satellite, to a millimetre.
         let inside = Motion::at_rest(state.position_m + Vector3::new(1e-3, 0.0, 0.0));
         refused +=
@@ -238,15 +245,22 @@ fn ranges(sky: &[(f64, f64)]) -> Vec<Range> {
 
 #[test]
 fn satellites_on_a_cone_or_in_a_plane_give_no_position_but_their_condition() {
-    let the = case(20, "satellites on a cone");
+    let the = case(20, "satellites on a cone", NONE);
     let cone = |opening: f64| (0..6).map(|k| (60.0 * f64::from(k), opening)).collect::<Vec<_>>();
     let plane: Vec<(f64, f64)> =
         (1..7).map(|k| (if k < 4 { 40.0 } else { 220.0 }, 25.0 * f64::from(1 + (k - 1) % 3))).collect();
-    let (mut refused, mut least) = (0, f64::INFINITY);
-    for sky in [cone(10.0), cone(45.0), cone(80.0), plane, vec![(10.0, 40.0); 5]] {
+    let (mut refused, mut least) = (0, Worst::least());
+    let skies = [
+        ("cone of 10°", cone(10.0)),
+        ("cone of 45°", cone(45.0)),
+        ("cone of 80°", cone(80.0)),
+        ("plane", plane),
+        ("one direction", vec![(10.0, 40.0); 5]),
+    ];
+    for (name, sky) in skies {
         if let Err(NoFix::Singular { condition }) = position(&ranges(&sky), Vector3::zeros(), &BARE) {
             refused += 1;
-            least = least.min(condition);
+            least.take(condition, || name.to_owned());
         }
     }
     the.all("singular, never a position", refused, 5);
@@ -260,7 +274,7 @@ fn satellites_on_a_cone_or_in_a_plane_give_no_position_but_their_condition() {
 
 #[test]
 fn too_few_satellites_are_said_to_be_and_four_prove_nothing() {
-    let the = case(21, "n = 0, 1, 3, 4");
+    let the = case(21, "n = 0, 1, 3, 4", NONE);
     let sky = [(20.0, 75.0), (65.0, 42.0), (190.0, 33.0), (300.0, 25.0)];
     let few = [0, 1, 3].iter().filter(|n| {
         matches!(position(&ranges(&sky[..**n]), Vector3::zeros(), &BARE), Err(NoFix::TooFew { have, need: 4 }) if have == **n)
@@ -271,12 +285,17 @@ fn too_few_satellites_are_said_to_be_and_four_prove_nothing() {
     faulty[2].pseudorange_m += 1000.0;
     let (kept, solution, excluded) = consistent(faulty, Vector3::zeros(), &BARE, 1e-3).unwrap();
     the.all("4: a position, nobody excluded", usize::from(kept.len() == 4 && excluded.is_empty()), 1);
-    the.at_most("4: sum of squared residuals with a fault of 1 km", solution.chi_square, 1e-6, "");
+    the.at_most(
+        "4: sum of squared residuals with a fault of 1 km",
+        (solution.chi_square, "the third of four"),
+        1e-6,
+        "",
+    );
 }
 
 #[test]
 fn of_two_signals_of_one_satellite_the_stronger_is_found() {
-    let the = case(22, "one PRN twice");
+    let the = case(22, "one PRN twice", CA);
     // A direct ray and its echo two chips behind, 8 dB below it and 8 dB above; a spoofer 10 dB above the
     // truth.
     let front = "[front_end]\nsample_rate_hz = 4e6\nformat = \"ci16\"\n[noise]\n[power]\ncn0_dbhz = 45\n";
@@ -297,8 +316,8 @@ fn of_two_signals_of_one_satellite_the_stronger_is_found() {
     // The search is right to a seventh of a chip. The loop's noise is 0.6 m at 45 dB-Hz and 0.5 Hz, 1 m where
     // pull-in ends, and the other ray is more than a chip and a half away: three sigma.
     let told = |name: &str, [found_m, tracked_m]: [f64; 2], theory_m: f64| {
-        the.near(&format!("{name}: code found, off the true one"), found_m, theory_m, 40.0, "m");
-        the.near(&format!("{name}: code tracked for 2 s"), tracked_m, theory_m, 3.0, "m");
+        the.near(&format!("{name}: code found, off the true one"), (found_m, "G23"), theory_m, 40.0, "m");
+        the.near(&format!("{name}: code tracked for 2 s"), (tracked_m, "G23"), theory_m, 3.0, "m");
     };
     let echo = |amplitude: f64| {
         format!("[[multipath]]\nkind = \"given\"\nexcess_m = 600\namplitude = {amplitude}\nphase_deg = 90\n")
@@ -311,11 +330,13 @@ fn of_two_signals_of_one_satellite_the_stronger_is_found() {
 
 #[test]
 fn a_position_is_as_good_as_its_condition_says_or_refused_with_it() {
-    let the = case(58, "conditioning told");
-    let (mut refused, mut least_refused, mut most_solved, mut worst, mut of) = (0, f64::INFINITY, 0.0_f64, 0.0_f64, 0);
+    let the = case(58, "conditioning told", CA);
+    let (mut refused, mut of) = (0, 0);
+    let (mut least_refused, mut most_solved, mut worst) = (Worst::least(), Worst::default(), Worst::default());
     for step in 0..60 {
         // From a cone to a fair sky: satellite after satellite leaves the common elevation.
         let off_deg = libm::pow(10.0, -5.0 + 0.1 * f64::from(step));
+        let at = || format!("{off_deg:.1e}° off the cone");
         let sky: Vec<(f64, f64)> =
             (0..6).map(|k| (60.0 * f64::from(k), 45.0 - off_deg.min(40.0) * f64::from(k % 3) / 2.0)).collect();
         let mut seen = ranges(&sky);
@@ -326,16 +347,16 @@ fn a_position_is_as_good_as_its_condition_says_or_refused_with_it() {
         match position(&seen, place, &BARE) {
             Err(NoFix::Singular { condition }) => {
                 refused += 1;
-                least_refused = least_refused.min(condition);
+                least_refused.take(condition, at);
             }
             Err(other) => panic!("{other}"),
             Ok(solution) => {
                 let values = solution.dilution.symmetric_eigenvalues();
-                most_solved = most_solved.max((values.max() / values.min()).sqrt());
+                most_solved.take((values.max() / values.min()).sqrt(), at);
                 // A range moves the solution by no more than the dilution's square root, its largest singular
                 // value.
                 let moved_m = ((solution.position_m - place).norm_squared() + solution.clock_m().powi(2)).sqrt();
-                worst = worst.max(moved_m / (1e-3 * values.max().sqrt()));
+                worst.take(moved_m / (1e-3 * values.max().sqrt()), at);
             }
         }
     }
@@ -348,8 +369,8 @@ fn a_position_is_as_good_as_its_condition_says_or_refused_with_it() {
     let near = TrackingSettings { integration: 20, pll_bandwidth_hz: 18.0, ..Default::default() };
     near.validate(1e-3).unwrap();
     let pll = near.margins(1e-3)[0];
-    the.near("18 Hz and 20 ms: bandwidth times update time told", pll.bandwidth_time, 0.36, 1e-12, "");
-    the.near("18 Hz and 20 ms: share of the limit told to be left", pll.margin_share, 0.1, 1e-9, "");
+    the.near("18 Hz and 20 ms: bandwidth times update time told", (pll.bandwidth_time, "the PLL"), 0.36, 1e-12, "");
+    the.near("18 Hz and 20 ms: share of the limit told to be left", (pll.margin_share, "the PLL"), 0.1, 1e-9, "");
     let scene = run::scene(1.0, "[front_end]\nsample_rate_hz = 2.6e6\n[power]\n");
     let directory = tempfile::tempdir().unwrap();
     let mut writer = truth::Writer::create(directory.path()).unwrap();

@@ -15,13 +15,13 @@ use gnss_twin::receiver::track::loops::{self, Gains, Rates, bandwidth_time};
 use gnss_twin::receiver::track::{Symbol, TrackingSettings};
 use num_complex::Complex64;
 
-use crate::figures::case;
+use crate::figures::{CA, NONE, Worst, case};
 use crate::fuzz::Period;
 use crate::run;
 
 #[test]
 fn sums_over_unknown_bits_lose_what_theory_says_and_two_quadrants_see_no_bit() {
-    let the = case(47, "T = 20 ms, bits unsynchronised");
+    let the = case(47, "T = 20 ms, bits unsynchronised", CA);
     // Prompts of a code period each from the generator's own signal, by the truth's code and carrier.
     let sv = Sv::gps(23);
     let mut still = run::only(
@@ -45,20 +45,20 @@ fn sums_over_unknown_bits_lose_what_theory_says_and_two_quadrants_see_no_bit() {
     let turns = prompts.windows(2).filter(|w| w[0] * w[1] < 0.0).count() as f64 / (prompts.len() as f64 / 20.0);
     let theory_db = 10.0 * libm::log10(1.0 - turns * (1.0 - 0.335));
     assert!((0.4..0.6).contains(&turns), "{turns}");
-    the.near("mean loss of 20 ms over unknown bits", 10.0 * libm::log10(power), theory_db, 0.02, "dB");
+    the.near("mean loss of 20 ms over unknown bits", (10.0 * libm::log10(power), "G23, 7 s"), theory_db, 0.02, "dB");
     the.near(
         "the same for bits of which half turn",
-        10.0 * libm::log10(1.0 - (1.0 - power) * 0.5 / turns),
+        (10.0 * libm::log10(1.0 - (1.0 - power) * 0.5 / turns), "G23, 7 s"),
         -1.76,
         0.03,
         "dB",
     );
-    let (mut worst, mut jumps) = (0.0_f64, 0.0_f64);
+    let (mut worst, mut jumps) = (Worst::default(), Worst::default());
     for f_hz in [-20.0, -3.0, 0.0, 7.0, 20.0] {
         let before = Complex64::from_polar(1.0, 0.4);
         let after = Complex64::from_polar(-1.0, 0.4 + std::f64::consts::TAU * f_hz * 1e-3);
-        worst = worst.max((loops::frequency_two_quadrant(before, after, 1e-3) - f_hz).abs());
-        jumps = jumps.max((loops::frequency_four_quadrant(before, after, 1e-3) - f_hz).abs());
+        worst.take((loops::frequency_two_quadrant(before, after, 1e-3) - f_hz).abs(), || format!("{f_hz} Hz"));
+        jumps.take((loops::frequency_four_quadrant(before, after, 1e-3) - f_hz).abs(), || format!("{f_hz} Hz"));
     }
     the.at_most("two-quadrant FLL across a bit edge", worst, 1e-9, "Hz");
     the.near("four-quadrant FLL across a bit edge jumps by 1/(2T)", jumps, 500.0, 1e-9, "Hz");
@@ -76,14 +76,15 @@ fn sums_over_unknown_bits_lose_what_theory_says_and_two_quadrants_see_no_bit() {
         at.unwrap().unwrap().0.doppler_hz
     };
     assert!(!channel.is_lost() && last.locked);
-    the.at_most("channel with T = 20 ms from 60 Hz off: Doppler", (last.doppler_hz - truth_hz).abs(), 2.0, "Hz");
+    let error_hz = (last.doppler_hz - truth_hz).abs();
+    the.at_most("channel with T = 20 ms from 60 Hz off: Doppler", (error_hz, "G23 after 3 s"), 2.0, "Hz");
 }
 
 #[test]
 fn beyond_the_classic_limits_of_stability_the_discrete_design_keeps_its_bandwidth() {
-    let the = case(48, "B·T of 0.36 to 0.60");
+    let the = case(48, "B·T of 0.36 to 0.60", NONE);
     for order in [1_u32, 2, 3] {
-        let (mut worst, mut stable, mut of) = (0.0_f64, 0, 0);
+        let (mut worst, mut stable, mut of) = (Worst::default(), 0, 0);
         for product in [0.018, 0.1, 0.36, 0.45, 0.56, 0.60, 1.0] {
             // An order-1 loop has at most 0.5.
             if order == 1 && product > 0.45 {
@@ -106,7 +107,7 @@ fn beyond_the_classic_limits_of_stability_the_discrete_design_keeps_its_bandwidt
             }
             of += 1;
             stable += usize::from(mean_before.abs() < 1e-9);
-            worst = worst.max((energy / 2.0 / product - 1.0).abs());
+            worst.take((energy / 2.0 / product - 1.0).abs(), || format!("B·T of {product}"));
         }
         the.all(&format!("order {order}: response dies out"), stable, of);
         the.at_most(&format!("order {order}: bandwidth against the one asked for"), worst, 0.05, "");
@@ -121,7 +122,7 @@ fn beyond_the_classic_limits_of_stability_the_discrete_design_keeps_its_bandwidt
 
 #[test]
 fn a_correlator_too_narrow_or_too_wide_is_refused_and_its_noise_stays_finite() {
-    let the = case(49, "d → 0, d = 2");
+    let the = case(49, "d → 0, d = 2", CA);
     let refused = [0.0, 1e-9, 0.0199, 1.51, 2.0, 2.5, f64::NAN].iter().filter(|d| {
         let settings = TrackingSettings { spacing_chips: **d, ..Default::default() };
         settings.validate(1e-3).is_err_and(|e| e.to_string().contains("spacing_chips"))
@@ -154,7 +155,7 @@ fn a_correlator_too_narrow_or_too_wide_is_refused_and_its_noise_stays_finite() {
     // σ at 50 dB-Hz, 0.5 Hz, d = 1.5: 0.57 m; three of them.
     the.at_most(
         "d = 1.5: code after 2.5 s at 50 dB-Hz",
-        run::code_error_m(&scene, Sv::gps(23), last.sample, last.code_fraction).abs(),
+        (run::code_error_m(&scene, Sv::gps(23), last.sample, last.code_fraction).abs(), "G23"),
         1.8,
         "m",
     );
@@ -162,7 +163,7 @@ fn a_correlator_too_narrow_or_too_wide_is_refused_and_its_noise_stays_finite() {
 
 #[test]
 fn data_upside_down_are_the_same_data() {
-    let the = case(50, "half-cycle lock");
+    let the = case(50, "half-cycle lock", CA);
     let set = &rinex::embedded().unwrap().ephemerides[0];
     let broadcast = Broadcast::new(None, 15, &[], set.toe).unwrap();
     let start = set.toe.seconds() - 3600;
@@ -202,14 +203,14 @@ fn data_upside_down_are_the_same_data() {
 
 #[test]
 fn away_from_the_peak_a_channel_comes_back_or_gives_up() {
-    let the = case(51, "false lock half a chip and a chip off");
+    let the = case(51, "false lock half a chip and a chip off", CA);
     let sv = Sv::gps(23);
     let scene = run::only(
         run::scene(8.0, "[front_end]\nsample_rate_hz = 2.6e6\nformat = \"ci8\"\n[noise]\n[power]\ncn0_dbhz = 45\n"),
         &[sv],
     );
     let bytes = run::samples(&scene);
-    let (mut held, mut of, mut worst_m) = (0, 0, 0.0_f64);
+    let (mut held, mut of, mut worst_m) = (0, 0, Worst::default());
     for chips in [-1.1, -1.0, -0.75, -0.5, 0.5, 0.75, 1.0, 1.1, 3.3, -511.5] {
         let (channel, report) =
             run::track(&scene, &bytes, &run::hit(&scene, sv, chips, 30.0), &TrackingSettings::default(), 260_000);
@@ -219,7 +220,9 @@ fn away_from_the_peak_a_channel_comes_back_or_gives_up() {
         of += 1;
         // Lost, never locked, or on the peak: the tail of 2.5 Hz from 1.1 chips leaves centimetres after 7 s.
         held += usize::from(channel.is_lost() || error_m.is_none_or(|m| m < 5.0));
-        worst_m = worst_m.max(error_m.filter(|_| !channel.is_lost()).unwrap_or(0.0));
+        if let Some(error_m) = error_m.filter(|_| !channel.is_lost()) {
+            worst_m.take(error_m, || format!("started {chips} chips off"));
+        }
     }
     the.all("on the peak, or told", held, of);
     the.at_most("code of those locked after 7 s", worst_m, 5.0, "m");
@@ -227,27 +230,23 @@ fn away_from_the_peak_a_channel_comes_back_or_gives_up() {
     let replica = Replica::new(l1ca::code(23).unwrap(), Edge::Nearest).unwrap();
     let code = l1ca::code(23).unwrap();
     let i: Vec<f32> = code.iter().map(|chip| if *chip { -1.0 } else { 1.0 }).collect();
-    let highest = (1..1023).map(|lag| {
+    let mut highest_db = Worst::default();
+    for lag in 1..1023 {
         let nco = Nco {
             carrier: 0,
             carrier_step: 0,
             code: chips_to_units(f64::from(lag) + 0.5),
             code_step: chips_to_units(1.0) as u64,
         };
-        replica.slow(&i, &vec![0.0; 1023], &nco, &[0])[0].norm() / 1023.0
-    });
-    the.near(
-        "highest lobe of the code beside its peak",
-        20.0 * libm::log10(highest.fold(0.0, f64::max)),
-        -23.94,
-        0.01,
-        "dB",
-    );
+        let lobe = replica.slow(&i, &vec![0.0; 1023], &nco, &[0])[0].norm() / 1023.0;
+        highest_db.take(20.0 * libm::log10(lobe), || format!("lag of {lag} chips"));
+    }
+    the.near("highest lobe of the code beside its peak", highest_db, -23.94, 0.01, "dB");
 }
 
 #[test]
 fn threads_change_no_byte() {
-    let the = case(52, "determinism");
+    let the = case(52, "determinism", CA);
     let tables = "[front_end]\nsample_rate_hz = 2.6e6\nformat = \"ci8\"\n[noise]\n[power]\n[receiver_clock]\n\
                   oscillator = \"tcxo\"\n\
         [scintillation]\ns4 = 0.5\nsigma_phi_rad = 0.3\ndecorrelation_s = 0.5\n";

@@ -11,7 +11,7 @@ use gnss_twin::receiver::settings::Settings;
 use gnss_twin::receiver::source::Block;
 use gnss_twin::receiver::track::TrackingSettings;
 
-use crate::figures::{self, case};
+use crate::figures::{self, CA, Worst, case};
 use crate::run::{self, Received};
 
 const FRONT: &str = "[front_end]\nsample_rate_hz = 2.6e6\nformat = \"ci8\"\n";
@@ -22,15 +22,15 @@ fn all() -> Vec<Link> {
 
 #[test]
 fn at_five_decibels_nothing_is_locked_and_at_eighty_the_code_stands_to_centimetres() {
-    let the = case(34, "C/N0 of 5 and 80 dB-Hz");
+    let the = case(34, "C/N0 of 5 and 80 dB-Hz", CA);
     let scene = run::scene(60.0, &format!("{FRONT}[noise]\n[power]\ncn0_dbhz = 5\n"));
     let received = Received::of(&scene, &Settings::default());
     let locked =
         received.events().iter().filter(|row| matches!(row.event, Event::PhaseLocked | Event::BitSynchronised)).count();
-    the.at_most("5 dB-Hz for 60 s: locks", locked as f64, 0.0, "");
-    the.at_most("5 dB-Hz for 60 s: fixes", received.fixes().len() as f64, 0.0, "");
+    the.none("5 dB-Hz for 60 s: locks", locked);
+    the.none("5 dB-Hz for 60 s: fixes", received.fixes().len());
     // One false alarm in 1e6 spectra is designed.
-    the.at_most("60 s of noise: seconds with a line told", received.lines().len() as f64, 0.0, "");
+    the.none("60 s of noise: seconds with a line told", received.lines().len());
     // One satellite alone, edges band-limited, 10 Msps: σ = 1.5 cm at B = 1 Hz, d = 0.5.
     let sv = Sv::gps(23);
     let tables = "[front_end]\nsample_rate_hz = 10e6\nformat = \"cf32\"\n[noise]\n[power]\ncn0_dbhz = 80\n[fidelity]\n\
@@ -47,13 +47,13 @@ fn at_five_decibels_nothing_is_locked_and_at_eighty_the_code_stands_to_centimetr
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
     let sigma = (errors.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / errors.len() as f64).sqrt();
     // 2 s hold four times the loop's memory: the spread is known to a third, three sigma of it above.
-    the.at_most("80 dB-Hz: code, standard deviation", sigma, 0.03, "m");
-    the.at_most("80 dB-Hz: code, mean", mean.abs(), 0.05, "m");
+    the.at_most("80 dB-Hz: code, standard deviation", (sigma, "G23 from 2 s to 4 s"), 0.03, "m");
+    the.at_most("80 dB-Hz: code, mean", (mean.abs(), "G23 from 2 s to 4 s"), 0.05, "m");
 }
 
 #[test]
 fn ten_satellites_of_fifty_five_leave_each_other_fifty() {
-    let the = case(35, "all at 55 dB-Hz");
+    let the = case(35, "all at 55 dB-Hz", CA);
     let tables = "[front_end]\nsample_rate_hz = 5e6\nformat = \"ci16\"\n[noise]\n[power]\ncn0_dbhz = 55\n";
     let scene = run::scene(5.0, tables);
     let up: Vec<Sv> = run::in_view(&scene).into_iter().take(10).collect();
@@ -67,12 +67,12 @@ fn ten_satellites_of_fifty_five_leave_each_other_fifty() {
         mean_db += report.measurements.last().unwrap().cn0_dbhz / 10.0;
     }
     // Nine matched signals at −61.86 dB of seconds: 50.44 dB-Hz; single pairs differ by their own lines.
-    the.near("mean C/N0 of ten", mean_db, 50.44, 0.5, "dB-Hz");
+    the.near("mean C/N0 of ten", (mean_db, "after 5 s"), 50.44, 0.5, "dB-Hz");
 }
 
 #[test]
 fn what_a_strong_satellite_puts_into_others_is_not_taken_for_them() {
-    let the = case(36, "near-far of 25 dB");
+    let the = case(36, "near-far of 25 dB", CA);
     let text = std::fs::read_to_string(run::folder().join("near_far.toml")).unwrap();
     let metadata = run::try_scene(&text).unwrap().metadata;
     let mut searcher = Searcher::new(&metadata, &AcquisitionSettings::default()).unwrap();
@@ -99,20 +99,25 @@ fn what_a_strong_satellite_puts_into_others_is_not_taken_for_them() {
                 }
             }
         }
-        the.at_most(&format!("{apart_db} dB: absent satellites acquired"), f64::from(ghosts), 0.0, "");
-        the.at_most(&format!("{apart_db} dB: weak one acquired at a cross-correlation"), wrong as f64, 0.0, "");
+        the.none(&format!("{apart_db} dB: absent satellites acquired"), ghosts);
+        the.none(&format!("{apart_db} dB: weak one acquired at a cross-correlation"), wrong);
         if apart_db < 24 {
             // Without the strong one 47 dB-Hz and more are found always, and their powers are known to a
             // decibel.
             let share = found as f64 / f64::from(of);
-            the.at_least(&format!("{apart_db} dB: weak one found at its place"), share, 0.9, "of them");
+            the.at_least(
+                &format!("{apart_db} dB: weak one found at its place"),
+                (share, format!("{of} seeds")),
+                0.9,
+                "of them",
+            );
         }
     }
 }
 
 #[test]
 fn silence_is_received_without_a_number_that_is_none() {
-    let the = case(37, "zero signal, zero noise");
+    let the = case(37, "zero signal, zero noise", CA);
     for (name, format, bytes_of) in [("ci8", "ci8", 2), ("cf32", "cf32", 8), ("ri16", "ri16", 2)] {
         let if_hz = if format == "ri16" { "if_hz = 6e5\n" } else { "" };
         let scene = run::scene(
@@ -148,7 +153,7 @@ fn silence_is_received_without_a_number_that_is_none() {
 
 #[test]
 fn without_noise_the_ratio_has_its_cap() {
-    let the = case(38, "noise off");
+    let the = case(38, "noise off", CA);
     let sv = Sv::gps(23);
     let tables = "[front_end]\nsample_rate_hz = 5e6\nformat = \"cf32\"\n[power]\ncn0_dbhz = 60\n[fidelity]\nlevel \
                   = \"reference\"\ncode_edge = \"area\"\n";
@@ -160,11 +165,12 @@ fn without_noise_the_ratio_has_its_cap() {
         &TrackingSettings::default(),
         50_000,
     );
-    let (least, most) = report
-        .measurements
-        .iter()
-        .filter(|m| m.locked)
-        .fold((f64::INFINITY, 0.0_f64), |(l, m), x| (l.min(x.cn0_dbhz), m.max(x.cn0_dbhz)));
+    let (mut least, mut most) = (Worst::least(), Worst::default());
+    for told in report.measurements.iter().filter(|m| m.locked) {
+        let at = || format!("G23, {:.2} s", scene.clock.rate.elapsed_s(told.sample));
+        least.take(told.cn0_dbhz, at);
+        most.take(told.cn0_dbhz, at);
+    }
     the.at_most("largest C/N0 told", most, 100.0, "dB-Hz");
     the.at_least("least C/N0 told once locked", least, 60.0, "dB-Hz");
 }
@@ -176,7 +182,7 @@ fn jammed(interference: &str, duration_s: f64, front: &str) -> Scene {
 
 #[test]
 fn ninety_decibels_end_every_channel_and_wrap_no_sample() {
-    let the = case(39, "J/S of 90 dB");
+    let the = case(39, "J/S of 90 dB", CA);
     let scene = jammed("kind = \"noise\"\nbandwidth_hz = 2e6\njs_db = 90\non_s = 4\n", 6.0, FRONT);
     let bytes = run::samples(&scene);
     let received = Received::from_bytes(&scene, &bytes, &Settings::default(), tempfile::tempdir().unwrap());
@@ -194,19 +200,19 @@ fn ninety_decibels_end_every_channel_and_wrap_no_sample() {
     assert!(locked.len() >= 10, "{locked:?}");
     the.all("channels lost within 0.5 s", locked.iter().filter(lost).count(), locked.len());
     let late = events.iter().filter(|row| row.event == Event::PhaseLocked && row.sample > 11_700_000).count();
-    the.at_most("locks under the jammer", late as f64, 0.0, "");
+    the.none("locks under the jammer", late);
     the.all("all tables finite", usize::from(received.finite()), 1);
     let jam: Vec<i8> = bytes[2 * 10_660_000..].iter().map(|b| *b as i8).collect();
     let (high, low) =
         (jam.iter().filter(|x| **x == 127).count() as f64, jam.iter().filter(|x| **x <= -127).count() as f64);
     // Saturated on both sides alike; 6e6 samples of a band of 2 MHz are known to a few permille.
-    the.at_least("samples at full scale", (high + low) / jam.len() as f64, 0.9, "");
-    the.near("share at the upper end of those", high / (high + low), 0.5, 0.01, "");
+    the.at_least("samples at full scale", ((high + low) / jam.len() as f64, "from 4.1 s on"), 0.9, "");
+    the.near("share at the upper end of those", (high / (high + low), "from 4.1 s on"), 0.5, 0.01, "");
 }
 
 #[test]
 fn a_tone_on_a_line_of_the_code_is_a_constant_of_the_predicted_size_and_no_satellite() {
-    let the = case(40, "CW on PRN 6's line at −227 kHz, J/S 30 dB");
+    let the = case(40, "CW on PRN 6's line at −227 kHz, J/S 30 dB", CA);
     // A still code against the tone alone.
     let scene = jammed(
         "kind = \"cw\"\noffset_hz = -227e3\njs_db = 30\n",
@@ -226,7 +232,7 @@ fn a_tone_on_a_line_of_the_code_is_a_constant_of_the_predicted_size_and_no_satel
         let [prompt] = replica.slow(&i[k * 5000..(k + 1) * 5000], &q[k * 5000..(k + 1) * 5000], &nco, &[0]);
         sum += prompt / (5000.0 * amplitude * 200.0);
     }
-    the.near("constant phasor over the signal's", sum.norm(), 2.73, 0.09, "");
+    the.near("constant phasor over the signal's", (sum.norm(), "PRN 6, 0.2 s"), 2.73, 0.09, "");
     // The receiver: the wave stands on the line as the satellite's motion places it when it begins, at 3 s.
     let sv = Sv::gps(6);
     // The wave is 11 dB above the noise of the band: eight deviations are 64 LSB.
@@ -243,13 +249,12 @@ fn a_tone_on_a_line_of_the_code_is_a_constant_of_the_predicted_size_and_no_satel
     let lines = received.lines();
     let second = |sample: u64| sample / 2_600_000;
     the.all("seconds under it that are told", lines.iter().filter(|row| second(row.sample) >= 3).count(), 3);
-    the.at_most(
-        "seconds before it that are told",
-        lines.iter().filter(|row| second(row.sample) < 3).count() as f64,
-        0.0,
-        "",
-    );
-    let worst = |of: &dyn Fn(&gnss_twin::gnss::record::LineRow) -> f64| lines.iter().map(of).fold(0.0, f64::max);
+    the.none("seconds before it that are told", lines.iter().filter(|row| second(row.sample) < 3).count());
+    let worst = |of: &dyn Fn(&gnss_twin::gnss::record::LineRow) -> f64| {
+        let mut worst = Worst::default();
+        lines.iter().for_each(|row| worst.take(of(row), || format!("second {}", second(row.sample))));
+        worst
+    };
     // Of a bin of 635 Hz; a line 40 dB above its bin is known to a hundredth of it, half a percent of its
     // neighbour's.
     the.at_most("frequency told", worst(&|row| (row.frequency_hz - wave_hz).abs()), 0.05 * 635.0, "Hz");
@@ -262,7 +267,7 @@ fn a_tone_on_a_line_of_the_code_is_a_constant_of_the_predicted_size_and_no_satel
             let seen = truth.iter().find(|t| t.sv == row.sv && t.sample >= row.sample);
             seen.is_none()
         });
-    the.at_most("absent satellites that reach bit lock under it", false_locks.count() as f64, 0.0, "");
+    the.none("absent satellites that reach bit lock under it", false_locks.count());
     the.all("all tables finite", usize::from(received.finite()), 1);
     // What makes the flag needed: the satellite's channel takes the wave for its signal, 8.7 dB stronger.
     let read = |from: u64, to: u64| {
@@ -272,18 +277,18 @@ fn a_tone_on_a_line_of_the_code_is_a_constant_of_the_predicted_size_and_no_satel
     };
     // At most the phasors' sum, 20 lg(1 + 2.73); it is high.
     let high_db = read(7_800_000, u64::MAX) - read(0, 7_800_000);
-    the.at_least("C/N0 that the satellite's channel tells, too high by", high_db, 1.0, "dB");
-    the.at_most("C/N0 that the satellite's channel tells, too high by", high_db, 11.4, "dB");
+    the.at_least("C/N0 that the satellite's channel tells, too high by", (high_db, "G06"), 1.0, "dB");
+    the.at_most("C/N0 that the satellite's channel tells, too high by", (high_db, "G06"), 11.4, "dB");
     // A satellite's own lines are none: 67 dB-Hz has them 16 dB above the noise of a bin.
     let text = std::fs::read_to_string(run::folder().join("near_far.toml")).unwrap();
     let strong = run::only(run::try_scene(&text.replace("duration_s = 1", "duration_s = 3")).unwrap(), &[Sv::gps(23)]);
     let own = Received::of(&strong, &Settings::default());
-    the.at_most("alone at 67 dB-Hz: seconds in which its own lines are told", own.lines().len() as f64, 0.0, "");
+    the.none("alone at 67 dB-Hz: seconds in which its own lines are told", own.lines().len());
 }
 
 #[test]
 fn an_offset_of_one_step_and_a_stuck_bit_are_no_satellites() {
-    let the = case(41, "DC at f_IF = 0, 1-bit stuck");
+    let the = case(41, "DC at f_IF = 0, 1-bit stuck", CA);
     let quiet = |tables: &str| run::scene(1.0, &format!("{FRONT}{tables}[power]\ncn0_dbhz = 45\n[noise]\n"));
     let mut scene = quiet("noise_lsb = 0.3\n[iq]\ndc_i_lsb = 1\ndc_q_lsb = -1\n");
     scene.excluded = scene.catalogue.satellites().collect();
@@ -294,19 +299,14 @@ fn an_offset_of_one_step_and_a_stuck_bit_are_no_satellites() {
         assert!(rows.iter().all(|(row, _)| row.statistic.is_finite() && row.cn0_dbhz.is_finite()));
         rows.iter().filter(|(_, hit)| hit.is_some()).count()
     };
-    the.at_most(
-        "8-bit with a DC of 1 LSB and noise of 0.3: acquired",
-        ghosts(&scene, &run::samples(&scene)) as f64,
-        0.0,
-        "",
-    );
+    the.none("8-bit with a DC of 1 LSB and noise of 0.3: acquired", ghosts(&scene, &run::samples(&scene)));
     // The comparator never leaves its side.
     let mut scene = quiet("[iq]\ndc_i_lsb = 60\ndc_q_lsb = 60\n[adc]\nbits = 1\n");
     scene.excluded = scene.catalogue.satellites().collect();
     scene.noise = false;
     let bytes = run::samples(&scene);
     the.all("1-bit stuck: one value throughout", usize::from(bytes.iter().all(|b| *b == bytes[0])), 1);
-    the.at_most("1-bit stuck: acquired", ghosts(&scene, &bytes) as f64, 0.0, "");
+    the.none("1-bit stuck: acquired", ghosts(&scene, &bytes));
     let received = Received::from_bytes(&scene, &bytes, &Settings::default(), tempfile::tempdir().unwrap());
     the.all(
         "1-bit stuck: tables finite, cause told",
@@ -317,7 +317,7 @@ fn an_offset_of_one_step_and_a_stuck_bit_are_no_satellites() {
 
 #[test]
 fn the_sign_of_zero_is_plus() {
-    let the = case(42, "1-bit at zero input");
+    let the = case(42, "1-bit at zero input", CA);
     let mut scene = run::scene(0.01, &format!("{FRONT}[adc]\nbits = 1\n[power]\ncn0_dbhz = 45\n"));
     scene.excluded = scene.catalogue.satellites().collect();
     let values: Vec<i8> = run::samples(&scene).iter().map(|b| *b as i8).collect();
@@ -326,7 +326,7 @@ fn the_sign_of_zero_is_plus() {
 
 #[test]
 fn pulses_without_length_and_sweeps_within_a_sample_are_refused() {
-    let the = case(43, "duty 0 and 1, sweep below a sample");
+    let the = case(43, "duty 0 and 1, sweep below a sample", CA);
     let scene = |interference: &str| {
         run::try_scene(&run::text(
             1.0,

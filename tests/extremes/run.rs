@@ -17,6 +17,8 @@ use gnss_twin::receiver::source::Block;
 use gnss_twin::receiver::track::{Channel, Report, TrackingSettings};
 use gnss_twin::receiver::{Outcome, receive};
 
+use crate::figures::Worst;
+
 pub const START: &str = "2010-07-01T08:05:58";
 pub const PLACE: &str =
     "[motion]\nkind = \"static\"\nlatitude_deg = 26.5123\nlongitude_deg = 80.2329\nheight_m = 130\n";
@@ -147,8 +149,8 @@ impl Received {
     }
 
     /// Largest distance of a fix from where the antenna was, and the number of fixes.
-    pub fn worst_m(&self, scene: &Scene, from_s: f64) -> (f64, usize) {
-        let (mut worst, mut count) = (0.0_f64, 0);
+    pub fn worst_m(&self, scene: &Scene, from_s: f64) -> (Worst, usize) {
+        let (mut worst, mut count) = (Worst::default(), 0);
         for fix in self.fixes() {
             let t_s = scene.clock.rate.elapsed_s(fix.sample);
             if t_s < from_s {
@@ -156,7 +158,8 @@ impl Received {
             }
             let local = scene.clock.epoch(fix.sample);
             let elapsed_s = scene.receiver_clock.true_elapsed_s(scene.clock.start, local);
-            worst = worst.max((fix.position_m() - scene.trajectory.at(elapsed_s).position_m).norm());
+            let error_m = (fix.position_m() - scene.trajectory.at(elapsed_s).position_m).norm();
+            worst.take(error_m, || format!("{t_s:.1} s"));
             count += 1;
         }
         (worst, count)

@@ -23,7 +23,7 @@ use gnss_twin::receiver::source::Block;
 use gnss_twin::receiver::track::TrackingSettings;
 use num_complex::Complex64;
 
-use crate::figures::case;
+use crate::figures::{CA, Worst, case};
 use crate::run::{self, Received};
 
 const CHIP_M: f64 = 299_792_458.0 / 1.023e6;
@@ -125,14 +125,20 @@ fn bias_m(rate_khz: usize, edge: Edge<'_>) -> f64 {
 
 #[test]
 fn where_the_rate_meets_the_chips_nearest_edges_are_metres_off_and_band_limited_ones_are_not() {
-    let the = case(29, "fs = k · 1.023 MHz at zero Doppler");
+    let the = case(29, "fs = k · 1.023 MHz at zero Doppler", CA);
     let filter = Filter::new(0.45);
     for rate_khz in [2046, 4092, 10_230] {
         let name = |edge: &str| format!("{:.3} Msps, {edge} edges: rms over places", rate_khz as f64 / 1e3);
         // All edges move by one part of a sample, uniform over it: rms 1/√12 of a sample.
         let sample_m = 299_792.458 / rate_khz as f64;
-        the.near(&name("nearest"), bias_m(rate_khz, Edge::Nearest), sample_m / 12.0_f64.sqrt(), 0.05 * sample_m, "m");
-        the.at_most(&name("band-limited"), bias_m(rate_khz, Edge::BandLimited(&filter)), 0.1, "m");
+        the.near(
+            &name("nearest"),
+            (bias_m(rate_khz, Edge::Nearest), "PRN 7"),
+            sample_m / 12.0_f64.sqrt(),
+            0.05 * sample_m,
+            "m",
+        );
+        the.at_most(&name("band-limited"), (bias_m(rate_khz, Edge::BandLimited(&filter)), "PRN 7"), 0.1, "m");
     }
     // What users get: the level's own edges in the samples, the receiver's own in the replica; it warns where
     // it is half a metre.
@@ -151,7 +157,7 @@ fn where_the_rate_meets_the_chips_nearest_edges_are_metres_off_and_band_limited_
         let name = format!("{:.3} Msps, generated and received by default: rms over places", rate_khz as f64 / 1e3);
         // The law that warns errs to the safe side; where places drift apart nothing stands still, and a
         // decimetre and a half is what one of them has.
-        the.at_most(&name, bias_m, told_m.max(0.15), "m");
+        the.at_most(&name, (bias_m, "PRN 7"), told_m.max(0.15), "m");
         let outcome = Received::from_bytes(&scene, &[], &settings, tempfile::tempdir().unwrap()).outcome;
         warned += usize::from(outcome.warnings.iter().any(|text| text.contains("samples a chip")) == expected);
     }
@@ -180,7 +186,7 @@ fn where_the_rate_meets_the_chips_nearest_edges_are_metres_off_and_band_limited_
 
 #[test]
 fn on_a_boundary_of_chips_the_index_is_inside_and_to_the_right() {
-    let the = case(30, "code phase on a boundary");
+    let the = case(30, "code phase on a boundary", CA);
     let spreading = plain(&L1_CA, 1).unwrap();
     let (mut held, mut of) = (0, 0);
     for second in [0_i64, 1, 604_799, 604_800, 1_000_000_000, 4_000_000_000] {
@@ -202,8 +208,8 @@ fn on_a_boundary_of_chips_the_index_is_inside_and_to_the_right() {
 
 #[test]
 fn rates_that_do_not_fit_the_code_keep_its_phase() {
-    let the = case(31, "fs = 1.1, 4.0009, 100 Msps");
-    let mut worst = 0.0_f64;
+    let the = case(31, "fs = 1.1, 4.0009, 100 Msps", CA);
+    let mut worst = Worst::default();
     for rate_hz in [1.1e6, 2.048e6, 4.0009e6, 100e6] {
         let scene = run::scene(
             600.0,
@@ -224,7 +230,7 @@ fn rates_that_do_not_fit_the_code_keep_its_phase() {
             // Integers where they can be: milliseconds are whole periods.
             let of_period = (sent.fraction() * 1e3).fract() * 1023.0;
             let apart = (of_period - place.steps()) / 1023.0;
-            worst = worst.max((apart - apart.round()).abs() * 1023.0);
+            worst.take((apart - apart.round()).abs() * 1023.0, || format!("{sv}, {rate_hz:e} sps, sample {n}"));
         }
     }
     // Knots of 1e-6 cycle are 6.5e-10 chip, the place itself resolves 1e-10.
@@ -237,7 +243,7 @@ fn rates_that_do_not_fit_the_code_keep_its_phase() {
 
 #[test]
 fn folded_and_mirrored_bands_give_the_doppler_its_sign() {
-    let the = case(32, "real IF, folded, mirrored");
+    let the = case(32, "real IF, folded, mirrored", CA);
     // Of the fastest satellite, so that a wrong sense shows.
     let any = run::scene(1.0, "[front_end]\nsample_rate_hz = 2.6e6\n[power]\ncn0_dbhz = 50\n");
     let speed_hz = |sv: &Sv| run::hit(&any, *sv, 0.0, 0.0).doppler_hz.abs();
@@ -282,15 +288,14 @@ fn folded_and_mirrored_bands_give_the_doppler_its_sign() {
     let bytes = |hz: f64, inverted: bool| {
         made.iter().find(|(if_hz, sense, _)| *if_hz == hz && *sense == inverted).map_or(&[][..], |(.., bytes)| bytes)
     };
-    let differ = [
-        (bytes(3.9e6, true), bytes(1.3e6, false)),
-        (bytes(3.9e6, false), bytes(1.3e6, true)),
-        (bytes(6.5e6, false), bytes(1.3e6, false)),
-        (bytes(6.5e6, true), bytes(1.3e6, true)),
-        (bytes(9.1e6, false), bytes(1.3e6, true)),
-    ]
-    .map(|(a, b)| a.iter().zip(b).filter(|(a, b)| a != b).count() as f64 / a.len().min(b.len()) as f64);
-    let most = differ.into_iter().fold(0.0, |most, share| if share <= most { most } else { share });
+    let mut most = Worst::default();
+    for (if_hz, inverted, mirrored) in
+        [(3.9e6, true, true), (3.9e6, false, true), (6.5e6, false, false), (6.5e6, true, false), (9.1e6, false, true)]
+    {
+        let (a, b) = (bytes(if_hz, inverted), bytes(1.3e6, inverted != mirrored));
+        let differ = a.iter().zip(b).filter(|(a, b)| a != b).count() as f64 / a.len().min(b.len()) as f64;
+        most.take(differ, || format!("IF of {if_hz:e} Hz{}", if inverted { ", inverted" } else { "" }));
+    }
     the.at_most("folded: samples other than of the IF that they hold", most, 1e-5, "of them");
     let told = Scenario::parse(
         &text_of("[front_end]\nsample_rate_hz = 5.2e6\nif_hz = 3.9e6\nformat = \"ri8\"\n[power]\n"),
@@ -319,7 +324,7 @@ fn folded_and_mirrored_bands_give_the_doppler_its_sign() {
 
 #[test]
 fn a_quarter_of_the_rate_is_exactly_four_samples() {
-    let the = case(33, "f_IF = fs/4");
+    let the = case(33, "f_IF = fs/4", CA);
     let (mut exact, mut of) = (0, 0);
     for rate_hz in [2.6e6, 4e6, 16.368e6, 50e6] {
         let rate = Rate::from_hz(rate_hz).unwrap();
@@ -341,7 +346,10 @@ fn a_quarter_of_the_rate_is_exactly_four_samples() {
     };
     let ((i, q), (a, b)) = (made("f32"), made("f64"));
     let amplitude = i.iter().zip(&q).map(|(i, q)| i.hypot(*q)).fold(0.0, f32::max);
-    let worst = i.iter().zip(&a).chain(q.iter().zip(&b)).map(|(x, y)| (x - y).abs()).fold(0.0, f32::max);
+    let mut worst = Worst::default();
+    for (n, (x, y)) in i.iter().zip(&a).chain(q.iter().zip(&b)).enumerate() {
+        worst.take(f64::from((x - y).abs() / amplitude), || format!("G23, sample {}", n % i.len()));
+    }
     // Within a run the carrier of single precision is 1e-6 cycle off, 6.3e-6 rad, and rounded to 6e-8.
-    the.at_most("fast against f64, of the amplitude", f64::from(worst / amplitude), 1e-5, "");
+    the.at_most("fast against f64, of the amplitude", worst, 1e-5, "");
 }
