@@ -17,5 +17,7 @@ mod phase;
 mod power;
 mod run;
 mod sampling;
+mod scales;
+mod skies;
 mod space;
 mod time;

@@ -32,8 +32,13 @@ pub fn folder() -> PathBuf {
 
 /// Reads a scene; its error is text.
 pub fn try_scene(text: &str) -> Result<Scene, String> {
+    try_scene_in(&folder(), text)
+}
+
+/// The same whose files are in a directory.
+pub fn try_scene_in(directory: &Path, text: &str) -> Result<Scene, String> {
     let scenario = Scenario::parse(text, "extreme").map_err(|e| e.to_string())?;
-    scenario.compose(&folder(), &Overrides::default()).map(|(scene, _)| scene).map_err(|e| e.to_string())
+    scenario.compose(directory, &Overrides::default()).map(|(scene, _)| scene).map_err(|e| e.to_string())
 }
 
 /// A scene of `tables` at the usual time.
