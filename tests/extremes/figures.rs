@@ -27,7 +27,7 @@ pub const CA: &str = "GPS L1 C/A";
 pub const NONE: &str = "none";
 
 /// Families by the number of their first case.
-const FAMILIES: [(u32, &str); 10] = [
+const FAMILIES: [(u32, &str); 11] = [
     (1, "Time"),
     (8, "Orbit"),
     (13, "Geometry"),
@@ -38,6 +38,7 @@ const FAMILIES: [(u32, &str); 10] = [
     (47, "Loops"),
     (53, "Beyond the list"),
     (59, "Time of every system"),
+    (62, "Codes and carriers of every signal"),
 ];
 
 /// An extreme of many figures and the input that makes it. The first of equals stays, and a figure that is no

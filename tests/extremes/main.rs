@@ -6,7 +6,9 @@
 #![cfg(all(feature = "generator", feature = "receiver", feature = "analysis"))]
 
 mod arithmetic;
+mod codes;
 mod dynamics;
+mod exact;
 mod figures;
 mod fuzz;
 mod geometry;

@@ -92,7 +92,7 @@ fn numbers(system: System) -> Numbers {
 }
 
 /// What a system's calendar reads at a second of GPS time.
-fn reads(system: System, seconds: i128) -> i128 {
+pub fn reads(system: System, seconds: i128) -> i128 {
     match system {
         System::Glonass => utc_of_gpst(seconds) + 10_800,
         _ => numbers(system).reads + seconds - numbers(system).begins,

@@ -1,0 +1,95 @@
+//! Carrier and code of one satellite's signal in 128-bit integers, by the definition of both.
+//!
+//! Everything that grows with time is whole: sample numbers, seconds since a scale began, the receiver's clock.
+//! Only the light time and the satellite's own clock, which stay small, come as `f64`.
+
+use gnss_twin::generator::scene::Scene;
+use gnss_twin::generator::sky;
+use gnss_twin::gnss::satellite::Sv;
+use gnss_twin::gnss::signal::Signal;
+use gnss_twin::gnss::time::Epoch;
+
+use crate::scales;
+
+pub const TURN: f64 = 18_446_744_073_709_551_616.0;
+/// Units in a sample's duration.
+const SAMPLE: i128 = 100_000_000_000;
+/// Receiver clock of the scenes here: 1.3e-4 s ahead, 5e-8 s/s fast.
+pub const CLOCK: &str = "[receiver_clock]\nbias_s = 1.3e-4\ndrift_sps = 5e-8\n";
+const BIAS: (i128, i128) = (13, 100_000);
+const FAST: (i128, i128) = (100_000_005, 100_000_000);
+
+/// A satellite's signal in a scene with that clock, of a whole rate and centre in hertz.
+pub struct Exact<'a> {
+    scene: &'a Scene,
+    sv: Sv,
+    signal: &'static Signal,
+    rate_hz: i128,
+    carrier_hz: i128,
+    if_hz: i128,
+}
+
+fn whole(hz: f64) -> i128 {
+    assert_eq!(hz.fract(), 0.0, "{hz}");
+    hz as i128
+}
+
+/// A fraction of turns modulo one in 2^-64, of a denominator below 2^63.
+fn turns(numerator: i128, denominator: i128) -> u64 {
+    let rest = numerator.rem_euclid(denominator) as u128;
+    ((rest << 64) / denominator as u128) as u64
+}
+
+/// Cycles nearest to zero.
+pub fn signed(turns: u64) -> f64 {
+    turns as i64 as f64 / TURN
+}
+
+impl<'a> Exact<'a> {
+    pub fn new(scene: &'a Scene, sv: Sv, signal: &'static Signal) -> Self {
+        assert_eq!(scene.clock.start.fraction(), 0.0);
+        let carrier_hz = signal.carrier_hz(sv);
+        let (rate_hz, if_hz) = (whole(scene.clock.rate.hz()), whole(scene.metadata.if_hz(carrier_hz)));
+        Self { scene, sv, signal, rate_hz, carrier_hz: whole(carrier_hz), if_hz }
+    }
+
+    /// Units in a second.
+    fn second(&self) -> i128 {
+        self.rate_hz * SAMPLE
+    }
+
+    /// By how much the satellite's clock was behind the receiver's reading of sample `n` when it sent, in units.
+    pub fn delay(&self, n: u64) -> i128 {
+        let (second, elapsed) = (self.second(), i128::from(n) * SAMPLE);
+        let true_elapsed = (elapsed - second * BIAS.0 / BIAS.1) * FAST.1 / FAST.0;
+        let fraction = true_elapsed.rem_euclid(second) as f64 / second as f64;
+        let received = Epoch::new(self.scene.clock.start.seconds() + true_elapsed.div_euclid(second) as i64, fraction);
+        let motion = self.scene.trajectory.at(0.0);
+        let emission = sky::emission(&self.scene.catalogue, self.sv, received, &motion).unwrap().unwrap();
+        let sent = received.plus_s(-emission.travel_s);
+        let clock_s = emission.satellite_clock_s + self.scene.catalogue.signal_clock_s(self.sv, sent, self.signal);
+        elapsed - true_elapsed + ((emission.travel_s - clock_s) * second as f64) as i128
+    }
+
+    /// Seconds of a number of units.
+    pub fn seconds(&self, units: i128) -> f64 {
+        units as f64 / self.second() as f64
+    }
+
+    /// Carrier at sample `n` with that delay, in 2^-64 turn.
+    pub fn carrier(&self, n: u64, delay: i128) -> u64 {
+        turns(i128::from(n) * self.if_hz, self.rate_hz).wrapping_sub(turns(delay * self.carrier_hz, self.second()))
+    }
+
+    /// Steps of a code since 1980-01-06 in its system's calendar at sample `n` with that delay, in 2^-48 step of
+    /// `step_mhz` thousandths of them a second.
+    pub fn steps(&self, n: u64, delay: i128, step_mhz: i128) -> i128 {
+        let start = scales::reads(self.signal.system, i128::from(self.scene.clock.start.seconds()));
+        let second = self.second();
+        let sent = i128::from(n) * SAMPLE - delay;
+        let (seconds, rest) = (start + sent.div_euclid(second), sent.rem_euclid(second) * step_mhz);
+        let denominator = 1000 * second;
+        // No leap second falls into a scene here.
+        ((seconds * step_mhz) << 48) / 1000 + ((rest / denominator) << 48) + ((rest % denominator) << 48) / denominator
+    }
+}
