@@ -100,11 +100,6 @@ static ROWS: Mutex<BTreeMap<Place, Row>> = Mutex::new(BTreeMap::new());
 static SECTIONS: Mutex<BTreeMap<&'static str, String>> = Mutex::new(BTreeMap::new());
 
 impl Case {
-    /// The same case on other signals.
-    pub const fn on(self, signals: &'static str) -> Self {
-        Self { signals, ..self }
-    }
-
     /// A figure that may not exceed its bar.
     #[track_caller]
     pub fn at_most(self, figure: &str, found: impl Into<Worst>, bar: f64, unit: &str) {
