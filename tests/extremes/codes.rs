@@ -23,7 +23,7 @@ use gnss_twin::gnss::time::Epoch;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
-use crate::exact::{CLOCK, Exact, TURN, signed};
+use crate::exact::{CLOCK, Exact, ONE, TURN, signed};
 use crate::figures::{self, ALL, Worst, case};
 use crate::{run, skies};
 
@@ -31,7 +31,6 @@ pub const RATE_HZ: f64 = 65e6;
 pub const IF_HZ: f64 = 4.092e6;
 pub const RUN: u64 = 4096;
 pub const DAY_S: u64 = 86_400;
-const ONE: f64 = 281_474_976_710_656.0;
 const KNOTS: &str = "[fidelity]\nlevel = \"reference\"\ncode_edge = \"nearest\"\ncarrier = \"f64\"\n\
                      knot_tolerance_cycles = 1e-6\n";
 

@@ -12,6 +12,8 @@ use gnss_twin::gnss::time::Epoch;
 use crate::scales;
 
 pub const TURN: f64 = 18_446_744_073_709_551_616.0;
+/// Parts of a code step.
+pub const ONE: f64 = 281_474_976_710_656.0;
 /// Units in a sample's duration.
 const SAMPLE: i128 = 100_000_000_000;
 /// Receiver clock of the scenes here: 1.3e-4 s ahead, 5e-8 s/s fast.

@@ -20,6 +20,7 @@ mod power;
 mod run;
 mod sampling;
 mod scales;
+mod sets;
 mod skies;
 mod space;
 mod time;

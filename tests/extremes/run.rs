@@ -74,10 +74,15 @@ pub fn in_view(scene: &Scene) -> Vec<Sv> {
 
 /// A part of a scene's samples, its truth left in `directory`.
 pub fn part(scene: &Scene, part: Range<u64>, directory: &Path) -> Vec<u8> {
+    part_with(scene, part, directory, &Options::default())
+}
+
+/// The same with a cut of the work and an instruction set of choice.
+pub fn part_with(scene: &Scene, part: Range<u64>, directory: &Path, options: &Options) -> Vec<u8> {
     let mut bytes = Vec::new();
     std::fs::create_dir_all(directory).unwrap();
     let mut writer = truth::Writer::create(directory).unwrap();
-    generate_part(scene, part, &mut bytes, &mut writer, &mut |_| (), &Options::default()).unwrap();
+    generate_part(scene, part, &mut bytes, &mut writer, &mut |_| (), options).unwrap();
     bytes
 }
 

@@ -28,8 +28,16 @@ use crate::run::{self, Received};
 
 const CHIP_M: f64 = 299_792_458.0 / 1.023e6;
 
-/// Samples of one code period of PRN 7 from `start` chips on.
+/// Samples of one code period of PRN 7 from `start` chips on: the same on every instruction set.
 fn period(rate_khz: usize, edge: Edge<'_>, start: f64) -> Vec<f32> {
+    let levels = Level::ALL.into_iter().filter(|level| level.is_available());
+    let waves: Vec<Vec<f32>> = levels.map(|level| period_on(level, rate_khz, edge, start)).collect();
+    assert!(waves.iter().all(|wave| *wave == waves[0]), "{rate_khz} kHz: other samples on another instruction set");
+    waves.into_iter().next().unwrap()
+}
+
+/// The same made by one instruction set.
+fn period_on(level: Level, rate_khz: usize, edge: Edge<'_>, start: f64) -> Vec<f32> {
     let spreading = plain(&L1_CA, 7).unwrap();
     let one = 281_474_976_710_656.0;
     let step = (1023.0 / rate_khz as f64 * one) as u64;
@@ -43,7 +51,7 @@ fn period(rate_khz: usize, edge: Edge<'_>, start: f64) -> Vec<f32> {
             let position = spreading.strip(at, step, 4096, |_| false, bits);
             Run { bits: &[], position, step, turns: 0, turns_step: 0, amplitude: 1.0, pulse: None }
         });
-        bank.render(Kernel { edge, arithmetic: Arithmetic::F64, level: Level::detect() }, i, &mut q);
+        bank.render(Kernel { edge, arithmetic: Arithmetic::F64, level }, i, &mut q);
     }
     wave
 }
