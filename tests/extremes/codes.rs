@@ -256,6 +256,55 @@ impl Definition {
 /// Samples on either side of the end of a code: half a millisecond, no code is shorter.
 const HALF: u64 = 32_500;
 
+/// What each component of a signal brings to samples from `first` on, carrier and all, without data and of a
+/// power of one, and whether an edge of chips is nearer to them than two sides agree on.
+pub fn replica(
+    (scene, sv, signal): (&Scene, Sv, &'static Signal),
+    (first, samples): (u64, u64),
+) -> (Vec<Vec<Complex64>>, Vec<bool>) {
+    let exact = Exact::new(scene, sv, signal);
+    let rate_hz = scene.clock.rate.hz();
+    // The delay as a quadratic through three samples: a satellite's jerk moves it by 1e-18 s.
+    let delays = [0, samples / 2, samples].map(|k| exact.delay(first + k));
+    let [a, b, c] = delays.map(|delay| exact.seconds(delay - delays[0]));
+    let moved_s = |u: f64| u * (4.0 * b - 3.0 * a - c) + u * u * (2.0 * a - 4.0 * b + 2.0 * c);
+    let waves: Vec<Definition> = signal.components.iter().map(|c| Definition::of(c, sv.number)).collect();
+    let starts: Vec<(i128, f64)> = (signal.components.iter())
+        .map(|c| exact.steps(first, delays[0], (c.chip_rate_hz * 1e3).round() as i128))
+        .map(|steps| (steps >> 48, (steps & ((1 << 48) - 1)) as f64 / ONE))
+        .collect();
+    let turns = exact.carrier(first, delays[0]) as f64 / TURN;
+    let (carrier_hz, if_hz) = (signal.carrier_hz(sv), scene.metadata.if_hz(signal.carrier_hz(sv)));
+    let mut near_edge = Vec::new();
+    let mut parts: Vec<Vec<Complex64>> = vec![Vec::new(); waves.len()];
+    for k in 0..samples {
+        let moved_s = moved_s(k as f64 / samples as f64);
+        let sent_s = k as f64 / rate_hz - moved_s;
+        let cycles = turns + (k as f64 * if_hz / rate_hz).fract() - moved_s * carrier_hz;
+        let carrier = Complex64::from_polar(1.0, TAU * cycles.fract());
+        let mut is_near = false;
+        for ((wave, (whole, rest)), part) in waves.iter().zip(&starts).zip(&mut parts) {
+            let chips = rest + sent_s * wave.component.chip_rate_hz;
+            part.push(carrier * wave.at(*whole, chips));
+            let steps = chips * wave.component.steps_per_chip() as f64;
+            is_near |= (steps - steps.round()).abs() < 1e-6;
+        }
+        near_edge.push(is_near);
+    }
+    (parts, near_edge)
+}
+
+/// The sum of components with the signs of their symbols that fit the samples best.
+pub fn fitted(signal: &Signal, parts: &[Vec<Complex64>], samples: &[Complex64]) -> Vec<Complex64> {
+    let mut sum = vec![Complex64::ZERO; samples.len()];
+    for (component, part) in signal.components.iter().zip(parts) {
+        let fit: f64 = samples.iter().zip(part).map(|(sample, part)| (sample * part.conj()).re).sum();
+        let sign = if component.message.is_some() { fit.signum() } else { 1.0 };
+        sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += sign * part);
+    }
+    sum
+}
+
 /// Departure of samples around the end of a component's longest code from the definition, of the amplitude.
 fn departure(scene: &Scene, sv: Sv, signal: &'static Signal, ending: usize) -> Worst {
     let exact = Exact::new(scene, sv, signal);
@@ -272,56 +321,22 @@ fn departure(scene: &Scene, sv: Sv, signal: &'static Signal, ending: usize) -> W
     let first = n - HALF;
     let bytes = run::part(scene, first..n + HALF, tempfile::tempdir().unwrap().path());
     let (i, q) = run::planes(scene, &bytes);
-    // The delay as a quadratic through three samples: a satellite's jerk moves it by 1e-18 s.
-    let delays = [first, n, n + HALF].map(|n| exact.delay(n));
-    let [a, b, c] = delays.map(|delay| exact.seconds(delay - delays[0]));
-    let moved_s = |u: f64| u * (4.0 * b - 3.0 * a - c) + u * u * (2.0 * a - 4.0 * b + 2.0 * c);
-    let waves: Vec<Definition> = signal.components.iter().map(|c| Definition::of(c, sv.number)).collect();
-    let starts: Vec<(i128, f64)> = (signal.components.iter())
-        .map(|c| exact.steps(first, delays[0], (c.chip_rate_hz * 1e3).round() as i128))
-        .map(|steps| (steps >> 48, (steps & ((1 << 48) - 1)) as f64 / ONE))
-        .collect();
-    let turns = exact.carrier(first, delays[0]) as f64 / TURN;
-    let if_hz = scene.metadata.if_hz(signal.carrier_hz(sv));
-    let cn0_hz = 1e6;
-    let amplitude = f64::from(scene.noise_lsb) * f64::sqrt(2.0 * cn0_hz / RATE_HZ);
-    // What each component has at each sample, with the carrier and without data, and whether an edge is nearer
-    // than the two sides agree on.
-    let mut near_edge = Vec::new();
-    let mut parts: Vec<Vec<Complex64>> = vec![Vec::new(); waves.len()];
-    for k in 0..2 * HALF {
-        let moved_s = moved_s(k as f64 / (2 * HALF) as f64);
-        let sent_s = k as f64 / RATE_HZ - moved_s;
-        let cycles = turns + (k as f64 * if_hz / RATE_HZ).fract() - moved_s * signal.carrier_hz(sv);
-        let carrier = Complex64::from_polar(amplitude, TAU * cycles.fract());
-        let mut is_near = false;
-        for ((wave, (whole, rest)), part) in waves.iter().zip(&starts).zip(&mut parts) {
-            let chips = rest + sent_s * wave.component.chip_rate_hz;
-            part.push(carrier * wave.at(*whole, chips));
-            let steps = chips * wave.component.steps_per_chip() as f64;
-            is_near |= (steps - steps.round()).abs() < 1e-6;
-        }
-        near_edge.push(is_near);
-    }
-    // A symbol's sign on either side, where there is a message: the one that fits.
-    let sample = |k: usize| Complex64::new(f64::from(i[k]), f64::from(q[k]));
-    let sides = [0..HALF as usize, HALF as usize..2 * HALF as usize];
-    let mut signs = vec![[1.0_f64; 2]; waves.len()];
-    for ((wave, part), signs) in waves.iter().zip(&parts).zip(&mut signs) {
-        for (side, sign) in sides.iter().zip(signs) {
-            let fit: f64 = side.clone().map(|k| (sample(k) * part[k].conj()).re).sum();
-            *sign = if wave.component.message.is_some() { fit.signum() } else { 1.0 };
-        }
-    }
+    let amplitude = f64::from(scene.noise_lsb) * f64::sqrt(2.0 * 1e6 / RATE_HZ);
+    let samples: Vec<Complex64> =
+        i.iter().zip(&q).map(|(i, q)| Complex64::new(f64::from(*i), f64::from(*q)) / amplitude).collect();
+    let (parts, near_edge) = replica((scene, sv, signal), (first, 2 * HALF));
     let mut worst = Worst::default();
-    for k in (0..2 * HALF as usize).filter(|k| !near_edge[*k]) {
-        let side = usize::from(k >= HALF as usize);
-        let due: Complex64 = parts.iter().zip(&signs).map(|(part, signs)| part[k] * signs[side]).sum();
-        let at = || {
-            let seconds = length as f64 / component.chip_rate_hz;
-            format!("{signal} of {sv}, code of {seconds:.3} s, sample {}", first + k as u64)
-        };
-        worst.take((sample(k) - due).norm() / amplitude, at);
+    // A symbol may change where the code ends.
+    for side in [0..HALF as usize, HALF as usize..2 * HALF as usize] {
+        let own: Vec<Vec<Complex64>> = parts.iter().map(|part| part[side.clone()].to_vec()).collect();
+        let due = fitted(signal, &own, &samples[side.clone()]);
+        for (k, due) in side.zip(due).filter(|(k, _)| !near_edge[*k]) {
+            let at = || {
+                let seconds = length as f64 / component.chip_rate_hz;
+                format!("{signal} of {sv}, code of {seconds:.3} s, sample {}", first + k as u64)
+            };
+            worst.take((samples[k] - due).norm(), at);
+        }
     }
     worst
 }

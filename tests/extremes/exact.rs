@@ -21,7 +21,7 @@ pub const CLOCK: &str = "[receiver_clock]\nbias_s = 1.3e-4\ndrift_sps = 5e-8\n";
 const BIAS: (i128, i128) = (13, 100_000);
 const FAST: (i128, i128) = (100_000_005, 100_000_000);
 
-/// A satellite's signal in a scene with that clock, of a whole rate and centre in hertz.
+/// A satellite's signal in a scene with that clock or a perfect one, of a whole rate and centre in hertz.
 pub struct Exact<'a> {
     scene: &'a Scene,
     sv: Sv,
@@ -63,7 +63,8 @@ impl<'a> Exact<'a> {
     /// By how much the satellite's clock was behind the receiver's reading of sample `n` when it sent, in units.
     pub fn delay(&self, n: u64) -> i128 {
         let (second, elapsed) = (self.second(), i128::from(n) * SAMPLE);
-        let true_elapsed = (elapsed - second * BIAS.0 / BIAS.1) * FAST.1 / FAST.0;
+        let perfect = self.scene.receiver_clock.bias_s == 0.0;
+        let true_elapsed = if perfect { elapsed } else { (elapsed - second * BIAS.0 / BIAS.1) * FAST.1 / FAST.0 };
         let fraction = true_elapsed.rem_euclid(second) as f64 / second as f64;
         let received = Epoch::new(self.scene.clock.start.seconds() + true_elapsed.div_euclid(second) as i64, fraction);
         let motion = self.scene.trajectory.at(0.0);
@@ -71,6 +72,12 @@ impl<'a> Exact<'a> {
         let sent = received.plus_s(-emission.travel_s);
         let clock_s = emission.satellite_clock_s + self.scene.catalogue.signal_clock_s(self.sv, sent, self.signal);
         elapsed - true_elapsed + ((emission.travel_s - clock_s) * second as f64) as i128
+    }
+
+    /// Cycles of that many units, whole ones and the rest.
+    pub fn cycles(&self, units: i128) -> (i128, f64) {
+        let cycles = units * self.carrier_hz;
+        (cycles.div_euclid(self.second()), cycles.rem_euclid(self.second()) as f64 / self.second() as f64)
     }
 
     /// Seconds of a number of units.

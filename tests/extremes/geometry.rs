@@ -15,7 +15,7 @@ use gnss_twin::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, look, rotate_ea
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::rinex;
 use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::time::{Epoch, GPST};
+use gnss_twin::gnss::time::{BDT, Epoch, GLONASST, GPST, GST};
 use gnss_twin::receiver::acquire;
 use gnss_twin::receiver::position::least_squares::{Corrections, Ionosphere, Range, position};
 use gnss_twin::receiver::position::{NoFix, consistent};
@@ -291,6 +291,68 @@ fn too_few_satellites_are_said_to_be_and_four_prove_nothing() {
         1e-6,
         "",
     );
+}
+
+#[test]
+fn five_satellites_of_two_systems_are_enough_and_of_four_are_not() {
+    let the = case(70, "five satellites of two and of four systems", NONE);
+    let sky = [(20.0, 75.0), (65.0, 42.0), (190.0, 33.0), (300.0, 25.0), (250.0, 60.0), (110.0, 15.0), (350.0, 50.0)];
+    let place = Geodetic::from_degrees(26.5, 80.2, 130.0).to_ecef();
+    // Each with its system's own clock, 0, 1, 2 and 3 km ahead.
+    let scales = [&GPST, &GST, &BDT, &GLONASST];
+    let seen = |of: &[usize]| {
+        let mut seen = ranges(&sky[..of.len()]);
+        for (range, system) in seen.iter_mut().zip(of) {
+            range.time = scales[*system];
+            range.pseudorange_m += 1e3 * *system as f64;
+        }
+        seen
+    };
+    let (mut worst_m, mut moved) = (Worst::default(), Worst::default());
+    let split = [[0, 0, 0, 0, 1], [0, 0, 0, 1, 1], [0, 0, 1, 1, 1], [0, 1, 1, 1, 1], [2, 3, 2, 3, 2]];
+    for of in split {
+        let ranges = seen(&of);
+        let found = position(&ranges, Vector3::zeros(), &BARE).unwrap();
+        let at = || format!("systems {of:?}");
+        worst_m.take((found.position_m - place).norm(), at);
+        for (scale, clock_m) in &found.clocks {
+            let system = scales.iter().position(|own| own == scale).unwrap();
+            worst_m.take((clock_m - 1e3 * system as f64).abs(), at);
+        }
+        // A millimetre on any of them, against the largest dilution: no freedom is left to hide it.
+        for faulty in 0..5 {
+            let mut ranges = ranges.clone();
+            ranges[faulty].pseudorange_m += 1e-3;
+            let other = position(&ranges, place, &BARE).unwrap();
+            let clocks: f64 = other.clocks.iter().zip(&found.clocks).map(|(a, b)| (a.1 - b.1).powi(2)).sum();
+            let moved_m = ((other.position_m - found.position_m).norm_squared() + clocks).sqrt();
+            let most = found.dilution.symmetric_eigenvalues().max().sqrt();
+            moved.take(moved_m / (1e-3 * most), || format!("{}, range {}", at(), faulty + 1));
+        }
+    }
+    // Coordinates of 2.7e7 m resolve 3.7e-9 m, ranges as much, times a dilution of some tens.
+    the.at_most("two systems: place and clocks of exact ranges", worst_m, 1e-6, "m");
+    // One, and that 1e-6 m in 1e-3 m.
+    the.at_most("two systems: error by 1 mm over the largest dilution", moved, 1.001, "");
+    // A satellite that is its system's only one says nothing but its clock.
+    let four = position(&seen(&[0, 0, 0, 0]), place, &BARE).unwrap();
+    let mut far = seen(&[0, 0, 0, 0, 1]);
+    far[4].pseudorange_m += 1e6;
+    let apart_m = (position(&far, place, &BARE).unwrap().position_m - four.position_m).norm();
+    the.at_most(
+        "a system's only satellite, 1000 km off: moves the place",
+        (apart_m, "systems [0, 0, 0, 0, 1]"),
+        1e-6,
+        "m",
+    );
+    // 3 + 4 unknowns.
+    let few = [&[0, 1, 2, 3, 0][..], &[0, 0, 1, 2, 3], &[0, 1, 2, 3, 0, 1]].into_iter().filter(|of| {
+        let found = position(&seen(of), place, &BARE);
+        matches!(found, Err(NoFix::TooFew { have, need: 7 }) if have == of.len())
+    });
+    the.all("four systems, five and six satellites: told that seven are needed", few.count(), 3);
+    let seven = position(&seen(&[0, 0, 0, 0, 1, 2, 3]), place, &BARE).unwrap();
+    the.at_most("four systems, seven satellites", ((seven.position_m - place).norm(), "4 + 1 + 1 + 1"), 1e-6, "m");
 }
 
 #[test]

@@ -14,6 +14,7 @@ mod fuzz;
 mod geometry;
 mod ladder;
 mod loops;
+mod many;
 mod orbit;
 mod phase;
 mod power;
