@@ -36,7 +36,7 @@ fn whole(hz: f64) -> i128 {
     hz as i128
 }
 
-/// A fraction of turns modulo one in 2^-64, of a denominator below 2^63.
+/// A fraction of turns modulo one in 2^-64, of a denominator below 2^64.
 fn turns(numerator: i128, denominator: i128) -> u64 {
     let rest = numerator.rem_euclid(denominator) as u128;
     ((rest << 64) / denominator as u128) as u64
@@ -78,6 +78,11 @@ impl<'a> Exact<'a> {
     pub fn cycles(&self, units: i128) -> (i128, f64) {
         let cycles = units * self.carrier_hz;
         (cycles.div_euclid(self.second()), cycles.rem_euclid(self.second()) as f64 / self.second() as f64)
+    }
+
+    /// Units of a delay in seconds.
+    pub fn units(&self, delay_s: f64) -> i128 {
+        (delay_s * self.second() as f64) as i128
     }
 
     /// Seconds of a number of units.
