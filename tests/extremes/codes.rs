@@ -85,8 +85,8 @@ struct Errors {
     channels: BTreeSet<i8>,
 }
 
-/// Carrier and code of all satellites of a signal so many days after sample 0, through an ionosphere where there
-/// is one.
+/// Carrier and code of all satellites of a signal so many days after sample 0, through an ionosphere where
+/// there is one.
 fn errors(signal: &'static Signal, days: u64, ionosphere: Option<Klobuchar>) -> Errors {
     let (mut scene, first) = late(signal, RATE_HZ, IF_HZ, days * DAY_S);
     let at = scene.clock.epoch(first);
@@ -171,7 +171,8 @@ fn after_a_month_at_65_msps_every_signal_has_its_carrier_its_codes_and_its_sub_c
             assert!(errors.places > 0, "{signal}");
             if days == 30 && signal.system == System::Glonass {
                 fdma.at_most(&format!("{signal}: carrier"), errors.carrier.clone(), 1e-6, "cycle");
-                // Twelve of the fourteen are assigned, the outermost among them (GLONASS constellation status).
+                // Twelve of the fourteen are assigned, the outermost among them (GLONASS constellation
+                // status).
                 let assigned = [-7, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5, 6];
                 let looked = assigned.iter().filter(|channel| errors.channels.contains(channel)).count();
                 fdma.all(&format!("{signal}: assigned channels looked at"), looked, assigned.len());

@@ -1,7 +1,7 @@
 //! Carrier and code of one satellite's signal in 128-bit integers, by the definition of both.
 //!
-//! Everything that grows with time is whole: sample numbers, seconds since a scale began, the receiver's clock.
-//! Only the light time and the satellite's own clock, which stay small, come as `f64`.
+//! Everything that grows with time is whole: sample numbers, seconds since a scale began, the receiver's
+//! clock. Only the light time and the satellite's own clock, which stay small, come as `f64`.
 
 use gnss_twin::generator::scene::Scene;
 use gnss_twin::generator::sky;
@@ -60,7 +60,8 @@ impl<'a> Exact<'a> {
         self.rate_hz * SAMPLE
     }
 
-    /// By how much the satellite's clock was behind the receiver's reading of sample `n` when it sent, in units.
+    /// By how much the satellite's clock was behind the receiver's reading of sample `n` when it sent, in
+    /// units.
     pub fn delay(&self, n: u64) -> i128 {
         let (second, elapsed) = (self.second(), i128::from(n) * SAMPLE);
         let perfect = self.scene.receiver_clock.bias_s == 0.0;
@@ -95,8 +96,8 @@ impl<'a> Exact<'a> {
         turns(i128::from(n) * self.if_hz, self.rate_hz).wrapping_sub(turns(delay * self.carrier_hz, self.second()))
     }
 
-    /// Steps of a code since 1980-01-06 in its system's calendar at sample `n` with that delay, in 2^-48 step of
-    /// `step_mhz` thousandths of them a second.
+    /// Steps of a code since 1980-01-06 in its system's calendar at sample `n` with that delay, in 2^-48 step
+    /// of `step_mhz` thousandths of them a second.
     pub fn steps(&self, n: u64, delay: i128, step_mhz: i128) -> i128 {
         let start = scales::reads(self.signal.system, i128::from(self.scene.clock.start.seconds()));
         let second = self.second();

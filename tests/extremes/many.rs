@@ -21,8 +21,8 @@ use crate::exact::{CLOCK, Exact, signed};
 use crate::figures::{ALL, CA, Case, Worst, case};
 use crate::{run, skies};
 
-/// Everything around L1 over Bangkok: the shipped full sky, B1I beside it, and all of that once more from a spoofer,
-/// two chips away.
+/// Everything around L1 over Bangkok: the shipped full sky, B1I beside it, and all of that once more from a
+/// spoofer, two chips away.
 fn full(format: &str) -> Scene {
     let tables = format!(
         "name = \"extreme\"\nstart = 2026-03-09T10:52:26\nduration_s = 0.01\nseed = 1\nsignals = [\"GPS L1 C/A\", \
@@ -78,15 +78,15 @@ fn sixty_signals_in_eight_bits_keep_their_amplitudes_and_phases() {
         worst.iter_mut().zip(found).for_each(|(worst, found)| worst.merge(found));
     }
     let [along, across] = worst;
-    // Rounding is white, 1/12 LSB² in each quadrature, in 36 000 samples of 0.84 LSB: 1.8e-3 of the signal. Of
-    // seventy and more in two quadratures the largest is below five deviations.
+    // Rounding is white, 1/12 LSB² in each quadrature, in 36 000 samples of 0.84 LSB: 1.8e-3 of the signal.
+    // Of seventy and more in two quadratures the largest is below five deviations.
     let bar = 5.0 * f64::sqrt(1.0 / 12.0 / SAMPLES as f64) / amplitude;
     the.at_most("amplitude moved by rounding to eight bits", along, bar, "of it");
     the.at_most("phase moved by rounding to eight bits", across, bar, "rad");
 }
 
-/// Largest departure of double differences from whole numbers, how many there are, and how many of them keep the
-/// whole number that their pair had first.
+/// Largest departure of double differences from whole numbers, how many there are, and how many of them keep
+/// the whole number that their pair had first.
 fn double_differences(of: [&Scene; 2], signal: &'static Signal, step_s: u64) -> (Worst, [usize; 2]) {
     let authentic = Constellation::authentic();
     let rate_hz = of[0].clock.rate.hz() as u64;
@@ -135,8 +135,8 @@ fn pair(mut make: impl FnMut(&str) -> Scene) -> [Scene; 2] {
 #[test]
 fn double_differences_are_whole_numbers_all_day() {
     let told = |the: Case, when: &str, (worst, [held, of]): (Worst, [usize; 2])| {
-        // Four sums of a delay and a clock, 0.08 s or 2e8 cycles at most, that resolve 3e-8 cycle, and four ranges
-        // whose coordinates resolve 7.5e-9 m, 6e-8 cycle of S, on both sides.
+        // Four sums of a delay and a clock, 0.08 s or 2e8 cycles at most, that resolve 3e-8 cycle, and four
+        // ranges whose coordinates resolve 7.5e-9 m, 6e-8 cycle of S, on both sides.
         the.at_most(&format!("double differences {when}, off whole numbers"), worst, 5e-7, "cycle");
         the.all(&format!("whole numbers {when} that stay"), held, of);
         assert!(of > 500, "{of}");
@@ -221,10 +221,11 @@ fn from_low_orbits_and_from_the_moon_light_takes_its_time_for_every_signal() {
         let [longest, apart_m, carrier] = worst;
         // To a geosynchronous orbit at 4.216e7 m at least.
         the.at_least(&format!("{name}: longest light time"), longest, longest_s, "s");
-        // A light time resolves 2.8e-17 s and 2.2e-16 s, 8e-9 and 6.6e-8 m, and coordinates 7.5e-9 m and 6e-8 m in
-        // each of three; half of each is rounded off, and the equation is solved to one of the first.
+        // A light time resolves 2.8e-17 s and 2.2e-16 s, 8e-9 and 6.6e-8 m, and coordinates 7.5e-9 m and 6e-8
+        // m in each of three; half of each is rounded off, and the equation is solved to one of the first.
         the.at_most(&format!("{name}: light-time equation"), apart_m, 3.0 * rounding_m, "m");
-        // Half the knots' tolerance, and such a rounding at the sample and in the nodes around it, in waves of S.
+        // Half the knots' tolerance, and such a rounding at the sample and in the nodes around it, in waves
+        // of S.
         let bar = 5e-7 + 2.0 * rounding_m / 0.12;
         the.at_most(&format!("{name}: carrier, to integers"), carrier, bar, "cycle");
     }

@@ -1,5 +1,5 @@
-//! Cases 6, 31, 33 and 65: the same phases from a seek as from a stream, in one front end as in another, at rates
-//! that fit no code, and in single as in double precision.
+//! Cases 6, 31, 33 and 65: the same phases from a seek as from a stream, in one front end as in another, at
+//! rates that fit no code, and in single as in double precision.
 
 use gnss_twin::generator::scene::Scene;
 use gnss_twin::generator::synth::Edge;
@@ -150,8 +150,8 @@ fn rates_that_fit_no_code_keep_every_signal_s_phases() {
         worst.iter_mut().zip(of).for_each(|(worst, of)| worst.merge(of));
     }
     let [carrier_m, code_m] = worst;
-    // Knots of 1e-6 cycle are 2.6e-7 m at most; a fraction of a second and a delay resolve 3.3e-8 m each, and the
-    // orbit 7.5e-9 m.
+    // Knots of 1e-6 cycle are 2.6e-7 m at most; a fraction of a second and a delay resolve 3.3e-8 m each, and
+    // the orbit 7.5e-9 m.
     the.at_most("carrier after 9 min, to integers", carrier_m, 4e-7, "m");
     the.at_most("code after 9 min, to integers", code_m, 4e-7, "m");
 }

@@ -215,8 +215,8 @@ impl Sum {
     }
 }
 
-/// Sends the units around a second of the system's time and reads them with a belief of the time by which they
-/// are dated `aliased_s` late.
+/// Sends the units around a second of the system's time and reads them with a belief of the time by which
+/// they are dated `aliased_s` late.
 fn hear(
     (signal, message, set): &(&'static Signal, &'static Message, Ephemeris),
     second: i128,
@@ -320,8 +320,8 @@ fn every_message_counts_over_its_rollovers_as_the_calendar_does() {
     the.all(figure, sum.heard.numbers[1], sum.heard.numbers[0]);
     let mut sum = Sum::default();
     for sent in messages.iter().filter(|(signal, ..)| signal.system == System::Glonass) {
-        // The ends of a day, of a year, of 29 February, and of all intervals of four years up to the year 2100,
-        // which is no leap year.
+        // The ends of a day, of a year, of 29 February, and of all intervals of four years up to the year
+        // 2100, which is no leap year.
         let years = (2000..=2096).step_by(4).map(|year| [year, 1, 1]);
         for date in years.chain([[2024, 2, 29], [2024, 3, 1], [2025, 1, 1], [2026, 5, 12], [2099, 12, 31]]) {
             // What is believed, to within a year, is off by 150 days.

@@ -85,8 +85,8 @@ fn rotation_radps(system: System) -> f64 {
     }
 }
 
-/// A set `delta_s` later on the same Earth-fixed path: the node at the begin of its system's week turns with it,
-/// a state vector stays.
+/// A set `delta_s` later on the same Earth-fixed path: the node at the begin of its system's week turns with
+/// it, a state vector stays.
 fn moved(set: &Ephemeris, signal: &Signal, delta_s: i64) -> Ephemeris {
     let later = |at: Epoch| Epoch::new(at.seconds() + delta_s, at.fraction());
     let of_week = |at: Epoch| signal.time.label(at).tow_s();
@@ -193,8 +193,9 @@ fn a_start_a_nanosecond_later_is_a_nanosecond_later_for_every_signal() {
             range_m.take(same_s.abs() * SPEED_OF_LIGHT_MPS, input);
         }
     }
-    // Two places of a code, each with a fraction of a second and a delay that resolve 1.1e-16 s, 3.3e-8 m, and
-    // knots of 1e-4 cycle or 2.5e-5 m whose errors at two starts a nanosecond apart differ by a part in 1e9.
+    // Two places of a code, each with a fraction of a second and a delay that resolve 1.1e-16 s, 3.3e-8 m,
+    // and knots of 1e-4 cycle or 2.5e-5 m whose errors at two starts a nanosecond apart differ by a part in
+    // 1e9.
     the.at_most("code against a nanosecond", code_m, 2e-7, "m");
     // Two sums of a delay, 0.08 s or 2e8 cycles, that resolve 3e-8, and the orbit's 7.5e-9 m of 0.12 m.
     the.at_most("carrier against a nanosecond's motion", carrier, 5e-7, "cycle");
