@@ -367,3 +367,31 @@ fn a_hundred_turns_a_second_are_a_hundred_cycles() {
     let (carrier, _) = worst_cycles(&spun, Sv::gps(23), (2_600_000, 3_900_000), 10_000);
     the.at_most("carrier between knots", carrier, 1e-4, "cycle");
 }
+
+#[test]
+fn a_hundred_turns_a_second_are_a_hundred_cycles_of_every_signal() {
+    let the = case(28, "spin of 100 rev/s", ALL);
+    let (mut most, mut least) = (Worst::default(), Worst::least());
+    for signal in SIGNALS {
+        let tables = |spin: &str| {
+            let attitude = "[attitude]\nkind = \"fixed\"\nyaw_deg = 125\npitch_deg = 80\n";
+            format!("{attitude}{spin}boresight = [1, 0, 0]\n{}", skies::front_end(signal, 12.5e6, 0.0))
+        };
+        let spun = skies::scene(&[signal], 4.0, &tables("spin_hz = 100\n"));
+        let still = skies::scene(&[signal], 4.0, &tables(""));
+        for sv in skies::in_view(&still, signal) {
+            let seen = |scene: &Scene, t_s: f64| {
+                truth::seen(scene, sv, signal, scene.clock.start.plus_s(t_s)).unwrap().unwrap()
+            };
+            let cycles = |scene: &Scene| {
+                seen(scene, 3.0).arrivals[0].carrier_cycles - seen(scene, 1.0).arrivals[0].carrier_cycles
+            };
+            let turns = (cycles(&spun) - cycles(&still)).abs();
+            most.take(turns, || format!("{signal} of {sv}"));
+            least.take(turns, || format!("{signal} of {sv}"));
+        }
+    }
+    // The satellite moves by 1e-4 rad a second against the nose.
+    the.near("wind-up in 2 s, most", most, 200.0, 1e-3, "cycles");
+    the.near("wind-up in 2 s, least", least, 200.0, 1e-3, "cycles");
+}

@@ -9,12 +9,13 @@ use gnss_twin::generator::synth::band::Filter;
 use gnss_twin::generator::synth::bank::Bank;
 use gnss_twin::generator::synth::chips::CodeTime;
 use gnss_twin::generator::synth::isa::Level;
-use gnss_twin::generator::synth::waveform::plain;
+use gnss_twin::generator::synth::waveform::{Waveform, plain};
 use gnss_twin::generator::synth::{Edge, Kernel, Run};
 use gnss_twin::generator::transmit::Transmitter;
 use gnss_twin::generator::truth;
 use gnss_twin::gnss::gps::l1ca::{self, L1_CA};
 use gnss_twin::gnss::satellite::Sv;
+use gnss_twin::gnss::signal::{Layers, SIGNALS};
 use gnss_twin::gnss::time::{Epoch, Rate, tone_turns};
 use gnss_twin::receiver::acquire::search;
 use gnss_twin::receiver::correlate;
@@ -23,7 +24,7 @@ use gnss_twin::receiver::source::Block;
 use gnss_twin::receiver::track::TrackingSettings;
 use num_complex::Complex64;
 
-use crate::figures::{CA, Worst, case};
+use crate::figures::{ALL, CA, Worst, case};
 use crate::run::{self, Received};
 
 const CHIP_M: f64 = 299_792_458.0 / 1.023e6;
@@ -212,6 +213,39 @@ fn on_a_boundary_of_chips_the_index_is_inside_and_to_the_right() {
         held += usize::from(exact.phase() == 0 && exact.period == second * 1000);
     }
     the.all("places in 0 ≤ phase < 1023, whole seconds at 0", held, of);
+}
+
+#[test]
+fn on_a_boundary_of_steps_every_sequence_of_every_signal_is_inside() {
+    let the = case(30, "code phase on a boundary", ALL);
+    let (mut inside, mut exact, mut of) = (0, 0, [0; 2]);
+    for signal in SIGNALS {
+        let sv = signal.satellites().next().unwrap();
+        for index in 0..signal.components.len() {
+            let waveform = Waveform::new(signal.link(sv), index).unwrap().unwrap();
+            for voice in waveform.voices(Layers::Whole, Edge::Nearest, 65e6).unwrap() {
+                let pace = voice.spreading.pace();
+                let (steps, step_hz) = (u128::from(pace.steps), pace.step_rate_hz());
+                for second in [0_i64, 1, 604_799, 604_800, 1_000_000_000, 4_000_000_000] {
+                    for step in (0..400).map(|k| f64::from(k) * 7.0) {
+                        for nudge in [-1e-16, 0.0, 1e-16] {
+                            let place = pace.at(Epoch::new(second, step / step_hz + nudge), 0.0);
+                            of[0] += 1;
+                            inside += usize::from(place.phase() < steps << 48);
+                        }
+                    }
+                    // Whole seconds of the system's own time are whole steps, by integers.
+                    let at = signal.time.instant(Epoch::new(second, 0.0));
+                    let place = pace.at(at, 0.0);
+                    let found = i128::from(place.period) * (steps << 48) as i128 + place.phase() as i128;
+                    of[1] += 1;
+                    exact += usize::from(found == (i128::from(second) * (step_hz as i128)) << 48);
+                }
+            }
+        }
+    }
+    the.all("places of every sequence in its period", inside, of[0]);
+    the.all("whole seconds of every system at their own step", exact, of[1]);
 }
 
 #[test]

@@ -157,13 +157,21 @@ fn week_bits(message: &Message) -> u32 {
     }
 }
 
-/// A set whose reference time is the nearest to `second` of the system's time that keeps its place in the
-/// hour, or in the half of it where sets are of half hours.
+/// A set with an issue of its own whose reference time is the nearest to `second` of the system's time that
+/// keeps its place in the hour, or in the half of it where sets are of half hours.
 fn near(set: &Ephemeris, signal: &Signal, second: i64) -> Ephemeris {
     let step_s = if signal.system == System::Glonass { 1800 } else { 3600 };
     let label = set.clone().timed(|at| signal.time.label(at));
     let ahead_s = (second - label.toe.seconds() + step_s / 2).div_euclid(step_s) * step_s;
-    label.timed(|at| signal.time.instant(Epoch::new(at.seconds() + ahead_s, at.fraction())))
+    // NavIC's message on L1 counts in steps of five minutes, the shipped sets of L5 in others.
+    let into_s = if signal.system == System::Navic { label.toe.seconds() % step_s } else { 0 };
+    let ahead_s = ahead_s - into_s;
+    let mut set = label.timed(|at| signal.time.instant(Epoch::new(at.seconds() + ahead_s, at.fraction())));
+    if set.vector.is_none() {
+        let issue = (set.toe.seconds() / 3600 % 16) as u16;
+        (set.iode, set.iodc) = (issue, issue);
+    }
+    set
 }
 
 /// Every form of message of the catalogue that says its time, with a satellite's set of its system.
@@ -190,6 +198,10 @@ fn messages() -> Vec<(&'static Signal, &'static Message, Ephemeris)> {
 struct Heard {
     /// Units with a number of the week or of the day, and those whose number is the calendar's.
     numbers: [usize; 2],
+    /// Units that were read, and those whose second of the week is right.
+    units: [usize; 2],
+    /// Sets of elements that were read, and those that have the reference times of one that was sent.
+    sets: [usize; 2],
     /// Times that the reader told before and from the instant on, and those that are right.
     times: [usize; 3],
 }
@@ -207,6 +219,8 @@ impl Sum {
         let add = |sum: &mut [usize], part: &[usize]| sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
         add(&mut self.heard.numbers, &heard.numbers);
         add(&mut self.heard.times, &heard.times);
+        add(&mut self.heard.sets, &heard.sets);
+        add(&mut self.heard.units, &heard.units);
         add(&mut self.rounds, &[1, usize::from(heard.times[0] > 0 && heard.times[1] > 0)]);
     }
 
@@ -234,11 +248,18 @@ fn hear(
     let mut reader = (message.reader)(set.sv);
     reader.know(believed);
     let (mut heard, mut fed, mut symbols_of_unit) = (Heard::default(), 0_u64, 0);
+    let mut sent_at = BTreeSet::new();
+    // Thousandths: no symbol is shorter.
+    let symbol_ms = (message.symbol_s * 1e3).round() as i128;
+    let first_ms = i128::from(message.unit_start(first).seconds()) * 1000;
     for unit in first..first + 2 * units + 1 {
         let slot = Slot { message, time: signal.time, unit };
         let set_at = |unit: i64| near(set, signal, message.unit_start(message.unit_of_set(unit)).seconds());
-        let sent = message::unit(&[], sender, [&set_at(unit - 1), &set_at(unit)], &slot)
+        let (before, now) = (set_at(unit - 1), set_at(unit));
+        let sent = message::unit(&[], sender, [&before, &now], &slot)
             .unwrap_or_else(|e| panic!("{} at {second}: {e}", message.name));
+        let [toe, toc] = [now.toe, now.toc].map(|at| i128::from(signal.time.label(at).seconds()) + aliased_s);
+        sent_at.insert((toe, toc));
         let start = i128::from(message.unit_start(unit).seconds());
         for (name, raw) in (message.parameters)(&sent.symbols).map(|(_, all)| all).unwrap_or_default() {
             let due = match (signal.system, name) {
@@ -264,11 +285,21 @@ fn hear(
             fed += 1;
             for read in reader.take(if one { -9.0 } else { 9.0 }, believed) {
                 match read {
-                    Read::Unit { symbols, .. } => symbols_of_unit = symbols,
+                    Read::Unit { symbols, of_week_s, .. } => {
+                        symbols_of_unit = symbols;
+                        let into_ms = i128::from(fed - symbols) * symbol_ms;
+                        // D2's subframes begin between seconds.
+                        let due_s = (first_ms + into_ms).div_euclid(1000).rem_euclid(WEEK_S);
+                        heard.units[0] += 1;
+                        heard.units[1] += usize::from(i128::from(of_week_s) == due_s);
+                    }
+                    Read::Ephemeris(found) => {
+                        heard.sets[0] += 1;
+                        let at = (i128::from(found.toe.seconds()), i128::from(found.toc.seconds()));
+                        heard.sets[1] += usize::from(sent_at.contains(&at));
+                    }
                     Read::Time(label) => {
-                        // Thousandths: no symbol is shorter.
-                        let into_ms = (fed - symbols_of_unit) as i128 * (message.symbol_s * 1e3).round() as i128;
-                        let due_ms = i128::from(message.unit_start(first).seconds()) * 1000 + into_ms;
+                        let due_ms = first_ms + i128::from(fed - symbols_of_unit) * symbol_ms;
                         let said_ms = i128::from(label.seconds()) * 1000 + (label.fraction() * 1e3).round() as i128;
                         heard.times[usize::from(due_ms >= i128::from(second) * 1000)] += 1;
                         heard.times[2] += usize::from(said_ms == due_ms + aliased_s * 1000);
@@ -314,6 +345,8 @@ fn every_message_counts_over_its_rollovers_as_the_calendar_does() {
     }
     the.all("rollovers with times read before and after", sum.rounds[1], sum.rounds[0]);
     the.all("times as read, or whole rounds on where the belief is", sum.heard.times[2], sum.times());
+    the.all("seconds of the week of all units as read", sum.heard.units[1], sum.heard.units[0]);
+    the.all("sets read around them, with the reference times sent", sum.heard.sets[1], sum.heard.sets[0]);
     assert_eq!(listed.len(), 11, "{listed:?}");
     // The other eight have theirs in what a unit says of itself, which the table of parameters leaves out.
     let figure = "numbers of the week as sent, of the 11 of 19 messages that list them, against the calendar";

@@ -1,4 +1,4 @@
-//! Case 66: the same bytes on every instruction set that the processor has.
+//! Cases 52 and 66: the same bytes on every instruction set that the processor has, and by one thread.
 
 use gnss_twin::generator::stream::Options;
 use gnss_twin::generator::synth::isa::Level;
@@ -17,10 +17,11 @@ const TABLES: &str = "[noise]\n[[interference]]\nkind = \"cw\"\noffset_hz = 1e5\
 fn every_instruction_set_makes_the_same_bytes_of_every_signal() {
     let the = case(66, "two instruction sets", ALL);
     let levels: Vec<Level> = Level::ALL.into_iter().filter(|level| level.is_available()).collect();
-    let held: Vec<[usize; 2]> = SIGNALS
+    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let held: Vec<[usize; 4]> = SIGNALS
         .par_iter()
         .map(|signal| {
-            let mut held = [0; 2];
+            let mut held = [0; 4];
             for (edge, carrier) in [("nearest", "f32"), ("area", "f32"), ("band_limited", "f32"), ("area", "f64")] {
                 let front = skies::front_end(signal, 12.5e6, 1e5).replace("cf32", "ci8");
                 let fidelity = format!("[fidelity]\ncode_edge = \"{edge}\"\ncarrier = \"{carrier}\"\n");
@@ -36,11 +37,15 @@ fn every_instruction_set_makes_the_same_bytes_of_every_signal() {
                 assert!(first.iter().any(|byte| *byte != first[0]));
                 held[0] += levels[1..].iter().filter(|level| made(level) == first).count();
                 held[1] += levels.len() - 1;
+                held[2] += usize::from(edge != "area" || alone.install(|| made(&levels[0])) == first);
+                held[3] += 1;
             }
             held
         })
         .collect();
     let sum = |which: usize| held.iter().map(|held| held[which]).sum::<usize>();
+    let threads = case(52, "determinism", ALL);
+    threads.all("1 thread, and all: same bytes of every signal", sum(2), sum(3));
     if levels.len() > 1 {
         let names: Vec<String> = levels.iter().map(|level| format!("{level:?}").to_lowercase()).collect();
         let figure = format!("pieces with the same bytes on {}", names.join(", "));

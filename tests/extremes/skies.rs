@@ -1,15 +1,17 @@
-//! A sky for every signal: place, time and orbits of the shipped scenario of its system. And cases 1, 6 and 7
-//! in each of them.
+//! A sky for every signal: place, time and orbits of the shipped scenario of its system. And cases 1, 2, 4,
+//! 6, 7 and 15 in each of them.
 
 use std::path::Path;
 use std::sync::Arc;
 
 use gnss_twin::generator::catalogue::Catalogue;
 use gnss_twin::generator::scene::Scene;
+use gnss_twin::generator::sky;
 use gnss_twin::generator::synth::Edge;
 use gnss_twin::generator::synth::waveform::Waveform;
 use gnss_twin::generator::transmit::Transmitter;
 use gnss_twin::generator::truth;
+use gnss_twin::generator::vehicle::Motion;
 use gnss_twin::gnss::broadcast::Ephemeris;
 use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss_twin::gnss::satellite::{Sv, System};
@@ -107,32 +109,75 @@ fn twins(signal: &'static Signal, delta_s: i64) -> [Scene; 2] {
     })
 }
 
-#[test]
-fn the_weeks_and_days_of_every_system_end_without_a_step_in_range() {
-    let the = case(1, "week rollover", ALL);
+/// Largest difference of pseudoranges between the skies of all signals and the same a second around an
+/// instant of their time, which `edge` says by what their start reads.
+fn worst_apart_m(edge: impl Fn(&Signal, Epoch) -> i64) -> Worst {
     let (mut worst_m, mut ranges) = (Worst::default(), 0);
     for signal in SIGNALS {
         let start = scene(&[signal], 3.0, &front_end(signal, 65e6, 0.0)).clock.start;
-        let label = signal.time.label(start);
-        // A second after the start the week ends, and with it the day.
-        let [here, there] = twins(signal, 2 * WEEK_S - 1 - label.tow_whole_s());
-        assert_eq!(signal.time.label(there.clock.start).tow_whole_s(), WEEK_S - 1);
+        // A second after the start.
+        let [here, there] = twins(signal, edge(signal, start) - 1 - start.seconds());
         for sv in in_view(&here, signal) {
-            for k in 0..=40 {
-                let t_s = 0.05 * f64::from(k);
+            for t_s in (0..=40).map(|k| 0.05 * f64::from(k)) {
                 let delay_s = |scene: &Scene| {
                     let seen = truth::seen(scene, sv, signal, scene.clock.start.plus_s(t_s)).unwrap().unwrap();
                     seen.arrivals[0].delay_s
                 };
                 let apart_m = (delay_s(&here) - delay_s(&there)).abs() * SPEED_OF_LIGHT_MPS;
-                worst_m.take(apart_m, || format!("{signal} of {sv}, {:.2} s from the week's end", t_s - 1.0));
+                worst_m.take(apart_m, || format!("{signal} of {sv}, {:.2} s from it", t_s - 1.0));
                 ranges += 1;
             }
         }
     }
     assert!(ranges > 3000, "{ranges}");
+    worst_m
+}
+
+#[test]
+fn weeks_days_and_leap_seconds_of_every_system_are_no_step_in_range() {
+    // The next end of the system's own week but one, and with it of its day.
+    let week = worst_apart_m(|signal, start| start.seconds() - signal.time.label(start).tow_whole_s() + 2 * WEEK_S);
     // Angles of the moved sets are rounded again: 2π to 4.4e-16 rad at 4.2e7 m is 1.9e-8 m, a few times.
-    the.at_most("pseudorange against the same sky in mid-week", worst_m, 1e-6, "m");
+    case(1, "week rollover", ALL).at_most("pseudorange against the same sky in mid-week", week, 1e-6, "m");
+    // The second inserted before 2017-01-01T00:00:00 UTC.
+    let leap = worst_apart_m(|_, _| Epoch::parse("2016-12-31T23:59:60Z").unwrap().seconds());
+    case(4, "leap second", ALL).at_most("pseudorange through it against the same sky of another year", leap, 1e-6, "m");
+}
+
+#[test]
+fn half_a_week_from_its_reference_time_no_orbit_steps() {
+    let the = case(2, "tk at ±302 400 s", ALL);
+    let (mut step_m, mut radius_m, mut sets) = (Worst::default(), Worst::default(), 0);
+    for signal in SIGNALS {
+        let scene = scene(&[signal], 3.0, &front_end(signal, 65e6, 0.0));
+        let start = scene.clock.start;
+        for sv in scene.catalogue.satellites() {
+            // In the Earth's centre.
+            let still = Motion::at_rest(nalgebra::Vector3::zeros());
+            if let Some(found) = sky::emission(&scene.catalogue, sv, start, &still).unwrap() {
+                let (state, _) = scene.catalogue.truth(sv, start.plus_s(-found.travel_s)).unwrap().unwrap();
+                radius_m.take((found.sight.range_m - state.position_m.norm()).abs(), || sv.to_string());
+            }
+            // State vectors are of minutes, not of weeks.
+            let Some(set) = scene.catalogue.sent_at(sv, start).filter(|set| set.vector.is_none()) else { continue };
+            for half_s in [-302_400.0, 302_400.0] {
+                let (a, b) = (
+                    set.state(set.toe.plus_s(half_s - 5e-7)).unwrap(),
+                    set.state(set.toe.plus_s(half_s + 5e-7)).unwrap(),
+                );
+                // What the satellite flies in the microsecond between is taken out.
+                let apart_m = (b.position_m - a.position_m - a.velocity_mps * 1e-6).norm();
+                step_m.take(apart_m, || format!("{signal} of {sv}, {half_s} s"));
+                sets += 1;
+            }
+        }
+    }
+    assert!(sets > 300, "{sets}");
+    // An angle of 302 400 s times the Earth's rate, 22 rad, is rounded to 3.6e-15 rad, 1.5e-7 m at 4.2e7 m, a
+    // few times.
+    the.at_most("step of every system's orbits at the edge", step_m, 1e-6, "m");
+    // Coordinates of 4.2e7 m resolve 7.5e-9 m, and a light time 2.8e-17 s, 8e-9 m.
+    case(15, "geocentre", ALL).at_most("range less orbital radius, every system", radius_m, 1e-7, "m");
 }
 
 #[test]
