@@ -134,8 +134,12 @@ pub struct Forecast {
     pub air: Air,
     /// What the true troposphere delays, for the share that a model of it errs by.
     pub troposphere_m: f64,
-    /// Variance of thermal noise, m².
-    pub noise_m2: f64,
+    /// Variance of one code value by thermal noise, m².
+    pub code_m2: f64,
+    /// Share of it that smoothing leaves.
+    pub variance_ratio: f64,
+    /// Variance of what elements in short leave, alike on all carriers of the satellite, m².
+    pub short_m2: f64,
     /// Variance of what chip edges and reflected rays leave, m².
     pub other_m2: f64,
     /// How long a range remembers its noise, seconds.
@@ -158,6 +162,13 @@ pub struct Forecast {
     pub near_mask: bool,
     /// Whether the fix leaves it out.
     pub excluded: bool,
+}
+
+impl Forecast {
+    /// Variance of what differs from fix to fix, m².
+    pub fn noise_m2(&self) -> f64 {
+        self.code_m2 * self.variance_ratio + self.short_m2
+    }
 }
 
 /// What is the same for all satellites of a run.
@@ -261,7 +272,9 @@ impl<'r> Scene<'r> {
             bias_m: true_m + ahead_m - computed_m - air.delay_m - sky.troposphere_m,
             air,
             troposphere_m: sky.troposphere_m,
-            noise_m2: noise_m * noise_m,
+            code_m2: noise_m * noise_m,
+            variance_ratio: 1.0,
+            short_m2: self.short_m2(true_row.sv, row.sample),
             other_m2: self.edge_m2(true_row),
             memory_s: 0.0,
             rate_sigma_mps: rate_hz * true_row.link().wavelength_m(),
@@ -372,7 +385,7 @@ impl Ranges<'_, '_> {
             // A fix with one clock brought all ranges to its time.
             clock: if fix.clocks == Some(1) { 0 } else { one.clock },
             bias_m: one.bias_m + smooth.value_m - parted_m,
-            noise_m2: one.noise_m2 * smooth.variance_ratio + scene.short_m2(link.sv, row.sample),
+            variance_ratio: smooth.variance_ratio,
             other_m2: one.other_m2 + bounced_m * bounced_m,
             memory_s: smooth.memory_s,
             rate_bias_mps: self.unmodelled.of(row.time_s, phase_m),

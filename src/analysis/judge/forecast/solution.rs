@@ -116,7 +116,7 @@ impl Sums {
             *slot = 1.0;
         }
         let model_m = model_sigma_m * range.slant;
-        let variance = range.noise_m2 + model_m * model_m + range.air.own_m2;
+        let variance = range.noise_m2() + model_m * model_m + range.air.own_m2;
         let spread_m2 = variance + range.air.common_m.norm_squared();
         self.faulty |= range.other_m2 >= variance || range.bias_m.abs() >= FAULT * spread_m2.sqrt();
         if range.excluded {
@@ -128,7 +128,7 @@ impl Sums {
         let weight = 1.0 / variance;
         self.normal.ger(weight, &row, &row, 1.0);
         self.plain.ger(1.0, &row, &row, 1.0);
-        self.noise.ger(weight * weight * (range.noise_m2 + range.other_m2), &row, &row, 1.0);
+        self.noise.ger(weight * weight * (range.noise_m2() + range.other_m2), &row, &row, 1.0);
         let bias = if range.stepping { &mut self.stepping } else { &mut self.bias };
         bias.axpy(weight * range.bias_m, &row, 1.0);
         self.ionosphere.axpy(weight * range.air.delay_m, &row, 1.0);
@@ -235,6 +235,11 @@ pub fn expected(
 }
 
 /// Two bands as one range; what is of the carrier and of the satellite is the first one's, the higher.
+///
+/// One filter smooths the combination, and it begins when both carriers have lock. It has the age of the
+/// younger filter of the two, whose share of the variance is the larger. What parts code and carrier cancels
+/// in the combination, here only as far as both filters lag alike: a band that is found 12 s after the other
+/// leaves centimetres.
 fn combined(first: &Forecast, second: &Forecast) -> Forecast {
     let square = |range: &Forecast| range.carrier_hz * range.carrier_hz;
     let a = square(first) / (square(first) - square(second));
@@ -243,9 +248,10 @@ fn combined(first: &Forecast, second: &Forecast) -> Forecast {
         // Without the model's correction, which combined ranges do not get.
         bias_m: a * (first.bias_m + first.air.delay_m) + b * (second.bias_m + second.air.delay_m),
         air: Air::default(),
-        noise_m2: a * a * first.noise_m2 + b * b * second.noise_m2,
+        code_m2: a * a * first.code_m2 + b * b * second.code_m2,
+        variance_ratio: first.variance_ratio.max(second.variance_ratio),
         other_m2: a * a * first.other_m2 + b * b * second.other_m2,
-        memory_s: first.memory_s.max(second.memory_s),
+        memory_s: first.memory_s.min(second.memory_s),
         steady: first.steady && second.steady,
         near_mask: first.near_mask || second.near_mask,
         excluded: first.excluded || second.excluded,
@@ -385,11 +391,14 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
+    use crate::expect::smoothing::Smoothing;
     use gnss::satellite::Sv;
 
-    #[test]
-    fn a_satellite_counts_once_whatever_it_sends_and_only_if_one_of_its_ranges_is_used() {
-        let range = |number: u8, carrier_hz: f64, near_mask: bool, excluded: bool| Forecast {
+    const L1_HZ: f64 = 1_575.42e6;
+    const L5_HZ: f64 = 1_176.45e6;
+
+    fn range(number: u8, carrier_hz: f64, near_mask: bool, excluded: bool) -> Forecast {
+        Forecast {
             sv: Sv::gps(number),
             clock: 0,
             carrier_hz,
@@ -398,7 +407,9 @@ mod tests {
             stepping: false,
             air: Air::default(),
             troposphere_m: 0.0,
-            noise_m2: 1.0,
+            code_m2: 1.0,
+            variance_ratio: 1.0,
+            short_m2: 0.0,
             other_m2: 0.0,
             memory_s: 0.0,
             rate_sigma_mps: 0.0,
@@ -409,19 +420,22 @@ mod tests {
             slant: 1.25,
             near_mask,
             excluded,
-        };
-        let (l1_hz, l5_hz) = (1_575.42e6, 1_176.45e6);
+        }
+    }
+
+    #[test]
+    fn a_satellite_counts_once_whatever_it_sends_and_only_if_one_of_its_ranges_is_used() {
         let all = [
             // Three ranges of one, two of one at the mask, one of two left out, both of one left out.
-            range(1, l1_hz, false, false),
-            range(1, l1_hz, false, false),
-            range(1, l5_hz, false, false),
-            range(2, l1_hz, true, false),
-            range(2, l5_hz, true, false),
-            range(3, l1_hz, false, true),
-            range(3, l5_hz, false, false),
-            range(4, l1_hz, false, true),
-            range(4, l5_hz, false, true),
+            range(1, L1_HZ, false, false),
+            range(1, L1_HZ, false, false),
+            range(1, L5_HZ, false, false),
+            range(2, L1_HZ, true, false),
+            range(2, L5_HZ, true, false),
+            range(3, L1_HZ, false, true),
+            range(3, L5_HZ, false, false),
+            range(4, L1_HZ, false, true),
+            range(4, L5_HZ, false, true),
         ];
         // A combination of two is left out with either.
         for (combines, expected) in [(false, (2, 3)), (true, (1, 2))] {
@@ -429,6 +443,36 @@ mod tests {
             all.iter().for_each(|range| sums.take(*range, (combines, 0.5)));
             sums.finish((combines, 0.5));
             assert_eq!((sums.least, sums.most), expected, "{combines}");
+        }
+    }
+
+    #[test]
+    fn a_combination_is_as_smooth_as_one_filter_of_both_bands_though_one_of_them_was_found_later_or_lost() {
+        let filter = || Smoothing::new(30.0, 0.5);
+        let (mut one, mut two, mut both) = (filter(), filter(), filter());
+        let (gain, rest) = (2.26 * 2.26, 1.26 * 1.26);
+        for tenth in 0..900 {
+            let time_s = 0.1 * f64::from(tenth);
+            // The second band comes 12 s later, the first breaks at 50 s.
+            let locked_s = [if tenth < 500 { time_s + 1.0 } else { time_s - 49.9 }, time_s - 11.9];
+            let first = one.take(time_s, locked_s[0], 0.0);
+            if tenth < 120 {
+                continue;
+            }
+            let second = two.take(time_s, locked_s[1], 0.0);
+            let pair = both.take(time_s, locked_s[0].min(locked_s[1]), 0.0);
+            let of = |carrier_hz: f64, code_m2: f64, smooth: crate::expect::smoothing::Smoothed| Forecast {
+                code_m2,
+                variance_ratio: smooth.variance_ratio,
+                memory_s: smooth.memory_s,
+                short_m2: 4.0,
+                ..range(1, carrier_hz, false, false)
+            };
+            let found = combined(&of(L1_HZ, 0.1, first), &of(L5_HZ, 0.4, second));
+            // The elements are the satellite's, not a band's.
+            let expected_m2 = (gain * 0.1 + rest * 0.4) * pair.variance_ratio + 4.0;
+            assert!((found.noise_m2() / expected_m2 - 1.0).abs() < 2e-3, "{time_s} s: {found:?}, {expected_m2} m²");
+            assert!((found.memory_s / pair.memory_s - 1.0).abs() < 1e-9, "{time_s} s");
         }
     }
 }
