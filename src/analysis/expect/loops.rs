@@ -299,6 +299,11 @@ pub(crate) struct Theory {
     peaks: (Peak, Peak),
     /// Of the code without any average.
     pub code: Code,
+    /// What is followed.
+    pub component: &'static Component,
+    /// Mean square that another satellite's code may add before the loop, chips²
+    /// ([`Beats`](super::beats::Beats)).
+    pub beat_chips2: f64,
     oscillator: Option<PowerLaw>,
 }
 
@@ -348,7 +353,9 @@ impl Theory {
             dll: (dll, Response::of(&dll)),
             dll_gain,
             peaks: (found, own),
+            beat_chips2: code.stray_chips2(settings.spacing_chips) / f64::from(followed.component.code_chips),
             code,
+            component: followed.component,
             oscillator: run.scene.oscillator.map(|noise| PowerLaw { h: noise.h }),
         })
     }
@@ -356,6 +363,11 @@ impl Theory {
     /// Standard deviation of the code that the loop gives, by thermal noise, metres.
     pub fn code_noise_m(&self, cn0_hz: f64) -> f64 {
         self.chip_m * self.noise(Loop::Dll, cn0_hz, &Places::default()).1
+    }
+
+    /// Noise bandwidth of the code loop, Hz.
+    pub fn dll_bandwidth_hz(&self) -> f64 {
+        self.settings.dll_bandwidth_hz
     }
 
     /// Distance of early and late, in chips.

@@ -9,6 +9,7 @@
 use std::collections::BTreeMap;
 
 use crate::error::JudgeError;
+use crate::expect::beats::Beats;
 use crate::expect::loops::{Stresses, Theory, update_s};
 use crate::expect::multipath::Rays;
 use crate::expect::multiple_access::MultipleAccess;
@@ -121,7 +122,7 @@ impl Links {
         if !run.scene.noise {
             return Ok(links);
         }
-        let access = MultipleAccess::new(run);
+        let (access, beats) = (MultipleAccess::new(run), Beats::new(run)?);
         for link in errors.signals.keys() {
             let Some(update_s) = update_s(run, link) else { continue };
             let Some(theory) = Theory::new(run, settings, &link, update_s) else {
@@ -133,7 +134,7 @@ impl Links {
                 links.leave_out(LeftOut::Unsettled, run.name(link));
                 continue;
             }
-            let Some(one) = One::new(run, link, &theory, settings, rows)? else { continue };
+            let Some(one) = One::new((run, &beats), link, &theory, settings, rows)? else { continue };
             one.observations(&mut links)?;
             let spans = &one.rows.spans;
             let mut updates = Updates::none();
@@ -214,6 +215,8 @@ struct One<'a> {
     ray_db: f64,
     /// Largest error of the code that chip edges leave.
     edge_m: f64,
+    /// Error of the code that beats may make, root mean square, and that of its mean, metres.
+    beat_m: [f64; 2],
     /// σ of the loops in their units: with oscillator and motion, without motion; and largest stress.
     sigma: BTreeMap<Loop, [f64; 3]>,
     raw: BTreeMap<Loop, f64>,
@@ -233,7 +236,7 @@ struct One<'a> {
 
 impl<'a> One<'a> {
     fn new(
-        run: &Run,
+        (run, beats): (&Run, &Beats),
         link: Link,
         theory: &'a Theory,
         settings: Settings,
@@ -262,6 +265,8 @@ impl<'a> One<'a> {
             _ => 0.0,
         };
         let span_s = 0.1_f64.max(rows.ends_s.1 - rows.ends_s.0);
+        let beat_m = [0.0, 0.5 * span_s]
+            .map(|averaged_s| theory.chip_m * beats.variance(theory, link, rows.ends_s, averaged_s).sqrt());
         Ok(Some(Self {
             name: run.name(link),
             theory,
@@ -269,6 +274,7 @@ impl<'a> One<'a> {
             ray_cycles: libm::asin(strongest) / std::f64::consts::TAU,
             ray_db: -20.0 * libm::log10(1.0 - strongest),
             edge_m,
+            beat_m,
             sigma,
             raw,
             span_s,
@@ -296,17 +302,21 @@ impl<'a> One<'a> {
         let (code_edge_m, carrier_rest) = (self.edge_m + 0.5 * ray_m, REST_CYCLES + self.ray_cycles);
         let (metres, level_cycles) = (self.theory.chip_m, self.rows.level_cycles()?);
         let of_code = [Figure::CodeBias, Figure::CodeLargest];
-        self.one(links, of_code, Loop::Dll, (code, 0.0), metres, code_edge_m)?;
+        // The lag of two codes is one draw for the whole run, and a beat that turns goes to √2 of its rms.
+        let [beat_m, middle_m] = self.beat_m.map(|beat_m| largest(1, 1) * beat_m);
+        let peaks_m = [middle_m, beat_m].map(|beat_m| code_edge_m + std::f64::consts::SQRT_2 * beat_m);
+        let rest_m = [peaks_m[0], peaks_m[1], libm::hypot(code_edge_m, beat_m)];
+        self.one(links, of_code, Loop::Dll, (code, 0.0), metres, rest_m)?;
         let (of_carrier, cycles) = ([Figure::CarrierBias, Figure::CarrierLargest], 1.0 / 360.0);
-        self.one(links, of_carrier, Loop::Pll, (carrier, level_cycles), cycles, carrier_rest)?;
+        self.one(links, of_carrier, Loop::Pll, (carrier, level_cycles), cycles, [carrier_rest; 3])?;
         let of_doppler = [Figure::DopplerBias, Figure::DopplerLargest];
-        self.one(links, of_doppler, Loop::Fll, (doppler, 0.0), 1.0, REST_HZ)?;
+        self.one(links, of_doppler, Loop::Fll, (doppler, 0.0), 1.0, [REST_HZ; 3])?;
         self.cn0(links, [Figure::Cn0Bias, Figure::Cn0Largest]);
         Ok(())
     }
 
     /// Bias, largest error and spread of one loop's errors above a level, which are in `scale` of the loop's
-    /// unit; `rest` is what may come on top.
+    /// unit; `rest` is what may come on top of each.
     fn one(
         &self,
         links: &mut Links,
@@ -314,7 +324,7 @@ impl<'a> One<'a> {
         which: Loop,
         (errors, level): (&Numbers, f64),
         scale: f64,
-        rest: f64,
+        [rest_of_bias, rest_of_largest, rest]: [f64; 3],
     ) -> Result<(), JudgeError> {
         let Some([sigma, noise, stress]) = self.sigma.get(&which).map(|all| all.map(|x| x * scale)) else {
             return Ok(());
@@ -325,8 +335,9 @@ impl<'a> One<'a> {
         let middle = sum / count;
         errors.each(|value| squares += (value - level - middle) * (value - level - middle))?;
         let factor = largest(1, 1) * THEORY * self.pair / self.independent(which, 2.0).sqrt();
-        links.put(figures[0], &self.name, middle.abs(), factor * sigma + stress + rest);
-        links.put(figures[1], &self.name, most, largest(1, errors.len()) * THEORY * self.pair * sigma + stress + rest);
+        links.put(figures[0], &self.name, middle.abs(), factor * sigma + stress + rest_of_bias);
+        let limit = largest(1, errors.len()) * THEORY * self.pair * sigma + stress + rest_of_largest;
+        links.put(figures[1], &self.name, most, limit);
         let spread = squares / count;
         let (low, high) = mean_square(self.independent(which, 4.0));
         // What is not noise may come and go.

@@ -13,6 +13,7 @@ use nalgebra::Vector3;
 
 use super::air::{Air, Sight};
 use crate::error::JudgeError;
+use crate::expect::beats::Beats;
 use crate::expect::due::satellite::{FADE_DB, is_stepping};
 use crate::expect::loops::{Places, Theory, update_s};
 use crate::expect::message::Message;
@@ -140,7 +141,7 @@ pub struct Forecast {
     pub variance_ratio: f64,
     /// Variance of what elements in short leave, alike on all carriers of the satellite, m².
     pub short_m2: f64,
-    /// Variance of what chip edges and reflected rays leave, m².
+    /// Variance of what chip edges, reflected rays and beats leave, m².
     pub other_m2: f64,
     /// How long a range remembers its noise, seconds.
     pub memory_s: f64,
@@ -184,25 +185,31 @@ pub struct Scene<'r> {
     /// What the receiver knows of satellites.
     pub(in crate::judge) heard: Heard,
     stated: &'r Stated,
+    beats: Beats,
     /// Error of chip edges with a code at rest, root mean square.
     edges_m: BTreeMap<&'static Signal, f64>,
 }
 
 impl<'r> Scene<'r> {
     /// `None` without the receiver's settings.
-    pub fn new(run: &'r Run, stated: &'r Stated) -> Option<Self> {
-        Some(Self {
+    ///
+    /// # Errors
+    /// [`JudgeError::Read`] where spilled rows cannot be read.
+    pub fn new(run: &'r Run, stated: &'r Stated) -> Result<Option<Self>, JudgeError> {
+        let Some(choices) = Choices::of(run) else { return Ok(None) };
+        Ok(Some(Self {
             run,
-            choices: Choices::of(run)?,
+            choices,
             message: Message::of(run),
             scales: scales(run),
             heard: Heard::of(run),
             stated,
+            beats: Beats::new(run)?,
             edges_m: (run.signals.iter())
                 .filter(|_| run.scene.code_edge == Edge::Area)
                 .map(|&signal| (signal, edges::averaged_m(signal, run.scene.waveform, run.rate_hz(signal))))
                 .collect(),
-        })
+        }))
     }
 
     /// The ranges of a satellite's signal, fix by fix; none where the settings make no loop that holds it.
@@ -381,12 +388,15 @@ impl Ranges<'_, '_> {
             return Ok(None);
         };
         let bounced_m = MULTIPATH_SHARE * bounced.value_m;
+        // A mean over twice the mean age.
+        let (span_s, averaged_s) = ((row.time_s, row.time_s), 0.5 * smooth.memory_s);
+        let beat_m2 = theory.chip_m * theory.chip_m * scene.beats.variance(theory, link, span_s, averaged_s);
         Ok(Some(Forecast {
             // A fix with one clock brought all ranges to its time.
             clock: if fix.clocks == Some(1) { 0 } else { one.clock },
             bias_m: one.bias_m + smooth.value_m - parted_m,
             variance_ratio: smooth.variance_ratio,
-            other_m2: one.other_m2 + bounced_m * bounced_m,
+            other_m2: one.other_m2 + bounced_m * bounced_m + beat_m2,
             memory_s: smooth.memory_s,
             rate_bias_mps: self.unmodelled.of(row.time_s, phase_m),
             fading,

@@ -49,7 +49,7 @@ impl Verdict {
         if run.fixes.is_empty() {
             return Ok(());
         }
-        let Some(scene) = Scene::new(run, &summary.details.stated) else {
+        let Some(scene) = Scene::new(run, &summary.details.stated)? else {
             self.not_judged.push("fixes against theory: the receiver names no settings".to_owned());
             return self.position(run, summary);
         };
