@@ -176,6 +176,8 @@ pub struct Channel {
     /// When the pull-in began, and its prompts.
     pull_in_since: u64,
     batch: Batch,
+    /// Whether the pull-in is that of a weak signal, by a batch.
+    is_batched: bool,
     confirmed: bool,
 
     sums: [Complex64; 3],
@@ -240,6 +242,7 @@ impl Channel {
         let followed = component.map_or(0.0, |c| followed_db(c, waveform));
         let loops = Loops::new(settings, shape, has_symbols, sense * hit.doppler_hz);
         let if_hz = metadata.if_hz(hit.link().carrier_hz());
+        let is_batched = hit.cn0_dbhz + followed < WEAK_DBHZ;
         let mut channel = Self {
             settings: settings.clone(),
             least_cn0_hz: settings.least_cn0_hz(),
@@ -293,11 +296,12 @@ impl Channel {
             whole: false,
             loops,
             wide: true,
-            stage: if hit.cn0_dbhz + followed < WEAK_DBHZ { Stage::Open } else { Stage::Frequency },
+            stage: if is_batched { Stage::Open } else { Stage::Frequency },
             stage_since: 0,
             update_since: 0,
             pull_in_since: 0,
             batch: supervise::batch(settings, group, period_s),
+            is_batched,
             confirmed: false,
             sums: [Complex64::ZERO; 3],
             summed: 0,

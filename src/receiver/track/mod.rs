@@ -31,6 +31,8 @@ mod stream_tests;
 mod sync;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod weak_tests;
 
 pub use channel::{Channel, Glance, Shown, pilot_group};
 pub use model::ReplicaModel;

@@ -194,6 +194,8 @@ impl Channel {
         self.symbol_lock = SymbolLock::new(self.period_s * f64::from(self.group));
         self.phase_lock = PhaseLock::new(LOCK_PERIODS);
         if !begins && matches!(self.stage, Stage::Tracking(_)) {
+            // The frequency may be another after the gap.
+            self.is_batched = false;
             self.enter(Stage::Assisted);
         }
         self.forget_edges();

@@ -225,9 +225,9 @@ impl Channel {
 
     /// The stage in which a pull-in begins.
     fn begin_pull_in(&mut self) {
-        let weak = 10.0 * libm::log10(self.cn0_hz()) < WEAK_DBHZ;
+        self.is_batched = 10.0 * libm::log10(self.cn0_hz()) < WEAK_DBHZ;
         self.pull_in_since = self.first;
-        self.enter(if weak { Stage::Open } else { Stage::Frequency });
+        self.enter(if self.is_batched { Stage::Open } else { Stage::Frequency });
     }
 
     /// Begins to track at the first symbol after its edge is known.
