@@ -74,9 +74,9 @@ impl Verdict {
             self.sigmas(&all)?;
             return self.geometry(&all);
         }
-        self.satellites_of_fixes(run, &all, &bounded)?;
-        let (mut fading, mut slipping) = (0, 0);
         let breaks = Breaks::of(run);
+        self.satellites_of_fixes(&all, &bounded, &breaks)?;
+        let (mut fading, mut slipping) = (0, 0);
         cases.each(|case| {
             fading += usize::from(case.expected.fading);
             slipping += usize::from(!case.expected.fading && breaks.follow(case.sample));
@@ -87,7 +87,7 @@ impl Verdict {
         if slipping > 0 {
             self.not_judged.push(format!("velocity of {slipping} fixes right before a loop says that it slips"));
         }
-        let slow = self.kinds(run, &scene.choices, &cases)?;
+        let slow = self.kinds(&scene, &cases, &breaks)?;
         self.scales(run, &scales, &bounded, slow)?;
         // What is stated follows from C/N0 and directions, whatever the errors are.
         self.sigmas(&all)?;
@@ -159,13 +159,18 @@ impl Verdict {
     }
 
     /// Whether fixes use the satellites that are observed, know their ionosphere, and pass their own test.
-    fn satellites_of_fixes(&mut self, run: &Run, cases: &Table<Case>, bounded: &Bounded<'_>) -> Result<(), JudgeError> {
+    fn satellites_of_fixes(
+        &mut self,
+        cases: &Table<Case>,
+        bounded: &Bounded<'_>,
+        breaks: &Breaks,
+    ) -> Result<(), JudgeError> {
+        let run = bounded.run;
         let away = (RETURN_S * run.scene.sample_rate_hz) as u64;
-        let breaks = Breaks::of(run).samples;
         let before = (LOOK_BACK_S * run.scene.sample_rate_hz) as u64;
         let excused = |sample: u64| {
             let around = |at: &u64| (at.saturating_sub(before)..*at + 3 * away).contains(&sample);
-            breaks.iter().any(around) || !bounded.holds(run.time_s(sample))
+            breaks.samples.iter().any(around) || !bounded.holds(run.time_s(sample))
         };
         let alarm = run.receiver.pointer("/settings/position/false_alarm").and_then(serde_json::Value::as_f64);
         let tested = |fix: &Fix| {
@@ -238,9 +243,9 @@ impl Verdict {
     }
 
     /// The five kinds of error; gives the number of independent fixes.
-    fn kinds(&mut self, run: &Run, choices: &Choices, cases: &Table<Case>) -> Result<f64, JudgeError> {
+    fn kinds(&mut self, scene: &Scene<'_>, cases: &Table<Case>, breaks: &Breaks) -> Result<f64, JudgeError> {
+        let (run, choices) = (scene.run, &scene.choices);
         let motion = Motion::new(run, choices)?;
-        let breaks = Breaks::of(run);
         let allowed_mps = motion.allowed_mps();
         let oscillator_mps = oscillator_mps(run, choices);
         let (mut memory_s, mut before_s, mut steps) = (0.0_f64, None, Vec::new());
@@ -354,4 +359,16 @@ fn oscillator_mps(run: &Run, choices: &Choices) -> f64 {
         Some(theory.oscillator_rate_hz() * link.wavelength_m())
     };
     links.values().filter_map(of).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_loop_may_have_let_go_before_it_says_so_and_not_after() {
+        let breaks = Breaks { samples: [5000, 9000].into(), noticed: 300 };
+        let follow = [4699, 4700, 5000, 5001, 8700, 9001].map(|sample| breaks.follow(sample));
+        assert_eq!(follow, [false, true, true, false, true, false]);
+    }
 }
