@@ -124,7 +124,7 @@ pub const ORDER: Order<'static> = &[
             &["stated"],
             &["peak", "timeline"],
             &["loops"],
-            &["due", "multipath"],
+            &["beats", "due", "multipath"],
         ],
     ),
     ("analysis/expect/theory", &[&["clock", "detection", "dll", "edges", "linear", "pll"], &["fll", "oscillator"]]),

@@ -65,7 +65,7 @@ impl Beats {
     /// Mean square of the code error between two times that beats may make in the code loop of a satellite
     /// and a mean over `averaged_s` after it, chips².
     pub fn variance(&self, theory: &Theory, link: Link, span_s: (f64, f64), averaged_s: f64) -> f64 {
-        let passed = |beat_hz: f64| passed(beat_hz, theory.dll_bandwidth_hz(), averaged_s);
+        let passed = |beat_hz: f64| passed(beat_hz, theory.settings.dll_bandwidth_hz, averaged_s);
         theory.beat_chips2 * self.power(theory.component, link, span_s, passed)
     }
 

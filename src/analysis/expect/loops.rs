@@ -285,7 +285,7 @@ impl Places {
 
 /// The three loops of a receiver as theory sees them at one integration time.
 pub(crate) struct Theory {
-    settings: Settings,
+    pub settings: Settings,
     pub update_s: f64,
     pub chip_m: f64,
     carrier_hz: f64,
@@ -363,16 +363,6 @@ impl Theory {
     /// Standard deviation of the code that the loop gives, by thermal noise, metres.
     pub fn code_noise_m(&self, cn0_hz: f64) -> f64 {
         self.chip_m * self.noise(Loop::Dll, cn0_hz, &Places::default()).1
-    }
-
-    /// Noise bandwidth of the code loop, Hz.
-    pub fn dll_bandwidth_hz(&self) -> f64 {
-        self.settings.dll_bandwidth_hz
-    }
-
-    /// Distance of early and late, in chips.
-    pub fn spacing_chips(&self) -> f64 {
-        self.settings.spacing_chips
     }
 
     /// Energy of what the replica finds in an update over the noise density, at the whole signal's C/N0.

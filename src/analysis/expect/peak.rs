@@ -175,7 +175,7 @@ mod tests {
                 }
             }
         }
-        // A triangle's slopes are one: half of the square is in phase, and early less late moves by two a chip.
+        // A triangle's slopes are one: half of the square is in phase, early less late moves by two a chip.
         let found = 1023.0 * 0.5 * (differences / count) / 4.0;
         let code = Code::of(&Waveform::of(&L1_CA).unwrap());
         // Neighbouring values of these codes differ by a fortieth less than those of a random walk.

@@ -377,7 +377,7 @@ impl Ranges<'_, '_> {
         let parted_m = true_row.pseudorange_m - link.wavelength_m() * true_row.carrier_cycles;
         let ray_m = match self.rays.at(row.sample)? {
             [] => 0.0,
-            rays => theory.chip_m * multipath::error_chips(&theory.code, rays, theory.spacing_chips()),
+            rays => theory.chip_m * multipath::error_chips(&theory.code, rays, theory.settings.spacing_chips),
         };
         let smooth = self.parting.take(row.time_s, row.locked_s, parted_m + ray_m);
         let bounced = self.reflected.take(row.time_s, row.locked_s, ray_m.abs());

@@ -88,7 +88,7 @@ impl Settled {
             }
             let ray_m = match rays.at(row.sample)? {
                 [] => 0.0,
-                rays => multipath::error_chips(&theory.code, rays, theory.spacing_chips()) * theory.chip_m,
+                rays => multipath::error_chips(&theory.code, rays, theory.settings.spacing_chips) * theory.chip_m,
             };
             let own_hz = libm::pow(10.0, row.cn0_true_dbhz / 10.0);
             let white_hz = access.white_hz(row.sample, link, own_hz) / libm::pow(10.0, cost_db / 10.0);

@@ -187,7 +187,7 @@ impl Channel {
         let before = match self.stage {
             _ if astray => None,
             Stage::Tracking(_) => self.previous_sum,
-            // The batch knows the frequency to tenths of a hertz; so weak a signal's pairs of prompts add hertz.
+            // The batch gives the frequency to tenths of a hertz; pairs of weak prompts would add hertz.
             Stage::Assisted if self.is_batched => None,
             Stage::Frequency | Stage::Assisted => self.previous,
             // Nothing may correct the frequency.
