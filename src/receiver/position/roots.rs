@@ -120,4 +120,14 @@ mod tests {
         // The iteration alone ends at the other root now and then, or this test shows nothing.
         assert!(elsewhere > 10 && refused < 20, "{elsewhere} {refused}");
     }
+
+    #[test]
+    fn ranges_whose_rates_leave_the_earth_agree_on_no_place() {
+        // 1e6 Hz of one carrier are 190 km/s.
+        let mut sky =
+            ranges_at(&[(0.0, 80.0, 2.1e7), (10.0, 20.0, 2.3e7), (130.0, 25.0, 2.4e7), (250.0, 30.0, 2.2e7)], 0.0);
+        assert!(first(&sky, Vector3::zeros(), &BARE).is_ok());
+        sky[1].doppler_hz = 1e6;
+        assert_eq!(first(&sky, Vector3::zeros(), &BARE).err(), Some(NoFix::Nowhere));
+    }
 }

@@ -475,4 +475,24 @@ mod tests {
             assert!((found.memory_s / pair.memory_s - 1.0).abs() < 1e-9, "{time_s} s");
         }
     }
+
+    #[test]
+    fn the_longest_axis_of_a_covariance_need_not_be_a_coordinate_s() {
+        let mut sums = Sums::new(1);
+        let sights = [[0.6, 0.0, 0.8], [-0.6, 0.0, 0.8], [0.0, 0.6, 0.8], [0.0, -0.8, 0.6], [0.0, 0.0, 1.0]];
+        for (number, [east, north, up]) in (1..).zip(sights) {
+            let sight = Vector3::new(east, north, up);
+            sums.take(Forecast { sight, rate_sigma_mps: 0.1, ..range(number, L1_HZ, false, false) }, (false, 0.5));
+        }
+        sums.finish((false, 0.5));
+        let (mut expected, _) = one(0, &sums, true).unwrap();
+        // 3 m/s along the diagonal of the cube, 1 m/s across it: √(1 + 8/3) along each coordinate.
+        let diagonal = Vector3::new(1.0, 1.0, 1.0) / 3.0_f64.sqrt();
+        let turned = nalgebra::Matrix3::identity() + 8.0 * diagonal * diagonal.transpose();
+        expected.rate_noise.fixed_view_mut::<3, 3>(0, 0).copy_from(&turned);
+        assert!((expected.rate_sigma_mps() - 3.0).abs() < 1e-9, "{}", expected.rate_sigma_mps());
+        // 2 m towards north-east, 1 m across: √2.5 along either.
+        expected.noise.fixed_view_mut::<2, 2>(0, 0).copy_from(&nalgebra::Matrix2::new(2.5, 1.5, 1.5, 2.5));
+        assert!((expected.flat_sigma_m() - 2.0).abs() < 1e-9, "{}", expected.flat_sigma_m());
+    }
 }
