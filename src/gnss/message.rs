@@ -153,6 +153,17 @@ pub(crate) fn almanac_time(reference: Epoch) -> Epoch {
     Epoch::new(reference.week() * WEEK_S + tow_s, 0.0)
 }
 
+/// The page of a `turn` of almanac pages, and the satellites in it: pages of up to `places` reduced almanacs,
+/// then one page for each satellite by itself. The flag is set for a page of reduced almanacs. Without
+/// satellites every page is such a page.
+pub(crate) fn almanac_page<T>(entries: &[T], places: usize, turn: i64) -> (bool, &[T]) {
+    let reduced = entries.len().div_ceil(places).max(1);
+    let turn = turn.rem_euclid((reduced + entries.len()) as i64) as usize;
+    let (first, count) = if turn < reduced { (turn * places, places) } else { (turn - reduced, 1) };
+    let (_, rest) = entries.split_at(first.min(entries.len()));
+    (turn < reduced, rest.split_at(count.min(rest.len())).0)
+}
+
 /// What messages newer than LNAV and D1 say of UTC: a polynomial and a change of leap seconds, in numbers of
 /// their system's own time (IS-GPS-705J, 20.3.3.6; BDS-SIS-ICD-B2a 1.0, 7.12).
 #[derive(Clone, Copy, Debug, Default)]

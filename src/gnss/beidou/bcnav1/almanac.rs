@@ -12,7 +12,7 @@ use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
 use crate::bits::{Field, element, plain};
 use crate::broadcast::Ephemeris;
 use crate::earth::GPS_PI;
-use crate::message::{ALMANAC_STEP_S, Common, almanac_time};
+use crate::message::{ALMANAC_STEP_S, Common, almanac_page, almanac_time};
 use crate::satellite::{Sv, System};
 use crate::time::{BDT, BDT_WEEK, Epoch};
 
@@ -97,13 +97,9 @@ impl Almanacs {
             return (WITH_ELECTRONS, entries);
         }
         let step_s = if has_electrons { 2 * FRAME_S } else { FRAME_S };
-        let reduced = self.entries.len().div_ceil(PLACES);
-        let turns = (reduced + self.entries.len()).max(1) as i64;
-        let turn = start.seconds().div_euclid(step_s).rem_euclid(turns) as usize;
-        let (page, first, count) =
-            if turn < reduced.max(1) { (WITH_ALMANACS, turn * PLACES, PLACES) } else { (WITH_ONE, turn - reduced, 1) };
-        entries.iter_mut().zip(self.entries.iter().skip(first).take(count)).for_each(|(place, entry)| *place = *entry);
-        (page, entries)
+        let (is_reduced, shown) = almanac_page(&self.entries, PLACES, start.seconds().div_euclid(step_s));
+        entries.iter_mut().zip(shown).for_each(|(place, entry)| *place = *entry);
+        (if is_reduced { WITH_ALMANACS } else { WITH_ONE }, entries)
     }
 }
 

@@ -203,8 +203,11 @@ impl Sender for Pages {
 
     fn restored(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<Vec<bool>>, FieldError> {
         let On { word_at, rest, .. } = self.carrier;
-        let of_set = WORDS_OF_SET.into_iter().filter(|_| REDUNDANT.contains(&word_at(start)));
-        of_set.map(|number| Ok(encode_page(&page_with(&self.word(number, ephemeris, start)?, rest(start))))).collect()
+        if !REDUNDANT.contains(&word_at(start)) {
+            return Ok(Vec::new());
+        }
+        let words = self.words_of_set(ephemeris, start)?;
+        Ok(words.iter().map(|word| encode_page(&page_with(word, rest(start)))).collect())
     }
 }
 
@@ -212,6 +215,15 @@ impl Pages {
     /// The part of the almanac that is sent in the minute of `start`.
     fn triple(&self, start: Epoch) -> Triple {
         Triple::at(start, &self.common.almanac, self.common.reference.unwrap_or(start), self.common.galileo)
+    }
+
+    /// Words 1 to 4 as they would leave at `start`.
+    fn words_of_set(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<[u128; 4], FieldError> {
+        let mut four = [0; 4];
+        for (word, number) in four.iter_mut().zip(WORDS_OF_SET) {
+            *word = self.word(number, ephemeris, start)?;
+        }
+        Ok(four)
     }
 
     /// A word as it leaves at `start`.
@@ -244,11 +256,7 @@ impl Pages {
                 }
             }
             17..=20 => {
-                let mut four = [0; 4];
-                for (word, number) in four.iter_mut().zip(WORDS_OF_SET) {
-                    *word = self.word(number, ephemeris, start)?;
-                }
-                word = redundancy(four.each_ref())[usize::from(number - 17)];
+                word = redundancy(self.words_of_set(ephemeris, start)?.each_ref())[usize::from(number - 17)];
             }
             REDUCED => match Reduced::of(ephemeris, start) {
                 Some(reduced) => write_all(&WORD_16, &reduced, &mut word)?,

@@ -13,7 +13,8 @@ use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
 use crate::bits::{Element, Field, element, plain};
 use crate::broadcast::Ephemeris;
 use crate::earth::GPS_PI;
-use crate::message::{ALMANAC_STEP_S, Common, almanac_time};
+use crate::gps::lnav::Almanac;
+use crate::message::{ALMANAC_STEP_S, Common, almanac_page, almanac_time};
 use crate::satellite::System;
 use crate::time::Epoch;
 
@@ -33,21 +34,11 @@ const GEOSTATIONARY: (f64, f64) = (0.0, 0.0);
 /// Between inclined and geostationary orbits, in semicircles.
 const INCLINED: f64 = 0.1;
 
-/// One satellite in both kinds of almanac.
+/// One satellite in both kinds of almanac; number 0 is a packet without satellite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Entry {
-    /// Number of the codes; 0 for a packet without satellite.
-    pub number: f64,
-    pub health: f64,
-    pub eccentricity: f64,
-    pub delta_i_rad: f64,
-    pub omega_dot_radps: f64,
-    pub sqrt_a_sqrtm: f64,
-    pub omega0_rad: f64,
-    pub omega_rad: f64,
-    pub m0_rad: f64,
-    pub af0_s: f64,
-    pub af1_sps: f64,
+    /// The elements: eccentricity and inclination count from those of the satellite's kind of orbit.
+    pub elements: Almanac,
     pub delta_a_m: f64,
     /// Node and argument of latitude of the reduced almanac.
     pub node_rad: f64,
@@ -56,48 +47,38 @@ pub(super) struct Entry {
 
 impl Entry {
     /// A packet without satellite, whose bits alternate after its number 0 as real ones do.
-    pub const EMPTY: Self = Self {
-        number: 0.0,
-        health: 5.0,
-        eccentricity: 0.0,
-        delta_i_rad: 0.0,
-        omega_dot_radps: 0.0,
-        sqrt_a_sqrtm: 0.0,
-        omega0_rad: 0.0,
-        omega_rad: 0.0,
-        m0_rad: 0.0,
-        af0_s: 0.0,
-        af1_sps: 0.0,
-        delta_a_m: -86.0 * 512.0,
-        node_rad: -43.0 / 64.0 * GPS_PI,
-        phi0_rad: 42.0 / 64.0 * GPS_PI,
-    };
+    pub fn empty() -> Self {
+        Self {
+            elements: Almanac { health: 5, ..Almanac::default() },
+            delta_a_m: -86.0 * 512.0,
+            node_rad: -43.0 / 64.0 * GPS_PI,
+            phi0_rad: 42.0 / 64.0 * GPS_PI,
+        }
+    }
 
     /// What elements come to at an almanac's reference time.
     pub fn of(set: &Ephemeris, toa: Epoch) -> Self {
-        let mean = set.mean_at(toa);
-        let is_geostationary = set.sv.system == System::Qzss && mean.inclination_rad < INCLINED * GPS_PI;
+        let inclination_rad = set.mean_at(toa).inclination_rad;
+        let is_geostationary = set.sv.system == System::Qzss && inclination_rad < INCLINED * GPS_PI;
         let (eccentricity, semicircles) = match set.sv.system {
             _ if is_geostationary => GEOSTATIONARY,
             System::Qzss => OF_QZSS,
             _ => OF_GPS,
         };
-        let node_rad = if is_geostationary { 0.0 } else { mean.omega0_rad };
+        let of_lnav = Almanac::derive(set, toa);
+        let elements = Almanac {
+            number: set.sv.prn(),
+            eccentricity: of_lnav.eccentricity - eccentricity,
+            delta_i_rad: inclination_rad - semicircles * GPS_PI,
+            health: unhealthy(set),
+            ..of_lnav
+        };
+        let node_rad = if is_geostationary { 0.0 } else { elements.omega0_rad };
         Self {
-            number: f64::from(set.sv.prn()),
-            health: f64::from(unhealthy(set)),
-            eccentricity: set.eccentricity - eccentricity,
-            delta_i_rad: mean.inclination_rad - semicircles * GPS_PI,
-            omega_dot_radps: set.omega_dot_radps,
-            sqrt_a_sqrtm: mean.sqrt_a_sqrtm,
-            omega0_rad: mean.omega0_rad,
-            omega_rad: set.omega_rad,
-            m0_rad: mean.m0_rad,
-            af0_s: mean.af0_s,
-            af1_sps: set.af1_sps,
-            delta_a_m: mean.sqrt_a_sqrtm * mean.sqrt_a_sqrtm - reference_axis_m(set.sv),
+            elements,
+            delta_a_m: elements.sqrt_a_sqrtm * elements.sqrt_a_sqrtm - reference_axis_m(set.sv),
             node_rad,
-            phi0_rad: mean.omega0_rad - node_rad + set.omega_rad + mean.m0_rad,
+            phi0_rad: elements.omega0_rad - node_rad + elements.omega_rad + elements.m0_rad,
         }
     }
 
@@ -110,8 +91,8 @@ impl Entry {
 }
 
 /// Bits of health of L1, L2 and L5, L1 the highest. Only sets of CNAV tell carriers apart.
-fn unhealthy(set: &Ephemeris) -> u16 {
-    let bit = |carrier: u16| u16::from(set.health & carrier > 0);
+fn unhealthy(set: &Ephemeris) -> u8 {
+    let bit = |carrier: u16| u8::from(set.health & carrier > 0);
     let of_all = if set.is_healthy() { 0 } else { 7 };
     if *set.form == CNAV_SETS { bit(L1) << 2 | bit(L2) << 1 | bit(L5) } else { of_all }
 }
@@ -133,17 +114,14 @@ impl Almanacs {
 
     /// The page of a system's satellites in the frame that begins then, and the satellites in it.
     pub fn page_at(&self, system: System, start: Epoch) -> (f64, [Entry; PACKETS]) {
-        let mut entries = [Entry::EMPTY; PACKETS];
+        let mut entries = [Entry::empty(); PACKETS];
         let own: Vec<Entry> = self.entries.iter().filter(|(other, _)| *other == system).map(|(_, own)| *own).collect();
         if own.is_empty() || is_first(start) {
             return (PAGE, entries);
         }
-        let reduced = own.len().div_ceil(PACKETS);
-        let turn = start.seconds().div_euclid(ROUND * FRAME_S).rem_euclid((reduced + own.len()) as i64) as usize;
-        let (page, first, count) =
-            if turn < reduced { (REDUCED, turn * PACKETS, PACKETS) } else { (MEDIUM, turn - reduced, 1) };
-        entries.iter_mut().zip(own.into_iter().skip(first).take(count)).for_each(|(place, entry)| *place = entry);
-        (page, entries)
+        let (is_reduced, shown) = almanac_page(&own, PACKETS, start.seconds().div_euclid(ROUND * FRAME_S));
+        entries.iter_mut().zip(shown).for_each(|(place, entry)| *place = *entry);
+        (if is_reduced { REDUCED } else { MEDIUM }, entries)
     }
 }
 
@@ -168,7 +146,7 @@ pub(super) static TIME: [Of; 2] = [
 const fn packet<const PLACE: usize, const AT: u16>() -> [Of; 5] {
     [
         element(Field::new("almanac_prn", const { &[(AT, 8)] }, Whole, 0, ALMANAC),
-            |c| c.entries[PLACE].number, |c, v| c.entries[PLACE].number = v),
+            |c| f64::from(c.entries[PLACE].elements.number), |c, v| c.entries[PLACE].elements.number = v as u8),
         element(Field::new("almanac_delta_a_m", const { &[(AT + 8, 8)] }, Signed, 9, ALMANAC),
             |c| c.entries[PLACE].delta_a_m, |c, v| c.entries[PLACE].delta_a_m = v),
         element(Field::new("almanac_omega0_rad", const { &[(AT + 16, 7)] }, Turn, -6, ALMANAC),
@@ -176,7 +154,7 @@ const fn packet<const PLACE: usize, const AT: u16>() -> [Of; 5] {
         element(Field::new("almanac_phi0_rad", const { &[(AT + 23, 7)] }, Turn, -6, ALMANAC),
             |c| c.entries[PLACE].phi0_rad, |c, v| c.entries[PLACE].phi0_rad = v),
         element(Field::new("almanac_health", const { &[(AT + 30, 3)] }, Whole, 0, ALMANAC),
-            |c| c.entries[PLACE].health, |c, v| c.entries[PLACE].health = v),
+            |c| f64::from(c.entries[PLACE].elements.health), |c, v| c.entries[PLACE].elements.health = v as u8),
     ]
 }
 
@@ -190,17 +168,19 @@ static PACKET_6: [Of; 5] = packet::<5, 200>();
 /// The almanac of page 4.
 #[rustfmt::skip]
 static MEDIUM_PAGE: [Of; 11] = [
-    plain!("almanac_prn", [(35, 8)], Whole, 0, ALMANAC, entries[0].number),
-    plain!("almanac_health", [(43, 3)], Whole, 0, ALMANAC, entries[0].health),
-    plain!("almanac_eccentricity", [(46, 11)], Unsigned, -16, ALMANAC, entries[0].eccentricity),
-    plain!("almanac_delta_i_rad", [(57, 11)], Semicircles, -14, ALMANAC, entries[0].delta_i_rad),
-    plain!("almanac_omega_dot_radps", [(68, 11)], Semicircles, -33, ALMANAC, entries[0].omega_dot_radps),
-    plain!("almanac_sqrt_a_sqrtm", [(79, 17)], Unsigned, -4, ALMANAC, entries[0].sqrt_a_sqrtm),
-    plain!("almanac_omega0_rad", [(96, 16)], Turn, -15, ALMANAC, entries[0].omega0_rad),
-    plain!("almanac_omega_rad", [(112, 16)], Turn, -15, ALMANAC, entries[0].omega_rad),
-    plain!("almanac_m0_rad", [(128, 16)], Turn, -15, ALMANAC, entries[0].m0_rad),
-    plain!("almanac_af0_s", [(144, 11)], Signed, -20, ALMANAC, entries[0].af0_s),
-    plain!("almanac_af1_sps", [(155, 10)], Signed, -37, ALMANAC, entries[0].af1_sps),
+    element(Field::new("almanac_prn", &[(35, 8)], Whole, 0, ALMANAC),
+        |c| f64::from(c.entries[0].elements.number), |c, v| c.entries[0].elements.number = v as u8),
+    element(Field::new("almanac_health", &[(43, 3)], Whole, 0, ALMANAC),
+        |c| f64::from(c.entries[0].elements.health), |c, v| c.entries[0].elements.health = v as u8),
+    plain!("almanac_eccentricity", [(46, 11)], Unsigned, -16, ALMANAC, entries[0].elements.eccentricity),
+    plain!("almanac_delta_i_rad", [(57, 11)], Semicircles, -14, ALMANAC, entries[0].elements.delta_i_rad),
+    plain!("almanac_omega_dot_radps", [(68, 11)], Semicircles, -33, ALMANAC, entries[0].elements.omega_dot_radps),
+    plain!("almanac_sqrt_a_sqrtm", [(79, 17)], Unsigned, -4, ALMANAC, entries[0].elements.sqrt_a_sqrtm),
+    plain!("almanac_omega0_rad", [(96, 16)], Turn, -15, ALMANAC, entries[0].elements.omega0_rad),
+    plain!("almanac_omega_rad", [(112, 16)], Turn, -15, ALMANAC, entries[0].elements.omega_rad),
+    plain!("almanac_m0_rad", [(128, 16)], Turn, -15, ALMANAC, entries[0].elements.m0_rad),
+    plain!("almanac_af0_s", [(144, 11)], Signed, -20, ALMANAC, entries[0].elements.af0_s),
+    plain!("almanac_af1_sps", [(155, 10)], Signed, -37, ALMANAC, entries[0].elements.af1_sps),
 ];
 
 /// The tables of pages 3 and 4 after their headers.

@@ -319,7 +319,7 @@ fn blank(set: Ephemeris) -> Content {
         klobuchar: Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] },
         utc: UtcNumbers::default(),
         toa: Epoch::new(0, 0.0),
-        entries: [Entry::EMPTY; PACKETS],
+        entries: [Entry::empty(); PACKETS],
     }
 }
 

@@ -31,7 +31,7 @@ const SUBFRAME_4_IDS: [u8; 25] =
 const HEALTH_ID: u8 = 51;
 
 /// One satellite's almanac; the week of `toa_s` is in page 25 of subframe 5.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Almanac {
     /// PRN.
     pub number: u8,
