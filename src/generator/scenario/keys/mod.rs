@@ -27,8 +27,13 @@ pub const SCENARIO: &[Key] = &[
     time("start", "what the receiver's clock reads at the first sample: GPS time, or UTC with a final Z").required(),
     number("duration_s", 0.01, LONGEST_S, "s", "length of the samples").required(),
     integer("seed", 0, i64::MAX as u64, "of everything random: noise, oscillators, faults").or(1.0),
-    words("signals", "an array of different signals of this program", "signals that the satellites send")
-        .or_else("[\"GPS L1 C/A\"]"),
+    words(
+        "signals",
+        "an array of different signals of this program",
+        "signals that the satellites send. How GLONASS sends a leap second is not settled by a document at hand: one \
+         second is sent twice",
+    )
+    .or_else("[\"GPS L1 C/A\"]"),
     table("navigation", NAVIGATION, "What the satellites broadcast. Absent: the program's own files."),
     table("satellites", SATELLITE_CHOICE, "Which satellites are computed."),
     table("orbits", satellites::ORBITS, "True orbits and clocks. Absent: those that are broadcast."),

@@ -11,8 +11,9 @@
 //! by it; bits do not depend on it.
 //!
 //! Limits: strings 6 to 15, almanacs, are empty but for their numbers. GLONASS time is sent as UTC(SU) and as
-//! GPS time, whole seconds apart. A failed check is not corrected. Sets that refer to midnight are read
-//! within half a day of when they were sent.
+//! GPS time, whole seconds apart. How a leap second is sent is not settled by a document at hand: one second
+//! is sent twice. A failed check is not corrected. Sets that refer to midnight are read within half a day of
+//! when they were sent.
 
 mod fields;
 mod reader;
