@@ -196,7 +196,7 @@ fn from_low_orbits_and_from_the_moon_light_takes_its_time_for_every_signal() {
                     apart_m.take((range_m - SPEED_OF_LIGHT_MPS * travel_s).abs(), input);
                     longest_s.take(travel_s, input);
                     // Of the carrier one satellite is enough: all are made alike.
-                    if !carrier.value().is_nan() {
+                    if !carrier.value().is_nan() || !truth::in_view(&scene, sv, at).unwrap() {
                         continue;
                     }
                     let Some(mut transmitter) = Transmitter::new(&scene, sv, signal, Edge::Nearest).unwrap() else {
