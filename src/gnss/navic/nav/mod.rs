@@ -34,7 +34,8 @@ pub static SPS_NAV: Message = Message {
     symbol_s: 0.02,
     bit: |_| &[1],
     unit_s: SUBFRAME_S,
-    set_s: SUBFRAME_S,
+    // Subframes 1 and 2 have no issue in common: a set goes on the air with a frame.
+    set_s: FRAME_S,
     first_s: 0,
     sender: |common| Ok(Box::new(Subframes { common: common.clone() })),
     number: subframe_at,
@@ -299,4 +300,20 @@ fn adjustable() -> Vec<&'static str> {
 /// Adds `by` to a parameter of subframes 1 and 2 in the unit of the tables; whether there is one.
 pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     of_set().into_iter().any(|table| add_to(table, parameter, ephemeris, by))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_set_goes_on_the_air_with_a_frame_as_those_of_real_satellites_do() {
+        // Transmission times of I02 in a file of 2026-03-09: each is where subframe 1 ends, whose count says it.
+        for at_s in [126_540, 127_452] {
+            assert_eq!(at_s % FRAME_S, SUBFRAME_S);
+        }
+        let first = 127_440 / SUBFRAME_S;
+        let chosen = [-1, 0, 1, 2, 3, 4].map(|more| SPS_NAV.unit_of_set(first + more));
+        assert_eq!(chosen, [first - 4, first, first, first, first, first + 4]);
+    }
 }
