@@ -54,6 +54,7 @@ pub mod fidelity;
 pub mod geometry;
 pub mod knots;
 pub mod levels;
+mod low_pass;
 pub mod message;
 pub mod orbit_error;
 pub mod plan;

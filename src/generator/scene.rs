@@ -11,6 +11,7 @@ use crate::fast_phase;
 use crate::fast_phase::satellite::SatelliteClocks;
 use crate::fast_phase::scintillation::Scintillation;
 pub use crate::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade};
+use crate::low_pass::CUTOFF_CPS;
 use crate::message::{MessageFault, Senders};
 use crate::random::Stream;
 use crate::ray::{Effect, Sight};
@@ -34,9 +35,6 @@ pub const SPACE_M: f64 = 100e3;
 /// Height below which no ray to a user in space may pass: the neutral atmosphere, which is modelled for rays
 /// that come down through it once.
 const LIMB_M: f64 = 50e3;
-
-/// Cut-off of band-limited edges, in cycles a sample.
-const CUTOFF_CPS: f64 = 0.45;
 
 /// Everything that the generator computes for the samples of one front end, and nothing that it does not.
 pub struct Scene {

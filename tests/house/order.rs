@@ -32,6 +32,7 @@ pub const ORDER: Order<'static> = &[
         "generator",
         &[
             &["random"],
+            &["low_pass"],
             &["fidelity"],
             &["vehicle"],
             &["clock"],

@@ -12,7 +12,7 @@ use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 
-use crate::synth::band::kaiser;
+use crate::low_pass::kaiser;
 
 /// What is left out of an endless response, against its largest value.
 const CUT: f64 = 1e-5;

@@ -10,9 +10,9 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
+use crate::low_pass::kaiser;
 use crate::stage::butterworth::{self, Analogue};
 use crate::stage::{Block, Stage};
-use crate::synth::band::kaiser;
 use gnss::facts::{FilterShape, FilterSpec, StageSpec};
 
 /// Shapes of filters, by the name that a scenario uses.

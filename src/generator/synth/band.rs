@@ -7,9 +7,9 @@ use std::f64::consts::PI;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::pulse::Pulse;
+pub use crate::low_pass::HALF_WIDTH;
+use crate::low_pass::impulse;
 
-/// Half width of the response in samples.
-pub const HALF_WIDTH: usize = 8;
 /// Samples of the response.
 pub(super) const WIDTH: usize = 2 * HALF_WIDTH;
 /// Points a sample in the table that the reference reads.
@@ -26,8 +26,6 @@ pub(super) const UNIT: f64 = 1.0 / (1_u32 << 29) as f64;
 pub(super) const UNITS: i32 = 1 << 29;
 /// Has a last place of one, as has each sum with a number below 2^22: bits of the sum count it.
 const COUNTER: f32 = 1.5 * (1 << 23) as f32;
-/// Kaiser's shape parameter: 60 dB in the stop band.
-const BETA: f64 = 5.65;
 
 /// A low-pass filter, known by its response to a unit step.
 #[derive(Debug)]
@@ -205,10 +203,6 @@ impl Filter {
     }
 }
 
-fn impulse(x: f64, cutoff_cps: f64) -> f64 {
-    windowed_sinc(x, cutoff_cps, HALF_WIDTH as f64, BETA)
-}
-
 /// The cubic polynomial, from the constant up, that is a function at Chebyshev's four points of 0 to 1.
 pub(super) fn cubic(value: impl Fn(f64) -> f64) -> [f64; 4] {
     let angle = |k: usize| (k as f64 + 0.5) * PI / 4.0;
@@ -219,31 +213,6 @@ pub(super) fn cubic(value: impl Fn(f64) -> f64) -> [f64; 4] {
         if j == 0 { sum / 4.0 } else { sum / 2.0 }
     });
     [a - b + c - d, 2.0 * b - 8.0 * c + 18.0 * d, 8.0 * c - 48.0 * d, 32.0 * d]
-}
-
-/// The impulse response `x` samples from the middle of a low-pass filter under a Kaiser window of
-/// ±`half_width` samples.
-pub(crate) fn windowed_sinc(x: f64, cutoff_cps: f64, half_width: f64, beta: f64) -> f64 {
-    let angle = 2.0 * PI * cutoff_cps * x;
-    let sinc = if angle.abs() < 1e-9 { 1.0 } else { libm::sin(angle) / angle };
-    2.0 * cutoff_cps * sinc * kaiser(x / half_width, beta)
-}
-
-/// Kaiser's window at `x` of its half width.
-pub(crate) fn kaiser(x: f64, beta: f64) -> f64 {
-    bessel_i0(beta * (1.0 - x * x).max(0.0).sqrt()) / bessel_i0(beta)
-}
-
-/// Modified Bessel function of the first kind and order zero, by its series.
-fn bessel_i0(x: f64) -> f64 {
-    let quarter = 0.25 * x * x;
-    let (mut sum, mut term, mut k) = (1.0, 1.0, 1.0);
-    while term > 1e-17 * sum {
-        term *= quarter / (k * k);
-        sum += term;
-        k += 1.0;
-    }
-    sum
 }
 
 #[cfg(test)]

@@ -5,8 +5,8 @@
 //! the source's rate about the cut-off. Limits: noise is drawn on the samples' own grid, so a drifting clock
 //! moves its band and not its shape.
 
+use crate::low_pass::windowed_sinc;
 use crate::synth::angle::cos_sin;
-use crate::synth::band::windowed_sinc;
 use crate::synth::isa::{self, Level};
 use crate::synth::noise::{BLOCK_SAMPLES, LANES};
 

@@ -25,7 +25,7 @@ mod shape;
 pub mod synthetic;
 mod tone;
 
-pub use shape::{Shape, sinc_squared};
+pub use shape::{Shape, chip_kinds, sinc, sinc_squared};
 pub use tone::Tone;
 
 /// The built-in signals.

@@ -84,13 +84,34 @@ pub(super) fn chip(layers: &[Layer], index: usize, steps: usize) -> Vec<Complex6
     wave
 }
 
+/// The kinds of chips that layers make, each as its waveform by equal steps, turned by the layers' phases;
+/// and which of them each chip has, from the beginning of a code period on and again.
+pub fn chip_kinds(layers: &[Layer]) -> (Vec<Vec<Complex64>>, Vec<usize>) {
+    let common = |of: fn(&Layer) -> usize| {
+        layers.iter().fold(1, |all, layer| super::least_common_multiple(all, of(layer).max(1)))
+    };
+    let (steps, pattern) = (common(|layer| layer.pulse.len()), common(|layer| layer.chips.len()));
+    let mut kinds: Vec<Vec<Complex64>> = Vec::new();
+    let mut kind = |index: usize| {
+        let wave = chip(layers, index, steps);
+        kinds.iter().position(|known| *known == wave).unwrap_or_else(|| {
+            kinds.push(wave);
+            kinds.len() - 1
+        })
+    };
+    let pattern = (0..pattern).map(&mut kind).collect();
+    (kinds, pattern)
+}
+
+/// sin πx / πx.
+pub fn sinc(x: f64) -> f64 {
+    let angle = PI * x;
+    if angle.abs() < 1e-9 { 1.0 } else { libm::sin(angle) / angle }
+}
+
 /// (sin πx / πx)².
 pub fn sinc_squared(x: f64) -> f64 {
-    let angle = PI * x;
-    if angle.abs() < 1e-9 {
-        return 1.0;
-    }
-    let sinc = libm::sin(angle) / angle;
+    let sinc = sinc(x);
     sinc * sinc
 }
 
