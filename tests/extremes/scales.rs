@@ -363,5 +363,7 @@ fn every_message_counts_over_its_rollovers_as_the_calendar_does() {
     }
     days.all("midnights with times read before and after", sum.rounds[1], sum.rounds[0]);
     days.all("times as read", sum.heard.times[2], sum.times());
+    days.all("seconds of the week of all units as read", sum.heard.units[1], sum.heard.units[0]);
+    days.all("sets read around them, with the reference times sent", sum.heard.sets[1], sum.heard.sets[0]);
     days.all("numbers of day and interval as sent, against the calendar", sum.heard.numbers[1], sum.heard.numbers[0]);
 }

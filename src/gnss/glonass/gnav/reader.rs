@@ -3,9 +3,10 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use super::{
-    GNAV, GlonassString, MARK_SYMBOLS, STRING_SYMBOLS, STRINGS, alike, decode_soft, elements, frame_began, id,
+    GNAV, GlonassString, MARK_SYMBOLS, STRING_SYMBOLS, STRINGS, TIME, alike, decode_soft, elements, frame_began, id,
     parameters, slot,
 };
+use crate::bits::Store;
 use crate::glonass::fdma::channel;
 use crate::message::{Read, Reader};
 use crate::record::NavigationRow;
@@ -35,6 +36,8 @@ pub struct GnavReader {
     failures: u32,
     /// The latest of strings 1 to 5.
     parts: BTreeMap<u8, Placed>,
+    /// The latest string 1 whose frame could be dated, and when that frame began.
+    dated: Option<(u64, Epoch)>,
     /// Those of the set that was reported last.
     complete: Option<Vec<(&'static str, i64)>>,
     /// A time that is known to within a year.
@@ -51,6 +54,7 @@ impl GnavReader {
             string: None,
             failures: 0,
             parts: BTreeMap::new(),
+            dated: None,
             complete: None,
             known: None,
         }
@@ -63,7 +67,7 @@ impl GnavReader {
         if let Some(slot) = (number == 4).then(|| slot(&string)).filter(|slot| *slot != self.sv.number) {
             // On a channel that is not its slot's nothing is known of it.
             if channel(slot).is_none() || channel(slot) != channel(self.sv.number) {
-                self.parts.clear();
+                self.forget();
                 return vec![Read::names_another("string 4", slot)];
             }
             // What was read under the other name is forgotten: another satellite may have sent it.
@@ -93,12 +97,27 @@ impl GnavReader {
         news
     }
 
-    /// When the string with that first symbol began, by strings 1, 4 and 5 of the last frame.
-    fn begun(&self, begin: u64) -> Option<Result<Epoch, String>> {
+    /// When the string with that first symbol began, by strings 1, 4 and 5 of the last frame, or of the one
+    /// before. In the first frame of a day, strings 4 and 5 of the frame before it have another date.
+    fn begun(&mut self, begin: u64) -> Option<Result<Epoch, String>> {
         let [one, four, five] = [1, 4, 5].map(|number| self.parts.get(&number));
-        let ((placed, one), (_, four), (_, five)) = (one?, four?, five?);
-        let frame = frame_began(one, four, five, self.known);
-        Some(frame.map(|frame| frame.plus_s((begin as f64 - *placed as f64) / RATE_HZ)))
+        if let (Some((placed, one)), Some((at_four, four)), Some((at_five, five))) = (one, four, five) {
+            let is_first_of_day = TIME.iter().all(|place| one.piece(*place) == 0);
+            if !is_first_of_day || (at_four > placed && at_five > placed) {
+                match frame_began(one, four, five, self.known) {
+                    Ok(frame) => self.dated = Some((*placed, frame)),
+                    Err(refused) => return Some(Err(refused)),
+                }
+            }
+        }
+        let (placed, frame) = self.dated?;
+        let is_recent = begin.saturating_sub(placed) < 2 * STRINGS * STRING_SYMBOLS as u64;
+        is_recent.then(|| Ok(frame.plus_s((begin as f64 - placed as f64) / RATE_HZ)))
+    }
+
+    fn forget(&mut self) {
+        self.parts.clear();
+        self.dated = None;
     }
 
     fn look_for_set(&mut self, (begin, start): (u64, Epoch), news: &mut Vec<Read>) {
@@ -174,7 +193,7 @@ impl Reader for GnavReader {
 
     fn doubt(&mut self) {
         (self.string, self.failures) = (None, 0);
-        self.parts.clear();
+        self.forget();
     }
 
     fn missing(&self) -> Vec<u8> {
