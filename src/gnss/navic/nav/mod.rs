@@ -308,7 +308,8 @@ mod tests {
 
     #[test]
     fn a_set_goes_on_the_air_with_a_frame_as_those_of_real_satellites_do() {
-        // Transmission times of I02 in a file of 2026-03-09: each is where subframe 1 ends, whose count says it.
+        // Transmission times of I02 in a file of 2026-03-09: each is where subframe 1 ends, whose count says
+        // it.
         for at_s in [126_540, 127_452] {
             assert_eq!(at_s % FRAME_S, SUBFRAME_S);
         }
