@@ -1,13 +1,20 @@
-//! Fills `reports/trade.md`, `.csv` and `.png`: what each setting of the generator costs and what it errs.
+//! Fills `reports/trade.md`, its tables and its pictures: what accuracy costs, for every signal, for whole
+//! scenes and for the knobs of both sides. Run alone: `cargo bench --bench trade`; `-- --signals NAME` and
+//! `-- --scenes NAME` print rows of some, `-- --dopplers` those of moving codes; `-- --costs FILE` writes the
+//! table that `plan` reads, `-- --widths` the page of the widths of samples.
 //!
-//! Errors are measured without noise and without rounding, one satellite at a time, by correlating its
-//! samples with those of the `reference` level: prompt, and half a chip apart for the code, whose
-//! discriminator is calibrated with a reference moved by 0.02 chip. Costs are medians of interleaved runs of
-//! the whole generator on one thread. Run alone: `cargo bench --bench trade`; `-- --widths` measures the
-//! widths of samples alone.
+//! Errors of the generator's knobs are measured without noise and without rounding, one satellite at a
+//! time, by correlating its samples with those of the `reference` level: prompt, and half a chip apart for
+//! the code, whose discriminator is calibrated with a reference moved by 0.02 chip. Costs are medians of
+//! interleaved runs.
 
+#[path = "../../tests/common/lines.rs"]
+mod lines;
 #[path = "../shared/machine.rs"]
 mod machine;
+mod page;
+mod scenes;
+mod signals;
 mod widths;
 
 use std::f64::consts::TAU;
@@ -15,7 +22,6 @@ use std::path::Path;
 use std::time::Instant;
 
 use fft::Planner;
-use gnss_twin::analysis;
 use gnss_twin::analysis::show::trade::{self, TradeRow};
 use gnss_twin::analysis::statistics::{mean, median};
 use gnss_twin::generator::fidelity::allowed_m;
@@ -27,9 +33,6 @@ use gnss_twin::generator::truth;
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::satellite::Sv;
 use gnss_twin::gnss::signal::Signal;
-use gnss_twin::receiver::output::Output;
-use gnss_twin::receiver::receive;
-use gnss_twin::receiver::settings::Settings;
 use num_complex::Complex;
 
 const CHIP_S: f64 = 1.0 / 1.023e6;
@@ -260,24 +263,6 @@ fn once_ns(site: Site, fidelity: Fidelity) -> f64 {
     (busy_s(start) - before_s) * 1e9 / (done.samples as f64 * done.satellites.len() as f64)
 }
 
-/// Mean position of the closed loop (east, north, up of the truth), with noise.
-fn position(fidelity: Fidelity) -> [f64; 3] {
-    let scene = scene(STATIC, fidelity, 45.0, "ci8", true);
-    let run = tempfile::tempdir().unwrap();
-    let mut samples = Vec::new();
-    for name in ["truth", "rx"] {
-        std::fs::create_dir(run.path().join(name)).unwrap();
-    }
-    let mut writer = truth::Writer::create(&run.path().join("truth")).unwrap();
-    generate_with(&scene, &mut samples, &mut writer, &mut |_| (), &Options::default()).unwrap();
-    drop(writer);
-    let mut output = Output::create(&run.path().join("rx")).unwrap();
-    let settings = Settings::parse("[position]\nrequire_ionosphere = true\n", "bench").unwrap();
-    receive(&scene.metadata, samples.as_slice(), &settings, &mut output, &mut |_| ()).unwrap();
-    drop(output);
-    analysis::judge(run.path()).unwrap().position.bias_enu_m.unwrap()
-}
-
 /// The levels, then every edge in both arithmetics that no level takes.
 fn settings(rate_msps: f64) -> Vec<(String, Fidelity)> {
     let mut found: Vec<(String, Fidelity)> = Grade::NAMES
@@ -301,7 +286,7 @@ fn settings(rate_msps: f64) -> Vec<(String, Fidelity)> {
 }
 
 /// Band-limited edges with knots of every tolerance.
-fn knots() -> Vec<(String, Fidelity)> {
+fn tolerances() -> Vec<(String, Fidelity)> {
     let base = Fidelity { code_edge: CodeEdge::BandLimited, ..Fidelity::of(Grade::Balanced) };
     let mut found: Vec<(String, Fidelity)> = [1e-2, 1e-3, 4e-4, 1e-4, 1e-5, 1e-6]
         .into_iter()
@@ -345,47 +330,52 @@ fn measure(site: Site, settings: &[(String, Fidelity)], rounds: usize, count: us
             doppler_hz: found.doppler_hz,
             spur_dbc: found.spur_dbc,
             cn0_loss_db: found.loss_db,
-            position_m: None,
         };
         println!("{} {} Msps | {row}", row.scene, row.sample_rate_msps);
         rows.push(row);
     }
 }
 
-fn preface() -> String {
-    format!(
-        "Each row is one setting of `[fidelity]`. Errors are against the `reference` level, without noise and \
-         rounding, over pieces of 20 ms (carrier: 1 ms) of three satellites: the mean is the largest of a satellite, \
-         σ is about the means, the last is the largest. A piece of 20 ms sees the code at nearly one place of the \
-         sampling grid; a code loop averages over the seconds in which the code's Doppler moves it along, and sees \
-         the mean. Where the rate is a multiple of the chip rate, or over short stretches, it sees one piece. ns are \
-         one core's for a sample of a satellite with everything that the generator does (truth, rounding to 8 bits), \
-         processor time, medians of interleaved runs. The position is the closed loop's mean over 45 s with noise, \
-         against that of `reference` with the same seed. Settings that no other beats in cost and pseudorange error \
-         are on the front. Widths of samples and qualities of noise have [a page of their own](widths.md).\n\n\
-         {}. `cargo bench --bench trade` makes this page.",
-        machine::machine()
-    )
+fn knobs(reports: &Path) -> String {
+    let mut rows = Vec::new();
+    measure(STATIC, &settings(STATIC.rate_msps), 3, 3, &mut rows);
+    measure(BOOST, &tolerances(), 3, 3, &mut rows);
+    trade::write(reports, &rows).unwrap();
+    let text = "\n## Knobs of the generator, GPS L1 C/A\n\n\
+        ![Pareto front](trade.png)\n\n\
+        Each row is one setting of `[fidelity]`. Errors are against the `reference` level, without noise and rounding, \
+        over pieces of 20 ms (carrier: 1 ms) of three satellites: the mean is the largest of a satellite, σ is about \
+        the means, the last is the largest. ns are the whole generator's for a sample of a satellite with truth and \
+        rounding to 8 bits, medians of three interleaved runs. Settings that no other beats in cost and pseudorange \
+        error are on the front. Widths of samples and qualities of noise have [a page of their own](widths.md).\n";
+    format!("{text}{}", trade::tables(&rows))
+}
+
+/// The argument after a word, where the word is there.
+fn asked(word: &str) -> Option<String> {
+    let all: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    let at = all.iter().position(|argument| argument == word)?;
+    Some(all.get(at + 1).cloned().unwrap_or_default())
 }
 
 fn main() {
-    let widths = widths::measure();
     let reports = Path::new("reports");
-    if std::env::args().any(|argument| argument == "--widths") {
-        return trade::write_widths(reports, &widths, &format!("{}.", machine::machine())).unwrap();
+    if asked("--widths").is_some() {
+        return trade::write_widths(reports, &widths::measure(), &format!("{}.", machine::machine())).unwrap();
     }
-    let mut rows = Vec::new();
-    measure(STATIC, &settings(STATIC.rate_msps), 7, 3, &mut rows);
-    let places: Vec<[f64; 3]> = Grade::NAMES.iter().map(|(_, grade)| position(Fidelity::of(*grade))).collect();
-    println!("mean positions (m): {places:.3?}");
-    for (row, place) in rows.iter_mut().zip(&places) {
-        let squares = place.iter().zip(&places[2]).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
-        row.position_m = Some(squares.sqrt());
+    if let Some(name) = asked("--signals") {
+        return drop(signals::measure(&name));
     }
-    for (rate_msps, error_s, time_s) in [(4.092, 2.0, 4.0), (10.0, 1.0, 2.0), (10.23, 1.0, 2.0), (25.0, 0.5, 1.0)] {
-        measure(Site { rate_msps, error_s, time_s, ..STATIC }, &settings(rate_msps), 3, 3, &mut rows);
+    if let Some(path) = asked("--costs") {
+        return page::write_costs(Path::new(&path), &signals::measure(""));
     }
-    measure(BOOST, &knots(), 3, 3, &mut rows);
-    trade::write(reports, &rows, &preface()).unwrap();
-    trade::write_widths(reports, &widths, &format!("{}.", machine::machine())).unwrap();
+    if asked("--dopplers").is_some() {
+        return drop(signals::dopplers());
+    }
+    if let Some(name) = asked("--scenes") {
+        return drop(scenes::measure(&name));
+    }
+    let found = signals::measure("");
+    let knobs = knobs(reports);
+    page::write(reports, &found, &signals::dopplers(), &scenes::measure(""), &knobs);
 }

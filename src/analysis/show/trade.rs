@@ -45,8 +45,6 @@ pub struct TradeRow {
     pub spur_dbc: f64,
     /// Power lost in a correlation with the reference waveform.
     pub cn0_loss_db: f64,
-    /// Distance of the closed loop's mean position from that of `reference`; only for levels.
-    pub position_m: Option<f64>,
 }
 
 impl TradeRow {
@@ -61,7 +59,7 @@ impl TradeRow {
 }
 
 impl fmt::Display for TradeRow {
-    /// The setting and its figures as cells of a table, without the position.
+    /// The setting and its figures as cells of a table.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
@@ -158,35 +156,33 @@ pub fn dominated(rows: &[TradeRow], index: usize) -> bool {
     })
 }
 
-/// Writes `trade.csv`, `trade.md` and `trade.png` into a directory; `preface` is the machine, the flags and
-/// the date.
+/// Writes `trade.csv` and `trade.png` into a directory.
 ///
 /// # Errors
 /// [`JudgeError`] with the file that could not be written.
-pub fn write(directory: &Path, rows: &[TradeRow], preface: &str) -> Result<(), JudgeError> {
+pub fn write(directory: &Path, rows: &[TradeRow]) -> Result<(), JudgeError> {
     write_rows(&directory.join("trade.csv"), rows.iter())?;
-    write_whole(&directory.join("trade.md"), markdown(rows, preface).as_bytes())?;
     draw(&directory.join("trade.png"), rows)
 }
 
-fn markdown(rows: &[TradeRow], preface: &str) -> String {
-    let mut text = format!("# Speed against accuracy\n\n{preface}\n\n![Pareto front](trade.png)\n");
+/// A table in Markdown for each scene and rate.
+pub fn tables(rows: &[TradeRow]) -> String {
+    let mut text = String::new();
     let mut last = None;
     for (index, row) in rows.iter().enumerate() {
         if last.is_none_or(|last: &TradeRow| !last.rivals(row)) {
             let _ = write!(
                 text,
-                "\n## Scene {}, {} Msps\n\n\
+                "\n### Scene {}, {} Msps\n\n\
                  | setting | edge | carrier | knots (cycle) | ns | pseudorange mean / σ / max (m) | carrier (cycle) \
-                 | Doppler (Hz) | spur (dBc) | C/N0 loss (dB) | position (m) | front |\n\
-                 | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+                 | Doppler (Hz) | spur (dBc) | C/N0 loss (dB) | front |\n\
+                 | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
                 row.scene, row.sample_rate_msps
             );
         }
         last = Some(row);
-        let position = row.position_m.map_or_else(String::new, |m| format!("{m:.3}"));
         let front = if dominated(rows, index) { "" } else { "yes" };
-        let _ = writeln!(text, "| {row} | {position} | {front} |");
+        let _ = writeln!(text, "| {row} | {front} |");
     }
     text
 }
@@ -274,7 +270,6 @@ mod tests {
             doppler_hz: 1e-3,
             spur_dbc: -90.0,
             cn0_loss_db: 0.0,
-            position_m: None,
         }
     }
 
@@ -296,8 +291,8 @@ mod tests {
     fn the_table_names_every_setting_and_the_files_appear() {
         let directory = tempfile::tempdir().unwrap();
         let rows = [row("fast", 2.6, 0.3, 1.0), row("balanced", 2.6, 0.4, 0.1), row("reference", 2.6, 8.0, 0.0)];
-        write(directory.path(), &rows, "Measured nowhere.").unwrap();
-        let text = std::fs::read_to_string(directory.path().join("trade.md")).unwrap();
+        write(directory.path(), &rows).unwrap();
+        let text = tables(&rows);
         assert!(rows.iter().all(|row| text.contains(&format!("| {} |", row.setting))), "{text}");
         let csv = std::fs::read_to_string(directory.path().join("trade.csv")).unwrap();
         assert_eq!(csv.lines().count(), 4);
