@@ -260,7 +260,7 @@ fn scenes(text: &mut String, rows: &[SceneRow]) {
 
 const EDGES: [(&str, usize); 3] = [("nearest", 1), ("area", 0), ("band_limited", 2)];
 
-const FAMILIES: [&str; 6] = ["GPS L1 C/A", "Galileo E1", "GPS L5", "GPS L1C", "Galileo E5", "GLONASS L1OF"];
+const FAMILIES: [&str; 6] = ["GPS L1 C/A", "Galileo E1", "GPS L5", "GPS L1C", "Galileo E5", "GLONASS G1"];
 
 fn log_chart(title: &str, x: (&str, &[f64]), y: (&str, &[f64]), series: Vec<Series>, multiples: &[f64]) -> Chart {
     let logs = |values: &[f64]| values.iter().map(|value| libm::log10(*value)).collect::<Vec<_>>();
@@ -406,6 +406,8 @@ pub fn write(
          over seeds.\n\
          - Scenes other than `static` are timed once, so their costs have no interval.\n\
          - Costs belong to this processor and its instruction set.\n\
+         - The receiver's cost is a difference: where the generator takes ten times as much, it is known to a tenth of \
+         the generator's at best.\n\
          - Single knobs are changed on `static` and `two_systems` alone.\n",
     );
     std::fs::write(directory.join("trade.md"), text).unwrap();
