@@ -44,7 +44,7 @@ fn usual_msps(rows: &[SignalRow], signal: &Signal) -> Option<f64> {
     let steps = |c: &gnss_twin::gnss::signal::Component| c.strongest().map_or(1, |layer| layer.pulse.len()) as f64;
     let wanted = signal.components.iter().map(|c| 2.001e-6 * c.chip_rate_hz * steps(c)).fold(0.0, f64::max);
     let rates = || rows.iter().filter(|row| row.signal == signal.name).map(|row| row.sample_rate_msps);
-    rates().find(|rate| *rate >= wanted).or_else(|| rates().last())
+    rates().find(|rate| *rate >= wanted).or_else(|| rates().next_back())
 }
 
 fn metres(m: f64) -> String {
