@@ -188,7 +188,7 @@ fn where_the_rate_meets_the_chips_nearest_edges_are_metres_off_and_band_limited_
     let warned = told("[fidelity]\ncode_edge = \"nearest\"\n").1;
     the.all(
         "4.092 Msps with nearest edges: warned of with the bias",
-        usize::from(warned.join("").contains("21.1 m off")),
+        usize::from(warned.join("").contains("21.7 m off")),
         1,
     );
 }
