@@ -2,8 +2,8 @@
 //!
 //! Both are sums over the signal's components by their shares of power, each from its own pulses
 //! ([`gnss::signal::Shape`]). Samples show a spectrum with its aliases, behind the response of what
-//! samples it ([`Sampler`]). Limits: codes count as random, so that the lines of a short code, its overlay
-//! and the data are left out; a chip that is another component's turn counts as any other.
+//! samples it ([`Sampler`]). Limits: codes count as random, so that the lines of a short code, its secondary
+//! code and the data are left out; a chip that is another component's turn counts as any other.
 
 use std::sync::Arc;
 

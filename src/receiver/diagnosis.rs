@@ -7,7 +7,8 @@ use crate::position::least_squares::UNKNOWNS;
 use gnss::satellite::Sv;
 use gnss::signal::Signal;
 
-/// Symbols come a second or two after the start: of a strong signal, whose edges or overlay are found then.
+/// Symbols come a second or two after the start: of a strong signal, whose edges or secondary code are found
+/// then.
 const SYMBOLS_S: f64 = 2.0;
 /// What to check where symbols make no frame.
 const TOO_WEAK: &str = "the signal's strength: below 27 dB-Hz words are lost to wrong bits";

@@ -96,7 +96,7 @@ impl Followed {
 /// Time of an update of the loops that follow a component of a satellite by settings that are fitted to it.
 fn updated_s(leading: &Component, sv: Sv, fitted: &TrackingSettings) -> f64 {
     let periods = match leading.message {
-        Some(message) if leading.overlay.periods() <= 1 => {
+        Some(message) if leading.secondary_code.periods() <= 1 => {
             let symbol = leading.periods_per_symbol().unwrap_or(1);
             if symbol == 1 { (message.bit)(sv).len() as u32 } else { symbol }
         }
@@ -143,8 +143,8 @@ mod tests {
             let Searched { components, coherent_s, sums } = Followed::of(signal, &settings).unwrap().search;
             (components.len(), 1e3 * coherent_s, sums)
         };
-        // Two periods within bits; one of symbols and of chips of overlays, which are as long; eight tenths
-        // of the sums where data and pilot are searched together.
+        // Two periods within bits; one of symbols and of chips of secondary codes, which are as long; eight
+        // tenths of the sums where data and pilot are searched together.
         for (name, expected) in [
             ("GPS L1 C/A", (1, 2.0, 10)),
             ("BeiDou B1I", (1, 1.0, 20)),

@@ -5,40 +5,41 @@ use gnss::signal::{self, Component, Layers, Shape, Signal};
 
 /// The strongest component whose code is short enough to be made; of equally strong ones a pilot.
 ///
-/// A pilot with an overlay costs the search no more than data do: both change sign from period to period.
+/// A pilot with a secondary code costs the search no more than data do: both change sign from period to
+/// period.
 pub fn lead(signal: &'static Signal) -> Option<&'static Component> {
     let rank = |component: &&Component| {
         let is_pilot = component.message.is_none();
-        (component.power_share, is_pilot, is_pilot && component.overlay.periods() > 1)
+        (component.power_share, is_pilot, is_pilot && component.secondary_code.periods() > 1)
     };
     let possible = signal.components.iter().filter(|component| fits(component));
     possible.rev().max_by(|a, b| rank(a).partial_cmp(&rank(b)).unwrap_or(std::cmp::Ordering::Equal))
 }
 
-/// The component whose data can be read once the overlay of `pilot` is aligned: their codes have the same
-/// length, symbols and overlay of the data begin where the pilot's overlay does, and both are on the same
-/// side of a sub-carrier where they have one.
+/// The component whose data can be read once the secondary code of `pilot` is aligned: their codes have the
+/// same length, symbols and secondary code of the data begin where the pilot's secondary code does, and both
+/// are on the same side of a sub-carrier where they have one.
 pub fn beside(pilot: &'static Component, signal: &'static Signal) -> Option<&'static Component> {
     let side = pilot.tone().map(|tone| tone.half_cycles);
     let fits = |component: &&Component| {
         let periods = component.periods_per_symbol().unwrap_or(0);
-        let whole = |periods: u32| pilot.overlay.periods().is_multiple_of(periods.max(1));
+        let whole = |periods: u32| pilot.secondary_code.periods().is_multiple_of(periods.max(1));
         let same = (component.period_s() / pilot.period_s() - 1.0).abs() < 1e-12;
         let on_side = component.tone().map(|tone| tone.half_cycles) == side;
-        periods > 0 && same && whole(periods) && whole(component.overlay.periods()) && on_side
+        periods > 0 && same && whole(periods) && whole(component.secondary_code.periods()) && on_side
     };
     signal.components.iter().find(|component| !std::ptr::eq(*component, pilot) && fits(component))
 }
 
-/// The pilot on the other side of the sub-carrier of which `pilot` is one side, as strong and with an overlay
-/// as long: both are followed together once the overlay is aligned.
+/// The pilot on the other side of the sub-carrier of which `pilot` is one side, as strong and with a
+/// secondary code as long: both are followed together once the secondary code is aligned.
 pub fn other_side(pilot: &Component, signal: &'static Signal) -> Option<&'static Component> {
-    let tone = pilot.tone().filter(|_| pilot.message.is_none() && pilot.overlay.periods() > 1)?;
+    let tone = pilot.tone().filter(|_| pilot.message.is_none() && pilot.secondary_code.periods() > 1)?;
     let is_other = |other: &&Component| {
         let like = |of: fn(&Component) -> (f64, f64, f64)| of(pilot) == of(other);
         other.message.is_none()
             && like(|one| (one.power_share, one.phase_cycles, one.chip_rate_hz))
-            && (pilot.code_chips, pilot.overlay.periods()) == (other.code_chips, other.overlay.periods())
+            && (pilot.code_chips, pilot.secondary_code.periods()) == (other.code_chips, other.secondary_code.periods())
             && other.tone().is_some_and(|other| other.is_opposite(&tone))
     };
     signal.components.iter().find(is_other)
@@ -51,7 +52,7 @@ pub const BOTH_SIDES: f64 = 2.0;
 /// for, but found once `lead` is followed.
 pub fn long_beside(lead: &'static Component, signal: &'static Signal) -> Option<&'static Component> {
     let is_long = |pilot: &&Component| {
-        let plain = pilot.message.is_none() && pilot.overlay.periods() == 1 && pilot.layers.len() == 1;
+        let plain = pilot.message.is_none() && pilot.secondary_code.periods() == 1 && pilot.layers.len() == 1;
         let in_step = pilot.chip_rate_hz == lead.chip_rate_hz && pilot.phase_cycles == lead.phase_cycles;
         let of_one_step = pilot.steps_per_chip() == 1 && lead.steps_per_chip() == 1;
         let segments = pilot.code_chips.checked_div(lead.code_chips).unwrap_or(0);
@@ -59,7 +60,7 @@ pub fn long_beside(lead: &'static Component, signal: &'static Signal) -> Option<
             && segments.is_multiple_of(lead.periods_per_symbol().unwrap_or(1));
         plain && in_step && of_one_step && segments > 1 && whole
     };
-    signal.components.iter().find(|pilot| lead.overlay.periods() == 1 && is_long(pilot))
+    signal.components.iter().find(|pilot| lead.secondary_code.periods() == 1 && is_long(pilot))
 }
 
 /// Correlation of a component with the replica that is made of it, and of the replica with itself. Of one
@@ -96,14 +97,14 @@ pub fn refusal(signal: &'static Signal) -> Option<String> {
     let Some(component) = lead(signal) else {
         return Some("none of its codes has fewer than 65 536 steps a period".to_owned());
     };
-    if component.message.is_some() && component.overlay.periods() > 1 {
-        return Some("its data have an overlay code, and no pilot beside them shows where it begins".to_owned());
+    if component.message.is_some() && component.secondary_code.periods() > 1 {
+        return Some("its data have a secondary code, and no pilot beside them shows where it begins".to_owned());
     }
-    if component.message.is_none() && component.overlay.periods() == 1 {
-        return Some("its pilot has no overlay code that shows where the data beside it begin".to_owned());
+    if component.message.is_none() && component.secondary_code.periods() == 1 {
+        return Some("its pilot has no secondary code that shows where the data beside it begin".to_owned());
     }
     let unread = component.message.is_none() && beside(component, signal).is_none();
-    unread.then(|| "its data do not begin where the overlay of its pilot does".to_owned())
+    unread.then(|| "its data do not begin where the secondary code of its pilot does".to_owned())
 }
 
 /// The first of some signals that cannot be dated by the others, and why.
@@ -126,7 +127,7 @@ mod tests {
     use gnss::galileo::e5::{E5A, E5B};
     use gnss::galileo::e6::E6;
     use gnss::gps::l1ca::L1_CA;
-    use gnss::signal::Overlay;
+    use gnss::signal::SecondaryCode;
     use gnss::signal::synthetic::{LONG_BOC, MIXED, MULTIPLEXED, MULTIPLEXED_DATA, QUADRATURE, QUADRATURE_DATA};
 
     #[test]
@@ -160,16 +161,16 @@ mod tests {
         for signal in [&QUADRATURE, &MIXED, &MULTIPLEXED] {
             assert!(refusal(signal).unwrap().contains("no message"), "{signal}");
         }
-        // In a time of its own, with a message that begins where the overlay does.
+        // In a time of its own, with a message that begins where the secondary code does.
         assert_eq!(refusal(&LONG_BOC), None);
-        // With a message that begins where the overlays do it can be received.
+        // With a message that begins where the secondary codes do it can be received.
         assert_eq!(refusal(&QUADRATURE_DATA), None);
         assert_eq!(refusal(&MULTIPLEXED_DATA), None);
         static OVERLAID: Signal = Signal {
             name: "overlaid",
-            components: &[Component { overlay: Overlay::Shared(&[1, -1]), ..L1_CA.components[0] }],
+            components: &[Component { secondary_code: SecondaryCode::Shared(&[1, -1]), ..L1_CA.components[0] }],
             ..L1_CA
         };
-        assert!(refusal(&OVERLAID).unwrap().contains("have an overlay"));
+        assert!(refusal(&OVERLAID).unwrap().contains("have a secondary code"));
     }
 }

@@ -401,9 +401,8 @@ mod tests {
     #[test]
     fn a_bias_that_no_row_shows_alone_shows_in_all_together() {
         let row = |found: u32| DetectionRow::new("detection", Some(33.0), (found, 2000), 0.43);
-        let honest =
-            Joint::of(&[row(860), row(870), row(850), DetectionRow::new("false alarm", None, (10, 2000), 0.1)]);
-        assert!(honest.rows == 3 && honest.bias_sigma.abs() < 0.1 && honest.exceeded > 0.5, "{honest:?}");
+        let sound = Joint::of(&[row(860), row(870), row(850), DetectionRow::new("false alarm", None, (10, 2000), 0.1)]);
+        assert!(sound.rows == 3 && sound.bias_sigma.abs() < 0.1 && sound.exceeded > 0.5, "{sound:?}");
         // Each 1.3 σ low.
         let low = Joint::of(&[row(830), row(830), row(830), row(830), row(830)]);
         assert!(low.bias_sigma < -2.5 && low.chi_square < 10.0, "{low:?}");

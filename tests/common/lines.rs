@@ -4,7 +4,7 @@
 //! a chip without any filter or sampling: the truth. The samples of one period are the same lines, with
 //! what the edges changed and folded back. Their delay is that of an early-minus-late correlator with the
 //! exact lines below half the rate. Nothing here is the generator's but the samples that are judged.
-//! Limits: codes without data and overlay, whose period is whole samples.
+//! Limits: codes without data and secondary code, whose period is whole samples.
 
 use std::f64::consts::{PI, TAU};
 
@@ -13,7 +13,7 @@ use gnss_twin::generator::synth::bank::Bank;
 use gnss_twin::generator::synth::waveform::{Voice, Waveform};
 use gnss_twin::generator::synth::{CODE_ONE, Kernel, RUN_SAMPLES, Run};
 use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::{Component, Layers, Overlay, Signal};
+use gnss_twin::gnss::signal::{Component, Layers, SecondaryCode, Signal};
 use gnss_twin::gnss::time::Epoch;
 use num_complex::{Complex, Complex64};
 
@@ -65,8 +65,13 @@ impl Code {
         let scale = 1.0 / lines.len() as f64;
         lines.iter_mut().for_each(|line| *line *= scale);
         // The component by itself, and the same in each period.
-        let alone =
-            Component { overlay: Overlay::None, message: None, power_share: 1.0, phase_cycles: 0.0, ..*component };
+        let alone = Component {
+            secondary_code: SecondaryCode::None,
+            message: None,
+            power_share: 1.0,
+            phase_cycles: 0.0,
+            ..*component
+        };
         let bare = Signal { components: Box::leak(Box::new([alone])), ..*signal };
         Some(Self {
             bare: Box::leak(Box::new(bare)),

@@ -213,7 +213,7 @@ fn after_a_month_at_65_msps_every_signal_has_its_carrier_its_codes_and_its_sub_c
 struct Definition {
     component: &'static Component,
     code: Vec<i8>,
-    overlay: Vec<i8>,
+    secondary_code: Vec<i8>,
     /// Of the amplitude.
     gain: f64,
 }
@@ -221,8 +221,8 @@ struct Definition {
 impl Definition {
     fn of(component: &'static Component, number: u8) -> Self {
         let code = (component.code)(number).unwrap();
-        let overlay = component.overlay.of(number).unwrap();
-        let mut wave = Self { component, code, overlay, gain: 1.0 };
+        let secondary_code = component.secondary_code.of(number).unwrap();
+        let mut wave = Self { component, code, secondary_code, gain: 1.0 };
         let steps = component.steps_per_chip();
         let places = wave.code.len() * steps;
         let power = (0..places).map(|step| wave.within((step as f64 + 0.5) / steps as f64).norm_sqr()).sum::<f64>();
@@ -230,7 +230,7 @@ impl Definition {
         wave
     }
 
-    /// The wave so many chips into a code period, without overlay.
+    /// The wave so many chips into a code period, without secondary code.
     fn within(&self, chips: f64) -> Complex64 {
         let index = chips as usize;
         let layer = |layer: &gnss_twin::gnss::signal::Layer| {
@@ -245,10 +245,11 @@ impl Definition {
     fn at(&self, whole: i128, rest: f64) -> Complex64 {
         let whole = whole + rest.floor() as i128;
         let length = self.code.len() as i128;
-        let overlay = self.overlay[whole.div_euclid(length).rem_euclid(self.overlay.len() as i128) as usize];
+        let secondary_code =
+            self.secondary_code[whole.div_euclid(length).rem_euclid(self.secondary_code.len() as i128) as usize];
         let chips = whole.rem_euclid(length) as f64 + rest.rem_euclid(1.0);
         self.gain
-            * f64::from(overlay)
+            * f64::from(secondary_code)
             * Complex64::from_polar(1.0, TAU * self.component.phase_cycles)
             * self.within(chips)
     }
@@ -311,7 +312,7 @@ fn departure(scene: &Scene, sv: Sv, signal: &'static Signal, ending: usize) -> W
     let exact = Exact::new(scene, sv, signal);
     let component = &signal.components[ending];
     let chip_mhz = (component.chip_rate_hz * 1e3).round() as i128;
-    let length = i128::from(component.code_chips) * i128::from(component.overlay.periods());
+    let length = i128::from(component.code_chips) * i128::from(component.secondary_code.periods());
     // The first end after sample 2^40, found by its own motion.
     let mut n = 1_u64 << 40;
     let end = ((exact.steps(n, exact.delay(n), chip_mhz) >> 48).div_euclid(length) + 1) * length;
@@ -357,7 +358,7 @@ fn where_the_longest_codes_end_after_two_to_the_fortieth_samples_every_sample_is
             let mut lengths = BTreeSet::new();
             let (mut ends, mut worst) = (0, Worst::default());
             for (index, component) in signal.components.iter().enumerate() {
-                let periods = u64::from(component.code_chips) * u64::from(component.overlay.periods());
+                let periods = u64::from(component.code_chips) * u64::from(component.secondary_code.periods());
                 if lengths.insert((periods, component.chip_rate_hz.to_bits())) {
                     ends += 1;
                     worst.merge(departure(&scene, sv, signal, index));

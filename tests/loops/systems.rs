@@ -1,9 +1,9 @@
 //! Several satellite systems in one sky, from ephemerides through samples to positions, by a synthetic second
 //! system.
 //!
-//! The system sends synthetic signal A (4 ms, BOC(1,1), coded data beside a pilot with an overlay) with pages
-//! of I/NAV in a time of its own, 3 s and 40 ns off GPS time. Its orbits are those of GPS satellites with
-//! turned nodes.
+//! The system sends synthetic signal A (4 ms, BOC(1,1), coded data beside a pilot with a secondary code) with
+//! pages of I/NAV in a time of its own, 3 s and 40 ns off GPS time. Its orbits are those of GPS satellites
+//! with turned nodes.
 #![cfg(all(feature = "generator", feature = "receiver", feature = "analysis"))]
 
 use std::collections::BTreeSet;
@@ -120,7 +120,7 @@ fn lost_samples_cost_no_channel_of_either_system_and_are_counted_by_each_alone()
     let both = "\"GPS L1 C/A\", \"synthetic A\"";
     let second = "\"synthetic A\"";
     // 1.6 ms displace codes and symbols of both systems; 4 ms are a symbol and a code period of the second,
-    // whose overlay alone shows them.
+    // whose secondary code alone shows them.
     let cases = [(both, 7000), (second, 17_200), (second, 7000), (both, 17_200)];
     let count = if std::env::var_os("GNSS_TWIN_LONG").is_some() { cases.len() } else { 2 };
     for (signals, lost) in cases.into_iter().take(count) {

@@ -32,7 +32,7 @@ const GLONASS_ORBITS: &str = "witness::glonass::broadcast_orbits_meet_those_of_c
 const NAVIC: &str = "witness::navic::subframes_are_coded_interleaved_and_timed_as_printed";
 const NAVIC_CODES: &str = "witness::navic::all_chips_of_all_codes_are_those_of_another_program";
 const NAVIC_L1_CODES: &str =
-    "witness::navic_l1::all_chips_of_all_codes_and_overlays_of_l1_are_those_of_another_program";
+    "witness::navic_l1::all_chips_of_all_codes_and_secondary_codes_of_l1_are_those_of_another_program";
 const NAVIC_L1_COUNT: &str =
     "witness::navic_l1::frames_are_counted_to_their_end_from_1_to_400_in_the_two_hours_in_which_they_begin";
 const NAVIC_L1_CARRIED: &str =
@@ -53,13 +53,14 @@ const QZSS_HEALTH: &str =
 const QZSS_SENDERS: &str = "witness::qzss::satellites_send_the_signals_that_they_broadcast";
 const QZSS_CNAV: &str =
     "witness::qzss::every_real_message_of_l5_and_l2c_is_read_and_sent_again_and_its_sets_are_the_records_of_the_hour";
-const B1C_CODES: &str = "witness::bcnav1::all_chips_of_all_codes_and_overlays_of_b1c_are_those_of_another_program";
+const B1C_CODES: &str =
+    "witness::bcnav1::all_chips_of_all_codes_and_secondary_codes_of_b1c_are_those_of_another_program";
 const FRAMES_B1C: &str = "witness::bcnav1::frames_are_read_from_any_symbol_and_either_way_up_to_what_was_sent";
 const BDGIM: &str = "witness::bdgim::places_and_contents_are_those_of_the_authors_program";
 const BDGIM_FIELDS: &str = "witness::bdgim::coefficients_have_their_places_signs_and_steps_in_all_three_messages";
 const FIELD_64: &str = "witness::bcnav1::elements_of_six_bits_are_those_of_the_printed_field";
 const B2_CODES: &str =
-    "witness::bcnav2::all_chips_of_all_codes_and_overlays_of_b2a_and_b2b_are_those_of_another_program";
+    "witness::bcnav2::all_chips_of_all_codes_and_secondary_codes_of_b2a_and_b2b_are_those_of_another_program";
 const MESSAGES_B2: &str = "witness::bcnav2::messages_are_read_from_any_symbol_and_either_way_up_to_what_was_sent";
 const PRINTED_B2: &str =
     "witness::bcnav2::messages_that_a_receiver_printed_are_what_it_decoded_and_are_framed_by_us_as_it_printed_them";
@@ -69,7 +70,8 @@ const CARRIED_B2: &str =
     "witness::bcnav2::a_set_of_d1_carried_to_b_cnav2_and_b_cnav3_is_the_same_orbit_and_clock_to_its_steps";
 const UTC_B2: &str =
     "witness::bcnav2::utc_is_four_seconds_behind_bdt_since_2017_and_real_polynomials_are_whole_steps_of_the_fields";
-const L1C_CODES: &str = "witness::codes::all_chips_of_all_codes_and_overlays_of_l1c_are_those_of_another_program";
+const L1C_CODES: &str =
+    "witness::codes::all_chips_of_all_codes_and_secondary_codes_of_l1c_are_those_of_another_program";
 const FRAMES_L1C: &str =
     "witness::cnav2::shipped_frames_are_coded_again_symbol_by_symbol_read_either_way_up_and_sent_again";
 const CIVIL: &str = "witness::cnav::shipped_messages_of_l5_and_l2c_hold_and_are_sent_by_us_bit_by_bit";
@@ -84,7 +86,7 @@ const E6_CODES: &str = "witness::codes::all_chips_of_all_codes_of_e6_are_those_o
 const E6_PAGES: &str = "witness::galileo_e6::pages_of_e6_are_coded_and_interleaved_as_printed";
 const E6_TIME: &str =
     "witness::galileo_e6::pages_of_e6_are_read_from_any_symbol_and_another_signal_tells_which_second_they_are_of";
-const E5_CODES: &str = "witness::codes::all_chips_of_all_codes_and_overlays_of_e5_are_those_of_another_program";
+const E5_CODES: &str = "witness::codes::all_chips_of_all_codes_and_secondary_codes_of_e5_are_those_of_another_program";
 const TWO_BANDS: &str =
     "laws::two_bands_show_the_ionosphere_without_the_group_delays_of_the_message_and_give_a_place_without_it";
 const CLOCKS: &str = "laws::two_systems_whose_times_differ_give_one_place_and_a_clock_of_each";
@@ -289,7 +291,7 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.sbas.acceleration", "accelerations count twice", SBAS_SETS),
     fault("gnss.qzss.codes", "codes of QZSS but the first are a chip late", QZSS_CODES),
     fault("gnss.qzss.prn", "satellites of QZSS have the codes of the next", QZSS_PRN),
-    fault("gnss.qzss.overlay", "the second register of overlays feeds back as the first does", L1C_CODES),
+    fault("gnss.qzss.secondary_code", "the second register of secondary codes feeds back as the first does", L1C_CODES),
     fault("gnss.qzss.health", "bits of L1C/B count for L1 C/A", QZSS_HEALTH),
     fault("gnss.qzss.l1cb", "J04 sends L1 C/A for ever", QZSS_SENDERS),
     fault("gnss.qzss.axis", "elements of QZSS count from 200 m less", QZSS_CNAV),
@@ -310,7 +312,7 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.bcnav.leap", "BDT's leap seconds are those of GPS time", UTC_B2),
     fault("gnss.fec.field64", "elements of six bits are of another field", FIELD_64),
     fault("gnss.l1c.insertion", "the seven chips are put into the code of L1C a chip late", L1C_CODES),
-    fault("gnss.l1c.overlay", "the register of L1C's overlay feeds back from the stages before", L1C_CODES),
+    fault("gnss.l1c.secondary_code", "the register of L1C's secondary code feeds back from the stages before", L1C_CODES),
     fault("gnss.fec.ldpc", "parity of low density leaves the last bit out", FRAMES_L1C),
     fault("gnss.cnav2.time", "the count of a frame is taken for its own beginning", FRAMES_L1C),
     fault("gnss.cnav2.isc", "L1C is corrected as its data are", DELAYS),
@@ -322,7 +324,7 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.altboc.odd_chips", "the sub-carrier of E5 is upright on every chip", ALTBOC),
     fault("gnss.altboc.delay", "both sides of E5 are delayed like the upper one", DELAYS),
     fault("receiver.correlate.side", "taps of both sides turn the wrong way", SIDES),
-    fault("receiver.sides.overlay", "both sides are added without the signs of their overlays", SIDES),
+    fault("receiver.sides.secondary_code", "both sides are added without the signs of their secondary codes", SIDES),
     fault("gnss.e6.codes", "the code of E6 is that of another satellite", E6_CODES),
     fault("gnss.e6.delay", "E6 has the group delay of E1 by its wavelength", DELAYS),
     fault("gnss.galileo_cnav.pattern", "pages of C/NAV begin with the inverse of their pattern", E6_PAGES),

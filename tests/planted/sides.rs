@@ -23,7 +23,7 @@ const IF_HZ: f64 = 213e3;
 const DOPPLER_HZ: f64 = 731.0;
 const CN0_DBHZ: f64 = 55.0;
 
-/// A code period of a component, step by step, and its overlay.
+/// A code period of a component, step by step, and its secondary code.
 fn period(component: &Component, number: u8) -> (Vec<Complex64>, Vec<i8>) {
     let wave = |step: usize| -> Complex64 {
         let layer = |layer: &Layer| {
@@ -34,7 +34,7 @@ fn period(component: &Component, number: u8) -> (Vec<Complex64>, Vec<i8>) {
     };
     let chips = (component.code)(number).unwrap();
     let steps = chips.iter().flat_map(|chip| (0..STEPS).map(move |step| wave(step) * f64::from(*chip)));
-    (steps.collect(), component.overlay.of(number).unwrap())
+    (steps.collect(), component.secondary_code.of(number).unwrap())
 }
 
 /// Uniform numbers, twelve of which make a normal one.
@@ -87,7 +87,9 @@ fn both_sides_of_a_sub_carrier_are_followed_on_the_peak_that_they_make_together(
                 let steps = ((first_chips + t_s * CHIP_HZ * ratio) * STEPS as f64) as usize;
                 let (number, step) = (steps / (CHIPS * STEPS), steps % (CHIPS * STEPS));
                 let wave: Complex64 = (pilots.iter())
-                    .map(|(steps, overlay)| steps[step] * f64::from(overlay[(number + 3) % overlay.len()]))
+                    .map(|(steps, secondary_code)| {
+                        steps[step] * f64::from(secondary_code[(number + 3) % secondary_code.len()])
+                    })
                     .sum();
                 let sample = wave * Complex64::from_polar(amplitude, TAU * ((IF_HZ + DOPPLER_HZ) * t_s + 0.2).fract());
                 i.push((sample.re + 0.5_f64.sqrt() * noise.next()) as f32);

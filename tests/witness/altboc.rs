@@ -11,7 +11,7 @@ use gnss_twin::receiver::correlate::{Edge, Nco, Replica, chips_to_units};
 use num_complex::Complex64;
 
 use super::recording::two_bits;
-use super::recording_e5::{CENTRE_HZ, CHIPS, FILE, IF_HZ, RATE_HZ, assert_found, overlay_place, search};
+use super::recording_e5::{CENTRE_HZ, CHIPS, FILE, IF_HZ, RATE_HZ, assert_found, search, secondary_code_place};
 
 /// Signs of e_a-I, e_b-I, e_a-Q and e_b-Q, then the phase in eighths of a cycle, 1 to 8, in each eighth of
 /// the sub-carrier's period (Galileo OS SIS ICD 2.1, table 7).
@@ -129,18 +129,20 @@ fn e5_as_one_signal_is_found_where_its_sides_are_and_both_pilots_make_the_narrow
         let number = hit.sv.number;
         let pilots = [&E5.components[1], &E5.components[3]];
         let mut sides = pilots.map(|pilot| Replica::made(pilot, number, Layers::Whole, Edge::Area).unwrap());
-        let overlays = pilots.map(|pilot| pilot.overlay.of(number).unwrap());
+        let secondary_codes = pilots.map(|pilot| pilot.secondary_code.of(number).unwrap());
         let at = (hit.code_phase_chips, hit.doppler_hz);
         let place = |side: usize, sides: &mut [Replica; 2]| {
             let prompts: Vec<Complex64> =
                 periods(&i, at, (&mut sides[side], &|_| false), [0.0]).into_iter().map(|[prompt]| prompt).collect();
-            overlay_place(&prompts, &overlays[side])
+            secondary_code_place(&prompts, &secondary_codes[side])
         };
         let places = [place(0, &mut sides), place(1, &mut sides)];
         assert!(places[0].0 == places[1].0 && places.iter().all(|(_, lead)| *lead > 1.5), "{number}: {places:?}");
         let mut both = Replica::joined(&sides[0], &sides[1]).unwrap();
         let opposed = |number: usize| {
-            let [upper, lower] = overlays.each_ref().map(|overlay| overlay[(places[0].0 + number) % overlay.len()]);
+            let [upper, lower] = secondary_codes
+                .each_ref()
+                .map(|secondary_code| secondary_code[(places[0].0 + number) % secondary_code.len()]);
             upper != lower
         };
         // From half a chip behind to half a chip ahead, and far away.
@@ -164,7 +166,7 @@ fn e5_as_one_signal_is_found_where_its_sides_are_and_both_pilots_make_the_narrow
         let sigma = (1.0 + 2.0 * peak).sqrt() / 41_f64.sqrt() / peak;
         assert!(near(8).iter().all(|share| *share < 0.1 + 4.0 * sigma), "{number}: {:?}", near(8));
         assert!(near(16).iter().any(|share| (share - 0.45).abs() < 0.15 + 4.0 * sigma), "{number}: {:?}", near(16));
-        // Without the signs of the overlays the sides cancel in as many periods as they add in.
+        // Without the signs of the secondary codes the sides cancel in as many periods as they add in.
         let unsigned = shape(&|_| false);
         assert!(unsigned[best] < 0.75 * peak, "{number}: {} of {peak}", unsigned[best]);
     }

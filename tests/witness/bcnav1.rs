@@ -21,7 +21,7 @@ use super::data::external;
 const CODES: &str = include_str!("../../data/witness/b1c_codes.csv");
 
 #[test]
-fn all_chips_of_all_codes_and_overlays_of_b1c_are_those_of_another_program() {
+fn all_chips_of_all_codes_and_secondary_codes_of_b1c_are_those_of_another_program() {
     let mut codes = 0;
     for line in CODES.lines().skip(1) {
         let column: Vec<&str> = line.split(',').collect();
@@ -29,14 +29,16 @@ fn all_chips_of_all_codes_and_overlays_of_b1c_are_those_of_another_program() {
         let signs = match column[0] {
             "B1CD" => b1c::code(Code::Data, number),
             "B1CP" => b1c::code(Code::Pilot, number),
-            _ => b1c::overlay(number),
+            _ => b1c::secondary_code(number),
         };
         let chips: Vec<u8> = signs.unwrap().into_iter().map(|sign| u8::from(sign < 0)).collect();
         holds(&chips, &column[2..], line);
         codes += 1;
     }
     assert_eq!(codes, 189);
-    assert!([0, 64].iter().all(|number| b1c::code(Code::Data, *number).is_none() && b1c::overlay(*number).is_none()));
+    assert!(
+        [0, 64].iter().all(|number| b1c::code(Code::Data, *number).is_none() && b1c::secondary_code(*number).is_none())
+    );
 }
 
 pub fn soft(symbols: &[bool], inverted: bool) -> impl Iterator<Item = f32> {

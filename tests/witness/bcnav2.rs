@@ -27,7 +27,7 @@ const CODES_B2B: &str = include_str!("../../data/witness/b2b_codes.csv");
 static BOTH: [(&Message, &Signal); 2] = [(&B_CNAV2, &B2A), (&B_CNAV3, &B2B)];
 
 #[test]
-fn all_chips_of_all_codes_and_overlays_of_b2a_and_b2b_are_those_of_another_program() {
+fn all_chips_of_all_codes_and_secondary_codes_of_b2a_and_b2b_are_those_of_another_program() {
     let mut codes = 0;
     for line in CODES_B2A.lines().skip(1).chain(CODES_B2B.lines().skip(1)) {
         let column: Vec<&str> = line.split(',').collect();
@@ -35,7 +35,7 @@ fn all_chips_of_all_codes_and_overlays_of_b2a_and_b2b_are_those_of_another_progr
         let signs = match column[0] {
             "B2AD" => b2a::code(Code::Data, number),
             "B2AP" => b2a::code(Code::Pilot, number),
-            "B2AS" => b2a::overlay(number),
+            "B2AS" => b2a::secondary_code(number),
             _ => b2b::code(number),
         };
         let chips: Vec<u8> = signs.unwrap().into_iter().map(|sign| u8::from(sign < 0)).collect();
@@ -43,7 +43,9 @@ fn all_chips_of_all_codes_and_overlays_of_b2a_and_b2b_are_those_of_another_progr
         codes += 1;
     }
     assert_eq!(codes, 3 * 63 + 53);
-    assert!([0, 64].iter().all(|number| b2a::code(Code::Data, *number).is_none() && b2a::overlay(*number).is_none()));
+    assert!(
+        [0, 64].iter().all(|number| b2a::code(Code::Data, *number).is_none() && b2a::secondary_code(*number).is_none())
+    );
     assert!([0, 5, 59].iter().all(|number| b2b::code(*number).is_none()));
 }
 

@@ -6,7 +6,7 @@ use gnss_twin::gnss::galileo::e6;
 use gnss_twin::gnss::gps::l1ca::{CODE_CHIPS, L1_CA, code};
 use gnss_twin::gnss::gps::{l1c, l2c, l5};
 use gnss_twin::gnss::qzss;
-use gnss_twin::gnss::signal::{Overlay, Signal};
+use gnss_twin::gnss::signal::{SecondaryCode, Signal};
 use sha2::{Digest, Sha256};
 
 /// PRN, ones, first and last 24 chips in hexadecimal, SHA-256 of a byte 0 or 1 for each chip.
@@ -44,11 +44,11 @@ fn all_chips_of_all_memory_codes_are_those_of_another_program() {
     assert_eq!(codes, 100);
 }
 
-/// The same, and the overlays of 100 chips as `CS100`.
+/// The same, and the secondary codes of 100 chips as `CS100`.
 const REGISTER_CODES: &str = include_str!("../../data/witness/e5_codes.csv");
 
 #[test]
-fn all_chips_of_all_codes_and_overlays_of_e5_are_those_of_another_program() {
+fn all_chips_of_all_codes_and_secondary_codes_of_e5_are_those_of_another_program() {
     let mut codes = 0;
     for line in REGISTER_CODES.lines().skip(1) {
         let column: Vec<&str> = line.split(',').collect();
@@ -58,7 +58,7 @@ fn all_chips_of_all_codes_and_overlays_of_e5_are_those_of_another_program() {
             "E5AQ" => e5::code(e5::Code::E5aPilot, number),
             "E5BI" => e5::code(e5::Code::E5bData, number),
             "E5BQ" => e5::code(e5::Code::E5bPilot, number),
-            _ => e5::overlay(number),
+            _ => e5::secondary_code(number),
         };
         let chips: Vec<u8> = signs.unwrap().into_iter().map(|sign| u8::from(sign < 0)).collect();
         holds(&chips, &column[2..], line);
@@ -66,16 +66,17 @@ fn all_chips_of_all_codes_and_overlays_of_e5_are_those_of_another_program() {
     }
     assert_eq!(codes, 300);
     assert!(e5::code(e5::Code::E5aData, 0).is_none() && e5::code(e5::Code::E5aData, 51).is_none());
-    assert!(e5::overlay(0).is_none() && e5::overlay(101).is_none());
-    // Which satellite has which overlay, and those of the data (Galileo OS SIS ICD 2.1, tables 17 to 19).
-    let chips = |overlay: &Overlay, number| overlay.of(number).unwrap();
+    assert!(e5::secondary_code(0).is_none() && e5::secondary_code(101).is_none());
+    // Which satellite has which secondary code, and those of the data (Galileo OS SIS ICD 2.1, tables 17 to
+    // 19).
+    let chips = |secondary_code: &SecondaryCode, number| secondary_code.of(number).unwrap();
     for number in [1, 17, 50] {
-        assert_eq!(chips(&e5::E5A.components[1].overlay, number), e5::overlay(number).unwrap());
-        assert_eq!(chips(&e5::E5B.components[1].overlay, number), e5::overlay(number + 50).unwrap());
+        assert_eq!(chips(&e5::E5A.components[1].secondary_code, number), e5::secondary_code(number).unwrap());
+        assert_eq!(chips(&e5::E5B.components[1].secondary_code, number), e5::secondary_code(number + 50).unwrap());
     }
     let word = |chips: Vec<i8>| chips.iter().fold(0, |word, chip| word << 1 | u32::from(*chip < 0));
-    assert_eq!(word(chips(&e5::E5A.components[0].overlay, 1)), 0x842E9);
-    assert_eq!(word(chips(&e5::E5B.components[0].overlay, 1)), 0xE);
+    assert_eq!(word(chips(&e5::E5A.components[0].secondary_code, 1)), 0x842E9);
+    assert_eq!(word(chips(&e5::E5B.components[0].secondary_code, 1)), 0xE);
 }
 
 /// The same of E6-B and E6-C.
@@ -95,8 +96,8 @@ fn all_chips_of_all_codes_of_e6_are_those_of_another_program() {
     }
     assert_eq!(codes, 100);
     assert!([0, 51].into_iter().all(|number| e6::code(Code::Pilot, number).is_none()));
-    // The pilot's overlay is that of E5a's (E6-B/C codes technical note).
-    assert_eq!(e6::E6.components[1].overlay.of(17), e5::overlay(17));
+    // The pilot's secondary code is that of E5a's (E6-B/C codes technical note).
+    assert_eq!(e6::E6.components[1].secondary_code.of(17), e5::secondary_code(17));
 }
 
 /// The same of I5 and Q5.
@@ -116,9 +117,11 @@ fn all_chips_of_all_codes_of_l5_are_those_of_another_program() {
     assert_eq!(codes, 420);
     assert!(l5::code(l5::Code::Data, 0).is_none() && l5::code(l5::Code::Pilot, 211).is_none());
     // IS-GPS-705J, 3.3.3.1.2: the Neuman-Hofman codes.
-    let word = |overlay: &Overlay| overlay.of(1).unwrap().iter().fold(0, |word, chip| word << 1 | u32::from(*chip < 0));
-    assert_eq!(word(&l5::L5.components[0].overlay), 0b00_0011_0101);
-    assert_eq!(word(&l5::L5.components[1].overlay), 0b0000_0100_1101_0100_1110);
+    let word = |secondary_code: &SecondaryCode| {
+        secondary_code.of(1).unwrap().iter().fold(0, |word, chip| word << 1 | u32::from(*chip < 0))
+    };
+    assert_eq!(word(&l5::L5.components[0].secondary_code), 0b00_0011_0101);
+    assert_eq!(word(&l5::L5.components[1].secondary_code), 0b0000_0100_1101_0100_1110);
 }
 
 /// The same of CM and CL.
@@ -145,11 +148,11 @@ fn all_chips_of_all_codes_of_l2c_are_those_of_another_program_and_take_turns() {
     assert!([0, 64, 158, 211].iter().all(|number| l2c::code(l2c::Code::Long, *number).is_none()));
 }
 
-/// The same of L1C-D and L1C-P, and the overlays of 1800 chips as `L1CO`.
+/// The same of L1C-D and L1C-P, and the secondary codes of 1800 chips as `L1CO`.
 const L1C_CODES: &str = include_str!("../../data/witness/l1c_codes.csv");
 
 #[test]
-fn all_chips_of_all_codes_and_overlays_of_l1c_are_those_of_another_program() {
+fn all_chips_of_all_codes_and_secondary_codes_of_l1c_are_those_of_another_program() {
     let mut codes = 0;
     for line in L1C_CODES.lines().skip(1) {
         let column: Vec<&str> = line.split(',').collect();
@@ -157,14 +160,14 @@ fn all_chips_of_all_codes_and_overlays_of_l1c_are_those_of_another_program() {
         let signs = match column[0] {
             "L1CD" => l1c::code(l1c::Code::Data, number),
             "L1CP" => l1c::code(l1c::Code::Pilot, number),
-            _ => l1c::overlay(number),
+            _ => l1c::secondary_code(number),
         };
         let chips: Vec<u8> = signs.unwrap().into_iter().map(|sign| u8::from(sign < 0)).collect();
         holds(&chips, &column[2..], line);
         codes += 1;
     }
     assert_eq!(codes, 219);
-    let none = |number: &u8| l1c::code(l1c::Code::Data, *number).is_none() && l1c::overlay(*number).is_none();
+    let none = |number: &u8| l1c::code(l1c::Code::Data, *number).is_none() && l1c::secondary_code(*number).is_none();
     assert!([0, 64, 192, 203].iter().all(none));
 }
 
@@ -179,7 +182,7 @@ fn satellites_of_qzss_have_the_codes_of_the_prn_that_rinex_names_and_those_of_gp
         let own = |signal: &Signal, place: usize| (signal.components[place].code)(number).unwrap();
         assert_eq!(own(&qzss::l1c::L1C, 0), l1c::code(l1c::Code::Pilot, prn).unwrap());
         assert_eq!(own(&qzss::l1c::L1C, 1), l1c::code(l1c::Code::Data, prn).unwrap());
-        assert_eq!(qzss::l1c::L1C.components[0].overlay.of(number), l1c::overlay(prn));
+        assert_eq!(qzss::l1c::L1C.components[0].secondary_code.of(number), l1c::secondary_code(prn));
         assert_eq!(own(&qzss::l5::L5, 0), l5::code(l5::Code::Data, prn).unwrap());
         assert_eq!(own(&qzss::l5::L5, 1), l5::code(l5::Code::Pilot, prn).unwrap());
         for (place, which) in [(0, l2c::Code::Moderate), (1, l2c::Code::Long)] {

@@ -13,7 +13,7 @@ use gnss_twin::gnss::exchange::{NavigationSets, Version};
 use gnss_twin::gnss::ionosphere::Coefficients;
 use gnss_twin::gnss::klobuchar::Klobuchar;
 use gnss_twin::gnss::message::{Common, Read};
-use gnss_twin::gnss::navic::l1::{CODE_CHIPS, Code, L1, OVERLAY_CHIPS, code, overlay};
+use gnss_twin::gnss::navic::l1::{CODE_CHIPS, Code, L1, SECONDARY_CODE_CHIPS, code, secondary_code};
 use gnss_twin::gnss::navic::l1nav::{self, L1_NAV};
 use gnss_twin::gnss::navic::sps::{L5, S};
 use gnss_twin::gnss::rinex;
@@ -27,7 +27,7 @@ use super::data::keplerian;
 const CODES: &str = include_str!("../../data/witness/navic_codes.csv");
 
 #[test]
-fn all_chips_of_all_codes_and_overlays_of_l1_are_those_of_another_program() {
+fn all_chips_of_all_codes_and_secondary_codes_of_l1_are_those_of_another_program() {
     let mut codes = 0;
     for line in CODES.lines().skip(1).filter(|line| line.starts_with("NAVL1")) {
         let column: Vec<&str> = line.split(',').collect();
@@ -35,7 +35,7 @@ fn all_chips_of_all_codes_and_overlays_of_l1_are_those_of_another_program() {
         let (signs, length) = match column[0] {
             "NAVL1D" => (code(Code::Data, of), CODE_CHIPS),
             "NAVL1P" => (code(Code::Pilot, of), CODE_CHIPS),
-            _ => (overlay(of), OVERLAY_CHIPS),
+            _ => (secondary_code(of), SECONDARY_CODE_CHIPS),
         };
         let chips: Vec<u8> = signs.unwrap().into_iter().map(|sign| u8::from(sign < 0)).collect();
         assert_eq!(chips.len(), length as usize);

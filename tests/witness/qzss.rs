@@ -235,7 +235,7 @@ fn every_real_message_of_l5_and_l2c_is_read_and_sent_again_and_its_sets_are_the_
 
 /// Pilots of L1C that others found in it at 0 Hz (J02) and beside it (J03).
 #[test]
-fn a_recording_holds_the_pilots_of_l1c_of_qzss_and_their_overlays_begin_when_travel_from_their_height_allows() {
+fn a_recording_holds_the_pilots_of_l1c_of_qzss_and_their_secondary_codes_begin_when_travel_from_their_height_allows() {
     let Some((i, q)) = recording::read("if/pocket_l1_2021-12-02_4msps_ci8.bin", Format::Ci8) else { return };
     let metadata = IfMetadata { inverted: true, ..recording::metadata(Format::Ci8, 4e6, 0.0) };
     let settings = AcquisitionSettings { doppler_max_hz: 2000.0, ..AcquisitionSettings::default() };
@@ -248,10 +248,10 @@ fn a_recording_holds_the_pilots_of_l1c_of_qzss_and_their_overlays_begin_when_tra
     let begins_s: Vec<f64> = (hits.iter())
         .map(|hit| {
             let pilot = &L1C.components[0];
-            let chips = [(pilot.code)(hit.sv.number).unwrap(), pilot.overlay.of(hit.sv.number).unwrap()];
-            let (begun_s, lead) = recording::overlay_begins_s(hit, [&i, &q], 4e6, [&chips[0], &chips[1]]);
+            let chips = [(pilot.code)(hit.sv.number).unwrap(), pilot.secondary_code.of(hit.sv.number).unwrap()];
+            let (begun_s, lead) = recording::secondary_code_begins_s(hit, [&i, &q], 4e6, [&chips[0], &chips[1]]);
             println!(
-                "{} {:.0} Hz: its overlay begins {begun_s:.4} s after the first sample, {lead:.2}",
+                "{} {:.0} Hz: its secondary code begins {begun_s:.4} s after the first sample, {lead:.2}",
                 hit.sv, hit.doppler_hz
             );
             // 49 prompts agree; the best of 1800 places and 121 frequencies by chance reaches half of that.

@@ -211,10 +211,15 @@ fn one_bit_snapshots_hold_only_satellites_that_were_up() {
     assert!([5, 7, 13, 20, 30].iter().all(|&prn| times_found[prn] >= 5), "{times_found:?}");
 }
 
-/// Where overlays begin in a recording of mirrored spectrum: of the pilot that was found, by its own code and
-/// overlay, the seconds after the first sample, modulo 18; and by how much their best place is better than
-/// the next.
-pub fn overlay_begins_s(hit: &Acquired, [i, q]: [&[f32]; 2], rate_hz: f64, [code, overlay]: [&[i8]; 2]) -> (f64, f64) {
+/// Where secondary codes begin in a recording of mirrored spectrum: of the pilot that was found, by its own
+/// code and secondary code, the seconds after the first sample, modulo 18; and by how much their best place
+/// is better than the next.
+pub fn secondary_code_begins_s(
+    hit: &Acquired,
+    [i, q]: [&[f32]; 2],
+    rate_hz: f64,
+    [code, secondary_code]: [&[i8]; 2],
+) -> (f64, f64) {
     let period_s = 0.01;
     let chips_a_sample = 1.023e6 * (1.0 + hit.doppler_hz / 1_575.42e6) / rate_hz;
     let mut prompts = vec![Complex64::default(); (i.len() as f64 / (period_s * rate_hz)) as usize];
@@ -236,18 +241,20 @@ pub fn overlay_begins_s(hit: &Acquired, [i, q]: [&[f32]; 2], rate_hz: f64, [code
     let sum = |own: &Vec<Complex64>, first: usize| {
         // The first period began before the recording.
         let rest = own.iter().enumerate().skip(1);
-        rest.map(|(k, prompt)| prompt * f64::from(overlay[(first + k) % overlay.len()])).sum::<Complex64>().norm()
+        rest.map(|(k, prompt)| prompt * f64::from(secondary_code[(first + k) % secondary_code.len()]))
+            .sum::<Complex64>()
+            .norm()
     };
     let best = |first: usize| turns.iter().map(|own| sum(own, first)).fold(0.0, f64::max);
-    let mut places: Vec<(f64, usize)> = (0..overlay.len()).map(|first| (best(first), first)).collect();
+    let mut places: Vec<(f64, usize)> = (0..secondary_code.len()).map(|first| (best(first), first)).collect();
     places.sort_by(|a, b| b.0.total_cmp(&a.0));
     let begun_s = hit.code_phase_chips / (chips_a_sample * rate_hz) + places[0].1 as f64 * period_s;
     ((-begun_s).rem_euclid(18.0), places[0].0 / places[1].0)
 }
 
 /// Phase of a pilot of L1C against L1 C/A of the satellite in a recording of mirrored spectrum, in cycles
-/// modulo half a cycle: neither bits nor overlay have to be known. Codes begin together, every tenth period
-/// of C/A.
+/// modulo half a cycle: neither bits nor secondary code have to be known. Codes begin together, every tenth
+/// period of C/A.
 fn l1c_ahead_of_ca_cycles(hit: &Acquired, [i, q]: [&[f32]; 2], rate_hz: f64, [pilot, civil]: [&[i8]; 2]) -> f64 {
     let chips_a_sample = 1.023e6 * (1.0 + hit.doppler_hz / 1_575.42e6) / rate_hz;
     let mut prompts = vec![[Complex64::default(); 2]; (i.len() as f64 / (0.01 * rate_hz)) as usize];
@@ -303,7 +310,7 @@ pub fn after_s(one_s: f64, other_s: f64) -> f64 {
 /// Pilots of L1C, which others found in it: G18 at −2700 Hz and G4 at −3250 Hz, of those of Block III that
 /// day.
 #[test]
-fn a_recording_holds_the_pilots_of_l1c_that_others_found_in_it_where_l1_ca_is_and_their_overlays_in_step() {
+fn a_recording_holds_the_pilots_of_l1c_that_others_found_in_it_where_l1_ca_is_and_their_secondary_codes_in_step() {
     let Some((i, q)) = read("if/pocket_l1_2021-12-02_4msps_ci8.bin", Format::Ci8) else { return };
     let metadata = IfMetadata { inverted: true, ..metadata(Format::Ci8, 4e6, 0.0) };
     let settings = AcquisitionSettings { doppler_max_hz: 4000.0, ..AcquisitionSettings::default() };
@@ -325,21 +332,22 @@ fn a_recording_holds_the_pilots_of_l1c_that_others_found_in_it_where_l1_ca_is_an
             assert!(apart.abs() < 0.3, "{hit:?} {ca:?}");
         }
         let number = hit.sv.number;
-        let chips = [l1c::code(l1c::Code::Pilot, number).unwrap(), l1c::overlay(number).unwrap()];
-        let (begun_s, lead) = overlay_begins_s(hit, [&i, &q], 4e6, [&chips[0], &chips[1]]);
-        println!("{}: its overlay begins {begun_s:.4} s after the first sample, better by {lead:.2}", hit.sv);
+        let chips = [l1c::code(l1c::Code::Pilot, number).unwrap(), l1c::secondary_code(number).unwrap()];
+        let (begun_s, lead) = secondary_code_begins_s(hit, [&i, &q], 4e6, [&chips[0], &chips[1]]);
+        println!("{}: its secondary code begins {begun_s:.4} s after the first sample, better by {lead:.2}", hit.sv);
         // 49 prompts agree; the best of 1800 places and 121 frequencies by chance reaches half of that.
         assert!(lead > 1.5, "{lead}");
         begins_s.push(begun_s);
     }
-    // Overlays of all satellites begin together; to reach the ground they take 67 to 87 ms. By chance: one in
+    // Secondary codes of all satellites begin together; to reach the ground they take 67 to 87 ms. By chance:
+    // one in
     // 450.
     assert!(after_s(begins_s[0], begins_s[1]).abs() < 0.02, "{begins_s:?}");
 }
 
 /// Pilots of B1C, which others found in it: C30, C36 and C45, of those that sent it that day.
 #[test]
-fn a_recording_holds_the_pilots_of_b1c_that_others_found_in_it_and_their_overlays_begin_by_bdt() {
+fn a_recording_holds_the_pilots_of_b1c_that_others_found_in_it_and_their_secondary_codes_begin_by_bdt() {
     let Some((i, q)) = read("if/pocket_l1_2021-12-02_4msps_ci8.bin", Format::Ci8) else { return };
     let metadata = IfMetadata { inverted: true, ..metadata(Format::Ci8, 4e6, 0.0) };
     let settings = AcquisitionSettings { doppler_max_hz: 3000.0, ..AcquisitionSettings::default() };
@@ -357,12 +365,15 @@ fn a_recording_holds_the_pilots_of_b1c_that_others_found_in_it_and_their_overlay
         .map(|hit| {
             let number = hit.sv.number;
             let chips = match hit.sv.system {
-                System::Gps => [l1c::code(l1c::Code::Pilot, number), l1c::overlay(number)],
-                _ => [b1c::code(b1c::Code::Pilot, number), b1c::overlay(number)],
+                System::Gps => [l1c::code(l1c::Code::Pilot, number), l1c::secondary_code(number)],
+                _ => [b1c::code(b1c::Code::Pilot, number), b1c::secondary_code(number)],
             };
-            let [code, overlay] = chips.map(Option::unwrap);
-            let (begun_s, lead) = overlay_begins_s(hit, [&i, &q], 4e6, [&code, &overlay]);
-            println!("{}: its overlay begins {begun_s:.4} s after the first sample, better by {lead:.2}", hit.sv);
+            let [code, secondary_code] = chips.map(Option::unwrap);
+            let (begun_s, lead) = secondary_code_begins_s(hit, [&i, &q], 4e6, [&code, &secondary_code]);
+            println!(
+                "{}: its secondary code begins {begun_s:.4} s after the first sample, better by {lead:.2}",
+                hit.sv
+            );
             assert!(lead > 1.5, "{lead}");
             begun_s
         })

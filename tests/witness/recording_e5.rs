@@ -107,23 +107,24 @@ fn periods(i: &[f32], hit: &Acquired, [code_a, code_b]: [&[i8]; 2]) -> Vec<[[Com
     all
 }
 
-/// Where an overlay begins among code periods, and by how much the sum that finds it is larger than the next.
-pub fn overlay_place(prompts: &[Complex64], overlay: &[i8]) -> (usize, f64) {
+/// Where a secondary code begins among code periods, and by how much the sum that finds it is larger than the
+/// next.
+pub fn secondary_code_place(prompts: &[Complex64], secondary_code: &[i8]) -> (usize, f64) {
     let sum = |first: usize, hz: f64| -> Complex64 {
         let one = |(k, prompt): (usize, &Complex64)| {
             let (sin, cos) = libm::sincos(-TAU * hz * 1e-3 * k as f64);
-            prompt * Complex64::new(cos, sin) * f64::from(overlay[(first + k) % overlay.len()])
+            prompt * Complex64::new(cos, sin) * f64::from(secondary_code[(first + k) % secondary_code.len()])
         };
         prompts.iter().enumerate().map(one).sum()
     };
     let best = |first: usize| (-8..=8).map(|step| sum(first, 5.0 * f64::from(step)).norm()).fold(0.0, f64::max);
-    let mut places: Vec<(usize, f64)> = (0..overlay.len()).map(|first| (first, best(first))).collect();
+    let mut places: Vec<(usize, f64)> = (0..secondary_code.len()).map(|first| (first, best(first))).collect();
     places.sort_by(|a, b| b.1.total_cmp(&a.1));
     (places[0].0, places[0].1 / places[1].1)
 }
 
 #[test]
-fn both_sides_of_e5_are_found_where_others_found_them_and_are_one_signal_with_overlays_and_subcarrier_in_step() {
+fn both_sides_of_e5_are_found_where_others_found_them_and_are_one_signal_with_secondary_codes_and_subcarrier_in_step() {
     let Some(i) = two_bits(FILE) else { return };
     let listed = [(11, Some(9037.0)), (12, Some(4605.0)), (19, Some(9418.0)), (30, None)];
     let [lower, upper] = [&E5A, &E5B].map(|signal| search(&i, signal, 4000.0));
@@ -136,7 +137,7 @@ fn both_sides_of_e5_are_found_where_others_found_them_and_are_one_signal_with_ov
         let dopplers_hz = [one.doppler_hz / E5A.centre_hz(), other.doppler_hz / E5B.centre_hz()].map(|f| f * CENTRE_HZ);
         assert!(apart.abs() < 0.1 && (dopplers_hz[0] / dopplers_hz[1] - 1.0).abs() < 0.01, "{one:?} {other:?}");
         let codes = [e5::Code::E5aPilot, e5::Code::E5bPilot].map(|which| e5::code(which, number).unwrap());
-        let overlays = [e5::overlay(number), e5::overlay(number + 50)].map(Option::unwrap);
+        let secondary_codes = [e5::secondary_code(number), e5::secondary_code(number + 50)].map(Option::unwrap);
         let doppler_hz = 0.5 * (dopplers_hz[0] + dopplers_hz[1]);
         let mut hit = Acquired { code_phase_chips: one.code_phase_chips - 0.5 * apart, doppler_hz, ..*one };
         let early_and_late = periods(&i, &hit, [&codes[0], &codes[1]]);
@@ -145,13 +146,17 @@ fn both_sides_of_e5_are_found_where_others_found_them_and_are_one_signal_with_ov
         hit.code_phase_chips += 0.5 * (power(1) - power(2)) / (power(1) + power(2));
         let all = periods(&i, &hit, [&codes[0], &codes[1]]);
         let prompts = [0, 1].map(|side| all.iter().map(|own| own[side][0]).collect::<Vec<_>>());
-        let places = [0, 1].map(|side| overlay_place(&prompts[side], &overlays[side]));
-        let signed = |k: usize, side: usize| prompts[side][k] * f64::from(overlays[side][(places[side].0 + k) % 100]);
+        let places = [0, 1].map(|side| secondary_code_place(&prompts[side], &secondary_codes[side]));
+        let signed =
+            |k: usize, side: usize| prompts[side][k] * f64::from(secondary_codes[side][(places[side].0 + k) % 100]);
         let product: Complex64 = (0..all.len()).map(|k| signed(k, 0) * signed(k, 1).conj()).sum();
         let size: f64 = (0..all.len()).map(|k| prompts[0][k].norm() * prompts[1][k].norm()).sum();
         let (coherence, cycles) = (product.norm() / size, product.arg() / TAU);
-        println!("{number}: {apart:.3} chips apart, overlays {places:.2?}, {coherence:.3} at {cycles:.3} cycles");
-        // Overlays of both sides begin together. 41 of 100 chips agree, by chance not two thirds of them.
+        println!(
+            "{number}: {apart:.3} chips apart, secondary codes {places:.2?}, {coherence:.3} at {cycles:.3} cycles"
+        );
+        // Secondary codes of both sides begin together. 41 of 100 chips agree, by chance not two thirds of
+        // them.
         assert!(places[0].0 == places[1].0 && places.iter().all(|(_, lead)| *lead > 1.5), "{number}: {places:?}");
         // Their pilots have one phase where code and subcarrier begin: an error of the code of a thirtieth of
         // a chip turns one against the other by a tenth of a cycle. By chance all four do so once in 625

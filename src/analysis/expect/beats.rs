@@ -16,7 +16,7 @@
 //! both phases as long as Dopplers and symbols are. The loop follows it as a first-order loop of bandwidth B
 //! follows f, 1/(1 + (πf/2B)²) of its square. Limits: whether symbols are equal is not asked, so that this is
 //! what a beat may add and not what it must; a code lag that changes by chips within the loop's time, a
-//! kilohertz apart, averages it; a pilot whose overlay is the satellite's own has none.
+//! kilohertz apart, averages it; a pilot whose secondary code is the satellite's own has none.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -24,7 +24,7 @@ use std::f64::consts::PI;
 use crate::error::JudgeError;
 use crate::expect::loops::Theory;
 use crate::read::Run;
-use gnss::signal::{Component, Link, Overlay};
+use gnss::signal::{Component, Link, SecondaryCode};
 
 /// Distance of the places at which carriers are compared, and how many there are of a run at most.
 const NODE_S: f64 = 1.0;
@@ -95,7 +95,7 @@ fn place(time_s: f64, step_s: f64) -> u64 {
 
 /// Whether the same chips come again in each period, symbols apart.
 fn repeats(component: &Component) -> bool {
-    !matches!(component.overlay, Overlay::PerSatellite { .. })
+    !matches!(component.secondary_code, SecondaryCode::PerSatellite { .. })
 }
 
 /// Power that a satellite puts into codes of a component's kind, over what that component has of its own
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn codes_beat_whose_carriers_are_whole_kilohertz_apart_and_none_under_overlays_of_their_own() {
+    fn codes_beat_whose_carriers_are_whole_kilohertz_apart_and_none_under_secondary_codes_of_their_own() {
         let beats = |signal: &'static gnss::signal::Signal, apart_hz: f64| {
             let track = |doppler_hz: f64, cn0_hz: f64| (0..10).map(|k| (k, Node { doppler_hz, cn0_hz })).collect();
             let (one, other) = (signal.link(Sv::gps(3)), signal.link(Sv::gps(7)));

@@ -29,7 +29,7 @@ pub const CONFIDENCE: f64 = 0.95;
 #[serde(rename_all = "snake_case")]
 pub enum Calibration {
     /// The mean lies within the band.
-    #[serde(rename = "honest")]
+    #[serde(rename = "consistent")]
     Consistent,
     /// Above: errors are larger than the receiver says.
     Optimistic,
@@ -41,14 +41,14 @@ impl Calibration {
     /// Its name in `summary.json`.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Consistent => "honest",
+            Self::Consistent => "consistent",
             Self::Optimistic => "optimistic",
             Self::Pessimistic => "pessimistic",
         }
     }
 }
 
-/// One fix: a row of `honesty.csv`.
+/// One fix: a row of `consistency.csv`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct NormalisedError {
     /// Number of the sample, counted from the first one.
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn the_band_holds_an_honest_receiver_as_often_as_it_says_though_its_errors_remember() {
+    fn the_band_holds_a_consistent_receiver_as_often_as_it_says_though_its_errors_remember() {
         let mut draw = Draw(2);
         let held = (0..300)
             .filter(|_| {

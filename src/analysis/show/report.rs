@@ -133,7 +133,7 @@ impl Summary {
             let verdict = self.position.nees_verdict.map_or("unjudged", Calibration::name);
             writeln!(
                 f,
-                "covariance    {verdict}: normalised error squared {mean:.2}, of honest ones {low:.2} to {high:.2} \
+                "covariance    {verdict}: normalised error squared {mean:.2}, of consistent ones {low:.2} to {high:.2} \
                  ({fixes} independent fixes)"
             )?;
         }

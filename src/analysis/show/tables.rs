@@ -100,7 +100,7 @@ pub(crate) fn write_measured(
 ) -> Result<(), JudgeError> {
     write_read_rows(&directory.join("clock.csv"), judged.clock.rows.cursor())?;
     write_rows(&directory.join("allan.csv"), judged.clock.stability())?;
-    write_read_rows(&directory.join("honesty.csv"), judged.consistency.rows.cursor())?;
+    write_read_rows(&directory.join("consistency.csv"), judged.consistency.rows.cursor())?;
     write_rows(&directory.join("satellites.csv"), elevations.satellites.iter())?;
     write_rows(&directory.join("elevation.csv"), elevations.bands.iter())?;
     write_slips(directory, slips)?;

@@ -1,9 +1,9 @@
 //! Codes as packed signs, and the strip of signs that a run reads.
 //!
 //! A [`Spreading`] is one sequence of ±1: the steps of a layer's chips, see [`super::waveform`]. A strip has
-//! code periods, overlay and data signs already joined: a wrap of the code and a change of sign fall at their
-//! exact phase, and kernels know neither. Codes and overlays run by the time of the signal's system, from the
-//! beginning of its weeks.
+//! code periods, secondary code and data signs already joined: a wrap of the code and a change of sign fall
+//! at their exact phase, and kernels know neither. Codes and secondary codes run by the time of the signal's
+//! system, from the beginning of its weeks.
 
 use std::sync::Arc;
 
@@ -38,8 +38,8 @@ pub struct Spreading {
     /// Signs, most significant bit first, continued cyclically for two words; a set bit is −1.
     words: Vec<u64>,
     pace: Pace,
-    /// Whether the overlay inverts each of its periods; empty without one.
-    overlay: Arc<[bool]>,
+    /// Whether the secondary code inverts each of its periods; empty without one.
+    secondary_code: Arc<[bool]>,
 }
 
 /// A position in a code: whole periods since 1980-01-06T00:00:00 as the satellite's clock shows its system's
@@ -134,9 +134,9 @@ fn greatest_common_divisor(a: i64, b: i64) -> i64 {
 }
 
 impl Spreading {
-    /// A sequence of signs, −1 where `negative`, and whether the overlay inverts each of its periods.
-    pub fn new(negative: &[bool], pace: Pace, overlay: Arc<[bool]>) -> Self {
-        Self { words: packed(negative, negative.len() + 128), pace, overlay }
+    /// A sequence of signs, −1 where `negative`, and whether the secondary code inverts each of its periods.
+    pub fn new(negative: &[bool], pace: Pace, secondary_code: Arc<[bool]>) -> Self {
+        Self { words: packed(negative, negative.len() + 128), pace, secondary_code }
     }
 
     /// How it runs.
@@ -150,8 +150,9 @@ impl Spreading {
     }
 
     fn is_overlaid(&self, period: i64) -> bool {
-        let length = self.overlay.len();
-        length > 0 && self.overlay.get(period.rem_euclid(length as i64) as usize).is_some_and(|&negative| negative)
+        let length = self.secondary_code.len();
+        length > 0
+            && self.secondary_code.get(period.rem_euclid(length as i64) as usize).is_some_and(|&negative| negative)
     }
 
     /// Appends the signs around `samples` samples that start at `at` and advance by `step`, with the data of

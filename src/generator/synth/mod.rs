@@ -43,8 +43,8 @@ pub const CODE_ONE: u64 = 1 << CODE_BITS;
 /// A stretch of one ray on which carrier and code advance by constant steps.
 #[derive(Clone, Copy, Debug)]
 pub struct Run<'a> {
-    /// Signs of the code steps in order, overlay and data applied, most significant bit first; a set bit is
-    /// −1. At least [`chips::MARGIN_STEPS`] steps are before `position` and after the last sample.
+    /// Signs of the code steps in order, secondary code and data applied, most significant bit first; a set
+    /// bit is −1. At least [`chips::MARGIN_STEPS`] steps are before `position` and after the last sample.
     pub bits: &'a [u64],
     /// Code position of sample 0 in `bits`, Q16.48 steps.
     pub position: u64,

@@ -4,8 +4,8 @@
 //! layer has chips of zero it becomes the mean of two sequences, which differ there and are equal elsewhere:
 //! their sum is exact and kernels read one sign a step. The mean power of the whole follows from the code's
 //! own correlation on the steps that all layers share. Limits: that correlation is cyclic, as if neither data
-//! nor overlay changed from one period to the next, which concerns as many steps of a period as an edge
-//! reaches.
+//! nor secondary code changed from one period to the next, which concerns as many steps of a period as an
+//! edge reaches.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -73,7 +73,7 @@ pub struct Waveform {
     index: usize,
     component: &'static Component,
     chips: Vec<i8>,
-    overlay: Arc<[bool]>,
+    secondary_code: Arc<[bool]>,
 }
 
 /// Why a component cannot be rendered.
@@ -120,29 +120,33 @@ impl Waveform {
     /// Component number `index` of a satellite's signal; `None` if the signal's documents assign it no code.
     ///
     /// # Errors
-    /// [`WaveformError::Code`] for a code, overlay or pulse that is none.
+    /// [`WaveformError::Code`] for a code, secondary code or pulse that is none.
     pub fn new(link: Link, index: usize) -> Result<Option<Self>, WaveformError> {
         let Some(component) = link.signal.components.get(index) else { return Ok(None) };
-        let codes = (component.code)(link.sv.number).zip(component.overlay.of(link.sv.number));
-        let Some((chips, overlay)) = codes else { return Ok(None) };
-        let negative: Vec<bool> = overlay.iter().map(|&chip| chip < 0).collect();
-        let has_overlay = negative.contains(&true);
-        let overlay_chips = overlay.len();
-        let inverts = if has_overlay { negative.into() } else { Arc::default() };
-        let waveform = Self { link, index, component, chips, overlay: inverts };
+        let codes = (component.code)(link.sv.number).zip(component.secondary_code.of(link.sv.number));
+        let Some((chips, secondary_code)) = codes else { return Ok(None) };
+        let negative: Vec<bool> = secondary_code.iter().map(|&chip| chip < 0).collect();
+        let has_secondary_code = negative.contains(&true);
+        let secondary_code_chips = secondary_code.len();
+        let inverts = if has_secondary_code { negative.into() } else { Arc::default() };
+        let waveform = Self { link, index, component, chips, secondary_code: inverts };
         let refuse = |what, found, expected: &str| Err(waveform.refuse(what, found, expected));
-        let (length, periods) = (component.code_chips as usize, component.overlay.periods() as usize);
+        let (length, periods) = (component.code_chips as usize, component.secondary_code.periods() as usize);
         if waveform.chips.len() != length || waveform.chips.iter().all(|&chip| chip == 0) {
             return refuse("code", format!("{} chips", waveform.chips.len()), &format!("{length}, not all zero"));
         }
         if let Some(chip) = waveform.chips.iter().find(|chip| !(-1..=1).contains(*chip)) {
             return refuse("code", format!("a chip of {chip}"), "-1, 0 or 1");
         }
-        if overlay_chips != periods || periods == 0 {
-            return refuse("overlay", format!("{overlay_chips} chips"), &format!("{periods}, at least one"));
+        if secondary_code_chips != periods || periods == 0 {
+            return refuse(
+                "secondary_code",
+                format!("{secondary_code_chips} chips"),
+                &format!("{periods}, at least one"),
+            );
         }
-        if let Some(chip) = overlay.iter().find(|chip| chip.abs() != 1) {
-            return refuse("overlay", format!("a chip of {chip}"), "-1 or 1");
+        if let Some(chip) = secondary_code.iter().find(|chip| chip.abs() != 1) {
+            return refuse("secondary_code", format!("a chip of {chip}"), "-1 or 1");
         }
         let pulses = || component.layers.iter().map(|layer| layer.pulse);
         let is_none = |pulse: &[i8]| pulse.iter().all(|&step| step == 0);
@@ -187,7 +191,7 @@ impl Waveform {
             })?;
             let negative: Vec<bool> = steps.iter().map(|&step| step < 0).collect();
             let voice = |negative: &[bool], share: f64| Voice {
-                spreading: Spreading::new(negative, pace, Arc::clone(&self.overlay)),
+                spreading: Spreading::new(negative, pace, Arc::clone(&self.secondary_code)),
                 amplitude: gain * weight * share,
                 phase_cycles,
                 pulse: pulse.clone(),

@@ -1,7 +1,8 @@
 //! What is rendered of every kind of signal, against their definition evaluated slowly and in another way.
 //!
 //! The definition counts steps since the beginning of the system's time as 128-bit integers, and takes chip,
-//! overlay and pulse from the component's tables. It shares no line with strips, sequences or pairs of them.
+//! secondary code and pulse from the component's tables. It shares no line with strips, sequences or pairs of
+//! them.
 
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
@@ -25,10 +26,10 @@ use gnss::gps::l1ca::L1_CA;
 use gnss::rinex;
 use gnss::satellite::{Sv, System};
 use gnss::signal::synthetic::{CHANNELS, LONG_BOC, MIXED, MULTIPLEXED, QUADRATURE, SYNTHETIC};
-use gnss::signal::{Carrier, Component, Layer, Layers, Overlay, Shape, Signal, always};
+use gnss::signal::{Carrier, Component, Layer, Layers, SecondaryCode, Shape, Signal, always};
 use gnss::time::{Epoch, TimeScale};
 
-/// Week 1590, whose beginning is that of every code and overlay.
+/// Week 1590, whose beginning is that of every code and secondary code.
 const WEEK: i64 = 1590 * 604_800;
 
 /// Seven steps of 1.023 MHz and layers of 1, 2 and 3 steps on top of each other, with zeros and a time of its
@@ -53,7 +54,7 @@ static LAYERED: Signal = Signal {
             Layer { weight: -0.4, phase_cycles: 0.2, ..Layer::BOC11 },
             Layer { weight: 1.1, pulse: &[1, -1, 1], chips: &[true, true, false], ..Layer::BPSK },
         ],
-        overlay: Overlay::PerSatellite { chips: 7, of: |_| Some(vec![1, 1, 1, -1, -1, 1, -1]) },
+        secondary_code: SecondaryCode::PerSatellite { chips: 7, of: |_| Some(vec![1, 1, 1, -1, -1, 1, -1]) },
         message: None,
     }],
 };
@@ -76,7 +77,7 @@ struct Definition {
     behind_s: i64,
     per_chip: i128,
     code: Vec<i8>,
-    overlay: Vec<i8>,
+    secondary_code: Vec<i8>,
     /// Weight and phase of each layer.
     factors: Vec<Complex64>,
     /// Brings the mean power over time to one.
@@ -91,7 +92,7 @@ impl Definition {
             behind_s: signal.time.behind_gpst_s,
             per_chip: component.steps_per_chip() as i128,
             code: (component.code)(number).unwrap(),
-            overlay: component.overlay.of(number).unwrap(),
+            secondary_code: component.secondary_code.of(number).unwrap(),
             factors: (component.layers.iter())
                 .map(|layer| Complex64::from_polar(layer.weight, TAU * layer.phase_cycles))
                 .collect(),
@@ -108,7 +109,8 @@ impl Definition {
         let (chip, within) = (number.div_euclid(self.per_chip), number.rem_euclid(self.per_chip));
         let length = self.code.len() as i128;
         let (period, index) = (chip.div_euclid(length), chip.rem_euclid(length) as usize);
-        let sign = self.code[index] * self.overlay[period.rem_euclid(self.overlay.len() as i128) as usize];
+        let sign =
+            self.code[index] * self.secondary_code[period.rem_euclid(self.secondary_code.len() as i128) as usize];
         let layers = self.component.layers.iter().zip(&self.factors);
         let layers = layers.filter(|(layer, _)| layer.chips.is_empty() || layer.chips[index % layer.chips.len()]);
         let layers = layers.map(|(layer, factor)| {
@@ -423,8 +425,11 @@ fn what_cannot_be_rendered_is_refused_by_name() {
     };
     static OFF_GRID: Signal =
         Signal { name: "off grid", components: &[Component { chip_rate_hz: 1.023e6 / 7.0, ..TEMPLATE }], ..L1_CA };
-    static TWO: Signal =
-        Signal { name: "two", components: &[Component { overlay: Overlay::Shared(&[1, 0]), ..TEMPLATE }], ..L1_CA };
+    static TWO: Signal = Signal {
+        name: "two",
+        components: &[Component { secondary_code: SecondaryCode::Shared(&[1, 0]), ..TEMPLATE }],
+        ..L1_CA
+    };
     const TEMPLATE: Component = Component {
         power_share: 1.0,
         phase_cycles: 0.0,
@@ -432,7 +437,7 @@ fn what_cannot_be_rendered_is_refused_by_name() {
         code_chips: 5,
         code: |number| (number < 9).then(|| vec![1, -1, 0, 1, 1]),
         layers: &[Layer::BPSK],
-        overlay: Overlay::None,
+        secondary_code: SecondaryCode::None,
         message: None,
     };
     let error = |signal: &'static Signal| match Waveform::new(signal.link(Sv::gps(4)), 0) {
@@ -440,7 +445,7 @@ fn what_cannot_be_rendered_is_refused_by_name() {
         Err(error) => error.to_string(),
     };
     assert_eq!(error(&SHORT), "short, component 1, code of G04: 5 chips: expected 6, not all zero");
-    assert_eq!(error(&TWO), "two, component 1, overlay of G04: a chip of 0: expected -1 or 1");
+    assert_eq!(error(&TWO), "two, component 1, secondary code of G04: a chip of 0: expected -1 or 1");
     assert!(error(&OFF_GRID).starts_with("off grid, component 1, code of G04: 5 steps at 146142.857"));
     // No code is no error.
     assert!(Waveform::new(TWO.link(Sv::gps(9)), 0).unwrap().is_none());
@@ -491,7 +496,8 @@ fn a_scene_is_the_sum_of_its_satellites_definitions() {
     for signal in SYNTHETIC {
         for edge in [Edge::Nearest, Edge::Area, Edge::BandLimited(&filter)] {
             let scene = scene(signal, name(edge), RATE_HZ);
-            // What arrives there was sent around a whole second, where overlays and codes of 0.1 s begin.
+            // What arrives there was sent around a whole second, where secondary codes and codes of 0.1 s
+            // begin.
             let part = (0.063 * RATE_HZ) as u64..(0.088 * RATE_HZ) as u64;
             let (found, reported) = samples(&scene, part.clone());
             let up: Vec<Sv> = scene
@@ -575,7 +581,7 @@ fn a_rate_that_a_scene_cannot_have_is_refused_with_the_rate_that_it_could() {
             code_chips: 10_230,
             code: |_| Some(vec![1; 10_230]),
             layers: &[Layer::BOC11],
-            overlay: Overlay::None,
+            secondary_code: SecondaryCode::None,
             message: None,
         }],
         ..QUADRATURE

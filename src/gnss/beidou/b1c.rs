@@ -1,18 +1,19 @@
 //! BeiDou B1C: data in BOC(1,1) and a pilot in QMBOC(6,1,4/33) with codes of 10 230 chips at 1.023 Mchip/s on
-//! 1575.42 MHz, the pilot under an overlay of 1800 chips of the satellite's own.
+//! 1575.42 MHz, the pilot under a secondary code of 1800 chips of the satellite's own.
 //!
 //! Source: BDS-SIS-ICD-B1C 1.0, 4.2 (modulation, equations 4-3 and 4-10: the pilot's BOC(1,1) leads the data
-//! by a quarter of a cycle, its BOC(6,1) is in phase with them), 5.2 and 5.3 (codes and overlays, tables 5-2
-//! to 5-4). Codes and overlays are pieces of Weil codes of lengths 10 243 and 3607; overlay and message begin
-//! together, every 18 s of the week of BDT. Satellites of the third generation in medium and inclined orbits
-//! send it: numbers 19 to 46 but 31 since the system was opened, 47 to 50 since the day of a file in which
-//! they broadcast B-CNAV1. Limits: power is that of medium orbits, 2 dB less of inclined ones.
+//! by a quarter of a cycle, its BOC(6,1) is in phase with them), 5.2 and 5.3 (codes and secondary codes,
+//! tables 5-2 to 5-4). Codes and secondary codes are pieces of Weil codes of lengths 10 243 and 3607;
+//! secondary code and message begin together, every 18 s of the week of BDT. Satellites of the third
+//! generation in medium and inclined orbits send it: numbers 19 to 46 but 31 since the system was opened, 47
+//! to 50 since the day of a file in which they broadcast B-CNAV1. Limits: power is that of medium orbits, 2
+//! dB less of inclined ones.
 
 use std::sync::LazyLock;
 
 use crate::beidou::bcnav1::B_CNAV1;
 use crate::satellite::System;
-use crate::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::signal::{Carrier, Component, Layer, SecondaryCode, Signal};
 use crate::time::{BDT, Epoch};
 use crate::weil::Legendre;
 
@@ -20,8 +21,8 @@ use crate::weil::Legendre;
 pub const CARRIER_HZ: f64 = 1_575.42e6;
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 10_230;
-/// Chips of an overlay, one a code period.
-pub const OVERLAY_CHIPS: u32 = 1800;
+/// Chips of a secondary code, one a code period.
+pub const SECONDARY_CODE_CHIPS: u32 = 1800;
 
 /// The signal: the pilot, and data with B-CNAV1.
 pub static B1C: Signal = Signal {
@@ -44,7 +45,7 @@ pub static B1C: Signal = Signal {
                 Layer { weight: 0.937_436_866_561_091_8, ..Layer::BOC11 }, // √(29/33)
                 Layer { weight: 0.348_155_311_911_395_6, phase_cycles: -0.25, ..Layer::BOC61 }, // √(4/33)
             ],
-            overlay: Overlay::PerSatellite { chips: OVERLAY_CHIPS, of: overlay },
+            secondary_code: SecondaryCode::PerSatellite { chips: SECONDARY_CODE_CHIPS, of: secondary_code },
             message: None,
         },
         Component {
@@ -54,7 +55,7 @@ pub static B1C: Signal = Signal {
             code_chips: CODE_CHIPS,
             code: |number| code(Code::Data, number),
             layers: &[Layer::BOC11],
-            overlay: Overlay::None,
+            secondary_code: SecondaryCode::None,
             message: Some(&B_CNAV1),
         },
     ],
@@ -97,10 +98,10 @@ pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     Some(piece(&LONG, own, CODE_CHIPS))
 }
 
-/// The overlay of a satellite by its number, 1 to 63, as ±1; `None` beyond.
-pub fn overlay(number: u8) -> Option<Vec<i8>> {
+/// The secondary code of a satellite by its number, 1 to 63, as ±1; `None` beyond.
+pub fn secondary_code(number: u8) -> Option<Vec<i8>> {
     let (.., own) = *CODES.get(usize::from(number).checked_sub(1)?)?;
-    Some(piece(&SHORT, own, OVERLAY_CHIPS))
+    Some(piece(&SHORT, own, SECONDARY_CODE_CHIPS))
 }
 
 /// So many chips of a Weil code from a place on, which counts from 1.
@@ -109,7 +110,8 @@ pub(super) fn piece(legendre: &Legendre, [later, first]: [u16; 2], chips: u32) -
     weil.take(chips as usize).map(|one| if one { -1 } else { 1 }).collect()
 }
 
-/// Weil index and place of truncation of the data's code, of the pilot's and of its overlay, for numbers 1 to
+/// Weil index and place of truncation of the data's code, of the pilot's and of its secondary code, for
+/// numbers 1 to
 /// 63.
 #[rustfmt::skip]
 const CODES: [([u16; 2], [u16; 2], [u16; 2]); 63] = [

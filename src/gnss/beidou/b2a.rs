@@ -2,9 +2,9 @@
 //! 1176.45 MHz.
 //!
 //! Source: BDS-SIS-ICD-B2a 1.0, 4.2 (modulation: the pilot leads by a quarter of a cycle), 5.2 and 5.3
-//! (codes and overlays, tables 5-2 to 5-4). Codes are those of two registers of thirteen stages, as that
-//! of B3I; the data's overlay is five chips, the pilot's a piece of a Weil code of length 1021. The
-//! satellites are those of B1C. Limits: power is that of medium orbits, 2 dB less of inclined ones.
+//! (codes and secondary codes, tables 5-2 to 5-4). Codes are those of two registers of thirteen stages, as
+//! that of B3I; the data's secondary code is five chips, the pilot's a piece of a Weil code of length 1021.
+//! The satellites are those of B1C. Limits: power is that of medium orbits, 2 dB less of inclined ones.
 
 use std::sync::LazyLock;
 
@@ -12,14 +12,14 @@ use crate::beidou::b1c::{THIRD_GENERATION, piece, sent};
 use crate::beidou::bcnav2::B_CNAV2;
 use crate::beidou::in_phase::registers;
 use crate::satellite::System;
-use crate::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::signal::{Carrier, Component, Layer, SecondaryCode, Signal};
 use crate::time::BDT;
 use crate::weil::Legendre;
 
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 10_230;
-/// Chips of the pilot's overlay, one a code period.
-pub const OVERLAY_CHIPS: u32 = 100;
+/// Chips of the pilot's secondary code, one a code period.
+pub const SECONDARY_CODE_CHIPS: u32 = 100;
 
 /// The signal: the pilot, and data with B-CNAV2. Satellites that send B1C send it.
 pub static B2A: Signal = Signal {
@@ -39,7 +39,7 @@ pub static B2A: Signal = Signal {
             code_chips: CODE_CHIPS,
             code: |number| code(Code::Data, number),
             layers: &[Layer::BPSK],
-            overlay: Overlay::Shared(&[1, 1, 1, -1, 1]), // 00010
+            secondary_code: SecondaryCode::Shared(&[1, 1, 1, -1, 1]), // 00010
             message: Some(&B_CNAV2),
         },
         Component {
@@ -49,7 +49,7 @@ pub static B2A: Signal = Signal {
             code_chips: CODE_CHIPS,
             code: |number| code(Code::Pilot, number),
             layers: &[Layer::BPSK],
-            overlay: Overlay::PerSatellite { chips: OVERLAY_CHIPS, of: overlay },
+            secondary_code: SecondaryCode::PerSatellite { chips: SECONDARY_CODE_CHIPS, of: secondary_code },
             message: None,
         },
     ],
@@ -76,14 +76,14 @@ pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     Some(chips)
 }
 
-/// The overlay of a satellite's pilot by its number, 1 to 63, as ±1; `None` beyond.
-pub fn overlay(number: u8) -> Option<Vec<i8>> {
+/// The secondary code of a satellite's pilot by its number, 1 to 63, as ±1; `None` beyond.
+pub fn secondary_code(number: u8) -> Option<Vec<i8>> {
     let (.., own) = *CODES.get(usize::from(number).checked_sub(1)?)?;
-    Some(piece(&LEGENDRE, own, OVERLAY_CHIPS))
+    Some(piece(&LEGENDRE, own, SECONDARY_CODE_CHIPS))
 }
 
 /// Where the second register begins, stage 1 to stage 13, of the data's code and of the pilot's, and Weil
-/// index and place of truncation of the overlay, for numbers 1 to 63.
+/// index and place of truncation of the secondary code, for numbers 1 to 63.
 #[rustfmt::skip]
 const CODES: [(u16, u16, [u16; 2]); 63] = [
     (0b1_0000_0010_0101, 0b1_0000_0010_0101, [123, 138]), (0b1_0000_0011_0100, 0b1_0000_0011_0100, [55, 570]),

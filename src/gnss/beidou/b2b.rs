@@ -12,7 +12,7 @@ use crate::beidou::b1c::{THIRD_GENERATION, sent};
 use crate::beidou::bcnav3::B_CNAV3;
 use crate::beidou::in_phase::registers;
 use crate::satellite::System;
-use crate::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::signal::{Carrier, Component, Layer, SecondaryCode, Signal};
 use crate::time::BDT;
 
 /// 4.1.
@@ -37,7 +37,7 @@ pub static B2B: Signal = Signal {
         code_chips: CODE_CHIPS,
         code,
         layers: &[Layer::BPSK],
-        overlay: Overlay::None,
+        secondary_code: SecondaryCode::None,
         message: Some(&B_CNAV3),
     }],
 };

@@ -12,7 +12,7 @@
 
 use crate::beidou::d1d2::D1_D2;
 use crate::satellite::System;
-use crate::signal::{Carrier, Component, Layer, Overlay, Signal, always};
+use crate::signal::{Carrier, Component, Layer, SecondaryCode, Signal, always};
 use crate::time::BDT;
 
 /// B1I: 763 times 2.046 MHz.
@@ -57,7 +57,7 @@ const SHORT: Component = Component {
     code_chips: 2046,
     code: short,
     layers: &[Layer::BPSK],
-    overlay: Overlay::None,
+    secondary_code: SecondaryCode::None,
     message: Some(&D1_D2),
 };
 

@@ -4,12 +4,12 @@
 //! angles, times S(t) ∓ jS(t − Ts/4) with a sub-carrier of 15.345 MHz in four levels, constant over eighths
 //! of its period Ts: the phase turns by an eighth of a cycle a step, down on E5a, up on E5b. A chip has
 //! twelve eighths, one and a half periods, so that the sub-carrier is upside down on every second chip: that
-//! sign is in the codes here ([`code`]). S is a sum of two sequences of signs, which are layers. Overlays
-//! and messages are those of E5a and E5b ([`super::e5`]), and no group delay of both together is broadcast
-//! (`status`). Limits: the products of three codes, which make the envelope constant and have (2 − √2)/4 of
-//! the power (14.6 %), are left out, as is their power. Their sub-carrier has harmonics 3, 5, 11, 13 and on
-//! and no fundamental: they lie 46 MHz and more from the middle, and 0.7 % of them, 0.1 % of the whole,
-//! within ±32.5 MHz.
+//! sign is in the codes here ([`code`]). S is a sum of two sequences of signs, which are layers. Secondary
+//! codes and messages are those of E5a and E5b ([`super::e5`]), and no group delay of both together is
+//! broadcast (`status`). Limits: the products of three codes, which make the envelope constant and have (2 −
+//! √2)/4 of the power (14.6 %), are left out, as is their power. Their sub-carrier has harmonics 3, 5, 11, 13
+//! and on and no fundamental: they lie 46 MHz and more from the middle, and 0.7 % of them, 0.1 % of the
+//! whole, within ±32.5 MHz.
 
 use super::e5::{self, Code};
 use crate::signal::{Carrier, Component, Layer, Signal};
@@ -38,7 +38,7 @@ const fn side(layers: &'static [Layer], alone: &Component, code: fn(u8) -> Optio
         code_chips: alone.code_chips,
         code,
         layers,
-        overlay: alone.overlay,
+        secondary_code: alone.secondary_code,
         message: alone.message,
     }
 }

@@ -1,15 +1,15 @@
 //! Galileo E1 open service: data (E1-B) and pilot (E1-C) with codes of 4092 chips at 1.023 Mchip/s, in
 //! CBOC(6,1,1/11) on 1575.42 MHz.
 //!
-//! Source: Galileo OS SIS ICD 2.1, 2.3.3 (modulation), 3.4 and annex C (codes), table 17 (overlay). The codes
-//! have no generator: the document prints them, and `e1_codes.bin` holds the same chips. Limits: signals of
-//! infinite bandwidth; the document's reference receiver has 24.552 MHz.
+//! Source: Galileo OS SIS ICD 2.1, 2.3.3 (modulation), 3.4 and annex C (codes), table 17 (secondary code).
+//! The codes have no generator: the document prints them, and `e1_codes.bin` holds the same chips. Limits:
+//! signals of infinite bandwidth; the document's reference receiver has 24.552 MHz.
 
 use crate::galileo::inav::INAV;
 pub use crate::galileo::memory::Code;
 use crate::galileo::memory::{self, COUNT};
 use crate::satellite::System;
-use crate::signal::{Carrier, Component, Layer, Overlay, Signal, always};
+use crate::signal::{Carrier, Component, Layer, SecondaryCode, Signal, always};
 use crate::time::GST;
 
 /// Chips in a code period.
@@ -33,7 +33,7 @@ pub static E1: Signal = Signal {
             code_chips: CODE_CHIPS,
             code: |number| code(Code::Data, number),
             layers: &[ONE, SIX],
-            overlay: Overlay::None,
+            secondary_code: SecondaryCode::None,
             message: Some(&INAV),
         },
         Component {
@@ -43,7 +43,7 @@ pub static E1: Signal = Signal {
             code_chips: CODE_CHIPS,
             code: |number| code(Code::Pilot, number),
             layers: &[ONE, Layer { phase_cycles: 0.5, ..SIX }],
-            overlay: Overlay::Shared(&CS25),
+            secondary_code: SecondaryCode::Shared(&CS25),
             message: None,
         },
     ],
@@ -54,11 +54,11 @@ const ONE: Layer = Layer { weight: 0.953_462_589_245_592_3, ..Layer::BOC11 };
 /// BOC(6,1) with the rest.
 const SIX: Layer = Layer { weight: 0.301_511_344_577_763_6, ..Layer::BOC61 };
 
-/// The overlay of the pilot, 380AD90 in the document's hexadecimal, one chip for each code period.
-const CS25: [i8; 25] = overlay(0x380_AD90);
+/// The secondary code of the pilot, 380AD90 in the document's hexadecimal, one chip for each code period.
+const CS25: [i8; 25] = secondary_code(0x380_AD90);
 
 /// The 25 first bits of 28, a logical 1 as −1.
-const fn overlay(word: u32) -> [i8; 25] {
+const fn secondary_code(word: u32) -> [i8; 25] {
     let mut chips = [1; 25];
     let mut index = 0;
     while index < chips.len() {
@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_overlay_is_the_printed_one() {
+    fn the_secondary_code_is_the_printed_one() {
         // Galileo OS SIS ICD 2.1, table 17 names its length and hexadecimal; the bits are written out here.
         let bits = "0011100000001010110110010";
         let written: Vec<i8> = bits.bytes().map(|bit| if bit == b'1' { -1 } else { 1 }).collect();

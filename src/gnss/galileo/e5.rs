@@ -2,8 +2,8 @@
 //! 10.23 Mchip/s, BPSK(10) on 1176.45 and 1207.14 MHz.
 //!
 //! Source: Galileo OS SIS ICD 2.1, 2.3.1 (modulation; a receiver of one side sees quadrature phase shift
-//! keying), 3.4.1, tables 15 and 16 (codes by two registers), 3.5, tables 17 to 19 (overlays). Limits: the
-//! products by which both sides together have a constant envelope are left out, as is their power.
+//! keying), 3.4.1, tables 15 and 16 (codes by two registers), 3.5, tables 17 to 19 (secondary codes). Limits:
+//! the products by which both sides together have a constant envelope are left out, as is their power.
 
 use std::sync::LazyLock;
 
@@ -11,7 +11,7 @@ use crate::galileo::fnav::FNAV;
 use crate::galileo::inav::INAV_E5B;
 use crate::message::Message;
 use crate::satellite::System;
-use crate::signal::{Carrier, Component, Layer, Overlay, Signal, always};
+use crate::signal::{Carrier, Component, Layer, SecondaryCode, Signal, always};
 use crate::time::GST;
 
 /// Chips in a code period.
@@ -28,8 +28,8 @@ pub static E5A: Signal = Signal {
     sent: always,
     minimum_power_dbw: Some(-155.25), // 2.7.1, table 12: both components
     components: &[
-        data(|number| code(Code::E5aData, number), Overlay::Shared(&CS20), &FNAV),
-        pilot(|number| code(Code::E5aPilot, number), overlay),
+        data(|number| code(Code::E5aData, number), SecondaryCode::Shared(&CS20), &FNAV),
+        pilot(|number| code(Code::E5aPilot, number), secondary_code),
     ],
 };
 
@@ -39,9 +39,9 @@ pub static E5B: Signal = Signal {
     rinex: "7Q",
     carrier: Carrier::Common(1_207.14e6), // 2.1, table 2
     components: &[
-        data(|number| code(Code::E5bData, number), Overlay::Shared(&CS4), &INAV_E5B),
+        data(|number| code(Code::E5bData, number), SecondaryCode::Shared(&CS4), &INAV_E5B),
         // Table 19: numbers 51 to 100 are those of E5b.
-        pilot(|number| code(Code::E5bPilot, number), |number| overlay(number.checked_add(SATELLITES)?)),
+        pilot(|number| code(Code::E5bPilot, number), |number| secondary_code(number.checked_add(SATELLITES)?)),
     ],
     ..E5A
 };
@@ -49,7 +49,7 @@ pub static E5B: Signal = Signal {
 const SATELLITES: u8 = 50;
 
 /// The component in phase.
-const fn data(code: fn(u8) -> Option<Vec<i8>>, overlay: Overlay, message: &'static Message) -> Component {
+const fn data(code: fn(u8) -> Option<Vec<i8>>, secondary_code: SecondaryCode, message: &'static Message) -> Component {
     Component {
         power_share: 0.5,
         phase_cycles: 0.0,
@@ -57,7 +57,7 @@ const fn data(code: fn(u8) -> Option<Vec<i8>>, overlay: Overlay, message: &'stat
         code_chips: CODE_CHIPS,
         code,
         layers: &[Layer::BPSK],
-        overlay,
+        secondary_code,
         message: Some(message),
     }
 }
@@ -71,7 +71,7 @@ const fn pilot(code: fn(u8) -> Option<Vec<i8>>, of: fn(u8) -> Option<Vec<i8>>) -
         code_chips: CODE_CHIPS,
         code,
         layers: &[Layer::BPSK],
-        overlay: Overlay::PerSatellite { chips: 100, of },
+        secondary_code: SecondaryCode::PerSatellite { chips: 100, of },
         message: None,
     }
 }
@@ -139,18 +139,18 @@ pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     Some(chips.take(CODE_CHIPS as usize).collect())
 }
 
-/// Overlay code CS100 of that number, 1 to 100, as ±1; `None` beyond.
-pub fn overlay(number: u8) -> Option<Vec<i8>> {
+/// Secondary code CS100 of that number, 1 to 100, as ±1; `None` beyond.
+pub fn secondary_code(number: u8) -> Option<Vec<i8>> {
     CS100.get(usize::from(number).checked_sub(1)?).cloned()
 }
 
-/// The overlays of 100 chips, from four bits a digit.
+/// The secondary codes of 100 chips, from four bits a digit.
 static CS100: LazyLock<Vec<Vec<i8>>> = LazyLock::new(|| {
     let digits = |line: &str| -> Vec<i8> {
         let digits = line.chars().filter_map(|digit| digit.to_digit(16));
         digits.flat_map(|digit| (0..4).rev().map(move |bit| if digit >> bit & 1 == 1 { -1 } else { 1 })).collect()
     };
-    include_str!("e5_overlays.txt").lines().map(digits).collect()
+    include_str!("e5_secondary_codes.txt").lines().map(digits).collect()
 });
 
 /// What the second registers start with, of E5a-I, E5a-Q, E5b-I and E5b-Q, for numbers 1 to 50 (table 16).

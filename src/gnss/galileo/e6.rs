@@ -1,8 +1,8 @@
 //! Galileo E6: data (E6-B) and pilot (E6-C) with codes of 5115 chips at 5.115 Mchip/s, BPSK(5) on 1278.75
 //! MHz.
 //!
-//! Source: Galileo E6-B/C codes technical note (modulation, codes; overlays are those of E5a's pilot, CS100
-//! of the satellite's number), by tables of other programs that agree. The codes have no generator, and
+//! Source: Galileo E6-B/C codes technical note (modulation, codes; secondary codes are those of E5a's pilot,
+//! CS100 of the satellite's number), by tables of other programs that agree. The codes have no generator, and
 //! `e6_codes.bin` holds the chips. Its message says neither time nor orbit ([`super::cnav`]), and no group
 //! delay of E6 is broadcast (`status`). Limits: the pilot's minus sign is the document's and has not been
 //! measured; E6-A is left out.
@@ -12,7 +12,7 @@ use crate::galileo::e5;
 pub use crate::galileo::memory::Code;
 use crate::galileo::memory::{self, COUNT};
 use crate::satellite::System;
-use crate::signal::{Carrier, Component, Layer, Overlay, Signal, always};
+use crate::signal::{Carrier, Component, Layer, SecondaryCode, Signal, always};
 use crate::time::GST;
 
 /// Chips in a code period.
@@ -36,7 +36,7 @@ pub static E6: Signal = Signal {
             code_chips: CODE_CHIPS,
             code: |number| code(Code::Data, number),
             layers: &[Layer::BPSK],
-            overlay: Overlay::None,
+            secondary_code: SecondaryCode::None,
             message: Some(&CNAV),
         },
         Component {
@@ -46,7 +46,7 @@ pub static E6: Signal = Signal {
             code_chips: CODE_CHIPS,
             code: |number| code(Code::Pilot, number),
             layers: &[Layer::BPSK],
-            overlay: Overlay::PerSatellite { chips: 100, of: e5::overlay },
+            secondary_code: SecondaryCode::PerSatellite { chips: 100, of: e5::secondary_code },
             message: None,
         },
     ],

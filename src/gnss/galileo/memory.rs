@@ -8,7 +8,7 @@ pub(super) const COUNT: usize = 50;
 pub enum Code {
     /// Of the component that carries the message.
     Data,
-    /// Of the one that has an overlay.
+    /// Of the one that has a secondary code.
     Pilot,
 }
 

@@ -11,7 +11,7 @@
 
 use crate::glonass::gnav::GNAV;
 use crate::satellite::System;
-use crate::signal::{Carrier, Component, Layer, Overlay, Signal, always};
+use crate::signal::{Carrier, Component, Layer, SecondaryCode, Signal, always};
 use crate::time::GLONASST;
 
 /// The band around 1602 MHz.
@@ -31,7 +31,7 @@ pub static G1: Signal = Signal {
         code_chips: 511,
         code: |number| channel(number).map(|_| code()),
         layers: &[Layer::BPSK],
-        overlay: Overlay::None,
+        secondary_code: SecondaryCode::None,
         message: Some(&GNAV),
     }],
 };

@@ -13,14 +13,14 @@ use std::sync::LazyLock;
 use crate::gps::cnav2::CNAV2;
 use crate::gps::modernised;
 use crate::satellite::System;
-use crate::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::signal::{Carrier, Component, Layer, SecondaryCode, Signal};
 use crate::time::GPST;
 use crate::weil::Legendre;
 
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 10_230;
 /// Chips of an overlay, one a code period.
-pub const OVERLAY_CHIPS: u32 = 1800;
+pub const SECONDARY_CODE_CHIPS: u32 = 1800;
 
 /// Phase of both components against L1 C/A. An antenna's recording has 0.243 to 0.253 cycles between pilot
 /// and C/A, modulo half a cycle, of J02, J03, J07, G04 and G18.
@@ -44,7 +44,10 @@ pub static L1C: Signal = Signal {
             code_chips: CODE_CHIPS,
             code: |number| code(Code::Pilot, gps(number)?),
             layers: &[Layer { chips: &ONE, ..Layer::BOC11 }, Layer { chips: &SIX, ..Layer::BOC61 }],
-            overlay: Overlay::PerSatellite { chips: OVERLAY_CHIPS, of: |number| overlay(gps(number)?) },
+            secondary_code: SecondaryCode::PerSatellite {
+                chips: SECONDARY_CODE_CHIPS,
+                of: |number| secondary_code(gps(number)?),
+            },
             message: None,
         },
         Component {
@@ -54,7 +57,7 @@ pub static L1C: Signal = Signal {
             code_chips: CODE_CHIPS,
             code: |number| code(Code::Data, gps(number)?),
             layers: &[Layer::BOC11],
-            overlay: Overlay::None,
+            secondary_code: SecondaryCode::None,
             message: Some(&CNAV2),
         },
     ],
@@ -119,11 +122,11 @@ pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
 
 /// The overlay of a satellite by its number, 1 to 63 or 193 to 202, as ±1; `None` beyond (3.2.2.1.2). A
 /// second register that has no start stays at zeros and adds none.
-pub fn overlay(number: u8) -> Option<Vec<i8>> {
+pub fn secondary_code(number: u8) -> Option<Vec<i8>> {
     let (.., [polynomial, start, second]) = origin(number)?;
-    let second = register(planted!("gnss.qzss.overlay", SECOND_POLYNOMIAL, polynomial), second);
+    let second = register(planted!("gnss.qzss.secondary_code", SECOND_POLYNOMIAL, polynomial), second);
     let chips = register(polynomial, start).zip(second).map(|(one, other)| sign(one ^ other));
-    Some(chips.take(OVERLAY_CHIPS as usize).collect())
+    Some(chips.take(SECONDARY_CODE_CHIPS as usize).collect())
 }
 
 /// The polynomial of the second register of overlays (3.2.2.1.2).
@@ -132,7 +135,7 @@ const SECOND_POLYNOMIAL: u16 = 0o5001;
 /// What a register of eleven stages gives at its last stage.
 fn register(polynomial: u16, start: u16) -> impl Iterator<Item = bool> {
     // Stage n is the bit of value 2ⁿ⁻¹; the polynomial's lowest coefficient is no stage.
-    let feedback = planted!("gnss.l1c.overlay", polynomial >> 1, polynomial);
+    let feedback = planted!("gnss.l1c.secondary_code", polynomial >> 1, polynomial);
     let mut stages = start;
     std::iter::repeat_with(move || {
         let out = stages >> 10 & 1 == 1;

@@ -6,7 +6,7 @@
 
 use crate::gps::lnav::LNAV;
 use crate::satellite::System;
-use crate::signal::{Carrier, Component, Layer, Overlay, Signal, always};
+use crate::signal::{Carrier, Component, Layer, SecondaryCode, Signal, always};
 use crate::time::GPST;
 
 /// Chips in a C/A code period.
@@ -29,7 +29,7 @@ pub static L1_CA: Signal = Signal {
         code_chips: CODE_CHIPS,
         code: |prn| Some(gps(prn).and_then(code)?.iter().map(|&one| if one { -1 } else { 1 }).collect()),
         layers: &[Layer::BPSK],
-        overlay: Overlay::None,
+        secondary_code: SecondaryCode::None,
         message: Some(&LNAV),
     }],
 };

@@ -9,7 +9,7 @@
 use crate::gps::cnav::CNAV_L2C;
 use crate::gps::modernised;
 use crate::satellite::System;
-use crate::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::signal::{Carrier, Component, Layer, SecondaryCode, Signal};
 use crate::time::GPST;
 
 /// Chips of CM and of CL.
@@ -35,7 +35,7 @@ pub static L2C: Signal = Signal {
             code_chips: 2 * MODERATE_CHIPS,
             code: |number| placed(Code::Moderate, gps(number)?),
             layers: &[Layer::BPSK],
-            overlay: Overlay::None,
+            secondary_code: SecondaryCode::None,
             message: Some(&CNAV_L2C),
         },
         Component {
@@ -45,7 +45,7 @@ pub static L2C: Signal = Signal {
             code_chips: 2 * LONG_CHIPS,
             code: |number| placed(Code::Long, gps(number)?),
             layers: &[Layer::BPSK],
-            overlay: Overlay::None,
+            secondary_code: SecondaryCode::None,
             message: None,
         },
     ],

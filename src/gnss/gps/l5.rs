@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 use crate::gps::cnav::CNAV;
 use crate::gps::modernised;
 use crate::satellite::System;
-use crate::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::signal::{Carrier, Component, Layer, SecondaryCode, Signal};
 use crate::time::GPST;
 
 /// Chips in a code period.
@@ -34,7 +34,7 @@ pub static L5: Signal = Signal {
             code_chips: CODE_CHIPS,
             code: |number| gps(number).and_then(|number| code(Code::Data, number)),
             layers: &[Layer::BPSK],
-            overlay: Overlay::Shared(&NH10),
+            secondary_code: SecondaryCode::Shared(&NH10),
             message: Some(&CNAV),
         },
         Component {
@@ -44,7 +44,7 @@ pub static L5: Signal = Signal {
             code_chips: CODE_CHIPS,
             code: |number| gps(number).and_then(|number| code(Code::Pilot, number)),
             layers: &[Layer::BPSK],
-            overlay: Overlay::Shared(&NH20),
+            secondary_code: SecondaryCode::Shared(&NH20),
             message: None,
         },
     ],

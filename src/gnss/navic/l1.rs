@@ -1,11 +1,11 @@
 //! NavIC L1: a pilot and data in synthesised BOC with codes of 10 230 chips at 1.023 Mchip/s on 1575.42 MHz,
-//! the pilot under an overlay of 1800 chips of the satellite's own.
+//! the pilot under a secondary code of 1800 chips of the satellite's own.
 //!
-//! Source: NavIC SPS ICD for L1 1.0 (ISRO, August 2023). Codes and overlays are interleaved Z4-linear: two
-//! registers, of which the second is fed back with what adding seven cells of the first carries. Overlay and
-//! message begin together, every 18 s of the week. Satellites of the second generation send it: of those in
-//! orbit NVS-01 alone, number 10, at the latest since the day of the record of its message that RINEX 4.02
-//! prints.
+//! Source: NavIC SPS ICD for L1 1.0 (ISRO, August 2023). Codes and secondary codes are interleaved Z4-linear:
+//! two registers, of which the second is fed back with what adding seven cells of the first carries.
+//! Secondary code and message begin together, every 18 s of the week. Satellites of the second generation
+//! send it: of those in orbit NVS-01 alone, number 10, at the latest since the day of the record of its
+//! message that RINEX 4.02 prints.
 //!
 //! Limits, all for want of a second source: weights, signs and the quarter of a cycle between pilot and data
 //! are as in the literature on the signal; the least power is unchecked; the product that keeps the envelope
@@ -13,13 +13,13 @@
 
 use crate::navic::l1nav::L1_NAV;
 use crate::satellite::System;
-use crate::signal::{Carrier, Component, Layer, Overlay, Signal};
+use crate::signal::{Carrier, Component, Layer, SecondaryCode, Signal};
 use crate::time::{Epoch, IRNSST};
 
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 10_230;
-/// Chips of an overlay, one a code period.
-pub const OVERLAY_CHIPS: u32 = 1800;
+/// Chips of a secondary code, one a code period.
+pub const SECONDARY_CODE_CHIPS: u32 = 1800;
 
 /// The signal: the pilot, and data with the message of L1.
 pub static L1: Signal = Signal {
@@ -43,7 +43,7 @@ pub static L1: Signal = Signal {
                 Layer { weight: 0.968_245_836_551_854_2, ..Layer::BOC11 },
                 Layer { weight: -0.25, ..Layer::BOC61 },
             ],
-            overlay: Overlay::PerSatellite { chips: OVERLAY_CHIPS, of: overlay },
+            secondary_code: SecondaryCode::PerSatellite { chips: SECONDARY_CODE_CHIPS, of: secondary_code },
             message: None,
         },
         Component {
@@ -57,7 +57,7 @@ pub static L1: Signal = Signal {
                 Layer { weight: 0.932_504_808_240_313_8, ..Layer::BOC11 },
                 Layer { weight: 0.361_157_559_257_307_6, ..Layer::BOC61 },
             ],
-            overlay: Overlay::None,
+            secondary_code: SecondaryCode::None,
             message: Some(&L1_NAV),
         },
     ],
@@ -90,10 +90,10 @@ pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     Some(chips.take(CODE_CHIPS as usize).map(sign).collect())
 }
 
-/// The overlay of a satellite by its number, 1 to 14, as ±1; `None` beyond.
-pub fn overlay(number: u8) -> Option<Vec<i8>> {
+/// The secondary code of a satellite by its number, 1 to 14, as ±1; `None` beyond.
+pub fn secondary_code(number: u8) -> Option<Vec<i8>> {
     let (.., starts) = *STARTS.get(usize::from(number).checked_sub(1)?)?;
-    Some(OVERLAYS.chips(starts).take(OVERLAY_CHIPS as usize).map(sign).collect())
+    Some(SECONDARY_CODES.chips(starts).take(SECONDARY_CODE_CHIPS as usize).map(sign).collect())
 }
 
 fn sign(one: bool) -> i8 {
@@ -111,7 +111,8 @@ struct Registers {
 
 const RANGING: Registers =
     Registers { cells: 55, fed: cells(55, &[50, 45, 40, 20, 10, 5, 0]), across: cells(55, &[40, 35, 30, 25, 15, 0]) };
-const OVERLAYS: Registers = Registers { cells: 10, fed: cells(10, &[5, 2, 1, 0]), across: cells(10, &[6, 3, 2, 0]) };
+const SECONDARY_CODES: Registers =
+    Registers { cells: 10, fed: cells(10, &[5, 2, 1, 0]), across: cells(10, &[6, 3, 2, 0]) };
 
 /// The bits of some cells of a register.
 const fn cells(of: u32, places: &[u32]) -> u64 {
@@ -141,7 +142,7 @@ impl Registers {
 }
 
 /// First states of both registers and of the one that turns: of the data's code and of the pilot's, and of
-/// the overlay's registers; numbers 1 to 14.
+/// the secondary code's registers; numbers 1 to 14.
 #[rustfmt::skip]
 const STARTS: [([u64; 3], [u64; 3], [u64; 2]); 14] = [
     ([0o0061727026503255544, 0o0377627103341647600, 0b10100], [0o0227743641272102303, 0o1667217344450257245, 0b01000],

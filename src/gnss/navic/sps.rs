@@ -9,7 +9,7 @@
 
 use crate::navic::nav::SPS_NAV;
 use crate::satellite::System;
-use crate::signal::{Carrier, Component, Layer, Overlay, Signal, always};
+use crate::signal::{Carrier, Component, Layer, SecondaryCode, Signal, always};
 use crate::time::IRNSST;
 
 /// Chips in a code period.
@@ -47,7 +47,7 @@ const SPS: Component = Component {
     code_chips: CODE_CHIPS,
     code: |number| signs(&L5_STARTS, number),
     layers: &[Layer::BPSK],
-    overlay: Overlay::None,
+    secondary_code: SecondaryCode::None,
     message: Some(&SPS_NAV),
 };
 

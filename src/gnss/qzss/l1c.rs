@@ -5,11 +5,11 @@
 //! C/A as those of GPS, as J02, J03 and J07 have them in a recording. Limits: of J01, of Block I, the phase
 //! may be another.
 
-use crate::gps::l1c::{self, Code, OVERLAY_CHIPS, code, overlay};
+use crate::gps::l1c::{self, Code, SECONDARY_CODE_CHIPS, code, secondary_code};
 use crate::qzss::civil::CNAV2;
 use crate::qzss::satellites::{SATELLITES, prn};
 use crate::satellite::System;
-use crate::signal::{Component, Overlay, Signal, always};
+use crate::signal::{Component, SecondaryCode, Signal, always};
 use crate::time::QZSST;
 
 /// The signal: L1C-P, and L1C-D with CNAV-2.
@@ -23,7 +23,10 @@ pub static L1C: Signal = Signal {
     components: &[
         Component {
             code: |number| code(Code::Pilot, prn(number)?),
-            overlay: Overlay::PerSatellite { chips: OVERLAY_CHIPS, of: |number| overlay(prn(number)?) },
+            secondary_code: SecondaryCode::PerSatellite {
+                chips: SECONDARY_CODE_CHIPS,
+                of: |number| secondary_code(prn(number)?),
+            },
             ..l1c::L1C.components[0]
         },
         Component { code: |number| code(Code::Data, prn(number)?), message: Some(&CNAV2), ..l1c::L1C.components[1] },

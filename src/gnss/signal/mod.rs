@@ -1,5 +1,5 @@
 //! A signal is data: a carrier and components, each with a code, the pulses that its chips have, and perhaps
-//! an overlay code and a message.
+//! a secondary code and a message.
 //!
 //! To add a signal: one file in `gnss/<system>/` with a `static` [`Signal`], one word in [`SIGNALS`]. Law
 //! tests walk that registry. A program that has a signal of its own calls [`register`] before it names it
@@ -154,7 +154,7 @@ pub struct Component {
     /// What the waveform of a chip is the sum of.
     pub layers: &'static [Layer],
     /// Secondary code: a chip for each period of the code.
-    pub overlay: Overlay,
+    pub secondary_code: SecondaryCode,
     /// What modulates it; a pilot has none.
     pub message: Option<&'static Message>,
 }
@@ -199,7 +199,7 @@ impl Layers {
 
 /// A code of one chip for each period of the spreading code, which it multiplies.
 #[derive(Clone, Copy, Debug)]
-pub enum Overlay {
+pub enum SecondaryCode {
     /// No secondary code.
     None,
     /// The same for all satellites: values of ±1.
@@ -323,7 +323,7 @@ impl Link {
     /// Whether another satellite's signal is the same but for its message: one signal, carrier and code.
     pub fn is_alike(self, other: Self) -> bool {
         let same = |component: &Component| {
-            let of = |sv: Sv| ((component.code)(sv.number), component.overlay.of(sv.number));
+            let of = |sv: Sv| ((component.code)(sv.number), component.secondary_code.of(sv.number));
             of(self.sv) == of(other.sv)
         };
         let on_one_channel = self.channel().is_some() && self.channel() == other.channel();
@@ -371,8 +371,8 @@ impl Layer {
     }
 }
 
-impl Overlay {
-    /// Periods of the spreading code in one of the overlay code; 1 without.
+impl SecondaryCode {
+    /// Periods of the spreading code in one of the secondary code; 1 without.
     pub fn periods(&self) -> u32 {
         match self {
             Self::None => 1,
@@ -381,7 +381,8 @@ impl Overlay {
         }
     }
 
-    /// The values of satellite `number`; `[1]` without an overlay, `None` where the document assigns none.
+    /// The values of satellite `number`; `[1]` without a secondary code, `None` where the document assigns
+    /// none.
     pub fn of(&self, number: u8) -> Option<Vec<i8>> {
         match self {
             Self::None => Some(vec![1]),
@@ -464,7 +465,7 @@ impl Component {
     }
 
     fn has_code(&self, number: u8) -> bool {
-        (self.code)(number).is_some() && self.overlay.of(number).is_some()
+        (self.code)(number).is_some() && self.secondary_code.of(number).is_some()
     }
 }
 
@@ -590,9 +591,9 @@ mod tests {
                 let code = (component.code)(sv.number).unwrap();
                 assert_eq!(code.len(), component.code_chips as usize, "{signal} {sv}");
                 assert!(code.iter().all(|chip| chip.abs() <= 1), "{signal} {sv}");
-                let overlay = component.overlay.of(sv.number).unwrap();
-                assert_eq!(overlay.len(), component.overlay.periods() as usize, "{signal} {sv}");
-                assert!(overlay.iter().all(|chip| chip.abs() == 1), "{signal} {sv}");
+                let secondary_code = component.secondary_code.of(sv.number).unwrap();
+                assert_eq!(secondary_code.len(), component.secondary_code.periods() as usize, "{signal} {sv}");
+                assert!(secondary_code.iter().all(|chip| chip.abs() == 1), "{signal} {sv}");
             }
             // A sub-carrier is upright again at a period's end.
             let halves = component.tone().map_or(0, |tone| tone.half_cycles.unsigned_abs());

@@ -117,7 +117,7 @@ pub fn sinc_squared(x: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Component, Overlay};
+    use super::super::{Component, SecondaryCode};
     use super::*;
 
     const CHIP_S: f64 = 1.0 / 1.023e6;
@@ -130,7 +130,7 @@ mod tests {
             code_chips: 4092,
             code: |_| None,
             layers,
-            overlay: Overlay::None,
+            secondary_code: SecondaryCode::None,
             message: None,
         };
         component.shape()

@@ -3,7 +3,7 @@
 //! Their codes are random. What assumes one BPSK component of 1 ms, one carrier, a code of ±1 or one time
 //! scale goes wrong with one of them.
 
-use super::{Carrier, Component, Layer, Overlay, Signal, always};
+use super::{Carrier, Component, Layer, SecondaryCode, Signal, always};
 use crate::galileo::altboc::{DOWN, UP};
 use crate::galileo::fnav::FNAV;
 use crate::galileo::inav::{INAV, INAV_E5B};
@@ -18,7 +18,7 @@ pub static SYNTHETIC: [&Signal; 6] = [&LONG_BOC, &QUADRATURE, &CHANNELS, &MULTIP
 pub static OWN_TIME: TimeScale = TimeScale { name: "synthetic", behind_gpst_s: 3, has_leap_seconds: false };
 
 /// Two components with codes of 4 ms in BOC(1,1), one with a coded message of a symbol a period and the other
-/// with an overlay of 25 chips, in a time of its own.
+/// with a secondary code of 25 chips, in a time of its own.
 pub static LONG_BOC: Signal = Signal {
     name: "synthetic A",
     rinex: "1X",
@@ -36,7 +36,7 @@ pub static LONG_BOC: Signal = Signal {
             code_chips: 4092,
             code: |number| assigned(number, 36, || random(4092, u64::from(number))),
             layers: &[Layer::BOC11],
-            overlay: Overlay::None,
+            secondary_code: SecondaryCode::None,
             message: Some(&INAV),
         },
         Component {
@@ -46,7 +46,7 @@ pub static LONG_BOC: Signal = Signal {
             code_chips: 4092,
             code: |number| assigned(number, 36, || random(4092, 100 + u64::from(number))),
             layers: &[Layer::BOC11],
-            overlay: Overlay::Shared(&[
+            secondary_code: SecondaryCode::Shared(&[
                 1, 1, -1, -1, 1, 1, 1, 1, 1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, -1, 1, -1, -1, 1, -1,
             ]),
             message: None,
@@ -54,7 +54,7 @@ pub static LONG_BOC: Signal = Signal {
     ],
 };
 
-/// Ten chips in a microsecond, data and pilot at right angles, an overlay on each, on another carrier.
+/// Ten chips in a microsecond, data and pilot at right angles, a secondary code on each, on another carrier.
 pub static QUADRATURE: Signal = Signal {
     name: "synthetic B",
     rinex: "5X",
@@ -72,7 +72,7 @@ pub static QUADRATURE: Signal = Signal {
             code_chips: 10_230,
             code: |number| assigned(number, 32, || random(10_230, 200 + u64::from(number))),
             layers: &[Layer::BPSK],
-            overlay: Overlay::Shared(&[1, 1, 1, 1, -1, -1, 1, -1, 1, -1]),
+            secondary_code: SecondaryCode::Shared(&[1, 1, 1, 1, -1, -1, 1, -1, 1, -1]),
             message: None,
         },
         Component {
@@ -82,7 +82,7 @@ pub static QUADRATURE: Signal = Signal {
             code_chips: 10_230,
             code: |number| assigned(number, 32, || random(10_230, 300 + u64::from(number))),
             layers: &[Layer::BPSK],
-            overlay: Overlay::PerSatellite {
+            secondary_code: SecondaryCode::PerSatellite {
                 chips: 20,
                 of: |number| assigned(number, 32, || random(20, 400 + u64::from(number))),
             },
@@ -91,7 +91,7 @@ pub static QUADRATURE: Signal = Signal {
     ],
 };
 
-/// The same with data whose symbols begin where the overlays do.
+/// The same with data whose symbols begin where the secondary codes do.
 pub static QUADRATURE_DATA: Signal = Signal {
     name: "synthetic B with data",
     components: &[
@@ -122,7 +122,7 @@ pub static CHANNELS: Signal = Signal {
         code_chips: 511,
         code: |number| assigned(number, 24, || random(511, 500)),
         layers: &[Layer::BPSK],
-        overlay: Overlay::None,
+        secondary_code: SecondaryCode::None,
         message: None,
     }],
 };
@@ -145,7 +145,7 @@ pub static MULTIPLEXED: Signal = Signal {
             code_chips: 20_460,
             code: |number| assigned(number, 32, || in_turn(10_230, 0, 600 + u64::from(number))),
             layers: &[Layer::BPSK],
-            overlay: Overlay::None,
+            secondary_code: SecondaryCode::None,
             message: None,
         },
         Component {
@@ -155,7 +155,7 @@ pub static MULTIPLEXED: Signal = Signal {
             code_chips: 1_534_500,
             code: |number| assigned(number, 32, || in_turn(767_250, 1, 700 + u64::from(number))),
             layers: &[Layer::BPSK],
-            overlay: Overlay::None,
+            secondary_code: SecondaryCode::None,
             message: None,
         },
     ],
@@ -192,7 +192,7 @@ pub static MIXED: Signal = Signal {
             code_chips: 10_230,
             code: |number| assigned(number, 10, || random(10_230, 800 + u64::from(number))),
             layers: &[Layer { chips: &ONE, ..Layer::BOC11 }, Layer { chips: &SIX, ..Layer::BOC61 }],
-            overlay: Overlay::PerSatellite {
+            secondary_code: SecondaryCode::PerSatellite {
                 chips: 1800,
                 of: |number| assigned(number, 10, || random(1800, 900 + u64::from(number))),
             },
@@ -205,7 +205,7 @@ pub static MIXED: Signal = Signal {
             code_chips: 10_230,
             code: |number| assigned(number, 10, || random(10_230, 1000 + u64::from(number))),
             layers: &[Layer::BOC11],
-            overlay: Overlay::None,
+            secondary_code: SecondaryCode::None,
             message: None,
         },
     ],
@@ -225,7 +225,7 @@ pub static SIDES: Signal = Signal {
         Component {
             phase_cycles: 0.0,
             code: |number| assigned(number, 36, || random(2046, 1100 + u64::from(number))),
-            overlay: Overlay::Shared(&[1, -1]),
+            secondary_code: SecondaryCode::Shared(&[1, -1]),
             message: Some(&INAV_E5B),
             ..UPPER_PILOT
         },
@@ -233,7 +233,7 @@ pub static SIDES: Signal = Signal {
         Component {
             phase_cycles: 0.0,
             code: |number| assigned(number, 36, || random(2046, 1400 + u64::from(number))),
-            overlay: Overlay::Shared(&[1, 1, -1, 1, -1, -1, -1, 1, 1, 1]),
+            secondary_code: SecondaryCode::Shared(&[1, 1, -1, 1, -1, -1, -1, 1, 1, 1]),
             message: Some(&FNAV),
             ..LOWER_PILOT
         },
@@ -248,7 +248,7 @@ const UPPER_PILOT: Component = Component {
     code_chips: 2046,
     code: |number| assigned(number, 36, || random(2046, 1200 + u64::from(number))),
     layers: &UP,
-    overlay: Overlay::PerSatellite {
+    secondary_code: SecondaryCode::PerSatellite {
         chips: 20,
         of: |number| assigned(number, 36, || random(20, 1300 + u64::from(number))),
     },
@@ -258,7 +258,7 @@ const UPPER_PILOT: Component = Component {
 const LOWER_PILOT: Component = Component {
     code: |number| assigned(number, 36, || random(2046, 1500 + u64::from(number))),
     layers: &DOWN,
-    overlay: Overlay::PerSatellite {
+    secondary_code: SecondaryCode::PerSatellite {
         chips: 20,
         of: |number| assigned(number, 36, || random(20, 1600 + u64::from(number))),
     },

@@ -227,11 +227,11 @@ impl Band {
 /// A satellite that is known to be there, and its place.
 type Known<'a> = (&'a Code, Refined);
 
-/// The data beside a pilot, where both are searched for: they have the same power, and the pilot's overlay
-/// keeps coherent sums to one code period.
+/// The data beside a pilot, where both are searched for: they have the same power, and the pilot's secondary
+/// code keeps coherent sums to one code period.
 pub(crate) fn companion(component: &'static Component, signal: &'static Signal) -> Option<&'static Component> {
     let equal = |data: &&Component| (data.power_share / component.power_share - 1.0).abs() < 1e-9;
-    (component.overlay.periods() > 1).then(|| beside(component, signal)).flatten().filter(equal)
+    (component.secondary_code.periods() > 1).then(|| beside(component, signal)).flatten().filter(equal)
 }
 
 impl Searcher {

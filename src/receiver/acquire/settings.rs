@@ -20,7 +20,7 @@ pub struct AcquisitionSettings {
     /// bands hold it, all that they hold where not.
     pub signals: Vec<String>,
     /// Code periods of 1 ms summed coherently; of longer codes as many as begin in that time, under an
-    /// overlay code one.
+    /// secondary code one.
     pub coherent_periods: u32,
     /// Coherent sums whose powers are added; more where sums are shorter.
     pub noncoherent_sums: u32,
@@ -50,11 +50,12 @@ pub const ALL: &str = "all";
 /// Code periods of a symbol that are too few to sum more than one coherently before its edges are known.
 const FEW: u32 = 3;
 
-/// Whether the sign may turn after every code period, or nearly: by an overlay, or by symbols of few periods.
-/// Sums as long all straddle an edge if one does, and half of the power is then found beside the Doppler.
+/// Whether the sign may turn after every code period, or nearly: by a secondary code, or by symbols of few
+/// periods. Sums as long all straddle an edge if one does, and half of the power is then found beside the
+/// Doppler.
 pub(super) fn sign_turns_often(component: &Component) -> bool {
     let few = |periods: Option<u32>| periods.is_none_or(|periods| periods <= FEW);
-    component.overlay.periods() > 1 || (component.message.is_some() && few(component.periods_per_symbol()))
+    component.secondary_code.periods() > 1 || (component.message.is_some() && few(component.periods_per_symbol()))
 }
 
 impl Default for AcquisitionSettings {

@@ -212,12 +212,12 @@ impl Fit {
 }
 
 /// Sums of the products of neighbouring prompts, by the code period's number modulo a symbol's or an
-/// overlay's.
+/// secondary code's.
 #[derive(Clone, Debug)]
 pub struct Edges {
     products: Vec<f64>,
     count: u64,
-    /// Of an overlay: the sign that has been taken off each product.
+    /// Of a secondary code: the sign that has been taken off each product.
     signs: Option<Vec<f64>>,
 }
 
@@ -227,9 +227,9 @@ impl Edges {
         Self { products: vec![0.0; periods.max(1) as usize], count: 0, signs: None }
     }
 
-    /// For an overlay whose chips, one a code period by its number, are these: they have been taken off the
-    /// prompts.
-    pub fn of_overlay(chips: &[f64]) -> Self {
+    /// For a secondary code whose chips, one a code period by its number, are these: they have been taken off
+    /// the prompts.
+    pub fn of_secondary_code(chips: &[f64]) -> Self {
         let before = chips.iter().skip(chips.len().saturating_sub(1)).chain(chips);
         let signs = before.zip(chips).map(|(before, chip)| before * chip).collect();
         Self { signs: Some(signs), ..Self::new(chips.len() as u32) }
@@ -240,7 +240,7 @@ impl Edges {
         Self { signs: self.signs.clone(), ..Self::new(self.products.len() as u32) }
     }
 
-    /// Code periods in a symbol, or in an overlay.
+    /// Code periods in a symbol, or in a secondary code.
     pub fn periods(&self) -> u64 {
         self.products.len() as u64
     }
@@ -250,7 +250,7 @@ impl Edges {
         self.count
     }
 
-    /// These products and those of a later time, of the same symbols or overlay.
+    /// These products and those of a later time, of the same symbols or secondary code.
     pub fn and(mut self, later: &Self) -> Self {
         self.products.iter_mut().zip(&later.products).for_each(|(sum, product)| *sum += product);
         self.count += later.count;
@@ -273,7 +273,7 @@ impl Edges {
 pub fn turned_by(channels: &[(&Edges, u64)]) -> Option<u64> {
     let length = channels.first()?.0.products.len();
     if channels.first()?.0.signs.is_some() {
-        return overlay_turned_by(channels, length);
+        return secondary_code_turned_by(channels, length);
     }
     let mut sums = vec![0.0; length];
     let (mut expected, mut noise) = (0.0, 0.0);
@@ -301,9 +301,9 @@ pub fn turned_by(channels: &[(&Edges, u64)]) -> Option<u64> {
     (lead > TURN_SIGMAS * (2.0 * noise).sqrt() && lead > TURN_SHARE * expected).then_some(best as u64)
 }
 
-/// [`turned_by`] of channels whose overlay is known: with the chips of `shift` periods later taken off in
-/// place of its own, every product is positive.
-fn overlay_turned_by(channels: &[(&Edges, u64)], length: usize) -> Option<u64> {
+/// [`turned_by`] of channels whose secondary code is known: with the chips of `shift` periods later taken off
+/// in place of its own, every product is positive.
+fn secondary_code_turned_by(channels: &[(&Edges, u64)], length: usize) -> Option<u64> {
     let mut sums = vec![0.0; length];
     let mut noise = 0.0;
     for (edges, _) in channels.iter().filter(|(edges, _)| edges.products.len() == length) {

@@ -18,8 +18,8 @@ use super::lock::{LockState, PhaseLock, Rotation, SymbolLock};
 use super::long::LongCode;
 use super::loops::CodeShape;
 use super::model::ReplicaModel;
-use super::overlay::{OverlayPhase, OverlaySync};
 use super::pull_in::Batch;
+use super::secondary_code::{SecondaryCodePhase, SecondaryCodeSync};
 use super::side::SidePeaks;
 use super::sides::Sides;
 use super::sync::SymbolSync;
@@ -128,15 +128,15 @@ pub struct Channel {
     carrier_offset_hz: f64,
     next_offset_hz: f64,
     period_s: f64,
-    /// Code periods a symbol, or those summed where there are none; 1 while an overlay is unknown.
+    /// Code periods a symbol, or those summed where there are none; 1 while a secondary code is unknown.
     group: u32,
     has_symbols: bool,
     /// Of symbols of one period that are a bit's by known signs, and at which periods bits begin, once that
     /// is known: `group` has those of a bit then.
     bits: Option<BitSync>,
     bit_begin: Option<u64>,
-    overlay: Option<OverlaySync>,
-    overlay_phase: Option<OverlayPhase>,
+    secondary_code: Option<SecondaryCodeSync>,
+    secondary_code_phase: Option<SecondaryCodePhase>,
     data: Option<Data>,
     /// A pilot with a code too long for the search, and the segment of it that is the replica.
     long: Option<LongCode>,
@@ -217,15 +217,16 @@ impl Channel {
         let period_s = component.map_or(1.0, |c| c.period_s());
         let message = component.and_then(|c| c.message);
         let settings = &component.map_or(settings.clone(), |c| settings.fitted(c));
-        let codes = component.filter(|c| c.overlay.periods() > 1).and_then(|c| c.overlay.of(hit.sv.number));
-        let overlay = codes.map(OverlaySync::new);
-        // Signs of prompts are anyone's guess until the overlay's are known.
+        let codes =
+            component.filter(|c| c.secondary_code.periods() > 1).and_then(|c| c.secondary_code.of(hit.sv.number));
+        let secondary_code = codes.map(SecondaryCodeSync::new);
+        // Signs of prompts are anyone's guess until the secondary code's are known.
         let group = match message {
-            _ if overlay.is_some() => 1,
+            _ if secondary_code.is_some() => 1,
             Some(_) => component.and_then(Component::periods_per_symbol).unwrap_or(1),
             None => pilot_group(period_s),
         };
-        let has_symbols = message.is_some() || overlay.is_some();
+        let has_symbols = message.is_some() || secondary_code.is_some();
         let waveform = settings.waveform;
         let (number, made) = (hit.sv.number, (waveform, settings.replica));
         let replica = component.and_then(|c| Replica::made_in(c, number, made, metadata.inverted));
@@ -260,15 +261,15 @@ impl Channel {
             group,
             has_symbols,
             data: component
-                .filter(|_| overlay.is_some())
+                .filter(|_| secondary_code.is_some())
                 .and_then(|c| Data::beside(c, (hit.signal, hit.sv), settings, rates)),
             bits: message
                 .map(|message| (message.bit)(hit.sv))
                 .filter(|signs| signs.len() > 1 && has_symbols && group == 1)
                 .map(BitSync::new),
             bit_begin: None,
-            overlay,
-            overlay_phase: None,
+            secondary_code,
+            secondary_code_phase: None,
             long: component.and_then(|c| LongCode::beside(c, hit.signal, hit.sv.number, settings.replica)),
             segment: None,
             side_peaks: component.and_then(|c| SidePeaks::new(c, waveform)),

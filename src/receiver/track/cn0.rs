@@ -7,8 +7,8 @@
 //! at a delay where the code's own correlation vanishes. It meets the same filters, interference and
 //! satellites as the prompt does, so multiple access counts as noise.
 //!
-//! Where each prompt has a sign of its own (symbols of one period, an unknown overlay) the signal is what the
-//! power of prompts exceeds the reference by.
+//! Where each prompt has a sign of its own (symbols of one period, an unknown secondary code) the signal is
+//! what the power of prompts exceeds the reference by.
 //!
 //! **After.** Power within and between the M prompts of a symbol (narrow against wide band, as moments): all
 //! noise is within. It is taken along the mean prompt alone. Across it the carrier loop's own jitter comes on

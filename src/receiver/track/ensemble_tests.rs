@@ -46,7 +46,7 @@ struct Start {
     locked: bool,
     /// Doppler that the search found, and at the end, less the true one.
     doppler_errors_hz: [f64; 2],
-    /// Whether the overlay was known at the end.
+    /// Whether the secondary code was known at the end.
     known: bool,
     searches: u32,
     /// Of the carrier, seconds after the channel's first sample.
@@ -183,7 +183,7 @@ fn no_cold_start_holds_a_side_peak_and_none_leaves_the_main_one() {
         println!(
             "{signal}: {} of {starts} starts found, {} on a side peak, moved after {middle_s:.2} s (median) and \
              {last_s:.2} s at most; {late} later than {bar_s} s, {left} left the main peak, {slips} slips, {lost} \
-             lost, {unlocked} not in lock and {unknown} without overlay at the end, {} searches",
+             lost, {unlocked} not in lock and {unknown} without secondary_code at the end, {} searches",
             runs.len(),
             beside.len(),
             runs.iter().map(|run| run.searches).sum::<u32>(),
@@ -331,8 +331,8 @@ fn follow(sent: Sent, settings: &TrackingSettings, duration_s: f64) -> Scatter {
     Scatter { code: scatter(&code), carrier: scatter(&carrier), values: code.len() as f64 }
 }
 
-/// After so long the carrier was locked for its first hundred prompts, symbols and overlay are known, and
-/// nothing is left of the pull-in.
+/// After so long the carrier was locked for its first hundred prompts, symbols and secondary code are known,
+/// and nothing is left of the pull-in.
 fn settle_s(component: &Component) -> f64 {
     0.8 + 115.0 * component.period_s()
 }

@@ -1,9 +1,9 @@
 //! How the carrier turns within code periods whose signs are not known.
 //!
-//! Where each period has a sign of its own, of a symbol or of an overlay's chip, neighbouring periods show
-//! the frequency modulo half a cycle a period: the search of sums over two of them has side lobes there, and
-//! frequency detector and Costas loop rest there. The two halves of one period have the same sign, so what
-//! they turn by is the frequency itself, within a cycle a period on either side.
+//! Where each period has a sign of its own, of a symbol or of a secondary code's chip, neighbouring periods
+//! show the frequency modulo half a cycle a period: the search of sums over two of them has side lobes there,
+//! and frequency detector and Costas loop rest there. The two halves of one period have the same sign, so
+//! what they turn by is the frequency itself, within a cycle a period on either side.
 
 use std::f64::consts::PI;
 

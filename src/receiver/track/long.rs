@@ -6,7 +6,7 @@
 //! CM). Limits: chips of one rectangular step; a segment's replica is cyclic, so its first and last chip lack
 //! their true neighbours, two of 20 460.
 
-use super::overlay::{OverlayPhase, Shifts};
+use super::secondary_code::{SecondaryCodePhase, Shifts};
 use crate::correlate::{Edge, Replica, Wave};
 use crate::lead::long_beside;
 use gnss::signal::{Component, Signal};
@@ -45,7 +45,7 @@ impl LongCode {
     }
 
     /// The segment of code period `number`.
-    pub fn segment(&self, phase: OverlayPhase, number: u64) -> u64 {
+    pub fn segment(&self, phase: SecondaryCodePhase, number: u64) -> u64 {
         (number + phase.shift) % self.segments
     }
 
@@ -67,7 +67,7 @@ impl LongCode {
 
     /// Takes code period `number`, in phase lock; `prompt` gives what it correlates to with a replica, in
     /// phase (noise of unit variance). Gives the phase when it is beyond doubt.
-    pub fn add(&mut self, number: u64, prompt: impl Fn(&Replica) -> f64) -> Option<OverlayPhase> {
+    pub fn add(&mut self, number: u64, prompt: impl Fn(&Replica) -> f64) -> Option<SecondaryCodePhase> {
         let all: Vec<f64> = (0..self.segments)
             .map(|shift| self.replica((number + shift) % self.segments).map_or(0.0, |replica| prompt(&replica)))
             .collect();

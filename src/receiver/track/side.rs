@@ -4,8 +4,8 @@
 //! **Statistic.** Two correlators follow the neighbouring peaks. The noise of taps is correlated as the
 //! code is, so where the phase of each period is unknown, how likely the main peak is at a tap depends on
 //! that tap's power alone: what the others show follows from it. Hence D, the power of a neighbour less the
-//! prompt's, period by period, without any help of phase, overlay or symbols; it works from the first period
-//! on.
+//! prompt's, period by period, without any help of phase, secondary code or symbols; it works from the first
+//! period on.
 //!
 //! **Decision.** Let noise have unit variance a component, the main peak the amplitude A = √(2·T·C/N0), a
 //! side peak c·A, and s² = 1 − c². On the main peak ln E exp(wD) = −ln(1 − 4s²w²) − w·s²·A²·(1 − 2w)/(1 −
@@ -17,8 +17,8 @@
 //! prompt's amplitude (c = 1/2). A C/N0 that is taken too low, as it is on a side peak, only costs time.
 //!
 //! **Move.** Code by the distance of the peaks, the carrier by half a cycle where their signs differ: loops,
-//! lock and the search for the overlay go on. Limits: of pulses with more side peaks the code moves from one
-//! to the next.
+//! lock and the search for the secondary code go on. Limits: of pulses with more side peaks the code moves
+//! from one to the next.
 
 use super::model::{SidePeak, side_peak, side_peak_of_both};
 use crate::correlate::chips_to_units;

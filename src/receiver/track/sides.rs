@@ -1,16 +1,16 @@
 //! Both sides of a sub-carrier, followed together.
 //!
 //! Either side alone is a code like any other: it is searched for and pulled in by itself, by the triangle of
-//! its chips, which has no side peaks. The pilot of each side has an overlay of its own, and a sum of both
-//! has to know them: once the first one's is aligned, the replica has both, with the signs of the period, and
-//! early and late draw near to the peak that they make together. A side alone brings the code to a few
-//! hundredths of a chip; the neighbouring peak of both is a third of a chip away for AltBOC(15,10), and is
-//! left like that of any other signal ([`super::side`]).
+//! its chips, which has no side peaks. The pilot of each side has a secondary code of its own, and a sum of
+//! both has to know them: once the first one's is aligned, the replica has both, with the signs of the
+//! period, and early and late draw near to the peak that they make together. A side alone brings the code to
+//! a few hundredths of a chip; the neighbouring peak of both is a third of a chip away for AltBOC(15,10), and
+//! is left like that of any other signal ([`super::side`]).
 
 use super::TrackingSettings;
 use super::loops::CodeShape;
 use super::model::ReplicaModel;
-use super::overlay::{OverlayPhase, OverlaySync};
+use super::secondary_code::{SecondaryCodePhase, SecondaryCodeSync};
 use super::side::SidePeaks;
 use crate::correlate::{Replica, chips_to_units};
 use crate::lead::other_side;
@@ -21,7 +21,7 @@ use gnss::signal::{Component, Signal};
 pub struct Sides {
     /// Of both; handed over where it is first used.
     replica: Option<Replica>,
-    overlays: [OverlaySync; 2],
+    secondary_codes: [SecondaryCodeSync; 2],
     both: Both,
 }
 
@@ -47,11 +47,11 @@ impl Sides {
     ) -> Option<Self> {
         let other = other_side(pilot, signal)?;
         let made = |component| Replica::made_in(component, number, (settings.waveform, settings.replica), sense < 0.0);
-        let overlay = |component: &Component| Some(OverlaySync::new(component.overlay.of(number)?));
+        let secondary_code = |component: &Component| Some(SecondaryCodeSync::new(component.secondary_code.of(number)?));
         let half = chips_to_units(0.5 * settings.spacing_chips);
         Some(Self {
             replica: Some(Replica::joined(&made(pilot)?, &made(other)?)?),
-            overlays: [overlay(pilot)?, overlay(other)?],
+            secondary_codes: [secondary_code(pilot)?, secondary_code(other)?],
             both: Both {
                 taps: [half, 0, -half],
                 shape: ReplicaModel::of_both_sides(settings, pilot, rate_hz)?.shape,
@@ -70,9 +70,9 @@ impl Sides {
         &self.both
     }
 
-    /// Whether the overlays of both sides have different signs in a code period.
-    pub fn are_opposed(&self, phase: OverlayPhase, number: u64) -> bool {
-        let [first, second] = self.overlays.each_ref().map(|overlay| overlay.chip(phase, number));
-        planted!("receiver.sides.overlay", first != second, false)
+    /// Whether the secondary codes of both sides have different signs in a code period.
+    pub fn are_opposed(&self, phase: SecondaryCodePhase, number: u64) -> bool {
+        let [first, second] = self.secondary_codes.each_ref().map(|secondary_code| secondary_code.chip(phase, number));
+        planted!("receiver.sides.secondary_code", first != second, false)
     }
 }

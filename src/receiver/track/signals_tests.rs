@@ -1,5 +1,5 @@
 //! Search and channels on every synthetic signal, one satellite. Its samples are those of a [`Stream`], which
-//! are held here to the signal's definition: chips, layers, overlays and symbols one by one.
+//! are held here to the signal's definition: chips, layers, secondary codes and symbols one by one.
 
 use std::f64::consts::TAU;
 
@@ -28,7 +28,7 @@ struct Sky {
 struct Made {
     component: &'static Component,
     code: Vec<i8>,
-    overlay: Vec<i8>,
+    secondary_code: Vec<i8>,
     phasors: Vec<Complex64>,
     /// For a mean power of its share.
     amplitude: f64,
@@ -44,15 +44,15 @@ impl Made {
         };
         let layers = component.layers.iter();
         let phasors = layers.map(|l| phasor(component.phase_cycles + l.phase_cycles) * l.weight).collect();
-        let overlay = component.overlay.of(number).unwrap();
-        Self { component, code, overlay, phasors, amplitude: (component.power_share / duty).sqrt() }
+        let secondary_code = component.secondary_code.of(number).unwrap();
+        Self { component, code, secondary_code, phasors, amplitude: (component.power_share / duty).sqrt() }
     }
 
     /// Random symbols: those of a message, or one a period where the power is that of data.
     fn symbol(&self, period: i64) -> f64 {
         match self.component.periods_per_symbol() {
             Some(periods) => symbol(period.div_euclid(i64::from(periods))),
-            None if self.component.power_share < 0.3 && self.overlay.len() == 1 => symbol(period),
+            None if self.component.power_share < 0.3 && self.secondary_code.len() == 1 => symbol(period),
             None => 1.0,
         }
     }
@@ -67,8 +67,9 @@ impl Made {
         let wave: Complex64 = layers
             .map(|(layer, phasor)| phasor * f64::from(layer.pulse[(steps * layer.pulse.len() as f64) as usize]))
             .sum();
-        let overlay = f64::from(self.overlay[period.rem_euclid(self.overlay.len() as i64) as usize]);
-        wave * (self.amplitude * f64::from(self.code[index]) * overlay * self.symbol(period))
+        let secondary_code =
+            f64::from(self.secondary_code[period.rem_euclid(self.secondary_code.len() as i64) as usize]);
+        wave * (self.amplitude * f64::from(self.code[index]) * secondary_code * self.symbol(period))
     }
 }
 
@@ -267,8 +268,9 @@ fn every_synthetic_signal_is_followed_with_the_phase_of_the_whole_signal() {
         let squaring = 1.0 + 0.5 / (t_s * followed_hz);
         let sigma = (settings.pll_bandwidth_hz / followed_hz * squaring).sqrt() / TAU;
         assert!(carrier.1 < 1.5 * sigma, "{}: {} cycles for {sigma}", sky.link, carrier.1);
-        // The whole signal's phase, where the overlay shows half cycles; the mean of 27 independent values.
-        let overlaid = component.message.is_none() && component.overlay.periods() > 1;
+        // The whole signal's phase, where the secondary code shows half cycles; the mean of 27 independent
+        // values.
+        let overlaid = component.message.is_none() && component.secondary_code.periods() > 1;
         let is_pilot = overlaid || long_beside(component, sky.link.signal).is_some();
         assert_eq!(found.half_cycle_known, is_pilot, "{}", sky.link);
         let off = if is_pilot { carrier.0 } else { carrier.0 - 0.5 * (2.0 * carrier.0).round() };

@@ -65,7 +65,7 @@ impl Noise {
 /// The integral of a component's waveform over a code period.
 struct Integral {
     component: &'static Component,
-    overlay: Vec<i8>,
+    secondary_code: Vec<i8>,
     phasor: Complex64,
     steps: f64,
     sums: Vec<f64>,
@@ -109,14 +109,14 @@ impl Integral {
         }
         let (sin, cos) = libm::sincos(TAU * (component.phase_cycles + turn_cycles));
         let phasor = Complex64::new(cos, sin) * (component.power_share / duty).sqrt();
-        // What carries a small share of the power and has no overlay are data: a symbol a period.
-        let symbol_periods = (component.power_share < 0.3 && component.overlay.periods() == 1).then_some(1);
-        let overlay = component.overlay.of(number).unwrap();
-        Self { component, overlay, phasor, steps: steps as f64, sums, symbol_periods }
+        // What carries a small share of the power and has no secondary code are data: a symbol a period.
+        let symbol_periods = (component.power_share < 0.3 && component.secondary_code.periods() == 1).then_some(1);
+        let secondary_code = component.secondary_code.of(number).unwrap();
+        Self { component, secondary_code, phasor, steps: steps as f64, sums, symbol_periods }
     }
 
     fn sign(&self, period: i64) -> f64 {
-        let chip = f64::from(self.overlay[period.rem_euclid(self.overlay.len() as i64) as usize]);
+        let chip = f64::from(self.secondary_code[period.rem_euclid(self.secondary_code.len() as i64) as usize]);
         self.symbol_periods.map_or(chip, |periods| chip * symbol(period.div_euclid(periods)))
     }
 
@@ -208,7 +208,7 @@ impl Stream {
     /// Sends random bits under a code of a symbol a code period.
     pub fn send_bits(&mut self, signs: &[i8]) {
         for integral in &mut self.components {
-            (integral.overlay, integral.symbol_periods) = (signs.to_vec(), Some(signs.len() as i64));
+            (integral.secondary_code, integral.symbol_periods) = (signs.to_vec(), Some(signs.len() as i64));
         }
     }
 

@@ -1,4 +1,4 @@
-//! Weak pilots under an overlay, whose prompts have signs that nobody knows when the phase loop begins.
+//! Weak pilots under a secondary code, whose prompts have signs that nobody knows when the phase loop begins.
 
 use rayon::prelude::*;
 
@@ -11,11 +11,15 @@ use gnss::satellite::Sv;
 use gnss::signal::synthetic::QUADRATURE;
 use gnss::signal::{Component, Signal};
 
-/// A code of 1 ms under an overlay of a satellite's own, at a tenth of the rate that others with such an
-/// overlay have.
+/// A code of 1 ms under a secondary code of a satellite's own, at a tenth of the rate that others with such
+/// an secondary code have.
 static PILOT: Signal = Signal {
     name: "synthetic pilot",
-    components: &[Component { overlay: QUADRATURE.components[1].overlay, message: None, ..L1_CA.components[0] }],
+    components: &[Component {
+        secondary_code: QUADRATURE.components[1].secondary_code,
+        message: None,
+        ..L1_CA.components[0]
+    }],
     ..L1_CA
 };
 
@@ -45,7 +49,7 @@ fn start(seed: u64, cn0_dbhz: f64) -> (Vec<Event>, bool) {
 }
 
 #[test]
-fn a_weak_pilot_under_an_overlay_that_has_locked_stays_locked() {
+fn a_weak_pilot_under_an_secondary_code_that_has_locked_stays_locked() {
     let starts = 80;
     for cn0_dbhz in [33.0, 35.0] {
         let all: Vec<(Vec<Event>, bool)> = (0..starts).into_par_iter().map(|run| start(7000 + run, cn0_dbhz)).collect();
@@ -54,7 +58,7 @@ fn a_weak_pilot_under_an_overlay_that_has_locked_stays_locked() {
         let tracking = all.iter().filter(|(_, is_tracking)| *is_tracking).count();
         println!("{cn0_dbhz} dB-Hz: locked, slipped and lost {counts:?} of {starts}, {tracking} track at the end");
         assert_eq!(counts, [starts as usize, 0, 0], "{cn0_dbhz} dB-Hz");
-        // A wrong place of the overlay is ruled out after a second and a half in most.
+        // A wrong place of the secondary code is ruled out after a second and a half in most.
         assert!(tracking as u64 > starts - starts / 10, "{cn0_dbhz} dB-Hz: {tracking}");
     }
 }

@@ -208,7 +208,7 @@ impl Search {
 /// it turns or not, as data do.
 fn turns(signal: &'static Signal, component: &Component, coherent_s: f64) -> (f64, f64) {
     let periods = coherent_s / component.period_s();
-    let data = component.message.filter(|_| component.overlay.periods() <= 1);
+    let data = component.message.filter(|_| component.secondary_code.periods() <= 1);
     match (data, component.periods_per_symbol()) {
         // Signs of a known code for each bit; the message with the most turns speaks for all.
         (Some(message), Some(1)) => {
@@ -220,7 +220,7 @@ fn turns(signal: &'static Signal, component: &Component, coherent_s: f64) -> (f6
             signal.satellites().map(|sv| of((message.bit)(sv))).fold((0.0, 0.0), |a, b| if b.0 > a.0 { b } else { a })
         }
         (Some(_), Some(symbol)) => (0.5 * periods / f64::from(symbol), periods / f64::from(symbol)),
-        _ if component.overlay.periods() > 1 => (0.5 * periods, periods),
+        _ if component.secondary_code.periods() > 1 => (0.5 * periods, periods),
         _ => (0.0, 0.0),
     }
 }

@@ -115,8 +115,8 @@ pub struct Position {
     pub bias_enu_m: Option<[f64; 3]>,
     /// Of the three-dimensional velocity error.
     pub velocity_p95_mps: Option<f64>,
-    /// Mean normalised error squared with the receiver's own covariance, 3 of an honest one; the 95 % band of
-    /// that mean for as many independent fixes as the errors' autocorrelation leaves.
+    /// Mean normalised error squared with the receiver's own covariance, 3 of a consistent one; the 95 % band
+    /// of that mean for as many independent fixes as the errors' autocorrelation leaves.
     pub nees_mean: Option<f64>,
     /// The 95 % band of the mean for a consistent receiver.
     pub nees_band: Option<[f64; 2]>,

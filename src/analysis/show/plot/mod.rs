@@ -125,11 +125,11 @@ pub(crate) const PICTURES: [Picture; 17] = [
         sketch: position::time,
     },
     Picture {
-        name: "position_honesty",
-        caption: "Whether the receiver's own σ is honest: errors between ±2σ, and the normalised error squared, \
+        name: "position_consistency",
+        caption: "Errors between the receiver's own ±2σ, and the normalised error squared (NEES), \
                   whose mean should lie in the band that so many independent fixes allow. Above it the receiver is \
                   optimistic, below pessimistic.",
-        numbers: &["honesty.csv"],
+        numbers: &["consistency.csv"],
         sketch: consistency::consistency,
     },
     Picture {

@@ -4,11 +4,11 @@
 //! [`suspect`] compares every code with its own past, [`reseat`] moves the replicas to where a scan finds the
 //! codes, [`settle`] counts the samples. Codes of all signals take part: their steps are compared in chips of
 //! the front end's first signal, the scan takes the signal whose code is longest, and whole code periods are
-//! counted by the signal whose symbols or overlay are longest. Limits: a channel whose code period does not
-//! divide what the scan leaves open is searched for anew. Whole periods of all codes that are no whole symbol
-//! show in no code but in the signs of symbols within 0.4 s and of overlays within 0.15 s, in which a phase
-//! loop loses its lock: where that takes longer than the lock's patience (code periods of 10 ms and more),
-//! or the signs stay in doubt for two seconds, channels are lost and found anew.
+//! counted by the signal whose symbols or secondary code are longest. Limits: a channel whose code period
+//! does not divide what the scan leaves open is searched for anew. Whole periods of all codes that are no
+//! whole symbol show in no code but in the signs of symbols within 0.4 s and of secondary codes within 0.15
+//! s, in which a phase loop loses its lock: where that takes longer than the lock's patience (code periods of
+//! 10 ms and more), or the signs stay in doubt for two seconds, channels are lost and found anew.
 
 use std::collections::VecDeque;
 
@@ -32,7 +32,8 @@ mod suspect;
 
 /// Seconds between looks at least.
 const LOOK_S: f64 = 0.045;
-/// Looks whose rates are remembered: a phase loop that an overlay misleads is noticed after three at most.
+/// Looks whose rates are remembered: a phase loop that a secondary code misleads is noticed after three at
+/// most.
 const REMEMBERED: usize = 5;
 /// Channels whose power has to vanish at once, and their share.
 const LEAST_CHANNELS: usize = 3;
@@ -57,7 +58,7 @@ pub(super) struct Watched {
     rates_of_late: VecDeque<(f64, [Rates; 2])>,
     /// Looks in a row without a carrier lock.
     unlocked: usize,
-    /// Where the signs of an overlay turned in the window before the running one.
+    /// Where the signs of a secondary code turned in the window before the running one.
     turns: Option<Edges>,
     moved_chips: f64,
     profile: Profile,
@@ -76,7 +77,7 @@ impl Watched {
     }
 
     /// A look without a carrier lock: what it shows is not taken, and after some nothing before counts. A
-    /// phase loop that an overlay misleads loses its lock first.
+    /// phase loop that a secondary code misleads loses its lock first.
     fn pause(&mut self) {
         self.unlocked += 1;
         if self.unlocked >= REMEMBERED {

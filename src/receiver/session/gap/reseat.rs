@@ -69,9 +69,9 @@ impl FrontEnd {
             .collect();
         let enough = profiles.len() >= LEAST_CHANNELS;
         match scan.decide(&profiles).filter(|_| enough) {
-            // An overlay out of place shakes the carrier until no power is left: the turns of its signs show
-            // it next, and want to know what was before.
-            Some(found) if found.samples == 0 && !whole && self.has_overlays() => {
+            // A secondary code out of place shakes the carrier until no power is left: the turns of its signs
+            // show it next, and want to know what was before.
+            Some(found) if found.samples == 0 && !whole && self.has_secondary_codes() => {
                 (self.gap.stage, self.gap.in_place) = (Stage::Quiet, Some(block.end()));
             }
             // Otherwise a power that vanished without a jump is someone else's matter.
@@ -110,8 +110,8 @@ impl FrontEnd {
             };
             let ahead = jump_chips + found.seconds * units.doppler_chips(&track.channel, &glanced);
             let expected = watched.trend.forecast(now_s).map_or(watched.moved_chips, |expected| expected.chips);
-            // Where an overlay is out of place the phase loop has followed anything, for several looks.
-            let before = watched.rates_before(now_s).filter(|_| whole && track.channel.has_overlay());
+            // Where a secondary code is out of place the phase loop has followed anything, for several looks.
+            let before = watched.rates_before(now_s).filter(|_| whole && track.channel.has_secondary_code());
             let rates = before.or((!whole).then_some(glanced));
             track.channel.reseat(now, ahead / units.chips, Some(expected), rates, &mut report);
             track.line.clear();

@@ -55,7 +55,7 @@ impl FrontEnd {
     }
 
     /// Code periods that are missing beside what the scan found, and their length: as the signal says whose
-    /// symbols or overlay are longest of those that say something, and near what the Dopplers say.
+    /// symbols or secondary code are longest of those that say something, and near what the Dopplers say.
     fn missing(&self, found: Found, fit: Option<&Fit>) -> Option<(i64, f64)> {
         let rate_hz = self.metadata.rate.hz();
         let one = |signal: &'static Signal| {
@@ -123,9 +123,9 @@ impl FrontEnd {
         let now_s = self.metadata.rate.elapsed_s(now);
         for track in self.tracks.iter_mut().filter(|track| !track.dropped) {
             let units = Units::of(&track.channel, reference);
-            // Signs that stay in doubt are those of an overlay that is somewhere else.
+            // Signs that stay in doubt are those of a secondary code that is somewhere else.
             let own = whole_number(missing_s / units.period_s);
-            let Some(own) = own.filter(|_| counted || !track.channel.has_overlay()) else {
+            let Some(own) = own.filter(|_| counted || !track.channel.has_secondary_code()) else {
                 // Its code is elsewhere: it is searched for anew.
                 (track.dropped, track.wrong_time) = (true, WRONG_TIME_FIXES);
                 continue;

@@ -18,11 +18,12 @@ const VANISHED: f64 = 0.25;
 const SEEN_SIGMAS: f64 = 4.0;
 /// Turns of signs are compared with where symbols begin so often while nothing is suspected.
 const EDGES_S: f64 = 0.4;
-/// Code periods in a window over which the turns of an overlay are compared, at least. Two windows of a chip
-/// sequence of 25 show every displacement; a phase loop in a wrong overlay loses its lock after 0.2 s.
-const OVERLAY_PERIODS: u64 = 10;
-/// An overlay out of place shakes the phase loop until no power is left: for so long after a scan has found
-/// the codes in place, that is no reason for another.
+/// Code periods in a window over which the turns of a secondary code are compared, at least. Two windows of a
+/// chip sequence of 25 show every displacement; a phase loop in a wrong secondary code loses its lock after
+/// 0.2 s.
+const SECONDARY_CODE_PERIODS: u64 = 10;
+/// A secondary code out of place shakes the phase loop until no power is left: for so long after a scan has
+/// found the codes in place, that is no reason for another.
 const SHAKEN_S: f64 = 0.3;
 /// Looks that are averaged before they enter a trend: whole symbols that are missing move codes by their
 /// Dopplers alone, 0.02 chip in 20 ms, twice the noise of one look at 45 dB-Hz.
@@ -72,14 +73,14 @@ impl Settled {
     }
 }
 
-/// Where signs turned of late, and where symbols begin: of an overlay over the last two windows, of symbols
-/// since the last comparison where another is `due`; `None` where there is nothing to compare.
+/// Where signs turned of late, and where symbols begin: of a secondary code over the last two windows, of
+/// symbols since the last comparison where another is `due`; `None` where there is nothing to compare.
 fn latest_turns(track: &mut Track, due: bool) -> Option<(Edges, u64)> {
     let begin = track.channel.symbols_begin();
-    if !track.channel.has_overlay() {
+    if !track.channel.has_secondary_code() {
         return due.then(|| track.channel.take_edges()).zip(begin);
     }
-    if track.channel.edges().count() < OVERLAY_PERIODS {
+    if track.channel.edges().count() < SECONDARY_CODE_PERIODS {
         return None;
     }
     let latest = track.channel.take_edges();
@@ -136,9 +137,9 @@ impl FrontEnd {
         }
     }
 
-    /// Whether channels follow pilots whose overlay is known.
-    pub(super) fn has_overlays(&self) -> bool {
-        self.tracks.iter().any(|track| track.channel.has_overlay())
+    /// Whether channels follow pilots whose secondary code is known.
+    pub(super) fn has_secondary_codes(&self) -> bool {
+        self.tracks.iter().any(|track| track.channel.has_secondary_code())
     }
 
     /// Steps of the latest looks together.
@@ -150,8 +151,8 @@ impl FrontEnd {
         self.tracks.iter().filter(|track| track.channel.is_settled()).filter_map(one).collect()
     }
 
-    /// Whether signs turn elsewhere than where symbols or overlays have them turn: then code periods are
-    /// missing, and nothing else shows it.
+    /// Whether signs turn elsewhere than where symbols or secondary codes have them turn: then code periods
+    /// are missing, and nothing else shows it.
     pub(super) fn compare_edges(&mut self, now: u64, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         if self.gap.stage != Stage::Quiet {
             return Ok(());
@@ -165,7 +166,7 @@ impl FrontEnd {
             let enough = edges.len() >= LEAST_CHANNELS && edges.len() as f64 >= VANISHED_SHARE * own().count() as f64;
             enough && turned_by(&edges).is_some_and(|turned| turned != 0)
         });
-        // An overlay shows it within two looks, symbols within the time between two comparisons.
+        // A secondary code shows it within two looks, symbols within the time between two comparisons.
         let since = if due { self.gap.last_edges } else { now.saturating_sub(self.samples(2.0 * LOOK_S)) };
         if due {
             self.gap.last_edges = now;
@@ -180,8 +181,8 @@ impl FrontEnd {
         self.reseat(Moved { since, at: now, found, whole: true }, sink)
     }
 
-    /// Periods by which the counts of a signal's channels are short, modulo a symbol's or an overlay's, with
-    /// that number of them; `None` while it is in doubt.
+    /// Periods by which the counts of a signal's channels are short, modulo a symbol's or a secondary code's,
+    /// with that number of them; `None` while it is in doubt.
     pub(super) fn turned(&self, signal: &'static Signal) -> Option<(u64, u64)> {
         let own = self.tracks.iter().filter(|track| track.channel.signal() == signal);
         let edges: Vec<(&Edges, u64)> =

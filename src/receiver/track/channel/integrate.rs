@@ -33,7 +33,7 @@ impl Channel {
     pub(super) fn correlate(&mut self, replica: &Replica, samples: Samples, next: u64, report: &mut Report) {
         let nco = self.oscillators();
         let Correlations { sums, noise, sides } = self.correlations(replica, samples, &nco);
-        let read = self.whole && self.confirmed && !self.held && self.overlay_phase.is_some();
+        let read = self.whole && self.confirmed && !self.held && self.secondary_code_phase.is_some();
         if self.whole && (self.power.is_none() || self.period.is_multiple_of(POWER_EVERY)) {
             let power = samples.power() / samples.count().max(1) as f64;
             self.power =
@@ -46,7 +46,7 @@ impl Channel {
         let deviation = (0.5 * mean * count as f64 * self.replica_power).sqrt();
         let scale = if deviation > 0.0 { 1.0 / deviation } else { 0.0 };
         if read && let Some(data) = &mut self.data {
-            let phase = self.overlay_phase.unwrap_or_default();
+            let phase = self.secondary_code_phase.unwrap_or_default();
             report.symbols.extend(data.read(samples, self.arithmetic, &nco, (self.period, phase, next), scale));
         }
         let first = self.first_half(replica, samples, &nco);
@@ -61,7 +61,7 @@ impl Channel {
             self.update_since = next;
             return;
         }
-        let signed = scale * self.overlay_chip(finished);
+        let signed = scale * self.secondary_code_chip(finished);
         let mut taps = [Complex64::ZERO; 3];
         taps.iter_mut().zip(&sums).for_each(|(tap, sum)| *tap = sum * signed);
         if !self.held && !self.moved {
@@ -155,7 +155,7 @@ impl Channel {
         let is_in_bit = self.bit_begin.is_some();
         if is_in_bit && self.confirmed {
             // As it was sent, with the sign that its bit's code has there.
-            let soft = (prompt.re * self.overlay_chip(number)) as f32;
+            let soft = (prompt.re * self.secondary_code_chip(number)) as f32;
             report.symbols.push(Symbol { first_period: number, end: self.first, soft });
         }
         self.symbol.0 += prompt;
@@ -182,8 +182,8 @@ impl Channel {
     /// Closes the loops with the sums of an integration.
     fn update(&mut self) {
         let t_s = self.period_s * f64::from(self.summed);
-        // With an overlay out of place nothing but the code is where it seems.
-        let astray = self.held && self.has_overlay();
+        // With a secondary code out of place nothing but the code is where it seems.
+        let astray = self.held && self.has_secondary_code();
         let before = match self.stage {
             _ if astray => None,
             Stage::Tracking(_) => self.previous_sum,

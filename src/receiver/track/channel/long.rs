@@ -6,13 +6,13 @@ use crate::correlate::sums::Samples;
 use crate::correlate::{Nco, Replica};
 use crate::lead::lead;
 use crate::track::long::LongCode;
-use crate::track::overlay::{OverlayPhase, OverlaySync};
+use crate::track::secondary_code::{SecondaryCodePhase, SecondaryCodeSync};
 
 impl Channel {
     /// The long code's replica for the running period, once its segment is known and where it is another than
     /// that of the period before.
     pub(super) fn next_segment(&mut self) -> Option<Replica> {
-        let phase = self.overlay_phase?;
+        let phase = self.secondary_code_phase?;
         let long = self.long.as_mut()?;
         let segment = long.segment(phase, self.period);
         if self.segment == Some(segment) {
@@ -24,8 +24,8 @@ impl Channel {
 
     /// Correlates the running period with all segments of the long code, where the carrier is locked to
     /// symbols; gives the long code's phase once it is beyond doubt.
-    pub(super) fn seek_segment(&mut self, samples: Samples, nco: &Nco, scale: f64) -> Option<OverlayPhase> {
-        let ready = self.whole && self.confirmed && !self.held && !self.moved && self.overlay_phase.is_none();
+    pub(super) fn seek_segment(&mut self, samples: Samples, nco: &Nco, scale: f64) -> Option<SecondaryCodePhase> {
+        let ready = self.whole && self.confirmed && !self.held && !self.moved && self.secondary_code_phase.is_none();
         if !ready || !matches!(self.stage, Stage::Tracking(_)) || !self.lock.is_locked() {
             return None;
         }
@@ -39,12 +39,12 @@ impl Channel {
 
     /// From the next code period on the long code is followed, and the code that was is that of the data
     /// beside it. The carrier gets the right half cycle.
-    pub(super) fn follow_long(&mut self, phase: OverlayPhase) {
+    pub(super) fn follow_long(&mut self, phase: SecondaryCodePhase) {
         let Some(pilot) = self.long.as_ref().map(LongCode::component) else { return };
         let rates = (self.rate.hz(), self.sense);
         self.data = lead(self.signal).and_then(|data| Data::new(data, pilot, self.sv.number, &self.settings, rates));
-        // The segment takes the place of an overlay: no signs are left.
-        self.overlay = Some(OverlaySync::new(vec![1]));
+        // The segment takes the place of a secondary code: no signs are left.
+        self.secondary_code = Some(SecondaryCodeSync::new(vec![1]));
         self.polarity = None;
         self.wipe(phase);
         self.enter(Stage::Tracking(0));

@@ -24,7 +24,7 @@ impl Channel {
             code_periods: periods.max(0) as u64,
             code_fraction: fraction,
             carrier_cycles: half - planted!("receiver.measure.carrier_sign", self.sense, -self.sense) * turns,
-            half_cycle_known: self.polarity.is_some() || self.overlay_phase.is_some(),
+            half_cycle_known: self.polarity.is_some() || self.secondary_code_phase.is_some(),
             doppler_hz: planted!("receiver.measure.doppler_sign", self.sense, -self.sense) * offset_hz,
             cn0_dbhz,
             locked_s: self.lock.locked_since().map_or(0.0, |since| tick.saturating_sub(since) as f64 / self.rate.hz()),

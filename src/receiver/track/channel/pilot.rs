@@ -1,4 +1,5 @@
-//! A pilot that has been recognised: its overlay is taken off the prompts, and the data beside it are read.
+//! A pilot that has been recognised: its secondary code is taken off the prompts, and the data beside it are
+//! read.
 
 use std::f64::consts::TAU;
 
@@ -12,7 +13,7 @@ use crate::lead::beside;
 use crate::track::TrackingSettings;
 use crate::track::cn0::Cn0;
 use crate::track::model::ReplicaModel;
-use crate::track::overlay::{OverlayPhase, OverlaySync};
+use crate::track::secondary_code::{SecondaryCodePhase, SecondaryCodeSync};
 use gnss::satellite::Sv;
 use gnss::signal::{Component, Signal};
 
@@ -25,7 +26,7 @@ pub(super) struct Data {
     /// Deviation of the noise in its correlations over that in the pilot's.
     deviation: f64,
     periods_per_symbol: u64,
-    overlay: OverlaySync,
+    secondary_code: SecondaryCodeSync,
     sum: (Complex64, u64),
 }
 
@@ -59,7 +60,7 @@ impl Data {
             turn: Complex64::new(cos, sin),
             deviation: (share / own).sqrt(),
             periods_per_symbol: u64::from(component.periods_per_symbol()?),
-            overlay: OverlaySync::new(component.overlay.of(number)?),
+            secondary_code: SecondaryCodeSync::new(component.secondary_code.of(number)?),
             sum: (Complex64::ZERO, 0),
         })
     }
@@ -76,11 +77,11 @@ impl Data {
         samples: Samples,
         arithmetic: Arithmetic,
         nco: &Nco,
-        (number, phase, end): (u64, OverlayPhase, u64),
+        (number, phase, end): (u64, SecondaryCodePhase, u64),
         scale: f64,
     ) -> Option<Symbol> {
         let [sum] = self.replica.correlate_in(arithmetic, samples, nco, &[0]);
-        let chip = self.overlay.chip(phase, number);
+        let chip = self.secondary_code.chip(phase, number);
         let at = (number + phase.shift) % self.periods_per_symbol;
         if at == 0 {
             self.sum = (Complex64::ZERO, 0);
@@ -94,10 +95,10 @@ impl Data {
 }
 
 impl Channel {
-    /// The sign of the overlay in a code period, or of the code under a bit; one while it is unknown.
-    pub(super) fn overlay_chip(&self, number: u64) -> f64 {
-        match (&self.overlay, self.overlay_phase, &self.bits, self.bit_begin) {
-            (Some(overlay), Some(phase), ..) => overlay.chip(phase, number),
+    /// The sign of the secondary code in a code period, or of the code under a bit; one while it is unknown.
+    pub(super) fn secondary_code_chip(&self, number: u64) -> f64 {
+        match (&self.secondary_code, self.secondary_code_phase, &self.bits, self.bit_begin) {
+            (Some(secondary_code), Some(phase), ..) => secondary_code.chip(phase, number),
             (_, _, Some(bits), Some(begin)) => bits.sign(number, begin),
             _ => 1.0,
         }
@@ -131,12 +132,12 @@ impl Channel {
         }
     }
 
-    /// From the next code period on the overlay is taken off. The carrier gets the right half cycle.
-    pub(super) fn wipe(&mut self, phase: OverlayPhase) {
+    /// From the next code period on the secondary code is taken off. The carrier gets the right half cycle.
+    pub(super) fn wipe(&mut self, phase: SecondaryCodePhase) {
         if phase.inverted {
             self.carrier += (0.5 * TURN) as i128;
         }
-        self.overlay_phase = Some(phase);
+        self.secondary_code_phase = Some(phase);
         self.group = pilot_group(self.period_s);
         self.has_symbols = false;
         self.loops.wipe();
@@ -144,6 +145,6 @@ impl Channel {
         self.join_sides();
         self.previous = None;
         self.previous_sum = None;
-        self.watch_overlay();
+        self.watch_secondary_code();
     }
 }

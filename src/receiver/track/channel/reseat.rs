@@ -9,7 +9,7 @@ use crate::gap::Edges;
 use crate::track::Report;
 use crate::track::lock::{LockState, PhaseLock, Rotation, SymbolLock};
 use crate::track::loops::Rates;
-use crate::track::overlay::OverlaySync;
+use crate::track::secondary_code::SecondaryCodeSync;
 use crate::track::sync::SymbolSync;
 
 use super::LOCK_PERIODS;
@@ -81,10 +81,10 @@ impl Channel {
     }
 
     /// The code period modulo a symbol's in which symbols begin, where that is beyond doubt; 0 where an
-    /// overlay or the code under bits is known, which numbers periods itself.
+    /// secondary code or the code under bits is known, which numbers periods itself.
     pub fn symbols_begin(&self) -> Option<u64> {
         match self.stage {
-            Stage::Tracking(_) if self.has_overlay() || self.bit_begin.is_some() => Some(0),
+            Stage::Tracking(_) if self.has_secondary_code() || self.bit_begin.is_some() => Some(0),
             Stage::Tracking(begin) if self.confirmed && self.has_symbols => Some(begin),
             _ => None,
         }
@@ -107,16 +107,16 @@ impl Channel {
         std::mem::replace(&mut self.glances.edges, emptied)
     }
 
-    /// Whether an overlay has been recognised, and is taken off the prompts.
-    pub fn has_overlay(&self) -> bool {
-        self.overlay_phase.is_some()
+    /// Whether a secondary code has been recognised, and is taken off the prompts.
+    pub fn has_secondary_code(&self) -> bool {
+        self.secondary_code_phase.is_some()
     }
 
-    /// Signs turn where an overlay has them turn.
-    pub(super) fn watch_overlay(&mut self) {
-        let periods = self.overlay.as_ref().map_or(0, OverlaySync::periods);
-        let chips: Vec<f64> = (0..periods as u64).map(|number| self.overlay_chip(number)).collect();
-        self.glances.edges = Edges::of_overlay(&chips);
+    /// Signs turn where a secondary code has them turn.
+    pub(super) fn watch_secondary_code(&mut self) {
+        let periods = self.secondary_code.as_ref().map_or(0, SecondaryCodeSync::periods);
+        let chips: Vec<f64> = (0..periods as u64).map(|number| self.secondary_code_chip(number)).collect();
+        self.glances.edges = Edges::of_secondary_code(&chips);
     }
 
     /// The carrier's Doppler at these rates, less what the code does not share.

@@ -6,12 +6,12 @@ use crate::lead::BOTH_SIDES;
 
 impl Channel {
     /// Makes the replica ready for the running period: with the segment of a long code, or with both sides of
-    /// a sub-carrier once the overlay is known, in the signs that they have.
+    /// a sub-carrier once the secondary code is known, in the signs that they have.
     pub(super) fn ready(&mut self, replica: &mut Replica) {
         if let Some(segment) = self.next_segment() {
             *replica = segment;
         }
-        let (Some(phase), Some(sides)) = (self.overlay_phase, &mut self.sides) else { return };
+        let (Some(phase), Some(sides)) = (self.secondary_code_phase, &mut self.sides) else { return };
         if let Some(both) = sides.replica() {
             *replica = both;
         }

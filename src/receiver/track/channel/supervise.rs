@@ -140,7 +140,7 @@ impl Channel {
         }
         self.loops.carrier = Rates { rate, acceleration: 0.0 };
         self.carrier += (found.phase_cycles * TURN) as i128;
-        if self.overlay.is_some() && self.overlay_phase.is_none() {
+        if self.secondary_code.is_some() && self.secondary_code_phase.is_none() {
             self.enter(Stage::Assisted);
             return;
         }
@@ -176,7 +176,7 @@ impl Channel {
     }
 
     fn confirm(&mut self, report: &mut Report) {
-        if !self.confirmed && (self.has_symbols || self.overlay.is_some()) {
+        if !self.confirmed && (self.has_symbols || self.secondary_code.is_some()) {
             report.events.push((self.first, Event::BitSynchronised));
         }
         self.confirmed = true;
@@ -233,10 +233,10 @@ impl Channel {
     /// Begins to track at the first symbol after its edge is known.
     fn find_symbols(&mut self, number: u64, prompt: Complex64, report: &mut Report) {
         let prompt = self.whitened(prompt);
-        if self.overlay_phase.is_none()
-            && let Some(overlay) = &mut self.overlay
+        if self.secondary_code_phase.is_none()
+            && let Some(secondary_code) = &mut self.secondary_code
         {
-            if let Some(phase) = overlay.add(number, prompt) {
+            if let Some(phase) = secondary_code.add(number, prompt) {
                 self.wipe(phase);
             }
             return;
@@ -294,13 +294,13 @@ impl Channel {
         self.forget_phase();
     }
 
-    /// Symbols and overlay are sought where the phase is right only.
+    /// Symbols and secondary code are sought where the phase is right only.
     fn forget_phase(&mut self) {
         self.polarity = None;
         self.forget_bits();
         self.sync = SymbolSync::new(self.group);
-        if let Some(overlay) = &mut self.overlay {
-            overlay.clear();
+        if let Some(secondary_code) = &mut self.secondary_code {
+            secondary_code.clear();
         }
         if let Some(long) = &mut self.long {
             long.clear();
