@@ -16,9 +16,9 @@ use crate::gnss::time::Epoch;
 use crate::study::sweep::export::Directive;
 use crate::study::sweep::part::Part;
 
-/// A GNSS digital twin: generate IF samples from real ephemerides, receive them, judge the receiver.
+/// A GNSS digital twin: generates IF samples from real ephemerides, receives them and judges the receiver.
 ///
-/// Without a command it runs the scene of GPS and Galileo that comes with the program.
+/// Without a command it runs its embedded scene of GPS and Galileo.
 #[derive(Debug, Parser)]
 #[command(version, after_help = "Example: gnss-twin run scenarios/moderate.toml --out reports/moderate")]
 pub struct Arguments {
@@ -38,30 +38,30 @@ pub enum Command {
     Receive(Receive),
     /// Judge an existing run again
     Analyze(Analyze),
-    /// Say what a scene will compute, what not, and why
+    /// Show what a scene will compute, without computing it
     Plan(Plan),
-    /// Run a study: a base, axes and repetitions become tables, curves and a report
+    /// Run a parameter study: vary keys, repeat with other noise, write tables, curves and a report
     Study(Study),
-    /// Write the tables of a run or a study as Parquet too
+    /// Convert the tables of a run or a study to Parquet
     Parquet(Parquet),
     /// List every key of scenarios, receiver settings, studies and limits: default, unit, range, meaning
     Reference(Reference),
     /// List the scenes that come with the program, or copy some of them
     Scenes(Scenes),
-    /// Write a scene with comments, to begin with
+    /// Write a commented scene to start from
     Init(Init),
     /// Print a JSON schema for editors and validators
     Schema(Schema),
-    /// Print the completions of a shell
+    /// Print shell completions
     Completions(Completions),
-    /// Write the manual's pages
+    /// Write the manual pages
     Man(Man),
 }
 
 #[derive(Args, Debug)]
 #[command(
-    after_help = "Example: gnss-twin parquet reports/static\n\nBeside TABLE.csv comes TABLE.parquet, with the same \
-                        names of columns"
+    after_help = "Example: gnss-twin parquet reports/static\n\nTABLE.parquet is written beside TABLE.csv, with the \
+                        same column names"
 )]
 pub struct Parquet {
     /// Directories with tables, of runs or studies, or tables (.csv)
@@ -72,12 +72,12 @@ pub struct Parquet {
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:\n  gnss-twin scenes\n  gnss-twin scenes jammed ionex --out my-scenes")]
 pub struct Scenes {
-    /// Scenes to copy, with the files that they name [default: none, all are listed]
+    /// Scenes to copy, with the files that they name [default: list all scenes]
     pub names: Vec<String>,
-    /// Directory to copy them to
+    /// Destination directory
     #[arg(long, value_name = "DIR", default_value = ".")]
     pub out: PathBuf,
-    /// Replace files that are there
+    /// Overwrite existing files
     #[arg(long)]
     pub force: bool,
 }
@@ -85,10 +85,10 @@ pub struct Scenes {
 #[derive(Args, Debug)]
 #[command(after_help = "Example: gnss-twin init my.toml && gnss-twin run my.toml")]
 pub struct Init {
-    /// Where to write it
+    /// File to write
     #[arg(default_value = "scene.toml")]
     pub path: PathBuf,
-    /// Replace a file that is there
+    /// Overwrite an existing file
     #[arg(long)]
     pub force: bool,
 }
@@ -97,7 +97,7 @@ pub struct Init {
 #[command(after_help = "Example: gnss-twin schema scenario > scenario.schema.json, and in the scene's first line:\n  \
                   #:schema scenario.schema.json")]
 pub struct Schema {
-    /// Of which kind of file
+    /// Kind of file that the schema describes
     pub of: SchemaOf,
 }
 
@@ -116,14 +116,14 @@ pub enum SchemaOf {
 #[derive(Args, Debug)]
 #[command(after_help = "Example: gnss-twin completions bash > ~/.local/share/bash-completion/completions/gnss-twin")]
 pub struct Completions {
-    /// The shell
+    /// Shell to write completions for
     pub shell: clap_complete::Shell,
 }
 
 #[derive(Args, Debug)]
 #[command(after_help = "Example: gnss-twin man --out ~/.local/share/man/man1")]
 pub struct Man {
-    /// Directory that takes gnss-twin.1 and a page for each command
+    /// Directory for gnss-twin.1 and one page per command
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
 }
@@ -131,7 +131,7 @@ pub struct Man {
 #[derive(Args, Debug)]
 #[command(after_help = "Example: gnss-twin reference front_end")]
 pub struct Reference {
-    /// One table by its name: motion, receiver.tracking, study.axis, limits [default: all]
+    /// Table to list, such as motion, receiver.tracking, study.axis or limits [default: all tables]
     pub table: Option<String>,
 }
 
@@ -140,29 +140,29 @@ pub struct Reference {
 pub struct Run {
     /// Scene to run [default: the embedded scene of GPS and Galileo]
     pub scenario: Option<PathBuf>,
-    /// Directory for the results [default: reports/<scene's name>, and -NAME with --front-end NAME]
+    /// Directory for the results [default: reports/SCENE, or reports/SCENE-NAME with --front-end NAME]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Front end to receive, of a scene that has several [default: all of them in one reception]
+    /// Front end to receive in a scene with several [default: all in one reception]
     #[arg(long, value_name = "NAME")]
     pub front_end: Option<String>,
-    /// Seed of the noise, in place of the scene's
+    /// Noise seed, overrides the scene's
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// Threads to use [default: one a core]
+    /// Threads to use [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Version of the RINEX files: 3.05 or 4.02
     #[arg(long, value_name = "VERSION", default_value_t)]
     pub rinex: Version,
-    /// Also keep the samples: if.sigmf-data and if.sigmf-meta
+    /// Keep the samples as if.sigmf-data and if.sigmf-meta
     #[arg(long)]
     pub keep_if: bool,
-    /// Exit with 3 if a limit is broken: one of this file's for summary.json, or of the verdict's own without
-    /// a file
+    /// Exit with code 3 if a limit is broken. Without a file the limits are the verdict's own; a file sets
+    /// limits for figures of summary.json
     #[arg(long, value_name = "LIMITS.toml", num_args = 0..=1)]
     pub check: Option<Option<PathBuf>>,
-    /// Also read files that lie outside the scenario's directory
+    /// Allow the scene to read files outside its own directory
     #[arg(long)]
     pub allow_outside: bool,
     #[command(flatten)]
@@ -178,54 +178,55 @@ pub struct Run {
 pub struct Generate {
     /// Scene to generate
     pub scenario: PathBuf,
-    /// Also read files that lie outside the scenario's directory
+    /// Allow the scene to read files outside its own directory
     #[arg(long)]
     pub allow_outside: bool,
-    /// File for the samples; metadata (.sigmf-meta) and truth (.truth/) are written beside it. Of a scene
-    /// with several front ends a directory, for NAME.sigmf-data and NAME.sigmf-meta of each, a
-    /// .sigmf-collection and truth/. Or a stream of samples alone, at the reader's pace: - (standard output),
-    /// fifo:PATH, file:PATH, tcp:ADDR, rtl-tcp:ADDR. ADDR is where to listen for one client: PORT on this
-    /// machine alone, or IP:PORT
+    /// File for the samples. Metadata (.sigmf-meta) and truth (.truth/) are written beside it. A scene with
+    /// several front ends needs a directory; it gets NAME.sigmf-data and NAME.sigmf-meta for each front end,
+    /// a .sigmf-collection and truth/. A stream carries samples alone, at the reader's pace: - (standard
+    /// output), fifo:PATH, file:PATH, tcp:ADDR, rtl-tcp:ADDR. ADDR is the address to listen on for one
+    /// client: PORT on this machine alone, or IP:PORT
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
-    /// Directory for the truth of a stream [default: none]
+    /// Directory for the truth of a stream [default: no truth is written]
     #[arg(long, value_name = "DIR")]
     pub truth: Option<PathBuf>,
-    /// Also write RINEX into the truth, what an ideal receiver would have and the sets that are sent: 3.05,
-    /// or --rinex=4.02
+    /// Write RINEX files into the truth directory: the observations of an ideal receiver, and the broadcast
+    /// ephemerides. Version 3.05, or --rinex=4.02
     #[arg(long, value_name = "VERSION", num_args = 0..=1, require_equals = true, default_missing_value = "3.05")]
     pub rinex: Option<Version>,
-    /// Also write the antenna's place into the truth as NMEA 0183: trajectory.nmea
+    /// Write the antenna's positions into the truth directory as NMEA 0183: trajectory.nmea
     #[arg(long)]
     pub nmea: bool,
-    /// Also write it as tracks for maps, a point a second: trajectory.kml and trajectory.gpx
+    /// Write the antenna's track into the truth directory, one point per second: trajectory.kml,
+    /// trajectory.gpx
     #[arg(long)]
     pub maps: bool,
-    /// Also write NAME.gnss-sdr.conf beside the samples, with which GNSS-SDR opens them
+    /// Write NAME.gnss-sdr.conf beside the samples, a configuration for GNSS-SDR
     #[arg(long)]
     pub gnss_sdr: bool,
-    /// Also write FILE.tag beside the samples, with which PocketSDR opens them
+    /// Write FILE.tag beside the samples, the description that PocketSDR reads
     #[arg(long)]
     pub pocketsdr: bool,
-    /// How samples of a few bits are packed: those of the scene's converter
+    /// Packing of samples whose width is that of the scene's converter
     #[command(flatten)]
     pub packed: Bits,
-    /// Front end to generate, of a scene that has several [default: all of them]
+    /// Front end to generate in a scene with several [default: all]
     #[arg(long, value_name = "NAME")]
     pub front_end: Option<String>,
-    /// Sample format, in place of the scene's: ci8, cu8, ci16, cf32, ri8, ri16 [default to rtl-tcp: cu8]
+    /// Sample format, overrides the scene's: ci8, cu8, ci16, cf32, ri8, ri16 [default for rtl-tcp: cu8]
     #[arg(long)]
     pub format: Option<Format>,
-    /// First sample of the scene to write: the same bits as in the whole, without making what lies before
+    /// Number of the first sample to write. Samples before it are not computed; those after it do not change
     #[arg(long, value_name = "SAMPLE", default_value_t = 0)]
     pub seek: u64,
-    /// Samples to write [default: to the scene's end]
+    /// Number of samples to write [default: up to the end of the scene]
     #[arg(long, value_name = "COUNT")]
     pub samples: Option<u64>,
-    /// Seed of the noise, in place of the scene's
+    /// Noise seed, overrides the scene's
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// Threads to use [default: one a core]
+    /// Threads to use [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     #[command(flatten)]
@@ -236,88 +237,87 @@ pub struct Generate {
 #[command(
     after_help = "Examples:\n  gnss-twin live scene.toml --motion udp:4567 --to - | hackrf_transfer -t - -f 1575420000 \
                   -s 2600000\n  gnss-twin live scene.toml --clock host --motion udp:4567 --to tcp:5000 --record \
-                  reports/flight\n  gnss-twin generate reports/flight/replay.toml --out again.sigmf-data\n\nStatus: a \
-                  line of JSON a second on standard error. Exit code: 3 past --max-underruns or --max-late, 130 or \
-                  143 by signal"
+                  reports/flight\n  gnss-twin generate reports/flight/replay.toml --out again.sigmf-data\n\nStatus: one \
+                  line of JSON per second on standard error. Exit code: 3 beyond --max-underruns or --max-late, 130 \
+                  or 143 after a signal"
 )]
 pub struct Live {
-    /// Scene to send; where its motion is "pushed" it takes motion and events
+    /// Scene to send. With motion kind = "pushed" it takes motion and events from --motion
     pub scenario: PathBuf,
-    /// Where samples go, several times for several: - (standard output), fifo:PATH, tcp:ADDR, rtl-tcp:ADDR,
-    /// file:PATH. The first one sets the pace; others lose whole ticks, which are counted, while they are
-    /// slow
+    /// Destination of the samples: - (standard output), fifo:PATH, tcp:ADDR, rtl-tcp:ADDR or file:PATH. May
+    /// be given several times. The first destination sets the pace; a slower one loses whole ticks, which are
+    /// counted
     #[arg(long, value_name = "SINK", default_value = "-")]
     pub to: Vec<Spec>,
-    /// What the pace follows: the first sink's reading, this machine's clock, or nothing
+    /// Source of the pace
     #[arg(long, value_enum, default_value_t = Clock::Sink)]
     pub clock: Clock,
-    /// How far ahead of their time samples are made: what a sluggish machine may lose without an underrun
+    /// Lead of the samples over their due time, in milliseconds; a delay up to it causes no underrun
     #[arg(long, value_name = "MS", default_value_t = 8.0, value_parser = latency)]
     pub latency: f64,
-    /// When the first sample is sent, and the time that it has: a UTC second like 2026-11-23T05:00:00Z, or +S
-    /// seconds from now [default: at once, at the scene's own time]
+    /// Time at which the first sample is sent and which it carries: a UTC second like 2026-11-23T05:00:00Z,
+    /// or +S seconds from now [default: sent at once, with the scene's own start time]
     #[arg(long, value_name = "UTC|+S", value_parser = start_at)]
     pub start_at: Option<StartAt>,
-    /// Where motion and events come in: udp:ADDR, tcp:ADDR or - (standard input). ADDR is PORT on this
-    /// machine alone, or IP:PORT
+    /// Source of motion and events: udp:ADDR, tcp:ADDR or - (standard input). ADDR is PORT on this machine
+    /// alone, or IP:PORT
     #[arg(long, value_name = "ORIGIN")]
     pub motion: Option<Origin>,
-    /// What the times of states count from: sample 0 of the scene, or the first state, which is then of the
-    /// instant at which it is used: for a rig whose clock shares no start with the scene's
+    /// Origin of the times in motion states
     #[arg(long, value_enum, default_value_t = MotionTime::Scene)]
     pub motion_time: MotionTime,
-    /// Directory for a record of the run: what came in, what was sent, its truth, and replay.toml
+    /// Directory for a record of the run: the received motion and events, the truth, and replay.toml
     #[arg(long, value_name = "DIR")]
     pub record: Option<PathBuf>,
-    /// Exit with 3 after more underruns than that
+    /// Exit with code 3 after more than N underruns
     #[arg(long, value_name = "N")]
     pub max_underruns: Option<u64>,
-    /// Exit with 3 after more states that came too late than that
+    /// Exit with code 3 after more than N late states
     #[arg(long, value_name = "N")]
     pub max_late: Option<u64>,
-    /// Front end to send, of a scene that has several
+    /// Front end to send in a scene with several
     #[arg(long, value_name = "NAME")]
     pub front_end: Option<String>,
-    /// Sample format, in place of the scene's: ci8, cu8, ci16, cf32, ri8, ri16 [default to rtl-tcp: cu8]
+    /// Sample format, overrides the scene's: ci8, cu8, ci16, cf32, ri8, ri16 [default for rtl-tcp: cu8]
     #[arg(long)]
     pub format: Option<Format>,
-    /// Seed of the noise, in place of the scene's
+    /// Noise seed, overrides the scene's
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// Threads to use [default: one a core]
+    /// Threads to use [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Also read files that lie outside the scenario's directory
+    /// Allow the scene to read files outside its own directory
     #[arg(long)]
     pub allow_outside: bool,
 }
 
-/// What the pace of a live run follows.
+/// Source of the pace of a live run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Clock {
-    /// The first sink's reading: a radio's own clock
+    /// The first destination's reading: a radio's own clock
     Sink,
     /// This machine's clock
     Host,
-    /// Nothing: as fast as sinks take it
+    /// None: as fast as the destinations read
     Free,
 }
 
-/// What the times of pushed states count from.
+/// Origin of the times in pushed motion states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum MotionTime {
-    /// The scene's sample 0
+    /// Sample 0 of the scene
     Scene,
-    /// The first state, which is of the instant at which it is used
+    /// The first state, which counts as current when it is used; for a rig whose clock has another origin
     First,
 }
 
-/// When a live run starts.
+/// Start of a live run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StartAt {
-    /// At this instant.
+    /// A given instant.
     Utc(Epoch),
-    /// At the first whole second that is so many seconds away.
+    /// The first whole second at least this many seconds from now.
     After(f64),
 }
 
@@ -340,42 +340,43 @@ fn latency(text: &str) -> Result<f64, String> {
 #[command(
     after_help = "Examples:\n  gnss-twin receive if.sigmf-data --out reports/mine\n  gnss-twin receive raw.bin --out \
                   reports/raw --format ci8 --rate-hz 4e6\n  gnss-twin receive rtl-tcp:1234 --rate-hz 2.4e6 --out \
-                  reports/now --live --nmea tcp:10110 --json -\n\nExit code: 0 with a fix, 2 for a command line \
-                  that is refused, 3 without a fix (results are written, the reason is printed), 74 when the sender \
-                  broke off (results end there), 130 after Ctrl-C with --live, 65 when the input is no recording"
+                  reports/now --live --nmea tcp:10110 --json -\n\nExit code: 0 with a fix, 2 for a refused \
+                  command line, 3 without a fix (results are written, the reason is printed), 65 if the input is not \
+                  a recording, 74 if the sender stopped early (results end there), 130 after Ctrl-C with --live"
 )]
 pub struct Receive {
-    /// Recording: a SigMF pair (either file), archive (.sigmf) or collection of front ends that share a
-    /// clock, ION metadata (.xml, .sdrx), or a raw file with --format or --bits and --rate-hz; - is standard
-    /// input. Or a stream: fifo:PATH, tcp:ADDR of a server of samples alone, rtl-tcp:ADDR of one that drives
-    /// a dongle (ADDR is HOST:PORT, or PORT on this machine)
+    /// Recording or stream. A recording is a SigMF pair (either file), a SigMF archive (.sigmf), a SigMF
+    /// collection of front ends that share a clock, ION metadata (.xml, .sdrx), or a raw file with --format
+    /// or
+    /// --bits and --rate-hz. A stream is - (standard input), fifo:PATH, tcp:ADDR of a server of plain
+    /// samples, or rtl-tcp:ADDR of an rtl_tcp server. ADDR is HOST:PORT, or PORT on this machine
     pub file: PathBuf,
     /// Directory for the results
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Rows and lines can be read as they come, in DIR.unfinished until the end; Ctrl-C ends the stream, and
-    /// what came before it is finished
+    /// Write rows as they are found, in DIR.unfinished, which is renamed to DIR at the end. Ctrl-C ends the
+    /// stream and completes the results
     #[arg(long)]
     pub live: bool,
-    /// NMEA 0183 of every fix (GGA, RMC, VTG, ZDA, GSA, GSV): a file, - (standard output), fifo:PATH, or
-    /// tcp:ADDR to listen on
+    /// Write each fix as NMEA 0183 (GGA, RMC, VTG, ZDA, GSA, GSV) to a file, - (standard output), fifo:PATH,
+    /// or the clients of tcp:ADDR
     #[arg(long, value_name = "TO")]
     pub nmea: Option<lines::Spec>,
-    /// JSON lines of fixes, satellites, channels, searches and events: a file, -, fifo:PATH or tcp:ADDR;
-    /// without one of these, print the results as one JSON object
+    /// Write fixes, satellites, channels, searches and events as JSON lines to a file, -, fifo:PATH or
+    /// tcp:ADDR. Without a value: print the results as one JSON object
     #[arg(long, value_name = "TO", num_args = 0..=1)]
     pub json: Option<Option<lines::Spec>>,
-    /// Print neither results nor progress: only warnings and errors
+    /// Print only warnings and errors
     #[arg(long, short)]
     pub quiet: bool,
-    /// Also write RINEX, observations.rnx and navigation.rnx: 3.05, or --rinex=4.02
+    /// Write observations.rnx and navigation.rnx in RINEX 3.05, or --rinex=4.02
     #[arg(long, value_name = "VERSION", num_args = 0..=1, require_equals = true, default_missing_value = "3.05")]
     pub rinex: Option<Version>,
-    /// Receiver settings [default: the built-in ones]
+    /// Receiver settings [default: built in]
     #[arg(long, value_name = "SETTINGS.toml")]
     pub receiver: Option<PathBuf>,
-    /// Signals to search for: all that the bands hold, or names like "GPS L1 C/A,Galileo E1" [default: the
-    /// settings'; those that the metadata name; GPS L1 C/A, or all where the bands do not hold it]
+    /// Signals to search for: names like "GPS L1 C/A,Galileo E1", or all for every signal in the bands
+    /// [default: those of the settings; else those of the metadata; else GPS L1 C/A, or all if L1 is outside]
     #[arg(long, value_name = "all|NAMES", value_delimiter = ',')]
     pub signals: Vec<String>,
     /// Sample format of a raw file or stream: ci8, cu8, ci16, cf32, ri8, ri16
@@ -384,21 +385,22 @@ pub struct Receive {
     /// Sample rate of a raw file or stream
     #[arg(long, value_name = "HZ")]
     pub rate_hz: Option<f64>,
-    /// Frequency at which GPS L1, 1575.42 MHz, lies in a raw file's samples: above zero where their 0 Hz is
-    /// at 1575.42 MHz less HZ, below zero where it is above 1575.42 MHz; with --inverted also as it lies in
-    /// the samples [default: 0 of complex samples; real ones need it]
+    /// Frequency of GPS L1 (1575.42 MHz) within a raw file's samples. It is positive if 0 Hz of the samples
+    /// is
+    /// 1575.42 MHz − HZ, and negative if 0 Hz lies above 1575.42 MHz. With --inverted it is the frequency as
+    /// it appears in the samples [default: 0 for complex samples; real samples need it]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub if_hz: Option<f64>,
-    /// The raw file's spectrum is mirrored (local oscillator above the signal)
+    /// The raw file's spectrum is inverted (local oscillator above the signal)
     #[arg(long)]
     pub inverted: bool,
-    /// How samples of a few bits, or of several channels, lie in the file
+    /// Packing of samples and channels in the file
     #[command(flatten)]
     pub packed: Packed,
-    /// Time of the first sample, as GPS time or with a final Z as UTC; only labels the clock
+    /// Time of the first sample: GPS time, or UTC with a final Z. It labels results and resolves the era
     #[arg(long, value_name = "TIME")]
     pub start: Option<String>,
-    /// Threads to use [default: one a core]
+    /// Threads to use [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
 }
@@ -409,19 +411,19 @@ pub struct Receive {
                   --truth static.truth --rinex-obs rx.26O --nmea rx.nmea --out reports/mine"
 )]
 pub struct Analyze {
-    /// Directory of a run, with truth/ and rx/
+    /// Directory of a run, which holds truth/ and rx/
     #[arg(required_unless_present = "truth", conflicts_with = "truth")]
     pub run: Option<PathBuf>,
-    /// Exit with 3 if a limit is broken: one of this file's for summary.json (foreign.json with --truth), or
-    /// of the verdict's own without a file
+    /// Exit with code 3 if a limit is broken. Without a file the limits are the verdict's own; a file sets
+    /// limits for figures of summary.json (foreign.json with --truth)
     #[arg(long, value_name = "LIMITS.toml", num_args = 0..=1)]
     pub check: Option<Option<PathBuf>>,
-    /// Judge another receiver, which was fed a scene's samples, against that scene's truth/ directory
+    /// Truth directory of the scene whose samples another receiver was given; judges that receiver
     #[arg(long, value_name = "DIR", requires = "files")]
     pub truth: Option<PathBuf>,
     #[command(flatten)]
     pub files: ReceiverFiles,
-    /// Directory for what is found of another receiver [default: reports/<scene's name>-foreign]
+    /// Directory for the results about another receiver [default: reports/SCENE-foreign]
     #[arg(long, value_name = "DIR", requires = "truth")]
     pub out: Option<PathBuf>,
     #[command(flatten)]
@@ -431,10 +433,10 @@ pub struct Analyze {
 #[derive(Args, Debug)]
 #[group(id = "files", multiple = true)]
 pub struct ReceiverFiles {
-    /// Its observations: RINEX 2.11, 3 or 4, plain, by Hatanaka's scheme (CRINEX) or packed by gzip
+    /// Observations of the other receiver: RINEX 2.11, 3 or 4, plain, compact (CRINEX) or gzip
     #[arg(long, value_name = "FILE", requires = "truth")]
     pub rinex_obs: Option<PathBuf>,
-    /// Its positions: NMEA 0183 with GGA, RMC or ZDA for the date, RMC or VTG for the velocity
+    /// Positions of the other receiver: NMEA 0183 with GGA; RMC or ZDA give the date, RMC or VTG the velocity
     #[arg(long, value_name = "FILE", requires = "truth")]
     pub nmea: Option<PathBuf>,
 }
@@ -444,7 +446,7 @@ pub struct ReceiverFiles {
 pub struct Plan {
     /// Scene to plan [default: the embedded scene of GPS and Galileo]
     pub scenario: Option<PathBuf>,
-    /// Also read files that lie outside the scenario's directory
+    /// Allow the scene to read files outside its own directory
     #[arg(long)]
     pub allow_outside: bool,
     #[command(flatten)]
@@ -460,15 +462,15 @@ pub struct Plan {
 pub struct Study {
     #[command(subcommand)]
     pub action: Option<StudyAction>,
-    /// Study to plan, run and report on this machine; after a kill the same command goes on
+    /// Study to plan, run and report on this machine. An interrupted study continues with the same command
     pub study: Option<PathBuf>,
-    /// Directory of the study [default: reports/<name of the study's file>]
+    /// Directory of the study [default: reports/STUDY]
     #[arg(long, short, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Threads to use [default: one a core]
+    /// Threads to use [default: one per core]
     #[arg(long, value_name = "J", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
-    /// Forget what an earlier plan in that directory has computed
+    /// Discard results of an earlier plan in that directory
     #[arg(long)]
     pub fresh: bool,
 }
@@ -479,15 +481,15 @@ pub enum StudyAction {
     Plan(StudyPlan),
     /// Compute missing shards: all of them, or one
     Run(StudyRun),
-    /// Say what is there; exit 3 if something is missing
+    /// Report which shards are complete; exit with code 3 if one is missing
     Status(StudyStatus),
-    /// Put all shards together: each case once, in order, or an error
+    /// Merge all shards into one table, in the order of the cases
     Merge(StudyMerge),
     /// Write tables, pictures and report.md into the study's directory
     Report(StudyReport),
-    /// Print a script that hands the missing shards to an engine
+    /// Print a script that runs the missing shards under an engine
     Export(StudyExport),
-    /// Hand the missing shards to an engine, wait, and again what is missing then; started anew, it goes on
+    /// Run the missing shards under an engine, wait, and repeat with those still missing
     Submit(StudySubmit),
 }
 
@@ -498,14 +500,14 @@ pub struct StudyPlan {
     /// Directory of the study
     #[arg(long, short, value_name = "DIR")]
     pub out: PathBuf,
-    /// Number of shards [default: 50 to 1000, of a minute at most]
+    /// Number of shards [default: 50 to 1000, of at most a minute each]
     #[arg(long, value_name = "N", conflicts_with = "shard_minutes")]
     #[arg(value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     pub shards: Option<u64>,
-    /// Length of a shard in minutes of one core, roughly
+    /// Approximate length of a shard, in minutes of one core
     #[arg(long, value_name = "M")]
     pub shard_minutes: Option<f64>,
-    /// Forget what an earlier plan in that directory has computed
+    /// Discard results of an earlier plan in that directory
     #[arg(long)]
     pub fresh: bool,
 }
@@ -514,19 +516,18 @@ pub struct StudyPlan {
 pub struct StudyRun {
     /// Directory of the study
     pub directory: PathBuf,
-    /// Number of a shard, or auto: the number that the engine gives to this task [default: all that are
-    /// missing]
+    /// Number of a shard, or auto for the number that the engine gives to this task [default: all missing]
     #[arg(long, value_name = "K")]
     pub shard: Option<Shard>,
-    /// Part of the plan, what is missing of it: part K of N, counted from 0
+    /// Missing shards of part K of N of the plan; K counts from 0
     #[arg(long, value_name = "K/N", conflicts_with = "shard")]
     pub part: Option<Part>,
-    /// Threads to use [default: one a core]
+    /// Threads to use [default: one per core]
     #[arg(long, value_name = "J", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
 }
 
-/// Which shard to run.
+/// Shard to run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shard {
     Auto,
@@ -548,7 +549,7 @@ impl FromStr for Shard {
 pub struct StudyStatus {
     /// Directory of the study
     pub directory: PathBuf,
-    /// Print the missing shards alone, as an engine's array takes them
+    /// Print only the numbers of the missing shards, as a job array takes them
     #[arg(long)]
     pub missing: bool,
 }
@@ -581,34 +582,34 @@ pub struct StudyExport {
 pub struct StudySubmit {
     /// Directory of the study
     pub directory: PathBuf,
-    /// What hands out shards
+    /// Engine that runs the shards
     #[arg(long, value_name = "ENGINE")]
     pub engine: Engine,
-    /// How often what is missing is handed out
+    /// Rounds of submission, each with the shards still missing
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub rounds: u32,
     #[command(flatten)]
     pub terms: Terms,
 }
 
-/// What a site asks of an engine's tasks.
+/// Demands of a site on an engine's tasks.
 #[derive(Args, Debug)]
 pub struct Terms {
-    /// Tasks, each with as many shards [default: one a shard, as far as the engine's arrays go]
+    /// Number of tasks, among which the shards are divided [default: one per shard, up to the array limit]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub tasks: Option<u32>,
-    /// Tasks that may run at a time
+    /// Number of tasks that may run at a time
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub at_once: Option<u32>,
-    /// Slurm: minutes that a task may take [default: 5, and three times what the plan expects]
+    /// Slurm: time limit of a task in minutes [default: 5 plus three times the planned time]
     #[arg(long, value_name = "M", value_parser = clap::value_parser!(u32).range(1..=525_600))]
     pub minutes: Option<u32>,
-    /// Slurm: another option of sbatch, several times for several: --directive=--partition=long
+    /// Slurm: further option of sbatch, such as --directive=--partition=long; may be given several times
     #[arg(long = "directive", value_name = "OPTION", allow_hyphen_values = true)]
     pub directives: Vec<Directive>,
 }
 
-/// What hands out shards.
+/// Engine that runs shards.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Engine {
     /// A job array of Slurm

@@ -11,24 +11,24 @@ use crate::gnss::recording::Samples;
 /// Samples of a few bits.
 #[derive(Args, Clone, Debug, Default)]
 pub struct Bits {
-    /// Bits of a value of packed samples: 1, 2, 3, 4, 8 or 16. Complex and first in the highest bits of each
-    /// byte unless other flags say so
+    /// Bits per value of packed samples: 1, 2, 3, 4, 8 or 16. Samples are complex and start in the highest
+    /// bits of each byte unless other flags say so
     #[arg(long, value_name = "N", conflicts_with = "format")]
     bits: Option<u32>,
-    /// How packed values are written: sign, negative-sign (1 is negative), sign-magnitude, twos-complement or
-    /// offset [default: twos-complement, of 1 bit sign]
+    /// Encoding of packed values: sign, negative-sign (1 is negative), sign-magnitude, twos-complement or
+    /// offset [default: twos-complement; sign for 1 bit]
     #[arg(long, requires = "bits")]
     encoding: Option<Encoding>,
-    /// Of packed samples, quadrature comes before in-phase
+    /// Packed samples have quadrature before in-phase
     #[arg(long, requires = "bits")]
     qi: bool,
-    /// Packed values begin in the lowest bits
+    /// Packed samples start in the lowest bits
     #[arg(long, requires = "bits")]
     lowest_first: bool,
-    /// Bytes of the words in which values are packed: 1, 2, 4 or 8
+    /// Bytes per packed word: 1, 2, 4 or 8
     #[arg(long, requires = "bits", value_name = "N", default_value_t = 1)]
     word_bytes: usize,
-    /// The highest byte of a word comes first
+    /// Packed words have the highest byte first
     #[arg(long, requires = "bits")]
     big_endian: bool,
 }
@@ -96,10 +96,10 @@ pub struct Packed {
     /// Packed samples are real
     #[arg(long, requires = "bits", conflicts_with = "qi")]
     real: bool,
-    /// Channels of a file, a sample of each in turn
+    /// Number of channels interleaved in the file, one sample each in turn
     #[arg(long, value_name = "N")]
     channels: Option<u32>,
-    /// The channel that is received: its number, from 1, or the name of a stream of ION's metadata
+    /// Channel to receive: its number from 1, or the name of a stream in ION metadata
     #[arg(long, value_name = "K")]
     pub channel: Option<String>,
 }

@@ -14,10 +14,10 @@ use crate::cli::scenario;
 /// Flags of a command with results.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct Printed {
-    /// Print neither results nor progress: only warnings and errors
+    /// Print only warnings and errors
     #[arg(long, short, conflicts_with = "json")]
     pub quiet: bool,
-    /// Print the results as one JSON object on a line, and no progress
+    /// Print the results as one JSON object on one line, without progress
     #[arg(long)]
     pub json: bool,
 }

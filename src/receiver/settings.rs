@@ -37,18 +37,18 @@ described! {
 pub struct OperationSettings {
     /// Milliseconds between observations and fixes.
     pub measurement_interval_ms: u32,
-    /// Milliseconds between rows of `tracking.csv`: a divisor of the one before.
+    /// Milliseconds between rows of `tracking.csv`: a divisor of `measurement_interval_ms`.
     pub tracking_interval_ms: u32,
-    /// Time between searches for satellites that have not been found.
+    /// Time between searches for satellites not found yet.
     pub search_interval_s: f64,
-    /// Time between searches while a satellite is missing that was followed within the last 30 s. Also
-    /// between short ones for what should be there: satellites of which another signal is followed, and after
-    /// a fix those that known ephemerides predict; a quarter of it while one was lost, and twice as long each
-    /// time that nothing is found, up to 16 times.
+    /// Time between searches for a satellite that was tracked within the last 30 s. It also separates short
+    /// searches for expected satellites: those tracked on another signal, and after a fix those that known
+    /// ephemerides predict. It is a quarter while a satellite is lost, and doubles after each search without
+    /// result, up to 16 times.
     pub reacquisition_interval_s: f64,
-    /// In searches after the first, the probability of a false alarm is multiplied by this.
+    /// Factor on the false-alarm probability in searches after the first.
     pub repeated_false_alarm_share: f64,
-    /// A channel without frame synchronisation after so long is dropped.
+    /// Time after which a channel without frame synchronisation is dropped.
     pub frame_limit_s: f64,
     /// GPS time near which the 10-bit week is resolved when the recording has no start time.
     pub week_reference: String,

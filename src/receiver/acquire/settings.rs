@@ -13,29 +13,28 @@ described! {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AcquisitionSettings {
-    /// Dopplers from minus to plus this are searched. It has to hold the offset of the local oscillator too.
+    /// Largest searched Doppler of either sign. It must include the offset of the local oscillator.
     pub doppler_max_hz: f64,
-    /// Names of the signals that are searched for, or "all" for what the bands of the samples hold. Empty for
-    /// those that a recording's metadata name, in `run` those of the scene, and else for GPS L1 C/A where the
-    /// bands hold it, all that they hold where not.
+    /// Signals to search for, or "all" for every signal within the bands. Empty means the signals of the
+    /// recording's metadata, or in `run` those of the scene; else GPS L1 C/A if it is within the bands; else
+    /// all.
     pub signals: Vec<String>,
-    /// Code periods of 1 ms summed coherently; of longer codes as many as begin in that time, under an
-    /// secondary code one.
+    /// Code periods of 1 ms summed coherently. Longer codes use as many periods as begin in that time. Codes
+    /// under a secondary code use one.
     pub coherent_periods: u32,
-    /// Coherent sums whose powers are added; more where sums are shorter.
+    /// Number of coherent sums whose powers are added; shorter sums use more.
     pub noncoherent_sums: u32,
-    /// Doppler step times coherent time: 0.5 loses 0.91 dB at worst and 0.29 dB on average, 2/3 1.65 and 0.51
-    /// dB.
+    /// Doppler step times coherent time. 0.5 loses 0.91 dB at worst and 0.29 dB on average; 2/3 loses 1.65
+    /// and 0.51 dB.
     pub doppler_step_cycles: f64,
-    /// Cells a chip at most, with one more between any two: faster recordings are band-limited to this many
-    /// times the chip rate for the search.
+    /// Largest number of search cells per chip, interpolated to twice as many. Faster recordings are
+    /// band-limited to this many times the chip rate for the search.
     pub cells_per_chip: f64,
-    /// Probability that the search for one absent satellite, over all its cells, finds it in noise alone;
-    /// where the others' cross-correlation is seen to make the tail heavier, in that too. The default costs
-    /// 0.7 dB against 1e-3.
+    /// Probability that the search over all cells reports one absent satellite. It holds for noise, and for
+    /// cross-correlation where that is seen to make the tail heavier. The default costs 0.7 dB against 1e-3.
     pub false_alarm_probability: f64,
-    /// Whether codes are searched for that no satellite of the constellation sends: of GPS, PRN 33 to 37; of
-    /// BeiDou's B1C, B2a and B2b those beyond 19 to 50, of B2I those beyond 18.
+    /// Search for reserved codes, which no satellite of the constellation sends: PRN 33 to 37 of GPS, codes
+    /// outside 19 to 50 of BeiDou B1C, B2a and B2b, codes above 18 of B2I.
     pub reserved_codes: bool,
 }
 }

@@ -211,7 +211,7 @@ impl Fit {
     }
 }
 
-/// Sums of the products of neighbouring prompts, by the code period's number modulo a symbol's or an
+/// Sums of the products of neighbouring prompts, by the code period's number modulo a symbol's or a
 /// secondary code's.
 #[derive(Clone, Debug)]
 pub struct Edges {

@@ -94,7 +94,7 @@ impl IonosphereChoice {
     }
 }
 
-/// How the troposphere is corrected.
+/// Correction of the troposphere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TroposphereChoice {
@@ -131,39 +131,38 @@ described! {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PositionSettings {
-    /// Satellites below this elevation are left out once a position below 100 km is known.
+    /// Elevation mask, applied once a position below 100 km height is known.
     pub mask_deg: f64,
-    /// Window of carrier smoothing; 0 for none.
+    /// Time constant of carrier smoothing; 0 for none.
     pub smoothing_s: f64,
     /// Probability that the residual test raises a false alarm.
     pub false_alarm: f64,
-    /// Standard deviation of the models at the zenith, for weights; it grows with one over the elevation's
-    /// sine.
+    /// Standard deviation of the models' errors at the zenith, for weights; it grows with 1 / sin(elevation).
     pub model_sigma_m: f64,
-    /// How the ionosphere is corrected: combined for two carriers of a satellite where there are two, and
-    /// else the model; broadcast for the model alone, Klobuchar's if received signals bring it, else
-    /// NeQuick-G, else BDGIM; klobuchar, nequick_g or bdgim for that one; none.
+    /// Correction of the ionosphere. combined: two carriers of a satellite where available, else the model.
+    /// broadcast: the model alone, Klobuchar's if received, else NeQuick-G, else BDGIM. klobuchar, nequick_g,
+    /// bdgim: that model. none: no correction.
     pub ionosphere: IonosphereChoice,
     /// Standard deviation of the broadcast ionosphere's error as a share of its delay, common to all
-    /// satellites: about 0.5 under a real sky, of whose ionosphere the model removes half; 0 where satellites
-    /// broadcast what is true, as in most scenes.
+    /// satellites. About 0.5 suits a real sky, where the model removes half of the delay. 0 suits scenes
+    /// whose satellites broadcast the true ionosphere.
     pub ionosphere_error_share: f64,
-    /// How the troposphere is corrected.
+    /// Correction of the troposphere.
     pub troposphere: TroposphereChoice,
-    /// Whether there is no fix until the ionosphere's parameters are decoded.
+    /// Wait for the ionosphere's parameters before the first fix.
     pub require_ionosphere: bool,
-    /// Else the first fix waits for them this long, counted from the fourth ephemeris; 0 for a fix at once.
+    /// Time for which the first fix waits for the ionosphere's parameters, counted from the fourth ephemeris;
+    /// 0 for a fix at once.
     pub ionosphere_wait_s: f64,
-    /// Whether a Galileo satellite is used by its elements in short, word 16, until its whole set is
-    /// decoded: a first fix within 20 s, but to metres, and at first without the satellites' health.
+    /// Use the reduced elements of Galileo (word 16) until the whole ephemeris is decoded. A first fix then
+    /// comes within 20 s, with errors of metres, at first without the satellites' health.
     pub reduced_elements: bool,
-    /// What SBAS says of GPS satellites on L1 C/A and of the ionosphere, where its signals are received:
-    /// corrections for its corrections, its integrity and its grid, unless it is in test mode; test for those
-    /// of a system in test mode too; none.
+    /// Use of SBAS messages for GPS L1 C/A and the ionosphere. corrections: corrections, integrity and grid,
+    /// unless the system is in test mode. test: also in test mode. none: not used.
     pub sbas: SbasChoice,
-    /// How the times of two systems are joined: estimated for a clock of each, of which a second one takes a
-    /// satellite more; broadcast for one clock and the offset that Galileo sends, which counts as exact, so
-    /// that any four satellites give a fix once it is decoded.
+    /// Treatment of the systems' time offsets. estimated: one clock per system; a second system needs one
+    /// satellite more. broadcast: one clock and the offset that Galileo broadcasts, taken as exact; any four
+    /// satellites give a fix once it is decoded.
     pub system_clocks: SystemClocks,
 }
 }

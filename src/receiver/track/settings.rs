@@ -7,7 +7,7 @@ use crate::correlate::{Arithmetic, Edge};
 use crate::described::described;
 use gnss::signal::{Component, Layers};
 
-/// How the code error is measured.
+/// Discriminator of the code loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CodeDiscriminator {
@@ -26,13 +26,13 @@ pub struct TrackingSettings {
     pub pll_order: u32,
     /// Bandwidth of the carrier phase loop.
     pub pll_bandwidth_hz: f64,
-    /// Order of the frequency loop of the pull-in: 1 or 2.
+    /// Order of the frequency loop during pull-in: 1 or 2.
     pub fll_order: u32,
-    /// Bandwidth of the frequency loop of the pull-in.
+    /// Bandwidth of the frequency loop during pull-in.
     pub fll_bandwidth_hz: f64,
-    /// Bandwidth of the frequency loop while it assists the phase loop until that has locked; 0 for none.
+    /// Bandwidth of the frequency loop that assists the phase loop until phase lock; 0 for none.
     pub fll_assist_bandwidth_hz: f64,
-    /// How long the frequency loop works alone.
+    /// Duration of pull-in by the frequency loop alone.
     pub fll_pull_in_s: f64,
     /// Order of the code loop: 1 or 2. It is always aided by the carrier.
     pub dll_order: u32,
@@ -40,32 +40,33 @@ pub struct TrackingSettings {
     pub dll_bandwidth_hz: f64,
     /// Bandwidth of the code loop during the first `dll_pull_in_s`.
     pub dll_pull_in_bandwidth_hz: f64,
-    /// How long the code loop pulls in.
+    /// Duration of the code loop's pull-in.
     pub dll_pull_in_s: f64,
-    /// How the code error is measured.
+    /// Discriminator of the code loop.
     pub dll_discriminator: CodeDiscriminator,
-    /// Distance from early to late; of BOC divided by the steps of its pulse.
+    /// Spacing from early to late correlator; for BOC divided by the steps of its pulse.
     pub spacing_chips: f64,
-    /// Code periods of 1 ms a loop update once symbols are known: a divisor of 20. Of longer codes as many as
-    /// fit.
+    /// Code periods of 1 ms per loop update once symbols are known: a divisor of 20. Longer codes use as many
+    /// periods as fit.
     pub integration: u32,
-    /// What the replica has of a waveform of several layers, such as CBOC: strongest for the strongest one,
-    /// whole for all, from a sample in each step of the shortest pulse on.
+    /// Layers of the replica for a composite waveform such as CBOC. strongest: the strongest layer. whole:
+    /// all layers; needs at least one sample per step of the shortest pulse.
     pub waveform: Layers,
-    /// How the replica's chips fall on the samples.
+    /// Treatment of chip edges between samples in the replica.
     pub replica: Edge,
-    /// What correlations are computed in: sums for running sums of 8-bit samples, where carrier and rate suit
-    /// them, i16 for products of 16 bits, f32, or f64 for the exact twin of all.
+    /// Arithmetic of the correlations. sums: running sums of 8-bit samples where carrier and rate suit them.
+    /// i16: 16-bit products. f32. f64: exact reference for the others.
     pub arithmetic: Arithmetic,
-    /// Phase lock (mean cosine of twice the phase error) is declared at this value …
+    /// Mean cosine of twice the phase error at which phase lock is declared.
     pub phase_lock_threshold: f64,
-    /// … and lost below this one, as a cycle slip; 0.4 leaves room for 30° of dynamic stress.
+    /// Mean cosine of twice the phase error below which phase lock is lost, as a cycle slip. 0.4 leaves room
+    /// for 30° of dynamic stress.
     pub phase_unlock_threshold: f64,
-    /// The signal is lost when the phase stays unlocked or C/N0 stays below `cn0_threshold_dbhz` so long.
+    /// Time without phase lock, or with C/N0 below `cn0_threshold_dbhz`, after which the signal is lost.
     pub loss_s: f64,
-    /// C/N0 below which the signal is taken for lost.
+    /// C/N0 below which the signal counts as lost.
     pub cn0_threshold_dbhz: f64,
-    /// A channel that has not reached symbol lock after so long gives up.
+    /// Time after which a channel without symbol lock gives up.
     pub pull_in_limit_s: f64,
     /// Time constant of the C/N0 estimate.
     pub cn0_average_s: f64,

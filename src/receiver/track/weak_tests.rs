@@ -12,7 +12,7 @@ use gnss::signal::synthetic::QUADRATURE;
 use gnss::signal::{Component, Signal};
 
 /// A code of 1 ms under a secondary code of a satellite's own, at a tenth of the rate that others with such
-/// an secondary code have.
+/// a secondary code have.
 static PILOT: Signal = Signal {
     name: "synthetic pilot",
     components: &[Component {

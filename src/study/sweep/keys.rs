@@ -18,83 +18,97 @@ pub const STUDY: &[Key] = &[
     )
     .required(),
     text("title", "a title", "title of the report").or_else("the name"),
-    text("about", "a text", "what the report says first"),
-    word("level", || vec!["correlator", "samples"], "the loops on modelled correlations, or generator and receiver")
-        .required(),
-    integer("seed", 0, i64::MAX as u64, "from which those of all cases follow").or(1.0),
-    integer("repetitions", 1, 1_000_000, "runs of each cell with other noise").or(1.0),
+    text("about", "a text", "introduction of the report"),
+    word(
+        "level",
+        || vec!["correlator", "samples"],
+        "correlator for loops on modelled correlations, samples for generator and receiver",
+    )
+    .required(),
+    integer("seed", 0, i64::MAX as u64, "seed from which the seeds of all cases follow").or(1.0),
+    integer("repetitions", 1, 1_000_000, "repetitions of each cell with other noise").or(1.0),
     text(
         "scenario",
         "the path of a scene, relative to the study",
-        "the base at level = \"samples\"; an axis may name scenes in its place",
+        "base scene at level = \"samples\"; an axis may name scenes instead",
     ),
-    table("signal", SIGNAL, "What arrives, at level = \"correlator\"."),
-    table("motion", MOTION, "How its Doppler changes, at level = \"correlator\"."),
-    table("loop", LOOP, "Which loop is closed, at level = \"correlator\"."),
-    table("measure", MEASURE, "When it is measured, at level = \"correlator\"."),
+    table("signal", SIGNAL, "Received signal, at level = \"correlator\"."),
+    table("motion", MOTION, "Doppler and its changes, at level = \"correlator\"."),
+    table("loop", LOOP, "Loop under study, at level = \"correlator\"."),
+    table("measure", MEASURE, "Measurement time, at level = \"correlator\"."),
     foreign("receiver", "the receiver's settings, tracking alone", "settings of the loops, at level = \"correlator\""),
-    tables("axis", AXIS, "A key and the values that it takes."),
+    tables("axis", AXIS, "Key and its values."),
     words("keep", "an array of figures", "figures of each case: those of the level, or paths into `summary.json`")
         .required(),
-    words("ensemble", "an array of axes", "axes that keep ensembles apart; all other cases are taken together")
+    words("ensemble", "an array of axes", "axes that separate ensembles; other cases are pooled")
         .or_else("no ensemble"),
-    tables("plot", PLOT, "A picture."),
+    tables("plot", PLOT, "Picture."),
 ];
 
 const SIGNAL: &[Key] = &[
-    word("name", || signals().into_iter().map(|signal| signal.name).collect(), "which signal").or_else("GPS L1 C/A"),
-    word("component", || vec!["leading", "data", "pilot"], "which of its components is followed").or_else("leading"),
+    word(
+        "name
+        ",
+        || signals().into_iter().map(|signal| signal.name).collect(),
+        "name of the signal",
+    )
+    .or_else("GPS L1 C/A"),
+    word("component", || vec!["leading", "data", "pilot"], "tracked component").or_else("leading"),
     number("cn0_dbhz", 0.0, 80.0, "dB-Hz", "C/N0").or_else("no noise"),
-    number("bandwidth_hz", 1e3, 1e9, "Hz", "of the front end").or_else("none"),
+    number("bandwidth_hz", 1e3, 1e9, "Hz", "bandwidth of the front end").or_else("none"),
     word(
         "oscillator",
         || PowerLaw::PRESETS.map(|(name, _)| name).to_vec(),
         "noise of the receiver's oscillator, by name",
     ),
-    numbers("power_law", 5, (-1e-12, 1e-12), "", "noise of the oscillator: 0, 0, h0, h-1, h-2; not beside oscillator"),
+    numbers("power_law", 5, (-1e-12, 1e-12), "", "noise by coefficients 0, 0, h0, h-1, h-2; not with oscillator"),
 ];
 
 const MOTION: &[Key] = &[
-    number("doppler_hz", -1e6, 1e6, "Hz", "Doppler at the beginning").or(0.0),
-    number("acceleration_g", -1e4, 1e4, "g", "acceleration from the end of settling on").or(0.0),
-    number("jerk_g_per_s", -1e5, 1e5, "g/s", "jerk from the end of settling on").or(0.0),
-    number("jerk_s", 1e-3, 1e6, "s", "how long the jerk lasts").or_else("to the end"),
+    number("doppler_hz", -1e6, 1e6, "Hz", "initial Doppler").or(0.0),
+    number("acceleration_g", -1e4, 1e4, "g", "acceleration after settling").or(0.0),
+    number("jerk_g_per_s", -1e5, 1e5, "g/s", "jerk after settling").or(0.0),
+    number("jerk_s", 1e-3, 1e6, "s", "duration of the jerk").or_else("to the end"),
 ];
 
 const LOOP: &[Key] = &[
     word("mode", || vec!["phase", "assisted", "frequency"], "carrier loop").or_else("phase"),
-    flag("detectors", "whether the receiver's lock detectors may give the signal up, and move the code off side peaks"),
-    number("start_chips", -1.0, 1.0, "chips", "by how much the code is late at the beginning").or(0.0),
+    flag("detectors", "let the receiver's lock detectors drop the signal and correct side peaks"),
+    number("start_chips", -1.0, 1.0, "chips", "initial delay error of the code").or(0.0),
 ];
 
 const MEASURE: &[Key] = &[
-    number("settle_s", 0.0, 1e6, "s", "time before it is measured").or(5.0),
-    number("duration_s", 0.1, 1e7, "s", "time that is measured").or(60.0),
+    number("settle_s", 0.0, 1e6, "s", "settling time before the measurement").or(5.0),
+    number("duration_s", 0.1, 1e7, "s", "duration of the measurement").or(60.0),
 ];
 
 const AXIS: &[Key] = &[
-    text("key", "a key of the base, like \"receiver.tracking.pll_bandwidth_hz\"", "what is varied").required(),
-    values("values", "the values, in place of from and to"),
+    text("key", "a key of the base, like \"receiver.tracking.pll_bandwidth_hz\"", "varied key").required(),
+    values("values", "values, in place of from and to"),
     number("from", -ANY, ANY, "", "first value"),
     number("to", -ANY, ANY, "", "last value"),
-    number("step", -ANY, ANY, "", "distance of values; step or count"),
+    number("step", -ANY, ANY, "", "distance between values; step or count"),
     integer("count", 0, i64::MAX as u64, "number of values"),
-    word("spacing", || vec!["linear", "log"], "how count values lie").or_else("linear"),
+    word("spacing", || vec!["linear", "log"], "spacing of count values").or_else("linear"),
     text("zip", "a word that other axes share", "axes with the same word step together"),
-    text("label", "words for the plots", "what plots call it").or_else("the key"),
+    text("label", "words for the plots", "name of the axis in plots").or_else("the key"),
 ];
 
 const PLOT: &[Key] = &[
-    word("kind", || vec!["curve", "heat", "crossing"], "its kind").or_else("curve"),
-    text("title", "a title", "above the picture").or_else("the figure"),
-    text("x", "one of the axes", "axis across").required(),
-    text("y", "one of the figures, or of the axes for kind = \"heat\"", "figure of a curve, second axis of a heat map"),
+    word("kind", || vec!["curve", "heat", "crossing"], "kind of picture").or_else("curve"),
+    text("title", "a title", "title above the picture").or_else("the figure"),
+    text("x", "one of the axes", "horizontal axis").required(),
+    text(
+        "y",
+        "one of the figures, or of the axes for kind = \"heat\"",
+        "figure of a curve, or second axis of a heat map",
+    ),
     text("z", "one of the figures", "figure of a heat map or a crossing"),
     text("series", "one of the axes", "axis that distinguishes curves"),
     text("panel", "one of the axes", "axis that distinguishes pictures"),
     text("along", "one of the axes", "axis along which the figure crosses the level"),
     number("level", -ANY, ANY, "", "level of a crossing"),
-    flag("log_x", "logarithmic across"),
-    flag("log_y", "logarithmic upwards"),
-    foreign("where", "axes and one value of each", "values of the other axes"),
+    flag("log_x", "logarithmic horizontal axis"),
+    flag("log_y", "logarithmic vertical axis"),
+    foreign("where", "axes and one value of each", "fixed values of the other axes"),
 ];

@@ -21,82 +21,77 @@ pub const SCENARIO: &[Key] = &[
     text(
         "name",
         "1 to 64 letters, digits, '-' and '_' (it names a directory)",
-        "name of the scene and of its directory of results",
+        "name of the scene and of its results directory",
     )
     .required(),
-    time("start", "what the receiver's clock reads at the first sample: GPS time, or UTC with a final Z").required(),
+    time("start", "receiver clock reading at the first sample: GPS time, or UTC with a final Z").required(),
     number("duration_s", 0.01, LONGEST_S, "s", "length of the samples").required(),
-    integer("seed", 0, i64::MAX as u64, "of everything random: noise, oscillators, faults").or(1.0),
+    integer("seed", 0, i64::MAX as u64, "seed of all random processes: noise, oscillators, faults").or(1.0),
     words(
         "signals",
         "an array of different signals of this program",
-        "signals that the satellites send. How GLONASS sends a leap second is not settled by a document at hand: one \
-         second is sent twice",
+        "transmitted signals. At a leap second GLONASS repeats one second; no available document specifies this",
     )
     .or_else("[\"GPS L1 C/A\"]"),
-    table("navigation", NAVIGATION, "What the satellites broadcast. Absent: the program's own files."),
-    table("satellites", SATELLITE_CHOICE, "Which satellites are computed."),
-    table("orbits", satellites::ORBITS, "True orbits and clocks. Absent: those that are broadcast."),
+    table("navigation", NAVIGATION, "Broadcast navigation data. Absent: the embedded files."),
+    table("satellites", SATELLITE_CHOICE, "Selection of satellites."),
+    table("orbits", satellites::ORBITS, "True orbits and clocks. Absent: the broadcast ones."),
     tables(
         "satellite_fault",
         satellites::SATELLITE_FAULT,
-        "What a satellite's clock or orbit does that it does not broadcast.",
+        "Error of a satellite's clock or orbit that its message does not contain.",
     ),
     table(
         "sbas",
         satellites::SBAS,
-        "What SBAS satellites say of GPS satellites and of the ionosphere: what of both differs from what GPS \
-         broadcasts. Absent: nothing.",
+        "Corrections by SBAS satellites: the differences of true GPS orbits, clocks and ionosphere from the \
+         broadcast ones. Absent: none.",
     ),
-    tables("message_fault", satellites::MESSAGE_FAULT, "What goes wrong with a navigation message."),
-    table("motion", motion::MOTION, "Where the antenna is, and how it moves.").required(),
+    tables("message_fault", satellites::MESSAGE_FAULT, "Fault of a navigation message."),
+    table("motion", motion::MOTION, "Position and motion of the antenna.").required(),
     table(
         "attitude",
         motion::ATTITUDE,
-        "How the body that carries the antenna is turned. Absent: the antenna looks up, no wind-up.",
+        "Attitude of the body that carries the antenna. Absent: the boresight points up, without wind-up.",
     ),
-    table("power", satellites::POWER, "How strong the satellites are. Absent: a link budget with its defaults."),
-    tables("multipath", way::MULTIPATH, "A ray that is reflected; at most 64."),
-    table("ionosphere", way::IONOSPHERE, "The true ionosphere, and what is broadcast of it. Absent: none."),
-    table("troposphere", way::TROPOSPHERE, "The neutral atmosphere. Absent: none."),
-    tables("obstruction", way::OBSTRUCTION, "What obstructs the antenna's sky."),
-    table("scintillation", way::SCINTILLATION, "Quick fading in the ionosphere."),
-    table(
-        "receiver_clock",
-        hardware::RECEIVER_CLOCK,
-        "How the receiver's clock departs from GPS time. Absent: it does not.",
-    ),
+    table("power", satellites::POWER, "Received power of the satellites. Absent: a link budget with its defaults."),
+    tables("multipath", way::MULTIPATH, "Reflected ray; at most 64."),
+    table("ionosphere", way::IONOSPHERE, "True ionosphere, and its broadcast parameters. Absent: none."),
+    table("troposphere", way::TROPOSPHERE, "Neutral atmosphere. Absent: none."),
+    tables("obstruction", way::OBSTRUCTION, "Obstruction of the antenna's sky."),
+    table("scintillation", way::SCINTILLATION, "Ionospheric scintillation."),
+    table("receiver_clock", hardware::RECEIVER_CLOCK, "Offset of the receiver's clock from GPS time. Absent: zero."),
     table("noise", &[], "Thermal noise. Absent: none."),
-    table("playback", hardware::PLAYBACK, "A transmitter of few bits that plays the satellites' signals."),
-    table("local_oscillator", hardware::LOCAL_OSCILLATOR, "The mixer's oscillator, apart from the sampling clock."),
-    table("filter", hardware::FILTER, "The front end's filter."),
-    table("iq", hardware::IQ, "Imbalance of the two branches, and direct current."),
-    table("adc", hardware::ADC, "A converter with fewer bits than the format has."),
+    table("playback", hardware::PLAYBACK, "Playback of the satellites' signals by a transmitter with few bits."),
+    table("local_oscillator", hardware::LOCAL_OSCILLATOR, "Oscillator of the mixer, separate from the sampling clock."),
+    table("filter", hardware::FILTER, "Filter of the front end."),
+    table("iq", hardware::IQ, "Imbalance of the I and Q branches, and their DC offsets."),
+    table("adc", hardware::ADC, "Converter with fewer bits than the sample format."),
     one_or_more(
         "front_end",
         hardware::FRONT_END,
-        "Sampling. Several, each written as [[front_end]], listen to one sky by one clock: one file each. The tables \
-         of stages (local_oscillator, filter, iq, adc) go below each of them then.",
+        "Sampling. Several front ends, each written as [[front_end]], share one antenna and one clock; each has a \
+         file of its own. Their local_oscillator, filter, iq and adc tables are then below each [[front_end]].",
     ),
     tables(
         "interference",
         spoofing_and_jamming::INTERFERENCE,
-        "A source of interference. Exactly one of `js_db`, `power_dbw`, `eirp_dbw`.",
+        "Source of interference. Exactly one of `js_db`, `power_dbw`, `eirp_dbw`.",
     ),
-    tables("spoofer", spoofing_and_jamming::SPOOFER, "A second constellation, for another place, motion or clock."),
+    tables("spoofer", spoofing_and_jamming::SPOOFER, "Second constellation, for another position, motion or clock."),
     table(
         "fidelity",
         FIDELITY,
-        "Speed against accuracy of the samples; `gnss-twin plan` prints what each choice costs and errs.",
+        "Speed against accuracy of the samples; `gnss-twin plan` prints the cost and error of each choice.",
     ),
-    table("truth", TRUTH, "The truth's files."),
+    table("truth", TRUTH, "Files of the truth."),
     table(
         "expect",
         EXPECT,
-        "What the scene expects of its receiver where physics alone would expect something else; at least one of \
-         `fix`, `losses` and `errors`, with the `reason`.",
+        "Expectation of the judge where it differs from what physics alone implies: at least one of `fix`, `losses` \
+         and `errors`, with the `reason`.",
     ),
-    foreign("receiver", "the receiver's settings", "settings of the receiver that `run` uses, as below"),
+    foreign("receiver", "the receiver's settings", "receiver settings for `run`, as below"),
 ];
 
 const NAVIGATION: &[Key] = &[
@@ -104,16 +99,15 @@ const NAVIGATION: &[Key] = &[
         "file",
         "a path, or an array of paths",
         "RINEX navigation files, version 2 to 4, plain or gzip, relative to the scenario and below its directory; \
-         together they have to cover the scene's time",
+         together they must cover the scene's time",
     )
     .or_else("embedded: GPS of 2010-07-01; GPS and Galileo of 2020-11-29, 10:10 to 16:00"),
     time(
         "moved_to",
-        "a day, to which the first day of the files is moved: satellites go over the same ground at the same hour, and \
-         messages say the new week",
+        "day to which the first day of the files is moved: ground tracks and hours stay, messages carry the new week",
     )
     .or_else("the files' own"),
-    number("galileo_ahead_ns", -900.0, 900.0, "ns", "by which Galileo's time is ahead of GPS time; it is broadcast")
+    number("galileo_ahead_ns", -900.0, 900.0, "ns", "offset of Galileo system time ahead of GPS time; it is broadcast")
         .or_else("the navigation file's at the start, or 0"),
 ];
 
@@ -123,21 +117,21 @@ const SATELLITE_CHOICE: &[Key] = &[
         -10.0,
         89.0,
         "deg",
-        "elevation below which satellites are not computed; from 100 km up the Earth's limb takes its place",
+        "lowest elevation of computed satellites; above 100 km height the Earth's limb is used instead",
     )
     .or(5.0),
-    words("exclude", SATELLITES, "satellites that are left out"),
-    flag("include_unhealthy", "whether those are computed that say of themselves that they are unhealthy"),
+    words("exclude", SATELLITES, "excluded satellites"),
+    flag("include_unhealthy", "include satellites whose broadcast health is bad"),
 ];
 
 const FIDELITY: &[Key] = &[
-    word("level", || Grade::NAMES.map(|(name, _)| name).to_vec(), "sets every knob").or_else("balanced"),
-    word("code_edge", || CodeEdge::NAMES.map(|(name, _)| name).to_vec(), "how chips' edges fall between samples")
+    word("level", || Grade::NAMES.map(|(name, _)| name).to_vec(), "level, which sets every knob").or_else("balanced"),
+    word("code_edge", || CodeEdge::NAMES.map(|(name, _)| name).to_vec(), "treatment of chip edges between samples")
         .or_else("the level's, for the rate, motion and noise"),
     word(
         "waveform",
         || Layers::NAMES.map(|(name, _)| name).to_vec(),
-        "what is sent of waveforms of several layers, such as CBOC: all, or of each component the strongest one",
+        "transmitted layers of a composite waveform such as CBOC: all, or the strongest of each component",
     )
     .or_else("whole"),
     word("carrier", || Arithmetic::NAMES.map(|(name, _)| name).to_vec(), "arithmetic of carrier and code")
@@ -154,28 +148,28 @@ const FIDELITY: &[Key] = &[
     .or_else("the level's"),
 ];
 
-const TRUTH: &[Key] = &[number("interval_s", 0.001, 3600.0, "s", "spacing of the truth's rows").or(0.1)];
+const TRUTH: &[Key] = &[number("interval_s", 0.001, 3600.0, "s", "interval of the rows").or(0.1)];
 
 const EXPECT: &[Key] = &[
-    word("fix", fixes, "whether there has to be a fix").or_else("as the satellites allow"),
-    word("losses", losses, "losses of lock that are excused").or_else("those that the scene explains"),
-    words("satellites", SATELLITES, "whose losses; with losses").or_else("all"),
-    word("errors", sizes, "whether errors are within what theory expects").or_else("bounded"),
-    number("position_within_m", 1e-3, 1e7, "m", "error in space that no fix may exceed, whatever errors says")
+    word("fix", fixes, "expected fix").or_else("as the satellites allow"),
+    word("losses", losses, "excused losses of lock").or_else("those that the scene explains"),
+    words("satellites", SATELLITES, "satellites whose losses are excused; with losses").or_else("all"),
+    word("errors", sizes, "bound of the errors: within theory, or any").or_else("bounded"),
+    number("position_within_m", 1e-3, 1e7, "m", "largest 3-D position error of any fix, whatever errors allows")
         .or_else("unbounded"),
-    text("reason", WHY, "why, for the verdict; required with the others"),
-    tables("interval", INTERVAL, "The same for a part of the scene."),
+    text("reason", WHY, "reason, printed in the verdict; required with the other keys"),
+    tables("interval", INTERVAL, "Expectation for a part of the scene."),
 ];
 
 const INTERVAL: &[Key] = &[
-    number("from_s", 0.0, LONGEST_S, "s", "where it begins, since the start of the samples").required(),
-    number("to_s", 0.0, LONGEST_S, "s", "where it ends").required(),
+    number("from_s", 0.0, LONGEST_S, "s", "begin, since the start of the samples").required(),
+    number("to_s", 0.0, LONGEST_S, "s", "end, since the start of the samples").required(),
     word("fix", fixes, "as in [expect]").or_else("as in [expect]"),
     word("losses", losses, "as in [expect]").or_else("as in [expect]"),
-    words("satellites", SATELLITES, "whose losses; with losses").or_else("all"),
+    words("satellites", SATELLITES, "satellites whose losses are excused; with losses").or_else("all"),
     word("errors", sizes, "as in [expect]").or_else("as in [expect]"),
     number("position_within_m", 1e-3, 1e7, "m", "as in [expect]").or_else("as in [expect]"),
-    text("reason", WHY, "why, for the verdict").required(),
+    text("reason", WHY, "reason, printed in the verdict").required(),
 ];
 
 const WHY: &str = "a sentence that says why";

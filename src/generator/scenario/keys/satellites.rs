@@ -6,50 +6,70 @@ use crate::effect::transmit::Block;
 use crate::scenario::schema::{Key, by_satellite, flag, integer, number, numbers, text, texts, word, words};
 use gnss::signal::SIGNALS;
 
-const OFFSET: Key = number("G01", -5.0, 5.0, "m", "of one satellite, by its name");
+const OFFSET: Key = number("G01", -5.0, 5.0, "m", "antenna offset of one satellite, by its name");
 const CN0: Key = number("G01", 0.0, 100.0, "dB-Hz", "C/N0 of one satellite, by its name");
 const BLOCK: Key = word("G01", blocks, "block of one satellite, by its name");
 
 pub(crate) const ORBITS: &[Key] = &[
-    texts("sp3", "the path of an SP3 file, or an array of such paths", "precise orbits and clocks over the scene")
-        .required(),
-    number("antenna_offset_m", -5.0, 5.0, "m", "antennas below the centre of mass, towards the Earth").or(0.0),
+    texts(
+        "sp3",
+        "the path of an SP3 file, or an array of such paths",
+        "files of precise orbits and clocks that cover the scene",
+    )
+    .required(),
+    number(
+        "antenna_offset_m",
+        -5.0,
+        5.0,
+        "m",
+        "offset of the transmit antenna from the centre of mass, towards the Earth",
+    )
+    .or(0.0),
     by_satellite("antenna_offsets_m", &OFFSET, "Antenna offsets by satellite."),
 ];
 
 pub(crate) const SBAS: &[Key] = &[
-    flag("test", "whether the system says that it is in test mode and not for safety"),
-    words("do_not_use", SATELLITES, "GPS satellites that it says must not be used, whatever is true of them"),
+    flag("test", "broadcast test mode: not for safety-of-life use"),
+    words("do_not_use", SATELLITES, "GPS satellites flagged as do-not-use, whatever their true state"),
 ];
 
 const fn on() -> Key {
-    number("on_s", 0.0, LONGEST_S, "s", "true time since the scene's start at which it begins").or(0.0)
+    number("on_s", 0.0, LONGEST_S, "s", "begin, in true time since the scene's start").or(0.0)
 }
 
 const fn off() -> Key {
-    number("off_s", 0.0, LONGEST_S, "s", "when it ends").or_else("never")
+    number("off_s", 0.0, LONGEST_S, "s", "end, in true time since the scene's start").or_else("never")
 }
 
 const CLOCK: &[&str] = &["clock_step", "clock_ramp"];
 const ORBIT: &[&str] = &["orbit"];
 
 pub(crate) const SATELLITE_FAULT: &[Key] = &[
-    word("kind", || vec!["clock_step", "clock_ramp", "clock_noise", "orbit"], "what goes wrong").required(),
-    words("satellites", SATELLITES, "which satellites").required().of(&["clock_step", "clock_ramp", "orbit"]),
-    words("satellites", SATELLITES, "which satellites").or_else("all").of(&["clock_noise"]),
+    word("kind", || vec!["clock_step", "clock_ramp", "clock_noise", "orbit"], "kind of fault").required(),
+    words("satellites", SATELLITES, "affected satellites").required().of(&["clock_step", "clock_ramp", "orbit"]),
+    words("satellites", SATELLITES, "affected satellites").or_else("all").of(&["clock_noise"]),
     on().of(CLOCK),
     off().of(CLOCK),
-    number("on_s", 0.0, LONGEST_S, "s", "when the offset begins to grow; with ramp_s")
-        .or_else("there from the beginning")
+    number(
+        "on_s",
+        0.0,
+        LONGEST_S,
+        "s",
+        "begin of the growth of the offset, in true time since the scene's start; with ramp_s",
+    )
+    .or_else("there from the beginning")
+    .of(ORBIT),
+    number("step_s", -1e-3, 1e-3, "s", "size of the clock step").required().of(&["clock_step"]),
+    number("drift_sps", -1e-6, 1e-6, "s/s", "drift of the clock").required().of(&["clock_ramp"]),
+    word("oscillator", presets, "clock noise of an oscillator type").of(&["clock_noise"]),
+    numbers("power_law", 5, (-1e-12, 1e-12), "", "clock noise by coefficients h2, h1, h0, h-1, h-2")
+        .of(&["clock_noise"]),
+    number("radial_m", -1e5, 1e5, "m", "offset of the true orbit from the broadcast one, radially outwards")
+        .or(0.0)
         .of(ORBIT),
-    number("step_s", -1e-3, 1e-3, "s", "by which the clock is off").required().of(&["clock_step"]),
-    number("drift_sps", -1e-6, 1e-6, "s/s", "by which the clock drifts").required().of(&["clock_ramp"]),
-    word("oscillator", presets, "noise of the clock, by name").of(&["clock_noise"]),
-    numbers("power_law", 5, (-1e-12, 1e-12), "", "noise of the clock: h2, h1, h0, h-1, h-2").of(&["clock_noise"]),
-    number("radial_m", -1e5, 1e5, "m", "true orbit off the broadcast one, outwards").or(0.0).of(ORBIT),
-    number("along_m", -1e5, 1e5, "m", "along the motion").or(0.0).of(ORBIT),
-    number("cross_m", -1e5, 1e5, "m", "across it").or(0.0).of(ORBIT),
-    number("ramp_s", 1.0, 1e6, "s", "how long the offset takes to grow; with on_s")
+    number("along_m", -1e5, 1e5, "m", "offset of the true orbit along the motion").or(0.0).of(ORBIT),
+    number("cross_m", -1e5, 1e5, "m", "offset of the true orbit across the orbital plane").or(0.0).of(ORBIT),
+    number("ramp_s", 1.0, 1e6, "s", "time over which the offset grows; with on_s")
         .or_else("there from the beginning")
         .of(ORBIT),
 ];
@@ -71,41 +91,43 @@ fn presets() -> Vec<&'static str> {
 }
 
 pub(crate) const MESSAGE_FAULT: &[Key] = &[
-    word("kind", || vec!["bit_errors", "bit", "health", "parameter", "alert"], "what goes wrong").required(),
-    words("satellites", SATELLITES, "which satellites").or_else("all").of(&["bit_errors", "bit"]),
-    words("satellites", SATELLITES, "which satellites").required().of(&["health", "parameter", "alert"]),
+    word("kind", || vec!["bit_errors", "bit", "health", "parameter", "alert"], "kind of fault").required(),
+    words("satellites", SATELLITES, "affected satellites").or_else("all").of(&["bit_errors", "bit"]),
+    words("satellites", SATELLITES, "affected satellites").required().of(&["health", "parameter", "alert"]),
     on(),
     off(),
-    number("rate", 0.0, 0.5, "(a probability)", "probability of each bit to be wrong").required().of(&["bit_errors"]),
+    number("rate", 0.0, 0.5, "(a probability)", "error probability of each bit").required().of(&["bit_errors"]),
     integer("subframe", 1, 5, "number of the subframe").required().of(&["bit"]),
-    integer("word", 1, 10, "word in it").required().of(&["bit"]),
-    integer("bit", 1, 30, "bit of the word that is flipped").required().of(&["bit"]),
-    integer("health", 0, 511, "the bits of health: GPS has six; of Galileo three each of E1-B, E5b and E5a")
+    integer("word", 1, 10, "number of the word in the subframe").required().of(&["bit"]),
+    integer("bit", 1, 30, "number of the inverted bit in the word").required().of(&["bit"]),
+    integer("health", 0, 511, "broadcast health bits: six for GPS; for Galileo three each for E1-B, E5b and E5a")
         .required()
         .of(&["health"]),
-    word("parameter", parameters, "which parameter is wrong").required().of(&["parameter"]),
-    number("add", -1e6, 1e6, "in the parameter's unit", "by how much").required().of(&["parameter"]),
+    word("parameter", parameters, "affected parameter").required().of(&["parameter"]),
+    number("add", -1e6, 1e6, "in the parameter's unit", "error added to the parameter").required().of(&["parameter"]),
 ];
 
 const FIXED: &[&str] = &["fixed"];
 const BUDGET: &[&str] = &["link_budget"];
 
 pub(crate) const POWER: &[Key] = &[
-    word("kind", || vec!["fixed", "link_budget"], "the same for all, or by range, elevation and antennas")
-        .or_else("fixed if cn0_dbhz is there, else link_budget"),
-    number("cn0_dbhz", 0.0, 100.0, "dB-Hz", "of all satellites").required().of(FIXED),
+    word(
+        "kind",
+        || vec!["fixed", "link_budget"],
+        "equal C/N0 for all satellites, or a link budget by range, elevation and antennas",
+    )
+    .or_else("fixed if cn0_dbhz is there, else link_budget"),
+    number("cn0_dbhz", 0.0, 100.0, "dB-Hz", "C/N0 of all satellites").required().of(FIXED),
     by_satellite("satellites", &CN0, "C/N0 by satellite, with kind = \"fixed\".").of(FIXED),
-    word("transmit", transmits, "antennas of the satellites: a block's for all, or of those that flew then")
+    word("transmit", transmits, "transmit antenna patterns: one block for all satellites, or the blocks of that date")
         .or_else("typical")
         .of(BUDGET),
-    number("transmit_dbw", -10.0, 40.0, "dBW", "power into the satellites' antennas").or(14.3).of(BUDGET),
+    number("transmit_dbw", -10.0, 40.0, "dBW", "power fed into the transmit antennas").or(14.3).of(BUDGET),
     by_satellite("blocks", &BLOCK, "Blocks by satellite, with kind = \"link_budget\".").of(BUDGET),
-    word("antenna", || vec!["isotropic", "patch", "turnstile", "table"], "the receiving antenna")
-        .or_else("patch")
-        .of(BUDGET),
+    word("antenna", || vec!["isotropic", "patch", "turnstile", "table"], "receive antenna").or_else("patch").of(BUDGET),
     text("antenna_file", A_PATH, "gain and phase by direction, for antenna = \"table\"").of(BUDGET),
-    number("noise_figure_db", 0.0, 30.0, "dB", "of the receiver").or(2.5).of(BUDGET),
-    number("loss_db", -20.0, 60.0, "dB", "any loss besides").or(0.0).of(BUDGET),
+    number("noise_figure_db", 0.0, 30.0, "dB", "noise figure of the receiver").or(2.5).of(BUDGET),
+    number("loss_db", -20.0, 60.0, "dB", "additional loss").or(0.0).of(BUDGET),
 ];
 
 fn blocks() -> Vec<&'static str> {

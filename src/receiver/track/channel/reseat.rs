@@ -80,7 +80,7 @@ impl Channel {
         })
     }
 
-    /// The code period modulo a symbol's in which symbols begin, where that is beyond doubt; 0 where an
+    /// The code period modulo a symbol's in which symbols begin, where that is beyond doubt; 0 where a
     /// secondary code or the code under bits is known, which numbers periods itself.
     pub fn symbols_begin(&self) -> Option<u64> {
         match self.stage {
