@@ -237,9 +237,9 @@ pub struct Generate {
 #[command(
     after_help = "Examples:\n  gnss-twin live scene.toml --motion udp:4567 --to - | hackrf_transfer -t - -f 1575420000 \
                   -s 2600000\n  gnss-twin live scene.toml --clock host --motion udp:4567 --to tcp:5000 --record \
-                  reports/flight\n  gnss-twin generate reports/flight/replay.toml --out again.sigmf-data\n\nStatus: one \
-                  line of JSON per second on standard error. Exit code: 3 beyond --max-underruns or --max-late, 130 \
-                  or 143 after a signal"
+                  reports/flight\n  gnss-twin generate reports/flight/replay.toml --out again.sigmf-data\n\nStatus: \
+                  one line of JSON per second on standard error. Exit code: 3 beyond --max-underruns or \
+                  --max-late, 130 or 143 after a signal"
 )]
 pub struct Live {
     /// Scene to send. With motion kind = "pushed" it takes motion and events from --motion

@@ -128,7 +128,7 @@ mod tests {
         let mirrored = tag(&[("[front_end]", "[front_end]\nspectrum_inverted = true")], None).unwrap();
         assert!(mirrored.contains("FMT  = INT8X2\n"), "{mirrored}");
         let refused = tag(&[], Some(Format::Ci16Le)).unwrap_err();
-        assert!(refused.contains("format ci16: expected ci8 or ri8") || refused.contains("ci16_le"), "{refused}");
+        assert!(refused.contains("format ci16: expected ci8 or ri8"), "{refused}");
     }
 
     #[test]

@@ -446,7 +446,8 @@ fn signal_list(table: &Table<'_>, key: &str) -> Result<Option<Vec<&'static Signa
     for word in words {
         match Signal::find(word) {
             Some(signal) if !signals.contains(&signal) => signals.push(signal),
-            _ => return Err(table.bad(key, expected)),
+            Some(_) => return Err(table.bad(key, expected)),
+            None => return Err(table.bad(key, expected + &Signal::suggestion(word))),
         }
     }
     if signals.is_empty() { Err(table.bad(key, expected)) } else { Ok(Some(signals)) }

@@ -29,7 +29,7 @@ pub enum Format {
 
 /// Why a text names no format.
 #[derive(Debug, Error, PartialEq)]
-#[error("unknown sample format '{0}': expected one of ci8, cu8, ci16_le, cf32_le, ri8, ri16_le")]
+#[error("unknown sample format '{0}': expected one of ci8, cu8, ci16, cf32, ri8, ri16")]
 pub struct FormatError(String);
 
 impl Format {
@@ -177,9 +177,10 @@ fn finite(x: f32) -> f32 {
     if x.is_finite() { x } else { 0.0 }
 }
 
+/// Name that flags and keys take: SigMF's without the byte order, which is little endian throughout.
 impl fmt::Display for Format {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
+        f.pad(self.name().trim_end_matches("_le"))
     }
 }
 

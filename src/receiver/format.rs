@@ -111,8 +111,8 @@ impl fmt::Display for Look {
         f.write_str(match self {
             Self::Signed8 => "ci8 or ri8",
             Self::Offset8 => "cu8",
-            Self::Signed16 => "ci16_le or ri16_le",
-            Self::Float32 => "cf32_le",
+            Self::Signed16 => "ci16 or ri16",
+            Self::Float32 => "cf32",
             Self::Packed => "packed samples of 2 or 4 bits, of which --bits and the flags beside it say how they lie",
             Self::Signed16BigEndian => "16-bit integers with the high byte first, which must be swapped",
             Self::Float32BigEndian => "floats with the high byte first, which must be swapped",

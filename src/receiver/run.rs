@@ -222,10 +222,10 @@ impl Reception {
             };
             let signals = settings.acquisition.signals();
             let if_hz = signals.first().map_or(0.0, |signal| metadata.if_hz(signal.centre_hz()));
-            let format = metadata.format.name();
+            let format = metadata.format.to_string();
             let (rate_hz, acquired) = (metadata.rate.hz(), outcome.acquired.len());
             let mut diagnosis =
-                Diagnosis::new(stage, seconds, rate_hz, format, if_hz, cut_bytes, acquired).with_messages(&signals);
+                Diagnosis::new(stage, seconds, rate_hz, &format, if_hz, cut_bytes, acquired).with_messages(&signals);
             if let Some(seen) = &outcome.interfered {
                 diagnosis.advice.insert(0, format!("the spectrum: {seen}"));
             }

@@ -174,7 +174,7 @@ fn replay(run: &Run<'_>, samples: u64) -> Result<String, CliError> {
     };
     let mut front_end = own.and_then(|own| own.as_table().cloned()).unwrap_or_default();
     if let Some(format) = overrides.format {
-        front_end.insert("format".to_owned(), format.to_string().trim_end_matches("_le").into());
+        front_end.insert("format".to_owned(), format.to_string().into());
     }
     if !front_end.is_empty() {
         root.insert("front_end".to_owned(), toml::Value::Table(front_end));

@@ -224,6 +224,15 @@ impl Signal {
         all().into_iter().find(|signal| signal.name == name)
     }
 
+    /// Suggestion for a name that [`Signal::find`] does not know, to append to a refusal: the signals whose
+    /// names contain it, whatever the case of letters; empty if there are none.
+    pub fn suggestion(name: &str) -> String {
+        let lower = name.to_lowercase();
+        let alike = all().into_iter().filter(|signal| !name.is_empty() && signal.name.to_lowercase().contains(&lower));
+        let names: Vec<String> = alike.map(|signal| format!("\"{}\"", signal.name)).collect();
+        if names.is_empty() { String::new() } else { format!(" (did you mean {}?)", names.join(" or ")) }
+    }
+
     /// Carrier frequency of a satellite; the middle of the band for one to which no channel is assigned.
     pub fn carrier_hz(&self, sv: Sv) -> f64 {
         match self.carrier {
@@ -542,6 +551,14 @@ mod tests {
         assert_eq!(all().iter().filter(|signal| signal.name == "own signal").count(), 1);
         assert_eq!(register(&OTHER), Err(NameTaken("own signal")));
         assert_eq!(&all()[..SIGNALS.len()], &SIGNALS);
+    }
+
+    #[test]
+    fn an_unknown_name_suggests_the_signals_whose_names_contain_it() {
+        let meant = Signal::suggestion("gps l1");
+        assert!(meant.contains("\"GPS L1 C/A\" or \"GPS L1C\"") && !meant.contains("QZSS"), "{meant}");
+        assert_eq!(Signal::suggestion("E6"), " (did you mean \"Galileo E6\"?)");
+        assert_eq!((Signal::suggestion("Transit"), Signal::suggestion("")), (String::new(), String::new()));
     }
 
     #[test]

@@ -60,7 +60,7 @@ pub enum AcquireError {
     UnknownSignal {
         /// The name as written.
         name: String,
-        /// Names of all registered signals.
+        /// Names of all registered signals, and which of them may be meant.
         known: String,
     },
     /// A code that this receiver cannot make.

@@ -132,7 +132,7 @@ impl AcquisitionSettings {
         if let Some(name) = self.signals.iter().find(|name| Signal::find(name).is_none() && !self.is_all()) {
             let known =
                 signal::all().iter().map(|signal| format!("\"{}\"", signal.name)).collect::<Vec<_>>().join(", ");
-            return Err(AcquireError::UnknownSignal { name: name.clone(), known });
+            return Err(AcquireError::UnknownSignal { name: name.clone(), known: known + &Signal::suggestion(name) });
         }
         for (key, value, low, high, expected) in rules {
             if !(low..=high).contains(&value) {

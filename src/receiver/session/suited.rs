@@ -49,7 +49,7 @@ fn image(metadata: &IfMetadata, signal: &Signal, doppler_max_hz: f64) -> Option<
             "{} real samples with {} at {:.4} MHz, {:.1} kHz from {} of the rate: a carrier and its image are less \
              than two Dopplers of {doppler_max_hz:.0} Hz apart, and Dopplers get the wrong sign; another \
              intermediate frequency or complex samples avoid it",
-            metadata.format.name(),
+            metadata.format,
             signal.name,
             1e-6 * if_hz,
             1e-3 * (if_hz - image_hz).abs(),
