@@ -391,6 +391,9 @@ pub struct Receive {
     /// it appears in the samples [default: 0 for complex samples; real samples need it]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub if_hz: Option<f64>,
+    /// Radio frequency at 0 Hz of a raw file's samples, in place of --if-hz
+    #[arg(long, value_name = "HZ", conflicts_with = "if_hz")]
+    pub center_hz: Option<f64>,
     /// The raw file's spectrum is inverted (local oscillator above the signal)
     #[arg(long)]
     pub inverted: bool,

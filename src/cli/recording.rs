@@ -253,6 +253,7 @@ fn of_collection(arguments: &args::Receive) -> Result<Vec<Recording>, CliError> 
         ("--format", arguments.format.is_some()),
         ("--rate-hz", arguments.rate_hz.is_some()),
         ("--if-hz", arguments.if_hz.is_some()),
+        ("--center-hz", arguments.center_hz.is_some()),
         ("--inverted", arguments.inverted),
         (arguments.packed.given().unwrap_or_default(), arguments.packed.given().is_some()),
     ];
@@ -302,11 +303,10 @@ fn metadata(arguments: &args::Receive, of: Description) -> Result<(IfMetadata, O
     let (format, layout) = samples.unpacked().map_err(|error| CliError::input(error.to_string()))?;
     let inverted = of.inverted | arguments.inverted;
     let tuned = |if_hz: f64| L1_CA.centre_hz() - if inverted { -if_hz } else { if_hz };
-    let center_hz = match (arguments.if_hz, of.center_hz) {
-        (Some(if_hz), _) => tuned(if_hz),
-        (None, Some(center_hz)) => center_hz,
+    let center_hz = match (arguments.center_hz.or(arguments.if_hz.map(tuned)), of.center_hz) {
+        (Some(center_hz), _) | (None, Some(center_hz)) => center_hz,
         // Real samples hold nothing about 0 Hz.
-        (None, None) if !format.is_complex() => return Err(missing("--if-hz")),
+        (None, None) if !format.is_complex() => return Err(missing("--if-hz or --center-hz")),
         (None, None) => L1_CA.centre_hz(),
     };
     let rate = rate.or(of.rate).ok_or_else(|| missing("--rate-hz"))?;

@@ -214,6 +214,8 @@ pub struct Scenario {
     pub galileo_ahead_s: Option<f64>,
     /// Elevation below which satellites are left out.
     pub mask_rad: f64,
+    /// The satellites that are computed; absent means all of the navigation files.
+    pub only: Option<Vec<Sv>>,
     /// Satellites that are left out.
     pub excluded: Vec<Sv>,
     /// Whether satellites that report themselves unhealthy are sent too.
@@ -358,7 +360,7 @@ impl Scenario {
         let allowed_m = allowed_m(power.as_ref().filter(|_| noise).map(Power::strongest_dbhz));
         let front_ends = front_end::front_ends(root, allowed_m, refusals);
         let playback = refusals.take(playback.map(|t| stages::playback(&t)).transpose()).flatten();
-        let (mask_rad, excluded, include_unhealthy) = chosen?;
+        let Choice { mask_rad, only, excluded, include_unhealthy } = chosen?;
         Some(Self {
             origin: String::new(),
             directory: PathBuf::from("."),
@@ -371,6 +373,7 @@ impl Scenario {
             moved_to,
             galileo_ahead_s: ahead_ns?.flatten().map(|ns: f64| ns * 1e-9),
             mask_rad,
+            only,
             excluded,
             include_unhealthy,
             orbits: orbits?,
@@ -453,11 +456,30 @@ fn signal_list(table: &Table<'_>, key: &str) -> Result<Option<Vec<&'static Signa
     if signals.is_empty() { Err(table.bad(key, expected)) } else { Ok(Some(signals)) }
 }
 
-fn satellites(table: Option<&Table<'_>>) -> Result<(f64, Vec<Sv>, bool), ScenarioError> {
-    let Some(table) = table else { return Ok((MASK_DEG.to_radians(), Vec::new(), false)) };
-    let mask_deg = table.need("mask_deg")?;
+/// `[satellites]`: the satellites that are computed.
+struct Choice {
+    mask_rad: f64,
+    only: Option<Vec<Sv>>,
+    excluded: Vec<Sv>,
+    include_unhealthy: bool,
+}
+
+fn satellites(table: Option<&Table<'_>>) -> Result<Choice, ScenarioError> {
+    let Some(table) = table else {
+        let mask_rad = MASK_DEG.to_radians();
+        return Ok(Choice { mask_rad, only: None, excluded: Vec::new(), include_unhealthy: false });
+    };
+    let mask_rad = table.need::<f64>("mask_deg")?.to_radians();
+    let only = satellite_list(table, "only")?;
     let excluded = satellite_list(table, "exclude")?.unwrap_or_default();
-    Ok((mask_deg.to_radians(), excluded, table.flag("include_unhealthy")?.unwrap_or(false)))
+    match &only {
+        Some(only) if only.is_empty() => return Err(table.bad("only", "at least one satellite")),
+        Some(_) if table.has("exclude") => {
+            return Err(table.bad("exclude", "nothing beside only, which names all that are computed"));
+        }
+        _ => {}
+    }
+    Ok(Choice { mask_rad, only, excluded, include_unhealthy: table.flag("include_unhealthy")?.unwrap_or(false) })
 }
 
 /// An array of satellites.

@@ -8,6 +8,7 @@ use super::read::Table;
 use super::{ScenarioError, satellite_list};
 use crate::spoof::Advantage;
 use gnss::earth::Geodetic;
+use gnss::gps::l1ca::L1_CA;
 use gnss::samples::Format;
 use gnss::satellite::Sv;
 
@@ -121,8 +122,8 @@ impl Kind {
 pub struct InterferenceSpec {
     /// What it sends.
     pub kind: Kind,
-    /// From GPS L1.
-    pub offset_hz: f64,
+    /// Radio frequency of its centre.
+    pub center_hz: f64,
     /// How strong it is.
     pub strength: Strength,
     /// Where it is; absent where it has no place.
@@ -186,12 +187,23 @@ pub(super) fn interference(table: &Table<'_>) -> Result<InterferenceSpec, Scenar
     let (on_s, off_s) = times(table)?;
     Ok(InterferenceSpec {
         kind,
-        offset_hz: table.need("offset_hz")?,
+        center_hz: center_hz(table)?,
         strength,
         place: if placed { Some(place(table)?) } else { None },
         on_s,
         off_s,
     })
+}
+
+/// Radio frequency of a source's centre: as written, or by its offset from GPS L1.
+fn center_hz(table: &Table<'_>) -> Result<f64, ScenarioError> {
+    match table.number("center_hz")? {
+        Some(_) if table.has("offset_hz") => {
+            Err(table.bad("offset_hz", "nothing beside center_hz, which is the radio frequency of the centre"))
+        }
+        Some(center_hz) => Ok(center_hz),
+        None => Ok(L1_CA.centre_hz() + table.need::<f64>("offset_hz")?),
+    }
 }
 
 /// The one of three keys that says how strong the source is.

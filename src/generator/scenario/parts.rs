@@ -173,13 +173,17 @@ pub(super) fn sky(
     }
     let ahead = galileo_ahead(scenario, navigation);
     catalogue.set_time_offset(System::Galileo, ahead.map_or(0.0, |offset| offset.at_s(start)));
-    for sv in scenario.excluded.iter().filter(|sv| catalogue.sent_at(**sv, start).is_none()) {
-        warnings.push(format!("satellites.exclude names {sv}, which has no ephemeris then"));
+    let only = scenario.only.as_deref();
+    for (key, named) in [("only", only.unwrap_or_default()), ("exclude", &scenario.excluded)] {
+        for sv in named.iter().filter(|sv| catalogue.sent_at(**sv, start).is_none()) {
+            warnings.push(format!("satellites.{key} names {sv}, which has no ephemeris then"));
+        }
     }
     let mut excluded = scenario.excluded.clone();
+    excluded.extend(catalogue.satellites().filter(|sv| only.is_some_and(|only| !only.contains(sv))));
     if !scenario.include_unhealthy {
-        let sick: Vec<Sv> =
-            catalogue.satellites().filter(|sv| catalogue.is_sick(*sv, start, &scenario.signals)).collect();
+        let computed = catalogue.satellites().filter(|sv| !excluded.contains(sv));
+        let sick: Vec<Sv> = computed.filter(|sv| catalogue.is_sick(*sv, start, &scenario.signals)).collect();
         if !sick.is_empty() {
             let names: Vec<String> = sick.iter().map(Sv::to_string).collect();
             warnings.push(format!("unhealthy by their own message and left out: {}", names.join(", ")));

@@ -154,7 +154,7 @@ impl Source<'_> {
     /// Lowest and highest frequency of a band of `width_hz` about the carrier that samples hold.
     fn overlap_hz(&self, width_hz: f64) -> Option<(f64, f64)> {
         let (low_hz, high_hz) = self.tuning.band_hz();
-        let place_hz = self.tuning.place_hz(L1_CA.centre_hz() + self.spec.offset_hz);
+        let place_hz = self.tuning.place_hz(self.spec.center_hz);
         let (low_hz, high_hz) = (low_hz.max(place_hz - 0.5 * width_hz), high_hz.min(place_hz + 0.5 * width_hz));
         // A line has no width, and lies inside or outside.
         (low_hz < high_hz || (width_hz == 0.0 && low_hz == high_hz)).then_some((low_hz, high_hz))
@@ -212,7 +212,7 @@ impl Source<'_> {
                 width_hz / 1e6
             ));
         }
-        let carrier_hz = L1_CA.centre_hz() + self.spec.offset_hz;
+        let carrier_hz = self.spec.center_hz;
         Ok(Some(Fitted { waveform, share: 1.0, carrier_hz, text }))
     }
 
@@ -269,7 +269,7 @@ impl Source<'_> {
         let scale = (1.0 / mean.sqrt()) as f32;
         i.iter_mut().chain(&mut q).for_each(|x| *x *= scale);
         let (low_hz, high_hz) = self.tuning.band_hz();
-        let place_hz = self.tuning.place_hz(L1_CA.centre_hz() + self.spec.offset_hz);
+        let place_hz = self.tuning.place_hz(self.spec.center_hz);
         let room_hz = (place_hz - low_hz).min(high_hz - place_hz);
         let cutoff_cps = (room_hz / file_rate_hz).min(0.5);
         // Below a sixteenth of the file's rate the interpolator's 64 neighbours hold no two cycles of the
@@ -297,7 +297,7 @@ impl Source<'_> {
             repeat,
         };
         let text = format!(", {:.3} s at {file_rate_hz} Hz", bytes.len() as f64 / format.bytes() as f64 / file_rate_hz);
-        Ok(Fitted { waveform, share: 1.0, carrier_hz: L1_CA.centre_hz() + self.spec.offset_hz, text })
+        Ok(Fitted { waveform, share: 1.0, carrier_hz: self.spec.center_hz, text })
     }
 }
 

@@ -83,7 +83,12 @@ const MEASURE: &[Key] = &[
 ];
 
 const AXIS: &[Key] = &[
-    text("key", "a key of the base, like \"receiver.tracking.pll_bandwidth_hz\"", "varied key").required(),
+    text(
+        "key",
+        "a key of the base, like \"receiver.tracking.pll_bandwidth_hz\" or \"interference[1].js_db\"",
+        "varied key",
+    )
+    .required(),
     values("values", "values, in place of from and to"),
     number("from", -ANY, ANY, "", "first value"),
     number("to", -ANY, ANY, "", "last value"),

@@ -120,6 +120,7 @@ const SATELLITE_CHOICE: &[Key] = &[
         "lowest elevation of computed satellites; above 100 km height the Earth's limb is used instead",
     )
     .or(5.0),
+    words("only", SATELLITES, "satellites that are computed, no others; not with exclude").or_else("all"),
     words("exclude", SATELLITES, "excluded satellites"),
     flag("include_unhealthy", "include satellites whose broadcast health is bad"),
 ];

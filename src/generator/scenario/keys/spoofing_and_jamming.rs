@@ -15,6 +15,8 @@ pub(crate) fn kinds() -> Vec<&'static str> {
 
 pub(crate) const INTERFERENCE: &[Key] = &[
     word("kind", kinds, "waveform of the interference").required(),
+    number("center_hz", 1e9, 3e9, "Hz", "radio frequency of its centre; not with offset_hz")
+        .or_else("that of GPS L1, plus offset_hz"),
     number("offset_hz", -1e9, 1e9, "Hz", "offset of its centre from GPS L1").or(0.0),
     number(
         "js_db",

@@ -160,6 +160,7 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
                 ("front_end", "name" | "center_hz" | "signals" | "local_oscillator" | "filter" | "iq" | "adc") => {
                     cases.push((with("front_end", &format!("{key} = 1")), table, key))
                 }
+                ("satellites", "only") => cases.push((with("satellites", "only = 1"), table, key)),
                 ("navigation", "moved_to") => cases.push((with("navigation", &format!("{key} = 1")), table, key)),
                 ("expect", "interval" | "position_within_m") => {
                     cases.push((with("expect", &format!("{key} = 1")), table, key));

@@ -86,6 +86,22 @@ fn faults_that_cannot_be_are_refused_with_their_remedy() {
 }
 
 #[test]
+fn only_the_named_satellites_are_computed_and_unknown_names_are_warned_of() {
+    let base = format!("{MINIMAL}{STATIC}");
+    let composed = |table: &str| {
+        let scenario = parse(&format!("{base}[satellites]\n{table}\n")).map_err(|error| error.to_string())?;
+        scenario.compose(Path::new("."), &Overrides::default()).map_err(|error| error.to_string())
+    };
+    let (scene, warned) = composed("only = [\"G13\", \"G23\", \"G99\"]").unwrap();
+    let left: Vec<Sv> = scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)).collect();
+    assert_eq!(left, [Sv::gps(13), Sv::gps(23)]);
+    assert!(warned.iter().any(|line| line.contains("satellites.only names G99")), "{warned:?}");
+    let both = composed("only = [\"G13\"]\nexclude = [\"G01\"]").err().unwrap();
+    assert!(both.contains("satellites.exclude") && both.contains("nothing beside only"), "{both}");
+    assert!(composed("only = []").err().unwrap().contains("satellites.only = []: expected at least one satellite"));
+}
+
+#[test]
 fn orbits_that_do_not_reach_over_the_scene_are_refused_with_their_reach() {
     let witness = "[orbits]\nsp3 = \"data/witness/igs15904.sp3.gz\"\n";
     let composed = |start: &str, tables: &str| {

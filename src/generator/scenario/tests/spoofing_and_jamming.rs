@@ -14,6 +14,7 @@ fn interference_and_spoofers_arrive_as_written() {
     let chirp = &scenario.interference[0];
     assert_eq!(chirp.kind, Kind::Chirp { sweep_hz: -2e6, sweep_s: 1e-5 });
     assert_eq!((chirp.strength, chirp.on_s, chirp.off_s), (Strength::OverSignal { db: 30.0 }, 1.0, Some(2.0)));
+    assert_eq!([0, 1].map(|n: usize| scenario.interference[n].center_hz), [1_575.52e6, 1_575.9e6]);
     assert!(scenario.interference[2].place.is_some() && scenario.interference[0].place.is_none());
     let spoofer = &scenario.spoofers[0];
     assert_eq!((spoofer.advantage.start_db, spoofer.advantage.end_db, spoofer.advantage.ramp_s), (-10.0, 6.0, 5.0));
@@ -31,6 +32,8 @@ fn interference_that_contradicts_itself_is_refused_with_its_remedy() {
     assert!(refused(&cw("")).contains("exactly one of"));
     let both = refused(&cw("js_db = 3\npower_dbw = -130"));
     assert!(both.contains("interference[1].power_dbw = -130") && both.contains("js_db is given"), "{both}");
+    let twice = refused(&cw("js_db = 3\ncenter_hz = 1.57e9\noffset_hz = 0"));
+    assert!(twice.contains("interference[1].offset_hz = 0: expected nothing beside center_hz"), "{twice}");
     let far = "eirp_dbw = 3\ndistance_m = 100\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 1130";
     assert!(refused(&cw(far)).contains("interference[1].distance_m = 100: expected nothing, because a place is given"));
     assert!(refused(&cw("power_dbw = -130\ndistance_m = 100")).contains("expected nothing with power_dbw"));
