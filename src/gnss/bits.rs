@@ -30,7 +30,7 @@ impl Store for u128 {
     }
 }
 
-/// So many bits; the first one sent is the first, counted from 0.
+/// Fixed-length sequence of bits. The bit that is sent first has index 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Bits<const N: usize>(pub [bool; N]);
 
@@ -41,7 +41,7 @@ impl<const N: usize> Default for Bits<N> {
 }
 
 impl<const N: usize> Bits<N> {
-    /// As many of them as the result has, from one on; zeros beyond the end.
+    /// Copies as many bits as the result holds, from index `first` on. Bits beyond the end are zero.
     pub fn part<const M: usize>(&self, first: usize) -> Bits<M> {
         Bits::joined(std::iter::once(self.0.get(first..).unwrap_or_default()))
     }
@@ -82,7 +82,7 @@ impl Store for Vec<bool> {
     }
 }
 
-/// Why a value cannot be sent.
+/// Reason for which a parameter cannot be encoded in a message.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum FieldError {
     /// A value beyond its field.
@@ -104,7 +104,7 @@ pub enum FieldError {
         name: &'static str,
         /// In the unit of its name.
         value: f64,
-        /// What one step is worth.
+        /// Scale factor: the value of one step, in the field's unit.
         step: f64,
     },
     /// Issues that do not go together (IS-GPS-200N, 20.3.4.4).
@@ -120,9 +120,9 @@ pub enum FieldError {
         "toe = {toe_s} s and toc = {toc_s} s of the week: expected the same, as the message has no other mark of a set"
     )]
     References {
-        /// Of the orbit.
+        /// Reference time of the orbit (`toe`), in seconds.
         toe_s: f64,
-        /// Of the clock.
+        /// Reference time of the clock (`toc`), in seconds.
         toc_s: f64,
     },
     /// A stream that cannot begin at that time.
@@ -132,12 +132,12 @@ pub enum FieldError {
         message: &'static str,
         /// Seconds after the beginning of the week.
         start_s: f64,
-        /// What is possible.
+        /// Values that the field can hold.
         expected: &'static str,
     },
 }
 
-/// What the integer of a field means.
+/// Interpretation of a field's integer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Not negative, rounded to the nearest step.
@@ -150,7 +150,8 @@ pub enum Kind {
     Magnitude,
     /// Two's complement of semicircles (or semicircles a second); the value is in radians.
     Semicircles,
-    /// The same for an angle that is meant modulo a turn: a value outside ±π is brought there first.
+    /// Two's complement of semicircles for an angle modulo one turn. A value outside ±π radians is reduced
+    /// first.
     Turn,
 }
 
@@ -171,11 +172,11 @@ pub struct Field {
     pub name: &'static str,
     /// First bit, counted as the document does, and length of each piece, most significant first.
     pub pieces: &'static [(u16, u8)],
-    /// What its integer means.
+    /// Interpretation of the integer.
     pub kind: Kind,
     /// One step is two to this power.
     pub exponent: i32,
-    /// Where the document defines it.
+    /// Clause of the interface document that defines the field.
     pub clause: &'static str,
 }
 
@@ -248,7 +249,7 @@ impl Field {
         }
     }
 
-    /// What an integer of this field means, in the unit of its name.
+    /// Returns the value of a raw integer, in the unit that the field's name states.
     pub fn value(&self, raw: i64) -> f64 {
         let scaled = libm::ldexp(raw as f64, self.exponent());
         let angle = matches!(self.kind, Kind::Semicircles | Kind::Turn);
@@ -287,7 +288,7 @@ pub struct Element<T> {
 }
 
 impl<T> Element<T> {
-    /// The same parameter at other places.
+    /// Copies the parameter to other bit positions, each a first bit and a length in bits.
     pub const fn at(&self, pieces: &'static [(u16, u8)]) -> Self {
         Self { field: Field { pieces, ..self.field }, get: self.get, set: self.set }
     }

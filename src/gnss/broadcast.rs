@@ -33,13 +33,13 @@ pub const GPS_CLOCK_CODE: &str = "1W";
 pub struct Ephemeris {
     /// The satellite.
     pub sv: Sv,
-    /// What clock and health mean in the message that it is of.
+    /// Meaning of clock and health in the message from which the ephemeris was decoded.
     pub form: &'static SetForm,
     /// Reference time of the orbit.
     pub toe: Epoch,
     /// Reference time of the clock.
     pub toc: Epoch,
-    /// When this set was first transmitted, as far as known.
+    /// Time of first transmission of this ephemeris, as far as known.
     pub transmitted: Epoch,
     /// Issue of data: IODE of GPS, IODnav of Galileo, IODEC of NavIC; of BeiDou a number of the
     /// reference time.
@@ -54,9 +54,9 @@ pub struct Ephemeris {
     pub health: u16,
     /// Codes on L2: 1 for P, 2 for C/A (IS-GPS-200N, 20.3.3.3.1.2).
     pub l2_codes: u8,
-    /// Whether P on L2 has no message (IS-GPS-200N, 20.3.3.3.1.6).
+    /// True if the P code on L2 carries no message (IS-GPS-200N, 20.3.3.3.1.6).
     pub l2_p_data_off: bool,
-    /// Whether the curve fit is longer than four hours (IS-GPS-200N, 20.3.3.4.3.1).
+    /// True if the curve fit interval exceeds four hours (IS-GPS-200N, 20.3.3.4.3.1).
     pub long_fit: bool,
     /// Age of data offset, in its 900 s units; AODE of BeiDou; days of GLONASS.
     pub aodo: u8,
@@ -86,11 +86,11 @@ pub struct Ephemeris {
     pub cuc_rad: f64,
     /// … and of its sine.
     pub cus_rad: f64,
-    /// The same in the radius, metres: of the cosine …
+    /// Amplitude of the cosine harmonic correction to the orbit radius, in metres.
     pub crc_m: f64,
     /// … and of its sine.
     pub crs_m: f64,
-    /// The same in the inclination: of the cosine …
+    /// Amplitude of the cosine harmonic correction to the inclination, in radians.
     pub cic_rad: f64,
     /// … and of its sine.
     pub cis_rad: f64,
@@ -109,8 +109,8 @@ pub struct Ephemeris {
     /// Corrections between signals beside the group delay in `tgd_s`: of L1 C/A, L2C, I5 and Q5 in CNAV, and
     /// of the pilot and the data of L1C in CNAV-2; of NavIC on L1 the two of its message at the last places.
     pub isc_s: [f64; 6],
-    /// Which carriers the clock is of, where a message says it: of NavIC on L1 0 for L1 and L5, 1 for S and
-    /// L5; 0 of others.
+    /// Carriers of the clock, as the message states them: NavIC on L1 has 0 for L1 and L5, 1 for S and L5.
+    /// Other messages have 0.
     pub reference_flag: u8,
     /// Group delays that another message of the satellite says, by the code of RINEX to which they belong
     /// ("5Q"), that of GPS's clock, T_GD, by [`GPS_CLOCK_CODE`]; others follow from `tgd_s`.
@@ -152,7 +152,7 @@ pub struct Mean {
     pub af0_s: f64,
 }
 
-/// What the users of a system's elements compute with.
+/// Constants with which users compute a system's orbits and clocks.
 pub(crate) struct Constants {
     /// Gravitational constant of the Earth.
     pub mu_m3ps2: f64,
@@ -184,7 +184,7 @@ const OF_BEIDOU: Constants = Constants { rotation_radps: 7.292_115_0e-5, behind_
 const OF_NAVIC: Constants = Constants { delay_carrier_hz: 2_492.028e6, ..OF_GPS };
 
 impl Constants {
-    /// Those of a system's interface document.
+    /// Returns the constants that the interface document of `system` prints.
     pub const fn of(system: System) -> &'static Self {
         match system {
             System::Galileo => &OF_GALILEO,
@@ -260,7 +260,7 @@ impl Ephemeris {
         }
     }
 
-    /// The same set with its times as `change` says.
+    /// Returns the ephemeris with each of its times replaced by `change(time)`.
     pub fn timed(self, change: impl Fn(Epoch) -> Epoch) -> Self {
         Self { toe: change(self.toe), toc: change(self.toc), transmitted: change(self.transmitted), ..self }
     }
@@ -408,14 +408,14 @@ impl Ephemeris {
         planted!("gnss.clock.group_delay", given_s, -given_s)
     }
 
-    /// By how much less than [`Self::clock`] the clock reads for a user of `signal` alone: its own delay
-    /// where the set has one, or else what its message makes of the delays that it has.
+    /// Group delay of `signal` in seconds: [`Self::clock`] minus the clock offset for a user of this signal
+    /// alone. The ephemeris states it for the signal, or the message derives it from other delays.
     pub fn group_delay_s(&self, signal: &Signal) -> f64 {
         self.delay_of_code_s(signal.rinex).unwrap_or_else(|| (self.form.group_delay_s)(self, signal))
     }
 
-    /// What a delay as 1/f² on another carrier of BeiDou makes of the one that the message gives on
-    /// `given_hz`: zero on B3I, whose clock it is.
+    /// Group delay on a BeiDou carrier, in seconds, scaled as 1/f² from the delay that the message gives on
+    /// `given_hz`. It is zero on B3I, to which the clock refers.
     pub(crate) fn group_delay_on_s(&self, given_hz: f64, carrier_hz: f64) -> f64 {
         let against_b3i = |hz: f64| B3I_HZ * B3I_HZ / (hz * hz) - 1.0;
         if carrier_hz == given_hz {
@@ -440,22 +440,22 @@ impl Ephemeris {
         Ok(ClockState { offset_s: clock.offset_s - self.group_delay_s(signal), ..clock })
     }
 
-    /// Whether the satellite says that its signal on L1 or E1 may be used, or the one that its message is of.
+    /// True if the satellite reports its signal on L1 or E1, or the signal of its message, as usable.
     pub fn is_healthy(&self) -> bool {
         (self.form.is_healthy)(self)
     }
 
-    /// Whether the satellite says that `signal` may be used; `None` where the set says nothing of it.
+    /// True if the satellite reports `signal` as usable. `None` if the ephemeris does not state it.
     pub fn is_healthy_on(&self, signal: &Signal) -> Option<bool> {
         (self.form.healthy)(self, signal)
     }
 
-    /// Whether sets go on the air after their reference time, and not hours before it as those of GPS do.
+    /// True if an ephemeris is first sent after its reference time. GPS sends it hours before.
     pub fn is_sent_after_reference(&self) -> bool {
         matches!(self.sv.system, System::Galileo | System::Navic | System::BeiDou)
     }
 
-    /// What distinguishes an orbit from others, to the bit.
+    /// Parameters that distinguish one orbit from another, as the bits of `f64` values.
     pub fn orbit_bits(&self) -> [u64; 5] {
         let vector = self.vector.unwrap_or_default();
         let of = |element: f64, own: f64| if self.vector.is_some() { own } else { element }.to_bits();
@@ -468,8 +468,8 @@ impl Ephemeris {
         ]
     }
 
-    /// When a set goes on the air whose fit interval is that in which it is sent, as of GLONASS; `None` where
-    /// the interval is longer.
+    /// Start of transmission for an ephemeris that is sent only within its fit interval, as for GLONASS.
+    /// `None` if the interval is longer.
     pub fn sent_from(&self) -> Option<Epoch> {
         match self.sv.system {
             // Sets of a network are those of its next message.

@@ -16,7 +16,7 @@ const OTHERS: [(&[u8], &str); 7] = [
     (b"Rar!", "RAR"),
 ];
 
-/// Why bytes do not unpack.
+/// Reason for which compressed bytes cannot be unpacked.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum InflateError {
     /// More bytes than allowed, which are these.

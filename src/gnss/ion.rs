@@ -17,7 +17,7 @@ use crate::packed::{Components, Encoding, Group, Layout};
 use crate::recording::{Blocks, Description, Samples};
 use crate::time::Rate;
 
-/// Why a text does not describe samples that can be read.
+/// Reason for which a text does not describe readable samples.
 #[derive(Debug, Error)]
 pub enum IonError {
     /// No XML.
@@ -25,7 +25,7 @@ pub enum IonError {
     Syntax {
         /// Name of the file.
         name: String,
-        /// What the parser reports.
+        /// Error of the XML parser.
         error: roxmltree::Error,
     },
     /// An element that is not there.
@@ -35,7 +35,7 @@ pub enum IonError {
         name: String,
         /// The element.
         element: &'static str,
-        /// Where it is expected.
+        /// Enclosing element in which it is expected.
         within: String,
     },
     /// An element whose value cannot be used.
@@ -45,9 +45,9 @@ pub enum IonError {
         name: String,
         /// The element.
         element: String,
-        /// Its value.
+        /// Text of the element.
         value: String,
-        /// What is expected.
+        /// Values that are expected.
         expected: String,
     },
 }
@@ -99,7 +99,7 @@ struct Chunk<'a, 'i> {
     framing: Framing,
 }
 
-/// What of a file is no samples.
+/// Bytes of a file that are not samples: headers and footers.
 #[derive(Default)]
 struct Framing {
     header_bytes: u64,

@@ -17,13 +17,13 @@ use crate::time::Epoch;
 pub const LARGEST_BYTES: u64 = 64 << 20;
 /// Values of all maps at most: 32 MiB of memory, 62 days of the IGS's maps.
 const MOST_VALUES: usize = 4 << 20;
-/// What is written where no value is known.
+/// Value that a map contains where the electron content is unknown.
 const NO_VALUE: f64 = 9999.0;
 const DAY_S: f64 = 86_400.0;
 /// A grid that ends farther from a pole than this is not one of the globe.
 const POLAR_GAP_DEG: f64 = 5.0;
 
-/// How a value between nodes is found.
+/// Method of interpolation between nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpolation {
     /// From four nodes, as the format's authors propose and every user of the maps does; its slope has steps.
@@ -56,7 +56,7 @@ struct Axis {
     count: usize,
 }
 
-/// Why a file gives no maps.
+/// Reason for which a file contains no usable maps.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum IonexError {
     /// A file that cannot be decompressed.
@@ -64,7 +64,7 @@ pub enum IonexError {
     Packed {
         /// Name of the file.
         name: String,
-        /// Why.
+        /// Error of unpacking.
         source: InflateError,
     },
     /// A line that is not as the format has it.
@@ -72,11 +72,11 @@ pub enum IonexError {
     Line {
         /// Name of the file.
         name: String,
-        /// Its number, from 1.
+        /// Line number, from 1.
         line: usize,
-        /// What is there.
+        /// Text that was found.
         found: String,
-        /// What is expected.
+        /// Text that is expected.
         expected: String,
     },
     /// A file that lacks something as a whole.
@@ -84,9 +84,9 @@ pub enum IonexError {
     Whole {
         /// Name of the file.
         name: String,
-        /// What was found.
+        /// Text that was found.
         found: String,
-        /// What is expected.
+        /// Text that is expected.
         expected: String,
     },
 }
@@ -173,7 +173,7 @@ fn weights(u: f64, how: Interpolation) -> [f64; 4] {
     }
 }
 
-/// What the header says that maps are read by.
+/// Header values that are needed to read the maps.
 #[derive(Default)]
 struct Header {
     radius_m: Option<f64>,

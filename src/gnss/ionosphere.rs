@@ -1,4 +1,4 @@
-//! What satellites broadcast of the ionosphere: coefficients of one model or another.
+//! Ionosphere coefficients that satellites broadcast, one type for all models.
 
 use nalgebra::Vector3;
 
@@ -11,30 +11,30 @@ use crate::time::Epoch;
 /// The models that there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Model {
-    /// Of GPS.
+    /// Klobuchar model of GPS.
     Klobuchar,
-    /// Of Galileo.
+    /// NeQuick G model of Galileo.
     NequickG,
-    /// That of GPS as NavIC sends it: the delay of L5.
+    /// Klobuchar model as NavIC sends it: delay on L5.
     KlobucharNavic,
-    /// That of GPS as BeiDou has it, with geographic latitudes: the delay of B1I.
+    /// Klobuchar model as BeiDou defines it, with geographic latitudes: delay on B1I.
     KlobucharBeidou,
-    /// Of BeiDou's third generation.
+    /// BDGIM, the model of BeiDou's third generation.
     Bdgim,
 }
 
 /// The coefficients of a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Coefficients {
-    /// Of GPS's model.
+    /// Klobuchar coefficients of GPS.
     Klobuchar(Klobuchar),
-    /// Of Galileo's.
+    /// NeQuick G coefficients of Galileo.
     NequickG(NequickG),
-    /// Of that of GPS, for the delay of NavIC's L5.
+    /// Klobuchar coefficients of NavIC, for the delay on L5.
     KlobucharNavic(Klobuchar),
-    /// Of BeiDou's form of it.
+    /// Klobuchar coefficients of BeiDou, for the delay on B1I.
     KlobucharBeidou(Klobuchar),
-    /// Of the model of BeiDou's third generation.
+    /// BDGIM coefficients of BeiDou's third generation.
     Bdgim(Bdgim),
 }
 
@@ -48,7 +48,7 @@ impl Model {
 }
 
 impl Coefficients {
-    /// Of which model they are.
+    /// Returns the model that the coefficients belong to.
     pub fn model(&self) -> Model {
         match self {
             Self::Klobuchar(_) => Model::Klobuchar,

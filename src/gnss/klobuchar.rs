@@ -86,9 +86,9 @@ impl Klobuchar {
         }
     }
 
-    /// The same by BeiDou's form of the model (BDS-SIS-ICD-B1I 3.0, 5.2.4.7): geographic latitude of a point
-    /// 375 km above a sphere, a cosine over a quarter of its period on either side of 14 h, and the delay of
-    /// B1I.
+    /// Slant delay in seconds by BeiDou's form of the model (BDS-SIS-ICD-B1I 3.0, 5.2.4.7), scaled from B1I
+    /// to `carrier_hz`. The pierce point is 375 km above a sphere and has a geographic latitude. The cosine
+    /// covers a quarter of its period on either side of 14 h.
     pub fn beidou_delay_s(&self, user: Geodetic, look: Look, at: Epoch, carrier_hz: f64) -> f64 {
         const EARTH_M: f64 = 6378e3;
         const SHELL_M: f64 = EARTH_M + 375e3;

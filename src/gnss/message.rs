@@ -1,4 +1,4 @@
-//! What a form of navigation message is to those who send and to those who read it.
+//! Navigation messages as encoders and decoders use them: one [`Message`] for each form.
 //!
 //! A transmitter asks a [`Sender`] for the symbols of a unit (a subframe, a page) that begins at a time; a
 //! receiver gives a [`Reader`] the symbols as they come and takes what they say. Each form is one [`Message`]
@@ -50,7 +50,7 @@ pub struct Message {
     pub set: &'static [u8],
     /// Numbers of the units each of which carries a set in short.
     pub reduced: &'static [u8],
-    /// What it says of the ionosphere.
+    /// Ionosphere model and the units that carry its coefficients.
     pub ionosphere: IonosphereForm,
     /// Names of the parameters of a set that bear its issue.
     pub set_parameters: fn() -> Vec<&'static str>,
@@ -65,7 +65,7 @@ pub struct Message {
     /// The set that satellites send in this form, of one in the form of another of their messages: orbits
     /// are the same, clocks differ by group delays.
     pub form: fn(&Ephemeris) -> Ephemeris,
-    /// What clock and health of its sets mean.
+    /// Meaning of clock and health in ephemerides of this message.
     pub sets: &'static SetForm,
     /// The set that a receiver decodes when this one is sent.
     pub quantised: fn(&Ephemeris) -> Result<Ephemeris, FieldError>,
@@ -76,16 +76,18 @@ pub struct Message {
     pub alert: Option<Alert>,
     /// Adds to the parameter of a set that the tables call so, in its unit; whether there is one.
     pub adjust: fn(&mut Ephemeris, &str, f64) -> bool,
-    /// What records of RINEX have of it; absent where they have it in a form that is not written.
+    /// RINEX record names of the message. Absent if RINEX has the message in a form that this crate does not
+    /// write.
     pub rinex: Option<Records>,
 }
 
 /// Names of a message's records in navigation files of RINEX 4 (RINEX 4.02, tables 24 and 25).
 #[derive(Clone, Copy, Debug)]
 pub struct Records {
-    /// Of the sets of a satellite.
+    /// Record name of a satellite's ephemerides.
     pub set: fn(Sv) -> &'static str,
-    /// Of what all satellites say alike: the ionosphere's coefficients, and the time of other systems.
+    /// Record name of the parameters that all satellites send alike: ionosphere coefficients and time offsets
+    /// between systems.
     pub common: &'static str,
     /// The fields of the message, from which offsets of time are read.
     pub fields: fn() -> Vec<(&'static str, Vec<&'static Field>)>,
@@ -97,12 +99,12 @@ pub struct Records {
 /// Four fields of a line of a record.
 pub type RecordLine = [Option<f64>; 4];
 
-/// How a message describes the ionosphere.
+/// Ionosphere content of a message.
 #[derive(Clone, Copy)]
 pub struct IonosphereForm {
-    /// By which model.
+    /// Model whose coefficients the message carries.
     pub model: Model,
-    /// Whether the unit that begins then carries its coefficients.
+    /// Function that returns true if the unit that begins at this time carries the coefficients.
     pub unit: fn(Epoch) -> bool,
     /// The coefficients by the raw integers of their parameters; `None` where one is missing.
     pub coefficients: fn(Raw<'_>) -> Option<Coefficients>,
@@ -116,16 +118,16 @@ pub type Alert = fn(&[bool]) -> Option<Vec<bool>>;
 /// Gives the raw integer of a parameter by its name.
 pub type Raw<'a> = &'a dyn Fn(&str) -> Option<i64>;
 
-/// What all satellites of a system say alike.
+/// Parameters that all satellites of a system send alike.
 #[derive(Clone, Debug, Default)]
 pub struct Common {
     /// Coefficients of GPS's model of the ionosphere; absent means none are sent.
     pub klobuchar: Option<Klobuchar>,
     /// Coefficients of the same model as NavIC sends them, for L5; absent means none are sent.
     pub klobuchar_navic: Option<Klobuchar>,
-    /// Those of BeiDou's form of it; absent means none are sent.
+    /// Klobuchar coefficients of BeiDou; absent means none are sent.
     pub klobuchar_beidou: Option<Klobuchar>,
-    /// Those of the model of BeiDou's third generation; absent means that nine zeros are sent.
+    /// BDGIM coefficients; absent means that nine zeros are sent.
     pub bdgim: Option<Bdgim>,
     /// Effective ionisation coefficients of NeQuick-G, in solar flux units, per degree and per degree
     /// squared.
@@ -138,7 +140,8 @@ pub struct Common {
     pub almanac: Vec<Ephemeris>,
     /// Time near which the almanac holds.
     pub reference: Option<Epoch>,
-    /// Who knows what augmentation systems send of others; absent means that they say nothing of them.
+    /// Ground network that supplies the content of augmentation messages; absent means that they contain no
+    /// corrections.
     pub network: Option<Arc<dyn Network>>,
 }
 
@@ -164,8 +167,8 @@ pub(crate) fn almanac_page<T>(entries: &[T], places: usize, turn: i64) -> (bool,
     (turn < reduced, rest.split_at(count.min(rest.len())).0)
 }
 
-/// What messages newer than LNAV and D1 say of UTC: a polynomial and a change of leap seconds, in numbers of
-/// their system's own time (IS-GPS-705J, 20.3.3.6; BDS-SIS-ICD-B2a 1.0, 7.12).
+/// UTC parameters of messages newer than LNAV and D1: a polynomial and a change of leap seconds. Weeks and
+/// seconds are those of the system's own time (IS-GPS-705J, 20.3.3.6; BDS-SIS-ICD-B2a 1.0, 7.12).
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct UtcNumbers {
     pub a0_s: f64,
@@ -180,8 +183,8 @@ pub(crate) struct UtcNumbers {
 }
 
 impl UtcNumbers {
-    /// Those of a time that is whole seconds behind GPS time, in a unit that begins at `start` of that time.
-    /// Weeks are numbers from `first_week` on; Sundays are day `sunday`.
+    /// UTC parameters in a time scale that is whole seconds behind GPS time, for a unit that begins at
+    /// `start`. Week numbers count from `first_week`. Sunday has the day number `sunday`.
     pub fn of(common: &Common, start: Epoch, time: &TimeScale, (first_week, sunday): (i64, i64)) -> Self {
         let utc = &common.utc;
         let behind_s = time.behind_gpst_s as f64;
@@ -213,7 +216,8 @@ pub trait Sender: Send + Sync {
     /// A value that the message cannot carry, or a start at which no unit begins.
     fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError>;
 
-    /// The same after a unit that carried the set `before`: of a code that runs on from unit to unit.
+    /// Symbols of a unit that follows a unit with the ephemeris `before`. It serves codes whose encoder state
+    /// continues from unit to unit.
     ///
     /// # Errors
     /// As [`Self::unit`].
@@ -233,7 +237,7 @@ pub trait Sender: Send + Sync {
     }
 }
 
-/// What a symbol completed.
+/// Result of decoding one symbol.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Read {
     /// A unit that passed its checks began `symbols` before the end of the newest symbol, at a time of week.
@@ -242,14 +246,14 @@ pub enum Read {
         symbols: u64,
         /// Seconds of the week at which its first symbol was sent.
         of_week_s: i64,
-        /// Whether symbols are received upside down.
+        /// True if symbols are received inverted.
         inverted: bool,
     },
-    /// The same of a message that does not say its time.
+    /// A unit of a message that does not state its time.
     Undated {
         /// From its first symbol to the newest, both counted.
         symbols: u64,
-        /// Whether symbols are received upside down.
+        /// True if symbols are received inverted.
         inverted: bool,
     },
     /// The start of a unit with its week, resolved near what the reader was given.
@@ -259,19 +263,19 @@ pub enum Read {
     /// A set in short, good to metres, for some minutes from its reference time on; whether group delays and
     /// health were read too, else they are zero.
     Reduced {
-        /// As whole elements, the rest zero.
+        /// Orbit as complete elements; all other parameters are zero.
         set: Box<Ephemeris>,
-        /// Whether group delays and health are in it.
+        /// True if group delays and health are included.
         with_delays: bool,
     },
     /// The ionosphere's parameters.
     Ionosphere(Coefficients),
-    /// By how much the system's time is ahead of GPS time, whole seconds apart.
+    /// Offset of the system's time ahead of GPS time, in seconds without the whole seconds between both.
     AheadOfGps(TimePolynomial),
-    /// What an augmentation system says of other satellites, in a block that began at that time.
+    /// Content of an augmentation message about other satellites, with the start of its block.
     Augmentation(Epoch, Box<Content>),
-    /// Which satellite sends, where it is another than the one that was assumed: of those that share code and
-    /// carrier nothing but the message tells them apart. All that follows is of this one.
+    /// Satellite that transmits, if it differs from the assumed one. Some satellites share code and carrier,
+    /// and only the message identifies them. All later results belong to this satellite.
     Sender(Sv),
     /// Raw parameters as decoded.
     Parameters(Vec<NavigationRow>),
@@ -280,12 +284,12 @@ pub enum Read {
 }
 
 impl Read {
-    /// What comes of a unit that names another satellite than the one that is followed.
+    /// Failure for a unit that names another satellite than the tracked one.
     pub(crate) fn names_another(unit: &str, said: impl fmt::Display) -> Self {
         Self::Refused(format!("{unit} names satellite {said}, which is another one"))
     }
 
-    /// What comes of parts that were all read and make no set.
+    /// Failure for parts that were all decoded but do not form an ephemeris.
     pub(crate) fn make_no_set(parts: &str) -> Self {
         Self::Refused(format!("{parts} are of different sets or of another satellite"))
     }
@@ -308,7 +312,7 @@ pub trait Reader: fmt::Debug + Send + Sync {
 }
 
 impl Message {
-    /// Whether it says its time by itself.
+    /// True if the message states its own time.
     pub fn is_dated(&self) -> bool {
         !self.timed.is_empty()
     }
@@ -329,7 +333,7 @@ impl Message {
         unit.div_euclid(units) * units
     }
 
-    /// When a unit begins.
+    /// Start time of the unit with this number.
     pub fn unit_start(&self, unit: i64) -> Epoch {
         Epoch::new(unit * self.unit_s + self.first_s, 0.0)
     }

@@ -23,7 +23,7 @@ pub const KNOT_MPS: f64 = 1852.0 / 3600.0;
 const GSA_SATELLITES: usize = 12;
 const GSV_SATELLITES: usize = 4;
 
-/// Where somebody is, and when.
+/// Position and time of a vehicle.
 #[derive(Clone, Debug)]
 pub struct Place {
     /// GPS time of the position.
@@ -47,13 +47,13 @@ pub struct Place {
 pub struct Seen {
     /// The satellite.
     pub sv: Sv,
-    /// Its strongest signal and that one's C/N0 in dB-Hz; absent if it is not received.
+    /// Strongest signal of the satellite and its C/N0 in dB-Hz; absent if no signal is received.
     pub signal: Option<(&'static Signal, f64)>,
     /// From north over east.
     pub azimuth_deg: f64,
     /// Above the horizon.
     pub elevation_deg: f64,
-    /// Whether it is in the solution.
+    /// True if the satellite is used in the solution.
     pub used: bool,
 }
 
@@ -87,7 +87,7 @@ pub fn sentence(talker: &str, body: &str) -> String {
     format!("${talker}{body}*{sum:02X}\r\n")
 }
 
-/// Who speaks for a system (NMEA 0183 4.11, table 1).
+/// Talker identifier of a system (NMEA 0183 4.11, table 1).
 pub fn talker(system: System) -> &'static str {
     match system {
         System::Gps | System::Sbas => "GP",

@@ -24,7 +24,7 @@ const READ_BYTES: usize = 1 << 16;
 /// Most words of a group.
 const MOST_WORDS: usize = 1 << 12;
 
-/// How a value is written in its bits.
+/// Encoding of a value in its bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
     /// One bit: 1 is positive.
@@ -86,7 +86,7 @@ impl FromStr for Encoding {
     }
 }
 
-/// What components a sample has, and in which order.
+/// Components of a sample and their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Components {
     /// One.
@@ -98,13 +98,13 @@ pub enum Components {
 }
 
 impl Components {
-    /// How many there are.
+    /// Number of components.
     fn count(self) -> u32 {
         if self == Self::Real { 1 } else { 2 }
     }
 }
 
-/// Why bits cannot be samples.
+/// Reason for which a bit layout cannot describe samples.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum LayoutError {
     /// A width that nothing is written in.
@@ -117,7 +117,7 @@ pub enum LayoutError {
         encoding: Encoding,
         /// The width.
         bits: u32,
-        /// What there is.
+        /// Values that are possible.
         expected: &'static str,
     },
     /// Floating point, of which a channel cannot be taken.
@@ -155,15 +155,15 @@ pub enum LayoutError {
 pub struct Interleaved {
     /// Bits of a value.
     pub bits: u32,
-    /// How they are written.
+    /// Encoding of the values.
     pub encoding: Encoding,
     /// Values of a sample.
     pub components: Components,
-    /// Whether the first value lies in the lowest bits of a word; in the highest otherwise.
+    /// True if the first value occupies the lowest bits of a word; otherwise it occupies the highest.
     pub lowest_first: bool,
     /// Bytes of a word.
     pub word_bytes: usize,
-    /// Whether the highest byte of a word comes first.
+    /// True if the highest byte of a word comes first.
     pub big_endian: bool,
     /// Channels, a sample of each in turn.
     pub channels: u32,
@@ -171,7 +171,7 @@ pub struct Interleaved {
     pub channel: u32,
 }
 
-/// Which bits of a group of words are samples.
+/// Assignment of the bits in a group of words to samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
     word_bytes: usize,
@@ -245,7 +245,7 @@ impl Layout {
         Ok(Self { word_bytes, big_endian, words, bits, encoding, complex, fields })
     }
 
-    /// How samples go out.
+    /// Format of the unpacked samples.
     pub fn format(&self) -> Format {
         let wide = self.bits > 8 || (self.bits == 8 && self.encoding != Encoding::TwosComplement);
         match (wide, self.complex) {
@@ -301,11 +301,11 @@ impl Layout {
 pub struct Group {
     /// Bytes of a word.
     pub word_bytes: usize,
-    /// Whether the highest byte of a word comes first.
+    /// True if the highest byte of a word comes first.
     pub big_endian: bool,
     /// Words of the group.
     pub words: usize,
-    /// Whether bits are counted from the lowest of a word; from the highest otherwise.
+    /// True if bits are counted from the lowest bit of a word; otherwise from the highest.
     pub lowest_first: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Where keys and values are in a TOML text, so that errors can name line and column.
+//! Line and column of keys and values in a TOML text, for error messages.
 //!
 //! Source: TOML 1.0, through the spans of the `toml` crate. Keys are named from the top, with dots between: a
 //! quoted key that has dots of its own is one with the tables that it abbreviates. Arrays are not looked
@@ -16,7 +16,7 @@ pub struct Keys<'t> {
 }
 
 impl<'t> Keys<'t> {
-    /// Those of `text`, which errors call `origin`; none if it is no TOML.
+    /// Indexes the keys of `text`, which errors call `origin`. The index is empty if the text is not TOML.
     pub fn new(origin: &'t str, text: &'t str) -> Self {
         let mut keys = Self { origin, text, entries: Vec::new() };
         if let Ok(document) = DeTable::parse(text) {

@@ -28,7 +28,7 @@ macro_rules! planted {
 #[cfg(feature = "planted")]
 pub const VARIABLE: &str = "GNSS_TWIN_PLANTED";
 
-/// Whether the fault of this name is active; read once a process.
+/// True if the fault of this name is active. The environment is read once per process.
 #[cfg(feature = "planted")]
 pub fn active(name: &str) -> bool {
     use std::sync::OnceLock;

@@ -32,11 +32,11 @@ pub struct Observation {
     pub sample: u64,
     /// The satellite.
     pub sv: Sv,
-    /// Its signal.
+    /// Signal of the satellite.
     #[serde(with = "by_name")]
     pub signal: &'static Signal,
-    /// What the satellite's clock read when it sent what arrives at this sample, as its signal
-    /// says (IS-GPS-200N, 20.3.3.3.3): whole GPS seconds …
+    /// Transmission time by the satellite's clock, whole GPS seconds, for the wave that arrives at this
+    /// sample. The clock is that of the signal (IS-GPS-200N, 20.3.3.3.3).
     pub sent_s: i64,
     /// … and the fraction.
     pub sent_fraction_s: f64,
@@ -53,20 +53,20 @@ pub struct Observation {
 }
 
 impl Observation {
-    /// When the signal was sent, by the satellite's clock.
+    /// Returns the transmission time by the satellite's clock.
     pub fn sent(&self) -> Epoch {
         Epoch::new(self.sent_s, self.sent_fraction_s)
     }
 }
 
-/// Where a satellite truly was as seen by the antenna: `truth/sky.csv`.
+/// True position of a satellite as seen from the antenna: one row of `truth/sky.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SkyRow {
     /// Number of the sample, from 0 at the start of the scene or recording.
     pub sample: u64,
     /// The satellite.
     pub sv: Sv,
-    /// Its signal, whose clock and ionosphere these are.
+    /// Signal to which the clock and the ionosphere delay refer.
     #[serde(with = "by_name")]
     pub signal: &'static Signal,
     /// From north over east.
@@ -83,7 +83,7 @@ pub struct SkyRow {
     pub troposphere_m: f64,
 }
 
-/// What begins or ends the time in which a satellite is in the scene's sky.
+/// Cause for which a pass of a satellite begins or ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PassEnd {
@@ -107,9 +107,9 @@ pub struct PassRow {
     pub sample: u64,
     /// The first sample out of view again.
     pub until_sample: u64,
-    /// What begins it.
+    /// Cause of the beginning.
     pub begins_by: PassEnd,
-    /// What ends it.
+    /// Cause of the end.
     pub ends_by: PassEnd,
 }
 
@@ -120,20 +120,20 @@ pub struct RayRow {
     pub sample: u64,
     /// The satellite.
     pub sv: Sv,
-    /// Its signal.
+    /// Signal of the satellite.
     #[serde(with = "by_name")]
     pub signal: &'static Signal,
     /// Counted from 1; the direct ray is 0.
     pub ray: u32,
     /// Delay of its code against the direct ray's.
     pub excess_m: f64,
-    /// Of the direct ray's; 0 while there is none.
+    /// Amplitude relative to the direct ray; 0 while there is no direct ray.
     pub amplitude_ratio: f64,
-    /// Its carrier ahead of the direct ray's, 0 to 1.
+    /// Carrier phase ahead of the direct ray, in cycles, 0 to 1.
     pub phase_cycles: f64,
 }
 
-/// Where the antenna was and what the clocks read: `truth/trajectory.csv`.
+/// True position of the antenna and true clock offsets: one row of `truth/trajectory.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TrajectoryRow {
     /// Number of the sample, from 0 at the start of the scene or recording.
@@ -195,7 +195,7 @@ impl Geographic {
     /// Names of its columns.
     pub const COLUMNS: [&'static str; 4] = ["latitude_deg", "longitude_deg", "height_m", "utc"];
 
-    /// Of an ECEF position at a time.
+    /// Converts an ECEF position in metres at a time.
     pub fn of(position_m: &Vector3<f64>, time: Epoch) -> Self {
         let place = Geodetic::from_ecef(position_m);
         Self {
@@ -212,11 +212,11 @@ impl Geographic {
 pub struct InterferenceRow {
     /// Number of the sample, from 0 at the start of the scene or recording.
     pub sample: u64,
-    /// Its number among those that are computed, from 1.
+    /// Number of the source among the computed ones, from 1.
     pub source: usize,
     /// Mean power over a repetition, over the density of the thermal noise.
     pub jn0_dbhz: f64,
-    /// Where its carrier appears in the samples, Doppler and the receiver's clock in.
+    /// Carrier frequency in the samples, in Hz, with Doppler and the receiver's clock included.
     pub frequency_hz: f64,
 }
 
@@ -261,13 +261,13 @@ pub struct Fix {
     pub correlation_nu: f64,
     /// Geometric dilution of precision, place and clock.
     pub gdop: f64,
-    /// Of the place.
+    /// Dilution of precision of the position.
     pub pdop: f64,
-    /// Of its horizontal part.
+    /// Dilution of precision of the horizontal position.
     pub hdop: f64,
-    /// Of its vertical part.
+    /// Dilution of precision of the vertical position.
     pub vdop: f64,
-    /// Of the clock.
+    /// Dilution of precision of the clock.
     pub tdop: f64,
     /// Ratio of the extreme singular values of the geometry: 1 would be perfect, 10 000 and more is refused.
     pub condition: f64,
@@ -277,7 +277,7 @@ pub struct Fix {
     pub chi_square: f64,
     /// Satellites left out by the residual test, separated by blanks.
     pub excluded: String,
-    /// How the ionosphere was corrected.
+    /// Ionosphere correction of the fix.
     pub ionosphere: IonosphereModel,
     /// Ranges in the solution, and clocks that it estimates: one a satellite, and one, where the file does
     /// not say.
@@ -286,7 +286,7 @@ pub struct Fix {
     /// Clocks that it estimates.
     #[serde(default)]
     pub clocks: Option<u32>,
-    /// What `clock_bias_s` and the time of the fix are counted from: GPS time, or that of the only system.
+    /// Time scale of `clock_bias_s` and of the fix's time: GPS time, or the scale of the only system.
     #[serde(default = "gpst")]
     pub time_scale: String,
 }
@@ -295,11 +295,11 @@ fn gpst() -> String {
     GPST.name.to_owned()
 }
 
-/// Where a satellite stands as the receiver sees it from its fix. It is reported while the receiver runs, and
-/// has no table.
+/// Direction of a satellite from the receiver's fix. It is reported while the receiver runs and is not
+/// written to a table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SightRow {
-    /// That of the fix.
+    /// Sample number of the fix.
     pub sample: u64,
     /// The satellite.
     pub sv: Sv,
@@ -307,7 +307,7 @@ pub struct SightRow {
     pub azimuth_deg: f64,
     /// Above the horizon.
     pub elevation_deg: f64,
-    /// Whether it is in the fix.
+    /// True if the satellite is used in the fix.
     pub used: bool,
 }
 
@@ -315,7 +315,7 @@ pub struct SightRow {
 /// with a satellite on two bands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct IonosphereRow {
-    /// That of the fix.
+    /// Sample number of the fix.
     pub sample: u64,
     /// The satellite.
     pub sv: Sv,
@@ -339,7 +339,7 @@ pub struct ClockRow {
     pub sigma_clock_m: f64,
 }
 
-/// What a fix was corrected by for the ionosphere.
+/// Ionosphere correction that a fix used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IonosphereModel {
@@ -389,14 +389,14 @@ pub struct AcquisitionRow {
     pub sample: u64,
     /// The satellite.
     pub sv: Sv,
-    /// Its signal.
+    /// Signal that was searched.
     #[serde(with = "by_name")]
     pub signal: &'static Signal,
-    /// Whether the satellite was found.
+    /// True if the satellite was found.
     pub acquired: bool,
     /// Largest detection statistic of the search, and the threshold that it had to pass.
     pub statistic: f64,
-    /// What the statistic had to pass.
+    /// Threshold of the statistic.
     pub threshold: f64,
     /// Doppler of the largest statistic.
     pub doppler_hz: f64,
@@ -412,15 +412,15 @@ pub struct AcquisitionRow {
 pub struct LineRow {
     /// First sample looked at.
     pub sample: u64,
-    /// Where the strongest line appears in the samples.
+    /// Frequency of the strongest line in the samples, in Hz.
     pub frequency_hz: f64,
-    /// Its power over the density of what lies beside it …
+    /// Power of the line over the noise density beside it, in dB-Hz.
     pub jn0_dbhz: f64,
     /// … and over the satellites' median C/N0 while there was no line; empty if there never was such a time.
     pub js_db: Option<f64>,
-    /// Its bin over those beside it, and what that had to pass.
+    /// Power of the line's bin relative to the bins beside it.
     pub statistic: f64,
-    /// What the statistic had to pass.
+    /// Threshold of the statistic.
     pub threshold: f64,
     /// Lines above the threshold: one of a continuous wave, many of a sweep or of pulses.
     pub lines: u32,
@@ -435,18 +435,18 @@ pub struct TrackingRow {
     pub sample: u64,
     /// The satellite.
     pub sv: Sv,
-    /// Its signal.
+    /// Signal of the satellite.
     #[serde(with = "by_name")]
     pub signal: &'static Signal,
     /// Prompt correlator, in units of its noise's standard deviation per component.
     pub prompt_i: f64,
-    /// Its component at right angles.
+    /// Quadrature prompt correlator, in units of its noise's standard deviation.
     pub prompt_q: f64,
     /// Raw discriminators of this update.
     pub dll_discriminator_chips: f64,
-    /// Of the phase.
+    /// Raw phase discriminator of this update, in cycles.
     pub pll_discriminator_cycles: f64,
-    /// Of the frequency.
+    /// Raw frequency discriminator of this update, in Hz.
     pub fll_discriminator_hz: f64,
     /// Carrier power over noise density of the whole signal, dB-Hz.
     pub cn0_dbhz: f64,
@@ -461,11 +461,11 @@ pub struct TrackingRow {
 pub struct NavigationRow {
     /// The satellite.
     pub sv: Sv,
-    /// What identifies the data set within the satellite: the issue of data for ephemerides, 0 otherwise.
+    /// Identifier of the data set within the satellite: the issue of data for ephemerides, 0 otherwise.
     pub issue: u32,
     /// Name in the message's field table.
     pub parameter: String,
-    /// Its integer as sent, sign extended.
+    /// Raw integer as sent, with its sign extended.
     pub raw: i64,
     /// The message's name: satellites may send several. Files of one message do not say it: LNAV.
     #[serde(default = "lnav")]
@@ -502,14 +502,14 @@ pub struct EventRow {
     pub sample: u64,
     /// The satellite.
     pub sv: Sv,
-    /// Its signal.
+    /// Signal of the channel.
     #[serde(with = "by_name")]
     pub signal: &'static Signal,
-    /// What happened.
+    /// Event that occurred.
     pub event: Event,
 }
 
-/// What can happen to a channel.
+/// Events of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Event {
@@ -533,7 +533,7 @@ pub enum Event {
     IonosphereDecoded,
     /// The satellite says that it is unhealthy: it is not used from here on.
     Unhealthy,
-    /// It says that it is healthy again.
+    /// The satellite reports itself healthy again.
     Healthy,
     /// The channel gave the signal up.
     LossOfLock,

@@ -1,5 +1,5 @@
-//! What metadata say of a recording before anything completes it: keys may be absent, samples packed, and a
-//! file may have more than samples.
+//! Metadata of a recording before they are completed: keys may be absent, samples packed, and a file may
+//! contain other bytes.
 
 use std::io::Read;
 
@@ -8,7 +8,7 @@ use crate::samples::Format;
 use crate::signal::Signal;
 use crate::time::{Epoch, Rate};
 
-/// How samples lie in a file.
+/// Arrangement of samples in a file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Samples {
     /// In whole bytes, as they are received.
@@ -22,17 +22,17 @@ pub enum Samples {
 /// A recording as its metadata describe it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Description {
-    /// How samples lie in the file.
+    /// Arrangement of samples in the file.
     pub samples: Option<Samples>,
     /// Samples a second.
     pub rate: Option<Rate>,
     /// The radio frequency at 0 Hz of the samples.
     pub center_hz: Option<f64>,
-    /// Whether the spectrum is mirrored.
+    /// True if the spectrum is mirrored.
     pub inverted: bool,
     /// The signals in it; none where nothing says it.
     pub signals: Vec<&'static Signal>,
-    /// What the recorder's clock read at the first sample.
+    /// Time of the first sample by the recorder's clock.
     pub start: Option<Epoch>,
     /// Channels, a sample of each in turn.
     pub channels: u32,

@@ -31,7 +31,7 @@ use crate::time::{Epoch, TimePolynomial, WEEK_S};
 /// Largest file that is read, in bytes after decompression.
 pub const LARGEST_BYTES: u64 = 256 << 20;
 
-/// What a navigation file says about GPS, Galileo, NavIC, BeiDou, GLONASS, QZSS and SBAS.
+/// Content of a navigation file for GPS, Galileo, NavIC, BeiDou, GLONASS, QZSS and SBAS.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Navigation {
     /// Sets of LNAV of GPS and QZSS, Galileo I/NAV, NavIC, BeiDou D1 or D2, GLONASS and SBAS by satellite
@@ -41,7 +41,7 @@ pub struct Navigation {
     pub klobuchar: Option<Klobuchar>,
     /// Coefficients of the same model as NavIC sends them, for L5, where the header has them.
     pub klobuchar_navic: Option<Klobuchar>,
-    /// Those of BeiDou's form of it, likewise.
+    /// Klobuchar coefficients of BeiDou, where the header has them.
     pub klobuchar_beidou: Option<Klobuchar>,
     /// Coefficients of BDGIM: of version 4's first record of them that are not all zero, of version 3 by the
     /// header's lines BDS1 to BDS3, which some providers write.
@@ -60,7 +60,7 @@ pub struct Navigation {
     pub skipped: Vec<String>,
 }
 
-/// Why a file gives no navigation data.
+/// Reason for which a file yields no navigation data.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum NavigationError {
     /// More than a navigation file can have.
@@ -74,7 +74,7 @@ pub enum NavigationError {
     Packed {
         /// Name of the file.
         name: String,
-        /// What packed it.
+        /// Error of unpacking.
         error: InflateError,
     },
     /// A file that cannot be decompressed.
@@ -82,7 +82,7 @@ pub enum NavigationError {
     Gzip {
         /// Name of the file.
         name: String,
-        /// What is wrong.
+        /// Description of the error.
         detail: String,
     },
     /// No RINEX file.
@@ -90,7 +90,7 @@ pub enum NavigationError {
     NotRinex {
         /// Name of the file.
         name: String,
-        /// How it begins.
+        /// First characters of the file.
         found: String,
     },
     /// A RINEX file of something else.
@@ -98,7 +98,7 @@ pub enum NavigationError {
     NotNavigation {
         /// Name of the file.
         name: String,
-        /// Its type.
+        /// File type that was found.
         found: String,
     },
     /// A record or header that is not as the format has it.
@@ -106,7 +106,7 @@ pub enum NavigationError {
     Damaged {
         /// Name of the file.
         name: String,
-        /// Where and what.
+        /// Position and description of the error.
         detail: String,
     },
     /// No set of elements that can be used.
@@ -114,7 +114,7 @@ pub enum NavigationError {
     Nothing {
         /// Name of the file.
         name: String,
-        /// What there is instead.
+        /// Content that was found instead.
         found: String,
     },
 }
@@ -238,12 +238,12 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
     Ok(navigation)
 }
 
-/// What a line of one time against another may hold.
+/// Permitted relation between two times of a record.
 struct Allowed {
     what: &'static str,
     a0_s: f64,
     a1_sps: f64,
-    /// Whether a reference time is one, and what it has to be.
+    /// Test of a reference time, and the words for what it must satisfy.
     is_time: fn(f64) -> bool,
     time: &'static str,
     /// Weeks that the message distinguishes.

@@ -10,7 +10,7 @@ use thiserror::Error;
 
 use crate::time::{Epoch, Rate};
 
-/// How one sample is written.
+/// Encoding of one sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Complex, 8 bits a component, two's complement.
@@ -27,7 +27,7 @@ pub enum Format {
     Ri16Le,
 }
 
-/// Why a text names no format.
+/// Error for a text that is not the name of a format.
 #[derive(Debug, Error, PartialEq)]
 #[error("unknown sample format '{0}': expected one of ci8, cu8, ci16, cf32, ri8, ri16")]
 pub struct FormatError(String);
@@ -58,7 +58,7 @@ impl Format {
         }
     }
 
-    /// Whether a sample has a quadrature component.
+    /// True if a sample has a quadrature component.
     pub fn is_complex(self) -> bool {
         !matches!(self, Self::Ri8 | Self::Ri16Le)
     }
@@ -197,18 +197,18 @@ impl FromStr for Format {
     }
 }
 
-/// What a data sheet says of a stream of samples; no truth can be written here.
+/// Description of a sample stream as a data sheet gives it. The type has no field for truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IfMetadata {
-    /// How samples are written.
+    /// Encoding of the samples.
     pub format: Format,
     /// Samples a second by the recorder's clock.
     pub rate: Rate,
     /// The radio frequency that appears at 0 Hz in the samples.
     pub center_hz: f64,
-    /// Whether the spectrum is mirrored about `center_hz` (local oscillator above the signal).
+    /// True if the spectrum is mirrored about `center_hz` (local oscillator above the signal).
     pub inverted: bool,
-    /// What the recorder's clock read at sample 0, if it was written down.
+    /// Time of sample 0 by the recorder's clock, if it was recorded.
     pub start: Option<Epoch>,
 }
 

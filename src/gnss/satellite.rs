@@ -1,4 +1,4 @@
-//! Which satellite: its system and its number there, written as RINEX does (`G05`).
+//! Identity of a satellite: its system and its number, written as in RINEX (`G05`).
 
 use std::fmt;
 use std::str::FromStr;
@@ -80,18 +80,18 @@ impl fmt::Display for System {
 pub struct Sv {
     /// The system.
     pub system: System,
-    /// Its number there: the PRN of GPS, the slot of GLONASS.
+    /// Number within the system: the PRN of GPS, the slot of GLONASS.
     pub number: u8,
 }
 
-/// Why a text is not a satellite.
+/// Error for a text that does not name a satellite.
 #[derive(Debug, Error, PartialEq)]
 #[error("'{0}' is not a satellite: expected a system letter and a number, like G05")]
 pub struct SvError(String);
 
 impl Sv {
-    /// Whether it is one of BeiDou's geostationary satellites, whose message and orbit differ from the
-    /// others' (BDS-SIS-ICD-B1I 3.0, table 4-1).
+    /// True for BeiDou's geostationary satellites, whose message and orbit differ from the others
+    /// (BDS-SIS-ICD-B1I 3.0, table 4-1).
     pub fn is_geostationary(self) -> bool {
         self.system == System::BeiDou && matches!(self.number, 1..=5 | 59..=63)
     }

@@ -23,7 +23,7 @@ use crate::time::{Epoch, Rate};
 const VERSION: &str = "1.2.0";
 const EXTENSION: &str = "gnss_twin";
 
-/// Why a text does not describe samples that can be read.
+/// Reason for which a text does not describe readable samples.
 #[derive(Debug, Error)]
 pub enum SigmfError {
     /// Not JSON, or not the objects that SigMF asks for.
@@ -31,7 +31,7 @@ pub enum SigmfError {
     Syntax {
         /// Name of the file.
         name: String,
-        /// What the parser reports.
+        /// Error of the JSON parser.
         error: serde_json::Error,
     },
     /// A needed key is absent.
@@ -41,7 +41,7 @@ pub enum SigmfError {
         name: String,
         /// The key.
         key: &'static str,
-        /// What is expected there.
+        /// Content that is expected there.
         expected: &'static str,
     },
     /// A key has a value that cannot be used.
@@ -53,7 +53,7 @@ pub enum SigmfError {
         key: &'static str,
         /// The value as written.
         value: String,
-        /// What is expected.
+        /// Content that is expected.
         expected: &'static str,
     },
 }
@@ -149,15 +149,15 @@ struct Capture {
     header_bytes: Option<Value>,
 }
 
-/// What metadata say of a recording beside what its samples are.
+/// Metadata of a recording beyond the sample format.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Beside<'a> {
     /// The signals in it; none where it is not known.
     pub signals: &'a [&'static Signal],
     /// The collection that it belongs to: the base name of its `.sigmf-collection` file.
     pub collection: Option<&'a str>,
-    /// How samples lie packed in the file. A program that does not know it would take bytes for samples, so
-    /// the extension is one that it must know.
+    /// Packing of the samples in the file. A program that ignores it would read bytes as samples, so the
+    /// extension is declared mandatory.
     pub packed: Option<&'a Interleaved>,
 }
 
@@ -166,7 +166,7 @@ pub fn write(metadata: &IfMetadata) -> String {
     write_with(metadata, &Beside::default())
 }
 
-/// The same with what else is known.
+/// Writes the metadata with the additional data in `beside`.
 pub fn write_with(metadata: &IfMetadata, beside: &Beside<'_>) -> String {
     let (datatype, optional) = match beside.packed {
         Some(_) => ("ru8", false),
@@ -356,7 +356,7 @@ impl File<'_> {
         }
     }
 
-    /// Those signals that are known of the names that are said.
+    /// Returns the signals with known names in the list `said`.
     fn signals(&self, said: Option<Value>) -> Result<Vec<&'static Signal>, SigmfError> {
         let Some(said) = said else { return Ok(Vec::new()) };
         let names = said.as_array().map(|names| names.iter().map(Value::as_str).collect::<Option<Vec<&str>>>());
@@ -375,7 +375,7 @@ impl File<'_> {
         }
     }
 
-    /// How samples lie in the file; nothing where no key says it.
+    /// Returns the arrangement of samples in the file, or `None` if no key states it.
     fn samples(&self, datatype: Option<Value>, packed: Packed) -> Result<Option<Samples>, SigmfError> {
         let Some(datatype) = datatype else { return Ok(None) };
         let name = datatype.as_str().unwrap_or_default();
@@ -430,7 +430,7 @@ impl File<'_> {
         Ok(Samples::Interleaved(of))
     }
 
-    /// What a word means; absent, what the first one does.
+    /// Returns the meaning of a word. An absent word has the meaning of the first one.
     fn one_of<T: Copy>(
         &self,
         key: &'static str,

@@ -35,14 +35,14 @@ pub struct Sample {
     pub broken: bool,
 }
 
-/// What a file says about GPS and Galileo: samples by satellite and GPS time (its whole seconds).
+/// Content of a file for GPS and Galileo: orbit samples by satellite and GPS time in whole seconds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Precise {
     /// Samples of each satellite by GPS time.
     pub satellites: BTreeMap<Sv, BTreeMap<i64, Sample>>,
 }
 
-/// Why a file gives no orbits.
+/// Reason for which a file contains no usable orbits.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum Sp3Error {
     /// A file that cannot be decompressed.
@@ -50,7 +50,7 @@ pub enum Sp3Error {
     Packed {
         /// Name of the file.
         name: String,
-        /// Why.
+        /// Error of unpacking.
         source: InflateError,
     },
     /// No SP3 file.
@@ -58,7 +58,7 @@ pub enum Sp3Error {
     NotSp3 {
         /// Name of the file.
         name: String,
-        /// How it begins.
+        /// First characters of the file.
         found: String,
     },
     /// A line that is not as the format has it.
@@ -66,7 +66,7 @@ pub enum Sp3Error {
     Damaged {
         /// Name of the file.
         name: String,
-        /// Where and what.
+        /// Position and description of the error.
         detail: String,
     },
     /// An epoch between two seconds.
@@ -74,7 +74,7 @@ pub enum Sp3Error {
     Fraction {
         /// Name of the file.
         name: String,
-        /// Its number, from 1.
+        /// Line number, from 1.
         line: usize,
         /// The epoch.
         found: String,
@@ -107,9 +107,9 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Precise, Sp3Error> {
     if precise.satellites.is_empty() { Err(Sp3Error::Nothing { name: name.to_owned() }) } else { Ok(precise) }
 }
 
-/// What is wrong with a line.
+/// Error in one line.
 enum Fault {
-    /// Its epoch has a fraction of a second.
+    /// An epoch has a fraction of a second.
     Fraction,
     /// Anything else.
     Damaged(String),

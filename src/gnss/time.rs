@@ -31,13 +31,12 @@ pub struct TimeScale {
     pub name: &'static str,
     /// Whole seconds by which it is behind GPS time, of a scale with leap seconds behind UTC.
     pub behind_gpst_s: i64,
-    /// Whether leap seconds are inserted in it, as in UTC.
+    /// True if the scale has leap seconds, as UTC does.
     pub has_leap_seconds: bool,
 }
 
 impl TimeScale {
-    /// What this scale's clock shows at an instant, as an [`Epoch`] whose week and seconds are the scale's
-    /// own.
+    /// Converts an instant to this scale: an [`Epoch`] whose week and seconds are the scale's own.
     pub fn label(&self, at: Epoch) -> Epoch {
         Epoch { seconds: at.seconds - self.behind_s(at), ..at }
     }
@@ -80,7 +79,8 @@ pub static GLONASST: TimeScale = TimeScale { name: "GLONASST", behind_gpst_s: -1
 /// UTC, by which RINEX dates GLONASS.
 pub static UTC: TimeScale = TimeScale { name: "UTC", behind_gpst_s: 0, has_leap_seconds: true };
 
-/// How far one time is ahead of another, whole seconds apart: `a0 + a1 (t − reference)`.
+/// Offset between two time scales in seconds, without the whole seconds between them: `a0 + a1 (t −
+/// reference)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimePolynomial {
     /// Seconds ahead at the reference time.
@@ -98,7 +98,7 @@ impl TimePolynomial {
     }
 }
 
-/// Why a text is not an instant.
+/// Error for a text that is not an instant.
 #[derive(Debug, Error, PartialEq)]
 #[error(
     "'{text}' is not a time: expected GPS time like 2010-07-01T08:12:30, or UTC with a final Z, from 1980-01-06 to 2180"
@@ -362,7 +362,7 @@ pub struct SampleClock {
 }
 
 impl SampleClock {
-    /// What the sampler's clock reads at sample `n`.
+    /// Returns the time of sample `n` by the sampler's clock.
     pub fn epoch(self, n: u64) -> Epoch {
         let (whole, fraction) = self.rate.elapsed(n);
         Epoch::new(self.start.seconds + whole, self.start.fraction + fraction)

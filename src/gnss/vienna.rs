@@ -20,7 +20,7 @@ const MOLAR_MASS_KGPMOL: f64 = 28.965e-3;
 const GAS_JPKMOL: f64 = 8.3143;
 const YEAR_DAYS: f64 = 365.25;
 
-/// Why a file gives no grid.
+/// Reason for which a file contains no usable grid.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum ViennaError {
     /// A file that cannot be decompressed.
@@ -28,7 +28,7 @@ pub enum ViennaError {
     Packed {
         /// Name of the file.
         name: String,
-        /// Why.
+        /// Error of unpacking.
         source: InflateError,
     },
     /// A line that is not as the format has it.
@@ -36,11 +36,11 @@ pub enum ViennaError {
     Line {
         /// Name of the file.
         name: String,
-        /// Its number, from 1.
+        /// Line number, from 1.
         line: usize,
-        /// What is there.
+        /// Text that was found.
         found: String,
-        /// What is expected.
+        /// Text that is expected.
         expected: String,
     },
 }
@@ -153,13 +153,13 @@ impl<T> Globe<T> {
 /// Coefficients a of the mapping functions at zero height.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MappingA {
-    /// Of dry air.
+    /// Coefficient a of dry air.
     pub hydrostatic: f64,
-    /// Of water vapour.
+    /// Coefficient a of water vapour.
     pub wet: f64,
 }
 
-/// Which mapping functions coefficients a were fitted with: each has b and c of its own.
+/// Mapping functions to which coefficients a belong; each has its own coefficients b and c.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub enum Vienna {
     /// Vienna mapping functions 1.
@@ -173,7 +173,7 @@ pub enum Vienna {
 #[derive(Clone, Debug, PartialEq)]
 pub struct MappingGrid {
     globe: Globe<MappingA>,
-    /// What its heading's line `Data_types` says, if there is one.
+    /// Mapping functions that the heading's line `Data_types` names, if there is one.
     pub fitted_with: Option<Vienna>,
 }
 
@@ -210,7 +210,7 @@ impl MappingGrid {
 /// A mean, and the amplitudes of the year's cosine and sine and the half year's.
 pub(super) type Season = [f64; 5];
 
-/// What a mean and amplitudes are multiplied with on a day of the year that counts from 1.0.
+/// Factors of a mean and its seasonal amplitudes on a day of the year, which counts from 1.0.
 pub(super) fn season_terms(day_of_year: f64) -> Season {
     let (sin, cos) = libm::sincos(TAU * day_of_year / YEAR_DAYS);
     // Double angles are those of the half year.
@@ -234,7 +234,7 @@ struct Climate {
     mean_temperature_k: Season,
 }
 
-/// What GPT3 says of a place at a day of the year.
+/// Weather that GPT3 gives for a position on a day of the year.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gpt3Weather {
     /// Pressure of the air.

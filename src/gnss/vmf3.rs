@@ -27,7 +27,7 @@ pub struct MappingBc {
     pub c_wet: f64,
 }
 
-/// What one degree and order adds to each of [`QUANTITIES`], with the cosine and the sine of the order times
+/// Contribution of one degree and order to each of [`QUANTITIES`], by cosine and sine of the order times
 /// longitude.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Term {
@@ -117,7 +117,7 @@ impl Vmf3 {
     }
 }
 
-/// Where a row's numbers belong.
+/// Position in the grid of a row's numbers.
 struct Place {
     pair: usize,
     quantity: usize,

@@ -8,7 +8,7 @@
 pub struct Legendre(Vec<bool>);
 
 impl Legendre {
-    /// That of `prime`.
+    /// Computes the Legendre sequence of `prime`.
     pub fn new(prime: u32) -> Self {
         let mut ones = vec![false; prime as usize];
         for root in 1..u64::from(prime) {

@@ -1,4 +1,4 @@
-//! What the indicators in SBAS's corrections stand for: accuracies, and how fast corrections age.
+//! Meaning of the indicators in SBAS corrections: accuracies, and the ageing of fast corrections.
 //!
 //! Source: RTCA DO-229D, tables A-6 (UDREI), A-17 (GIVEI), A-7 and A-8 (degradation factors) and A-25
 //! (time-outs). Accuracies bound an error with a probability of 99.9 %: 3.29 standard deviations. Time-outs
@@ -48,7 +48,7 @@ const DELAYS: [(f64, f64); 15] = [
     (45.0, 187.0826),
 ];
 
-/// How a fast correction ages.
+/// Ageing of a fast correction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ageing {
     /// Acceleration by which its error grows.
@@ -63,7 +63,7 @@ const fn ageing(acceleration_mps2: f64, timeout_s: f64, interval_s: f64) -> Agei
     Ageing { acceleration_mps2, timeout_s, interval_s }
 }
 
-/// By the degradation factor's indicator (tables ).
+/// Ageing by degradation factor indicator (tables ).
 const AGEING: [Ageing; 16] = [
     ageing(0.0, 120.0, 60.0),
     ageing(0.000_05, 120.0, 60.0),

@@ -54,7 +54,7 @@ pub fn band_of(longitude_deg: i16) -> u8 {
     ((longitude_deg + 180).rem_euclid(360) / (MERIDIANS * STEP_DEG)) as u8
 }
 
-/// Where a line of sight meets the shell.
+/// Point at which a line of sight crosses the shell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pierce {
     /// Latitude, north positive.
@@ -65,7 +65,8 @@ pub struct Pierce {
     pub obliquity: f64,
 }
 
-/// Where the line from `user` towards `look` meets the shell (A.4.4.10.1, A.4.4.10.4).
+/// Computes the point at which the line from `user` towards `look` crosses the shell (A.4.4.10.1,
+/// A.4.4.10.4).
 pub fn pierce(user: Geodetic, look: Look) -> Pierce {
     let (sine, cosine) = libm::sincos(look.elevation_rad);
     let level = EARTH_M / (EARTH_M + SHELL_M) * cosine;

@@ -1,5 +1,5 @@
-//! What augmentation systems say of other systems' satellites and of the ionosphere, apart from how it is
-//! sent: the content of each block, what a network of ground stations knows, and what it means.
+//! Content of augmentation messages about satellites and the ionosphere, independent of its encoding. The
+//! module has the content of each block, its meaning, and the knowledge of a network of ground stations.
 //!
 //! Source: RTCA DO-229D, A.4.4.1 to A.4.4.10. Satellites go by their place in the mask of type 1, points of
 //! the grid by theirs in the mask of type 18. Limits: types 10, 17, 27 and 28 are not among them.
@@ -37,15 +37,15 @@ pub struct Mask {
 /// Types 2 to 5, and 0: fast corrections of thirteen satellites.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Fast {
-    /// Which thirteen of the mask, from 0.
+    /// Index of a group of thirteen satellites in the mask, from 0.
     pub part: u8,
-    /// Whether the block says that the system is in test mode, not to be used for safety (type 0).
+    /// True if the block reports test mode, in which the system must not be used for safety (type 0).
     pub is_test: bool,
     /// Issue of these corrections.
     pub iodf: u8,
     /// Issue of the mask.
     pub iodp: u8,
-    /// What is added to the ranges, in metres.
+    /// Corrections that users add to the ranges, in metres.
     pub correction_m: [f64; FAST_SLOTS],
     /// Indicators of their accuracy.
     pub udrei: [u8; FAST_SLOTS],
@@ -78,13 +78,13 @@ pub struct LongTerm {
     pub place: u8,
     /// Issue of the elements that they correct.
     pub iode: u8,
-    /// What is added to the satellite's place in ECEF, in metres.
+    /// Correction of the satellite's position in ECEF, in metres.
     pub place_m: [f64; 3],
-    /// What is added to its velocity, in m/s.
+    /// Correction of the satellite's velocity in ECEF, in m/s.
     pub velocity_mps: [f64; 3],
-    /// What is added to its clock.
+    /// Correction of the satellite's clock offset, in seconds.
     pub af0_s: f64,
-    /// What is added to its clock's drift.
+    /// Correction of the satellite's clock drift, in s/s.
     pub af1_sps: f64,
     /// Second of the day at which all that holds, a multiple of 16 s.
     pub second_of_day: f64,
@@ -136,7 +136,7 @@ pub struct GridMask {
 pub struct Delays {
     /// The band.
     pub band: u8,
-    /// Which fifteen of its mask, from 0.
+    /// Index of a group of fifteen grid points in the band's mask, from 0.
     pub part: u8,
     /// Issue of the masks.
     pub iodi: u8,
@@ -146,7 +146,7 @@ pub struct Delays {
     pub givei: [u8; DELAY_SLOTS],
 }
 
-/// What a block says.
+/// Content of a block.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Content {
     /// Type 0 without corrections: the system is in test mode.
@@ -194,7 +194,7 @@ impl Fast {
     }
 }
 
-/// What a network knows of a satellite at a time.
+/// Network's estimate of a satellite at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Known {
     /// Fast correction: what is added to ranges beside the long-term correction, in metres.
@@ -205,7 +205,7 @@ pub struct Known {
     pub degradation: u8,
     /// Long-term correction; its place in the mask is 0.
     pub long_term: LongTerm,
-    /// Whether the latter has rates.
+    /// True if the long-term correction includes rates.
     pub is_moving: bool,
 }
 
@@ -218,11 +218,11 @@ impl Known {
 
 /// A network of ground stations whose knowledge satellites send.
 pub trait Network: fmt::Debug + Send + Sync {
-    /// Whether it says that it must not be used for safety.
+    /// True if the network reports that it must not be used for safety.
     fn is_test(&self) -> bool;
     /// Numbers of the satellites that it corrects, in ascending order.
     fn numbers(&self) -> &[u8];
-    /// What it knows of one of them.
+    /// Returns the network's estimate of the satellite with this number at a time.
     fn satellite(&self, number: u8, at: Epoch) -> Known;
     /// Bands of the grid with the numbers of the points that it has delays of, in ascending order.
     fn bands(&self) -> &[(u8, Vec<u8>)];

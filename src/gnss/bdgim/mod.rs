@@ -41,11 +41,11 @@ const ORDER: usize = 3;
 /// The nine broadcast coefficients: α₁ to α₉, in TECU.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bdgim {
-    /// By degree and order 0/0, 1/0, 1/1, 1/−1, 2/0, 2/1, 2/−1, 2/2 and 2/−2.
+    /// Coefficients in TECU of degree/order 0/0, 1/0, 1/1, 1/−1, 2/0, 2/1, 2/−1, 2/2 and 2/−2.
     pub alpha_tecu: [f64; 9],
 }
 
-/// Where the line of sight meets the shell.
+/// Point at which the line of sight crosses the shell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pierce {
     /// Geographic latitude.
@@ -75,7 +75,8 @@ impl Pierce {
         }
     }
 
-    /// The same place in geomagnetic coordinates, its longitude from the mean Sun's at a time (7-9, 7-10).
+    /// Converts the point to geomagnetic coordinates, with its longitude relative to the mean Sun at a time
+    /// (7-9, 7-10).
     pub fn under_sun(&self, at: Epoch) -> UnderSun {
         let (sin_pole, cos_pole) = libm::sincos(POLE_LATITUDE_DEG.to_radians());
         let pole_rad = planted!("gnss.bdgim.pole", POLE_LONGITUDE_DEG, 72.58).to_radians();

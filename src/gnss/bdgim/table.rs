@@ -7,7 +7,7 @@
 pub(super) const BROADCAST: [(usize, i8); 9] =
     [(0, 0), (1, 0), (1, 1), (1, -1), (2, 0), (2, 1), (2, -1), (2, 2), (2, -2)];
 
-/// The same of the forecast.
+/// Degree and order of the forecast's harmonics; orders below zero are those of sines.
 #[rustfmt::skip]
 pub(super) const FORECAST: [(usize, i8); 17] = [
     (3, 0), (3, 1), (3, -1), (3, 2), (3, -2), (3, 3), (3, -3),
@@ -19,8 +19,8 @@ pub(super) const FORECAST: [(usize, i8); 17] = [
 pub(super) const PERIODS_D: [f64; 12] =
     [1.0, 0.5, 0.33, 14.6, 27.0, 121.6, 182.51, 365.25, 4028.71, 2014.35, 1342.90, 1007.18];
 
-/// Of each harmonic of [`FORECAST`], in hundredths of a TECU: the constant, then cosine and sine of each
-/// period.
+/// Amplitudes of each harmonic of [`FORECAST`], in hundredths of a TECU. The constant comes first, then
+/// cosine and sine of each period.
 #[rustfmt::skip]
 pub(super) const AMPLITUDES: [[i16; 25]; 17] = [
     [-61, -51, 23, -6, 2, 1, 0, -1, 0, 0, 1, -19, -9, -18, 15, 109, 50, -34, 0, -13, 5, -6, 3, -3, 4],

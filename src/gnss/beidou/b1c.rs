@@ -70,18 +70,18 @@ pub const THIRD_GENERATION: [u8; 2] = [19, 50];
 const SINCE: [(std::ops::RangeInclusive<u8>, &str); 3] =
     [(19..=30, "2020-07-31T00:00:00"), (32..=46, "2020-07-31T00:00:00"), (47..=50, "2026-03-09T00:00:00")];
 
-/// Whether the satellite of a number sends it at a time.
+/// True if the satellite with this number sends the signal at a time.
 pub fn sent(number: u8, at: Epoch) -> bool {
     let begun = |since: &str| Epoch::parse(since).is_ok_and(|since| at.since(since) >= 0.0);
     SINCE.iter().any(|(numbers, since)| numbers.contains(&number) && begun(since))
 }
 
-/// Which of the two codes of a satellite.
+/// Component to which a code of a satellite belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Code {
-    /// Of the data.
+    /// Code of the data component.
     Data,
-    /// Of the pilot.
+    /// Code of the pilot.
     Pilot,
 }
 
@@ -104,7 +104,7 @@ pub fn secondary_code(number: u8) -> Option<Vec<i8>> {
     Some(piece(&SHORT, own, SECONDARY_CODE_CHIPS))
 }
 
-/// So many chips of a Weil code from a place on, which counts from 1.
+/// Returns `chips` chips of a Weil code from the truncation point `first` on, which counts from 1.
 pub(super) fn piece(legendre: &Legendre, [later, first]: [u16; 2], chips: u32) -> Vec<i8> {
     let weil = legendre.weil(later, first - planted!("gnss.b1c.truncation", 1, 0));
     weil.take(chips as usize).map(|one| if one { -1 } else { 1 }).collect()

@@ -55,12 +55,12 @@ pub static B2A: Signal = Signal {
     ],
 };
 
-/// Which of the two codes of a satellite.
+/// Component to which a code of a satellite belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Code {
-    /// Of the data.
+    /// Code of the data component.
     Data,
-    /// Of the pilot.
+    /// Code of the pilot.
     Pilot,
 }
 
@@ -82,8 +82,8 @@ pub fn secondary_code(number: u8) -> Option<Vec<i8>> {
     Some(piece(&LEGENDRE, own, SECONDARY_CODE_CHIPS))
 }
 
-/// Where the second register begins, stage 1 to stage 13, of the data's code and of the pilot's, and Weil
-/// index and place of truncation of the secondary code, for numbers 1 to 63.
+/// Initial states of the second register, stage 1 to stage 13, for the data's code and the pilot's, numbers 1
+/// to 63. The pair is the Weil index and the truncation point of the secondary code.
 #[rustfmt::skip]
 const CODES: [(u16, u16, [u16; 2]); 63] = [
     (0b1_0000_0010_0101, 0b1_0000_0010_0101, [123, 138]), (0b1_0000_0011_0100, 0b1_0000_0011_0100, [55, 570]),

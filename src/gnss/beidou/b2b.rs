@@ -52,7 +52,7 @@ pub fn code(number: u8) -> Option<Vec<i8>> {
     Some(registers([1, 9, last, 13], &[3, 4, 6, 9, 12, 13], start))
 }
 
-/// Where the second register begins, stage 1 to stage 13, for numbers 6 to 58.
+/// Initial states of the second register, stage 1 to stage 13, for numbers 6 to 58.
 #[rustfmt::skip]
 const G2_STARTS: [u16; 53] = [
     0b1_0001_1010_1110, 0b1_0001_1110_1110, 0b1_0001_1111_1011, 0b1_0011_0010_1001, 0b1_0011_1101_1010,

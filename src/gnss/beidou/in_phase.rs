@@ -74,7 +74,7 @@ const G2_OUTPUTS: [&[u32]; 63] = [
     &[3, 4, 5], &[3, 4, 9], &[3, 5, 6], &[3, 5, 8], &[3, 5, 10], &[3, 5, 11], &[3, 6, 9],
 ];
 
-/// Where G2 of B3I begins, of PRN 1 to 63: stage 1 to stage 13.
+/// Initial states of B3I's register G2, stage 1 to stage 13, for PRN 1 to 63.
 #[rustfmt::skip]
 const G2_STARTS: [u16; 63] = [
     0b1_0101_1111_1111, 0b1_1110_0010_1011, 0b1_0111_1000_1010, 0b1_1111_1111_1011, 0b1_1001_0001_1111,

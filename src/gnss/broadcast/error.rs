@@ -1,10 +1,10 @@
-//! What is no orbit, by name.
+//! Errors for elements that do not describe an orbit.
 
 use thiserror::Error;
 
 use crate::satellite::Sv;
 
-/// Why elements give no state.
+/// Reason for which elements give no satellite state.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum OrbitError {
     /// An element that no orbit has.
@@ -16,7 +16,7 @@ pub enum OrbitError {
         element: &'static str,
         /// In its SI unit.
         value: f64,
-        /// What an orbit would have.
+        /// Values that describe an orbit.
         expected: &'static str,
     },
     /// A state vector integrated further than it means anything.
@@ -32,7 +32,7 @@ pub enum OrbitError {
     Kepler {
         /// The satellite.
         sv: Sv,
-        /// Of its orbit.
+        /// Eccentricity of the orbit.
         eccentricity: f64,
     },
     /// A satellite at the antenna.

@@ -1,4 +1,4 @@
-//! What the numbers of a set mean by the message that it is of.
+//! Meaning of an ephemeris' clock, delays and health in each message.
 //!
 //! Sources: those of the messages. A set of no message in particular has one group delay of two carriers
 //! (IS-GPS-200N, 20.3.3.3.3.2), BeiDou's two against B3I.
@@ -9,20 +9,20 @@ use super::{B1I_HZ, B2I_HZ, Ephemeris};
 use crate::satellite::System;
 use crate::signal::Signal;
 
-/// What clock, delays and health of a set mean: messages of one satellite have the same orbit, but clocks of
-/// other signals.
+/// Meaning of clock, delays and health in the ephemerides of one message. Messages of one satellite describe
+/// the same orbit, but their clocks refer to different signals.
 pub struct SetForm {
     /// Name of the message.
     pub name: &'static str,
-    /// By how much less than a set's clock the clock reads for a user of a signal alone.
+    /// Group delay in seconds: the ephemeris clock minus the clock offset for a user of one signal alone.
     pub group_delay_s: fn(&Ephemeris, &Signal) -> f64,
-    /// Whether a decoded set is enough for ranges of a signal: with its delays the message is complete.
+    /// True if a decoded ephemeris suffices for ranges of a signal: it then includes the signal's delays.
     pub serves: fn(&Signal) -> bool,
     /// The group delay on the carrier of which the message gives it.
     pub given_delay_s: fn(&Ephemeris) -> f64,
-    /// Whether a set says that the first of the signals that it speaks of may be used.
+    /// True if an ephemeris reports the first of its signals as usable.
     pub is_healthy: fn(&Ephemeris) -> bool,
-    /// Whether a set says that a signal may be used; `None` where it says nothing of it.
+    /// True if an ephemeris reports a signal as usable; `None` if it does not state it.
     pub healthy: fn(&Ephemeris, &Signal) -> Option<bool>,
     /// Data sources as records of RINEX name them; none of messages whose records have no such field.
     pub rinex_sources: Option<f64>,
@@ -55,7 +55,7 @@ impl Ephemeris {
         self.signal_delays_s.iter().find(|(own, _)| *own == code).map(|(_, delay_s)| *delay_s)
     }
 
-    /// Whether the set is enough for ranges of a signal: with delays of its own or of another message.
+    /// True if the ephemeris suffices for ranges of a signal, with delays of its own or from another message.
     pub fn serves(&self, signal: &Signal) -> bool {
         (self.form.serves)(signal) || self.delay_of_code_s(signal.rinex).is_some()
     }

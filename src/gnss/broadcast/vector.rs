@@ -61,8 +61,8 @@ impl StateVector {
         Ok(State { position_m, velocity_mps })
     }
 
-    /// The same of a geostationary satellite, whose acceleration is that of its motion in the rotating
-    /// axes (RTCA DO-229D, A.4.4.11).
+    /// State of a geostationary satellite `since_s` seconds after the reference time. Its acceleration is
+    /// given in the rotating axes (RTCA DO-229D, A.4.4.11).
     fn straight(&self, since_s: f64) -> State {
         let half_s = planted!("gnss.sbas.acceleration", 0.5 * since_s, since_s);
         State {

@@ -19,7 +19,8 @@ type Raws = BTreeMap<String, i64>;
 /// Collects parameters as they come; a set is some kilobytes, however often it is read again.
 #[derive(Debug, Default)]
 pub struct NavigationSets {
-    /// By message, satellite and issue: where parameters of no issue are newest, they are common.
+    /// Parameters by message, satellite and issue. Parameters that belong to no issue are in `common`, the
+    /// newest only.
     sets: BTreeMap<(String, Sv, u32), Raws>,
     common: BTreeMap<String, Raws>,
 }
@@ -372,7 +373,7 @@ mod tests {
     const NAVIC: &[u8] = include_bytes!("../../../scenarios/navic_2026-03-09_10h_12h.rnx");
     const QZSS: &[u8] = include_bytes!("../../../scenarios/qzss_2023-03-12_02h_04h.rnx");
 
-    /// What RINEX rounds to twelve digits after the first.
+    /// True if both values agree to the twelve digits after the first that RINEX keeps.
     fn near(a: f64, b: f64) -> bool {
         (a - b).abs() <= 1e-12 * b.abs()
     }
@@ -459,8 +460,8 @@ mod tests {
         assert_eq!(of("> EPH J"), 4, "{count:?}");
     }
 
-    /// What a satellite sends in half a quarter of an hour, as long as the slowest, LNAV, takes for its page
-    /// with the ionosphere, from a second on at which units of every length begin.
+    /// Sends a satellite's message for half of a quarter of an hour. LNAV, the slowest, needs it for its
+    /// ionosphere page. The start is a second at which units of every length begin.
     fn send(sets: &mut NavigationSets, (message, signal, set): &(&Message, &Signal, Ephemeris), common: &Common) {
         let sender = (message.sender)(common).unwrap();
         let set = (message.form)(set).timed(|at| signal.time.label(at));

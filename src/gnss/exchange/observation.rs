@@ -34,12 +34,12 @@ pub struct ObservationFile<W> {
     begun: bool,
     rows: Vec<Observation>,
     clock_bias_s: Option<f64>,
-    /// Of every signal the reading at its newest observation.
+    /// Time by the receiver's clock of each signal's newest observation.
     seen: BTreeMap<Link, Epoch>,
 }
 
 impl<W: Write> ObservationFile<W> {
-    /// Of such signals at a place of that name; nothing is written yet.
+    /// Creates a file for these signals and a marker of this name; nothing is written yet.
     pub fn new(writer: W, version: Version, marker: &str, signals: &[&'static Signal]) -> Self {
         let mut own: Vec<&'static Signal> = Vec::new();
         for signal in signals {
@@ -174,8 +174,9 @@ impl<W: Write> ObservationFile<W> {
     }
 }
 
-/// What was added to a signal's phases, in cycles, so that they are those of the signal that a band refers to
-/// (RINEX 3.05, tables A2 and A23); blank where nothing was. The pilot's are measured where there is one.
+/// Correction in cycles that was added to a signal's phases to align them with the band's reference signal
+/// (RINEX 3.05, tables A2 and A23). It is blank if none was added. The pilot's phase is measured where there
+/// is one.
 fn shift(signal: &Signal) -> String {
     let pilot = signal.components.iter().find(|component| component.message.is_none());
     let cycles = pilot.or(signal.components.first()).map_or(0.0, |component| component.phase_cycles);

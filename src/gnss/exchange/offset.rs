@@ -11,9 +11,9 @@ use crate::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
 /// One time scale against another, as a message says it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Offset {
-    /// Of both scales, as RINEX calls the pair.
+    /// RINEX name of the pair of time scales.
     pub pair: &'static str,
-    /// Which UTC, as version 4 calls it.
+    /// Name of the UTC realisation in RINEX 4.
     utc: &'static str,
     /// Constant, rate and its change, in seconds.
     polynomial: [f64; 3],
@@ -24,7 +24,7 @@ pub(super) struct Offset {
 /// Parameters of an offset, by what their names begin with, and the pair and UTC that they are of.
 type Named = (&'static str, &'static str, &'static str);
 
-/// What messages of a system say of others' time.
+/// Time offsets that messages of a system contain.
 fn named(system: System) -> &'static [Named] {
     match system {
         System::Gps => &[("utc", "GPUT", "UTC(USNO)")],

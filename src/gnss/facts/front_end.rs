@@ -1,11 +1,11 @@
-//! What a front end's stages do to the spectrum and the timing of samples.
+//! Front-end stages: their effect on the spectrum and the timing of samples.
 //!
 //! In `scene.json` each stage is an object whose key `stage` names its kind. A kind that is not known here is
 //! refused by name.
 
 use serde::{Deserialize, Serialize};
 
-/// How the edges of chips fall between samples.
+/// Placement of chip edges between samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Edge {
@@ -26,7 +26,7 @@ pub enum StageSpec {
     Filter(FilterSpec),
     /// A local oscillator that is off its nominal frequency.
     LocalOscillator {
-        /// By how much carriers lie higher in the samples, Hz.
+        /// Frequency offset of carriers in the samples, in Hz, positive upwards.
         offset_hz: f64,
     },
     /// Two mixers that are out of balance.
@@ -45,7 +45,7 @@ pub fn converter(stages: &[StageSpec]) -> Option<&ConverterSpec> {
     stages.iter().find_map(|stage| if let StageSpec::Adc(converter) = stage { Some(converter) } else { None })
 }
 
-/// By how much oscillators among stages bring carriers higher in the samples, Hz.
+/// Sum of the frequency offsets in Hz that oscillators among the stages add to carriers.
 pub fn oscillator_offset_hz(stages: &[StageSpec]) -> f64 {
     let offset_hz =
         |stage: &StageSpec| if let StageSpec::LocalOscillator { offset_hz } = stage { *offset_hz } else { 0.0 };
@@ -55,7 +55,7 @@ pub fn oscillator_offset_hz(stages: &[StageSpec]) -> f64 {
 /// A filter's shape, width and delay.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FilterSpec {
-    /// Its response.
+    /// Shape of the filter's response.
     #[serde(flatten)]
     pub shape: FilterShape,
     /// Both sides of the carrier together, Hz: between the −3 dB points of a Butterworth filter, between the
@@ -96,15 +96,15 @@ pub struct BalanceSpec {
 /// A converter with its gain.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ConverterSpec {
-    /// Of a component.
+    /// Bits per component of a sample.
     pub bits: u32,
     /// Step over the deviation of a component for which the gain is made.
     pub step_sigma: f64,
     /// Deviation of a component, in LSB, for which a fixed gain is made.
     pub nominal_lsb: f64,
-    /// Whether the gain follows the power of the samples.
+    /// True if the gain follows the power of the samples.
     pub gain_control: bool,
-    /// Whether levels are the format's integers.
+    /// True if the quantiser's levels are the format's integers.
     pub whole: bool,
 }
 

@@ -38,7 +38,7 @@ pub enum Interference {
         repetition_hz: f64,
         /// Share of a period in which it is on, 0 to 1.
         duty: f64,
-        /// By how much of a period a pulse may come late, at random, 0 to 1.
+        /// Largest random delay of a pulse, as a fraction of the period, 0 to 1.
         jitter: f64,
     },
     /// Random chips.

@@ -23,15 +23,15 @@ pub use scene::{FrontEndFacts, OscillatorFacts, SceneFacts};
 pub struct TimeOffset {
     /// Name of the time scale.
     pub time_scale: String,
-    /// By how much it is ahead of GPS time, whole seconds apart.
+    /// Offset ahead of GPS time, in seconds, without the whole seconds between both.
     pub ahead_s: f64,
 }
 
-/// What is expected of fixes.
+/// Expectation about fixes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fixes {
-    /// They must come, whatever the judge computes from satellites and message.
+    /// Fixes must exist, whatever the judge computes from satellites and message.
     Required,
     /// There must be none.
     None,
@@ -40,12 +40,12 @@ pub enum Fixes {
 }
 
 impl Fixes {
-    /// By the word that a scenario uses.
+    /// Values by the words that a scenario uses.
     pub const NAMES: [(&'static str, Self); 3] =
         [("required", Self::Required), ("none", Self::None), ("any", Self::Any)];
 }
 
-/// What is expected of satellites: acquisition, lock and use.
+/// Expectation about satellites: acquisition, lock and use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Losses {
@@ -56,11 +56,11 @@ pub enum Losses {
 }
 
 impl Losses {
-    /// By the word that a scenario uses.
+    /// Values by the words that a scenario uses.
     pub const NAMES: [(&'static str, Self); 2] = [("any", Self::Any), ("none", Self::None)];
 }
 
-/// What is expected of the errors of fixes and observations.
+/// Expectation about the errors of fixes and observations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sizes {
@@ -71,40 +71,40 @@ pub enum Sizes {
 }
 
 impl Sizes {
-    /// By the word that a scenario uses.
+    /// Values by the words that a scenario uses.
     pub const NAMES: [(&'static str, Self); 2] = [("bounded", Self::Bounded), ("any", Self::Any)];
 }
 
 /// Expectations over a time. What is absent follows from the scene's physics.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Terms {
-    /// Of fixes.
+    /// Expectation about fixes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fix: Option<Fixes>,
-    /// Of losses of lock.
+    /// Expectation about losses of lock.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub losses: Option<Losses>,
     /// Satellites that `losses` is about; absent means all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub satellites: Option<Vec<Sv>>,
-    /// Of the size of the fixes' errors.
+    /// Expectation about the size of the position errors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub errors: Option<Sizes>,
     /// Error in space that no fix may exceed, metres, whatever is said of `errors`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub position_within_m: Option<f64>,
-    /// Why, in the scene's words.
+    /// Reason for the expectation, in the scene's words.
     pub reason: String,
 }
 
 /// Expectations from one time to another.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
-    /// When it begins, seconds since the start of the samples.
+    /// Start of the interval, in seconds since the start of the samples.
     pub from_s: f64,
-    /// When it ends.
+    /// End of the interval, in seconds since the start of the samples.
     pub to_s: f64,
-    /// What is expected meanwhile.
+    /// Expectations during the interval.
     #[serde(flatten)]
     pub terms: Terms,
 }
@@ -112,16 +112,16 @@ pub struct Interval {
 /// `[expect]`: of the whole scene, and over intervals, which replace what is said of the whole.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Expect {
-    /// Of the whole scene.
+    /// Expectations for the whole scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub whole: Option<Terms>,
-    /// Of parts of it; the last one that covers a time counts.
+    /// Expectations for intervals; the last interval that covers a time applies.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub intervals: Vec<Interval>,
 }
 
 impl Expect {
-    /// Whether the scene expects nothing of its own.
+    /// True if the scene declares no expectations.
     pub fn is_empty(&self) -> bool {
         self.whole.is_none() && self.intervals.is_empty()
     }
@@ -132,12 +132,12 @@ impl Expect {
         self.intervals.iter().rev().filter(within).map(|interval| &interval.terms).chain(&self.whole)
     }
 
-    /// What is said of fixes at a time.
+    /// Returns the expectation about fixes at a time.
     pub fn fix(&self, time_s: f64) -> Option<Fixes> {
         self.at(time_s).find_map(|terms| terms.fix)
     }
 
-    /// What is said of a satellite's losses at a time.
+    /// Returns the expectation about a satellite's losses of lock at a time.
     pub fn losses(&self, sv: Sv, time_s: f64) -> Option<Losses> {
         let concerns = |terms: &&Terms| terms.satellites.as_ref().is_none_or(|list| list.contains(&sv));
         self.at(time_s).filter(concerns).find_map(|terms| terms.losses)
@@ -148,18 +148,18 @@ impl Expect {
         self.at(time_s).find_map(|terms| Some((terms, terms.position_within_m?)))
     }
 
-    /// Whether errors at a time are to be judged.
+    /// True if errors at a time are judged.
     pub fn bounded(&self, time_s: f64) -> bool {
         self.at(time_s).find_map(|terms| terms.errors) != Some(Sizes::Any)
     }
 
-    /// Whether errors are judged at all times.
+    /// True if errors are judged at all times.
     pub fn always_bounded(&self) -> bool {
         let all = self.whole.iter().chain(self.intervals.iter().map(|interval| &interval.terms));
         all.filter_map(|terms| terms.errors).all(|sizes| sizes != Sizes::Any)
     }
 
-    /// Whether errors of what remembers `memory_s` of the past are to be judged at a time.
+    /// True if errors at a time are judged for estimates that depend on the last `memory_s` seconds.
     pub fn bounded_since(&self, time_s: f64, memory_s: f64) -> bool {
         let within = |interval: &&Interval| (interval.from_s..interval.to_s + memory_s).contains(&time_s);
         let any = |interval: &Interval| interval.terms.errors == Some(Sizes::Any);
@@ -167,7 +167,7 @@ impl Expect {
     }
 }
 
-/// What is wrong, by the word that a scenario uses.
+/// Kind of satellite fault, by the word that a scenario uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FaultKind {
@@ -194,14 +194,14 @@ pub enum FaultKind {
 /// Something wrong with satellites or their messages.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fault {
-    /// What it is.
+    /// Kind of the fault.
     pub kind: FaultKind,
     /// Absent means all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub satellites: Option<Vec<Sv>>,
-    /// When it begins, seconds since the start of the samples.
+    /// Start of the fault, in seconds since the start of the samples.
     pub from_s: f64,
-    /// When it ends.
+    /// End of the fault, in seconds since the start of the samples.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub to_s: Option<f64>,
 }

@@ -31,7 +31,7 @@ pub struct SceneFacts {
     /// Frequency on the air that lies at 0 in the samples, Hz.
     #[serde(default)]
     pub center_hz: Option<f64>,
-    /// Whether the samples' spectrum is mirrored about `center_hz`.
+    /// True if the samples' spectrum is mirrored about `center_hz`.
     #[serde(default)]
     pub inverted: bool,
     /// SigMF name of the sample format.
@@ -40,13 +40,13 @@ pub struct SceneFacts {
     /// Level of fidelity, by name.
     #[serde(default)]
     pub fidelity: String,
-    /// How the edges of chips fall between samples.
+    /// Placement of chip edges between samples.
     #[serde(default)]
     pub code_edge: Edge,
     /// Cut-off (−6 dB) of band-limited edges, cycles a sample.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edge_cutoff_cps: Option<f64>,
-    /// What of waveforms of several layers is sent.
+    /// Layers that are transmitted of waveforms with several layers.
     #[serde(default, skip_serializing_if = "is_whole")]
     pub waveform: Layers,
     /// Arithmetic of the carrier, by name.
@@ -64,7 +64,7 @@ pub struct SceneFacts {
     /// Names of the signals.
     #[serde(default)]
     pub signals: Vec<String>,
-    /// Whether thermal noise was added.
+    /// True if thermal noise was added.
     #[serde(default = "yes")]
     pub noise: bool,
     /// Arithmetic of the noise, by name.
@@ -83,7 +83,7 @@ pub struct SceneFacts {
     /// The receiver's oscillator, if the scene has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub oscillator: Option<OscillatorFacts>,
-    /// Where there are several front ends, each of them.
+    /// Facts of each front end, if there are several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub front_ends: Vec<FrontEndFacts>,
     /// Waveforms of the sources of interference, in the order of their numbers.
@@ -92,19 +92,19 @@ pub struct SceneFacts {
     /// Each spoofer in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub spoofers: Vec<String>,
-    /// What is true of the orbits that satellites do not broadcast, in words.
+    /// Deviation of the true orbits from the broadcast ones, in words.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orbits: Option<String>,
-    /// What is wrong with satellites, in words.
+    /// Faults of satellites, in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub satellite_faults: Vec<String>,
-    /// What is wrong with messages, in words.
+    /// Faults of messages, in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub message_faults: Vec<String>,
     /// Both kinds of faults again, for the judge.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<Fault>,
-    /// What the scene expects of a receiver.
+    /// Expectations that the scene declares for a receiver.
     #[serde(default, skip_serializing_if = "Expect::is_empty")]
     pub expect: Expect,
     /// Systems' times that are off GPS time by more than whole seconds.
@@ -113,7 +113,7 @@ pub struct SceneFacts {
 }
 
 impl SceneFacts {
-    /// By how much a system's time is ahead of GPS time, seconds, whole seconds apart.
+    /// Offset of a system's time ahead of GPS time, in seconds, without the whole seconds between both.
     pub fn ahead_s(&self, scale: &str) -> f64 {
         self.time_offsets.iter().find(|offset| offset.time_scale == scale).map_or(0.0, |offset| offset.ahead_s)
     }
@@ -153,7 +153,7 @@ pub struct OscillatorFacts {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct FrontEndFacts {
-    /// Its name, if it has one.
+    /// Name of the front end, if it has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// Number of samples.
@@ -162,11 +162,11 @@ pub struct FrontEndFacts {
     pub sample_rate_hz: f64,
     /// Frequency on the air that lies at 0 in the samples, Hz.
     pub center_hz: f64,
-    /// Whether the samples' spectrum is mirrored.
+    /// True if the samples' spectrum is mirrored.
     pub inverted: bool,
     /// SigMF name of the sample format.
     pub format: String,
-    /// How the edges of chips fall between samples.
+    /// Placement of chip edges between samples.
     pub code_edge: Edge,
     /// Cut-off (−6 dB) of band-limited edges, cycles a sample.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -181,7 +181,7 @@ pub struct FrontEndFacts {
 }
 
 impl FrontEndFacts {
-    /// What its oscillator adds to every Doppler, Hz.
+    /// Frequency offset in Hz that the front end's oscillator adds to every Doppler.
     pub fn doppler_hz(&self) -> f64 {
         let offset_hz = super::oscillator_offset_hz(&self.front_end);
         if self.inverted { -offset_hz } else { offset_hz }

@@ -11,7 +11,7 @@ const POLYNOMIALS: [u32; 2] = [0o171, 0o133];
 /// A code of this family.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Convolutional {
-    /// Whether the second symbol of each pair is sent inverted, as Galileo does.
+    /// True if the second symbol of each pair is sent inverted, as in Galileo.
     pub second_inverted: bool,
 }
 

@@ -67,7 +67,7 @@ impl Frames {
         self.doubt();
     }
 
-    /// Where frames begin is sought anew.
+    /// Restarts the search for the beginning of frames.
     pub fn doubt(&mut self) {
         (self.frame, self.failures) = (None, 0);
     }

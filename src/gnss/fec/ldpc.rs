@@ -20,7 +20,7 @@ pub struct Ldpc {
     checks: Vec<Vec<usize>>,
     /// Information bits, and as many parity bits.
     half: usize,
-    /// Of each parity bit the information bits whose sum it is, 64 to a word.
+    /// Information bits whose sum is each parity bit, 64 bits to a word.
     generator: Vec<Vec<u64>>,
 }
 
@@ -77,7 +77,7 @@ impl Ldpc {
         None
     }
 
-    /// Whether the signs of symbols fulfil all checks.
+    /// True if the signs of the symbols fulfil all checks.
     fn holds(&self, sure: &[f32]) -> bool {
         let is_one = |place: &&usize| sure.get(**place).is_some_and(|value| *value < 0.0);
         self.checks.iter().all(|row| row.iter().filter(is_one).count() % 2 == 0)

@@ -29,11 +29,11 @@ type Belief = [f32; ORDER];
 pub struct Ldpc64 {
     /// Place and factor of the elements whose sum is zero, check after check.
     checks: Vec<Vec<(usize, u8)>>,
-    /// Of each element its checks, and its place in them.
+    /// Checks of each element, each with the element's position in it.
     edges: Vec<Vec<(usize, usize)>>,
     /// Information elements, and as many of parity.
     half: usize,
-    /// Of each parity element the factors of the information's.
+    /// Factors of the information elements for each parity element.
     generator: Vec<Vec<u8>>,
 }
 
@@ -124,7 +124,7 @@ impl Ldpc64 {
         None
     }
 
-    /// What is believed of an element by its symbols and what its checks say, one of them left out.
+    /// Belief about an element from its symbols and the messages of its checks, with one check left out.
     fn belief(&self, place: usize, prior: &Belief, said: &[Vec<Belief>], without: Option<usize>) -> Belief {
         let mut belief = *prior;
         let edges = self.edges.get(place).into_iter().flatten().filter(|(check, _)| Some(*check) != without);
@@ -135,7 +135,7 @@ impl Ldpc64 {
         belief
     }
 
-    /// Whether elements fulfil all checks.
+    /// True if the elements fulfil all checks.
     fn holds(&self, word: &[u8]) -> bool {
         let term = |(place, factor): &(usize, u8)| word.get(*place).map_or(0, |element| product(*factor, *element));
         self.checks.iter().all(|row| row.iter().map(term).fold(0, |sum, term| sum ^ term) == 0)
@@ -183,7 +183,8 @@ fn likeliest(belief: &Belief) -> u8 {
     best.map_or(0, |(element, _)| element as u8)
 }
 
-/// What a check says of each of its elements by what is believed of the others; each with its factor.
+/// Messages of a check to each of its elements, computed from the beliefs about the others. Each belief has
+/// its factor.
 fn answers(row: &[(Belief, u8)]) -> Vec<Belief> {
     let transformed: Vec<Belief> = row
         .iter()

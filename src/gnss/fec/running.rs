@@ -32,9 +32,9 @@ pub struct Running {
 /// A message that was found.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Found {
-    /// Its bits as they were sent.
+    /// Bits of the message as sent.
     pub bits: Vec<bool>,
-    /// Whether symbols were upside down.
+    /// True if the symbols were inverted.
     pub inverted: bool,
     /// From its first symbol to the newest, both counted.
     pub symbols: u64,
@@ -95,12 +95,13 @@ impl Running {
         self.doubt();
     }
 
-    /// Where messages begin is sought anew.
+    /// Restarts the search for the beginning of messages.
     pub fn doubt(&mut self) {
         (self.frame, self.failures) = (None, 0);
     }
 
-    /// Where a message may begin in the window, which is decoded for both ways in which symbols may be pairs.
+    /// Finds a possible start of a message in the window. The window is decoded for both ways of pairing
+    /// symbols.
     fn search(&mut self) -> Option<(usize, Vec<bool>, bool)> {
         let soft = self.symbols.make_contiguous();
         for offset in 0..2 {

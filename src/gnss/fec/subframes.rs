@@ -17,17 +17,17 @@ use super::register::RegisterCode;
 pub struct Subframes {
     /// Code of the time.
     pub time: RegisterCode,
-    /// Whether the time has one bit more, the highest, which is sent before the code word and added to it.
+    /// True if the time has one more bit, the highest, which is sent before the code word and added to it.
     pub has_high_bit: bool,
     /// The times that there are.
     pub times: RangeInclusive<u32>,
     /// Code of the first block, and its bits with their check.
     pub two: (&'static LazyLock<Ldpc>, usize),
-    /// Those of the second.
+    /// Code of the second block, and its bits with their check.
     pub three: (&'static LazyLock<Ldpc>, usize),
-    /// Of both.
+    /// Interleaver of both blocks.
     pub interleaver: Interleaver,
-    /// Whether the check of a block is right.
+    /// Function that returns true if the check of a block is right.
     pub is_right: fn(&[bool]) -> bool,
 }
 
@@ -36,11 +36,11 @@ pub struct Subframes {
 pub struct Blocks {
     /// The time.
     pub time: u32,
-    /// Whether symbols were upside down.
+    /// True if the symbols were inverted.
     pub inverted: bool,
     /// Bits of the first block with their check.
     pub two: Vec<bool>,
-    /// Those of the second; `None` where it fails its check.
+    /// Bits of the second block with their check; `None` if the check fails.
     pub three: Option<Vec<bool>>,
 }
 

@@ -47,7 +47,7 @@ const fn side(layers: &'static [Layer], alone: &Component, code: fn(u8) -> Optio
 /// signs, (2+√2)/4 of them, and of √2/4 times these with the smaller level inverted.
 const SIGNS: Layer = Layer { weight: WEIGHTS[0], ..pulse(&[1, 1, -1, -1, -1, -1, 1, 1, 1, 1, -1, -1]) };
 const LEVELS: Layer = Layer { weight: WEIGHTS[1], ..pulse(&[1, -1, 1, -1, -1, 1, -1, 1, 1, -1, 1, -1]) };
-/// The same a quarter of the period later.
+/// Subcarrier signs a quarter of the period later.
 const SIGNS_LATER: Layer = Layer { weight: WEIGHTS[0], ..pulse(&[1, 1, 1, 1, -1, -1, -1, -1, 1, 1, 1, 1]) };
 const LEVELS_LATER: Layer = Layer { weight: WEIGHTS[1], ..pulse(&[-1, 1, 1, -1, 1, -1, -1, 1, -1, 1, 1, -1]) };
 

@@ -106,7 +106,7 @@ impl Code {
         }
     }
 
-    /// Its column of [`STARTS`].
+    /// Column of the code in [`STARTS`].
     fn column(self) -> usize {
         match self {
             Self::E5aData => 0,
@@ -117,7 +117,7 @@ impl Code {
     }
 }
 
-/// What a register gives: the last stage first, then what its feedback puts in.
+/// Output of a register: the last stage first, then the bits that its feedback inserts.
 fn register(feedback: u32, start: u32) -> impl Iterator<Item = bool> {
     let mut stages = start;
     std::iter::repeat_with(move || {
@@ -153,7 +153,7 @@ static CS100: LazyLock<Vec<Vec<i8>>> = LazyLock::new(|| {
     include_str!("e5_secondary_codes.txt").lines().map(digits).collect()
 });
 
-/// What the second registers start with, of E5a-I, E5a-Q, E5b-I and E5b-Q, for numbers 1 to 50 (table 16).
+/// Initial states of the second registers of E5a-I, E5a-Q, E5b-I and E5b-Q, for numbers 1 to 50 (table 16).
 #[rustfmt::skip]
 const STARTS: [[u32; 4]; 50] = [
     [0o30305, 0o25652, 0o07220, 0o03331], [0o14234, 0o05142, 0o26047, 0o06143],

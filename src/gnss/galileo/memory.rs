@@ -3,12 +3,12 @@
 /// Numbers that have codes.
 pub(super) const COUNT: usize = 50;
 
-/// Which of the two codes of a satellite.
+/// Component to which a code of a satellite belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Code {
-    /// Of the component that carries the message.
+    /// Code of the component that carries the message.
     Data,
-    /// Of the one that has a secondary code.
+    /// Code of the component that has a secondary code.
     Pilot,
 }
 

@@ -11,17 +11,17 @@ use super::e5;
 use crate::broadcast::Ephemeris;
 use crate::signal::Signal;
 
-/// Where the three bits of a signal are in [`Ephemeris::health`].
+/// Position of a signal's three status bits in [`Ephemeris::health`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Status {
     low: u32,
 }
 
-/// Of E1-B.
+/// Status bits of E1-B.
 pub(super) const E1B: Status = Status { low: 0 };
-/// Of E5b.
+/// Status bits of E5b.
 pub(super) const E5B: Status = Status { low: 3 };
-/// Of E5a.
+/// Status bits of E5a.
 pub(super) const E5A: Status = Status { low: 6 };
 
 impl Status {
@@ -46,7 +46,7 @@ impl Status {
         set.health = set.health & !(0b11 << low) | (value as u16 & 0b11) << low;
     }
 
-    /// Whether all three are zero.
+    /// True if all three bits are zero.
     pub(super) fn is_good(self, set: &Ephemeris) -> bool {
         set.health >> self.low & 0b111 == 0
     }
@@ -59,14 +59,14 @@ const BELOW_E5B_HZ: f64 = 1_199e6;
 const ABOVE_E5_HZ: f64 = 1_240e6;
 const ABOVE_E6_HZ: f64 = 1_400e6;
 
-/// Of which part of the spectrum a signal is.
+/// Part of the spectrum to which a signal belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Band {
     /// E1, and what is beside it.
     E1,
     /// The lower side of E5.
     E5a,
-    /// Its upper side.
+    /// Upper sideband of E5.
     E5b,
     /// Both sides as one signal.
     E5,
@@ -97,7 +97,7 @@ pub(super) fn against_inav_s(set: &Ephemeris, signal: &Signal) -> f64 {
     }
 }
 
-/// The same against the clock of E1 and E5a.
+/// Group delay of a signal in seconds, relative to the clock of E1 and E5a.
 pub(super) fn against_fnav_s(set: &Ephemeris, signal: &Signal) -> f64 {
     match band(signal) {
         Band::E5b => set.tgd2_s + set.tgd_s * set.dispersion(signal) - set.tgd_s,
@@ -113,12 +113,12 @@ fn of_both(set: &Ephemeris, of: fn(&Ephemeris, &Signal) -> f64) -> f64 {
     0.5 * (of(set, planted!("gnss.altboc.delay", &e5::E5A, &e5::E5B)) + upper_s)
 }
 
-/// By how much the clock of F/NAV is ahead of that of I/NAV: on E1 both have to be one clock.
+/// Clock of F/NAV minus clock of I/NAV, in seconds. On E1 both must give the same clock.
 pub(super) fn fnav_ahead_s(set: &Ephemeris) -> f64 {
     planted!("gnss.fnav.clock", set.tgd2_s - set.tgd_s, set.tgd_s - set.tgd2_s)
 }
 
-/// Whether a set says that a signal may be used, of those bands of which its message says something.
+/// True if an ephemeris reports a signal as usable, judged by the bands that its message describes.
 pub(super) fn healthy(set: &Ephemeris, signal: &Signal, says: &[Band]) -> Option<bool> {
     let parts: &[(Band, Status)] = match band(signal) {
         Band::E1 => &[(Band::E1, E1B)],

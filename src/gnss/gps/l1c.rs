@@ -68,7 +68,7 @@ fn gps(number: u8) -> Option<u8> {
     (number <= 63).then_some(number)
 }
 
-/// Of 33 chips of the pilot those in BOC(6,1), and those in BOC(1,1) (3.3.1).
+/// Chips of the pilot in BOC(6,1), among 33, and those in BOC(1,1) (3.3.1).
 const SIX: [bool; 33] = chips(true);
 const ONE: [bool; 33] = chips(false);
 
@@ -78,7 +78,7 @@ const fn chips(six: bool) -> [bool; 33] {
     chips
 }
 
-/// Which of the two codes of a satellite.
+/// Component to which a code of a satellite belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Code {
     /// L1C-D.
@@ -91,12 +91,11 @@ static LEGENDRE: LazyLock<Legendre> = LazyLock::new(|| Legendre::new(10_223));
 /// The chips that are put into a Weil code (3.2.2.1.1).
 const INSERTED: [bool; 7] = [false, true, true, false, true, false, false];
 
-/// What a satellite's codes are made of: Weil index and insertion point of the data's code and of the
-/// pilot's, and polynomial and first state of the overlay's register, with the first state of the second
-/// one.
+/// Parameters of a satellite's codes: Weil index and insertion point for the data and for the pilot. Then
+/// follow polynomial and first state of the overlay's register, with the first state of its second register.
 type Origin = ([u16; 2], [u16; 2], [u16; 3]);
 
-/// That of a number from 1 to 63 or 193 to 202; `None` beyond.
+/// Parameters of the codes of a number from 1 to 63 or 193 to 202; `None` beyond.
 fn origin(number: u8) -> Option<Origin> {
     if let Some(place) = number.checked_sub(193) {
         return QZSS_CODES.get(usize::from(place)).copied();
@@ -132,7 +131,7 @@ pub fn secondary_code(number: u8) -> Option<Vec<i8>> {
 /// The polynomial of the second register of overlays (3.2.2.1.2).
 const SECOND_POLYNOMIAL: u16 = 0o5001;
 
-/// What a register of eleven stages gives at its last stage.
+/// Output of a register of eleven stages, taken from its last stage.
 fn register(polynomial: u16, start: u16) -> impl Iterator<Item = bool> {
     // Stage n is the bit of value 2ⁿ⁻¹; the polynomial's lowest coefficient is no stage.
     let feedback = planted!("gnss.l1c.secondary_code", polynomial >> 1, polynomial);
@@ -187,7 +186,7 @@ const CODES: [([u16; 2], [u16; 2], [u16; 2]); 63] = [
     ([4851, 4353], [1852, 6284], [0o4577, 0o0341]),
 ];
 
-/// The same for numbers 193 to 202, and the first state of the second register.
+/// Parameters of the codes of numbers 193 to 202, with the first state of the second register.
 #[rustfmt::skip]
 const QZSS_CODES: [Origin; 10] = [
     ([4834, 9753], [4311, 9864], [0o5403, 0o0500, 0o3261]), ([4456, 4799], [5024, 9753], [0o5403, 0o0254, 0o1760]),

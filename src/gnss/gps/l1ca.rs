@@ -40,14 +40,14 @@ const G2_DELAY_CHIPS: [usize; 37] = [
     514, 515, 516, 859, 860, 861, 862, 863, 950, 947, 948, 950,
 ];
 
-/// The same of PRN 120 to 158, of augmentation systems (IS-GPS-200N, table 6-I).
+/// Delay of G2 in chips for PRN 120 to 158, of augmentation systems (IS-GPS-200N, table 6-I).
 const SBAS_G2_DELAY_CHIPS: [usize; 39] = [
     145, 175, 52, 21, 237, 235, 886, 657, 634, 762, 355, 1012, 176, 603, 130, 359, 595, 68, 386, 797, 456, 499, 883,
     307, 127, 211, 121, 118, 163, 628, 853, 484, 289, 811, 202, 1021, 463, 568, 904,
 ];
 const FIRST_OF_SBAS: u8 = 120;
 
-/// The same of PRN 193 to 202, of QZSS (IS-GPS-200N, table 6-I; IS-QZSS-PNT-005, table 3.2.2-1).
+/// Delay of G2 in chips for PRN 193 to 202, of QZSS (IS-GPS-200N, table 6-I; IS-QZSS-PNT-005, table 3.2.2-1).
 const QZSS_G2_DELAY_CHIPS: [usize; 10] = [339, 208, 711, 189, 263, 537, 663, 942, 173, 900];
 const FIRST_OF_QZSS: u8 = 193;
 

@@ -75,7 +75,7 @@ fn in_turn(chips: &[i8], first: usize) -> Vec<i8> {
     all
 }
 
-/// Which of the two codes of a satellite.
+/// Component to which a code of a satellite belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Code {
     /// CM.
@@ -84,8 +84,8 @@ pub enum Code {
     Long,
 }
 
-/// What a one at the output adds to the register after its shift (figure 3-9; the polynomial is octal
-/// 1112225171).
+/// Bits that are added to the register after a shift if the output is one (figure 3-9; the polynomial is
+/// octal 1112225171).
 const FEEDBACK: u32 = 0o445_112_474;
 
 /// The chips of a satellite by its number, 1 to 63 or 159 to 210, as ±1; `None` beyond.

@@ -59,7 +59,7 @@ fn gps(number: u8) -> Option<u8> {
 const NH10: [i8; 10] = [1, 1, 1, 1, -1, -1, 1, -1, 1, -1];
 const NH20: [i8; 20] = [1, 1, 1, 1, 1, -1, 1, 1, -1, -1, 1, -1, 1, -1, 1, 1, -1, -1, -1, 1];
 
-/// Which of the two codes of a satellite.
+/// Component to which a code of a satellite belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Code {
     /// I5.
@@ -76,7 +76,7 @@ const XB_CHIPS: usize = 8191;
 const XA_TAPS: [u32; 4] = [9, 10, 12, 13];
 const XB_TAPS: [u32; 8] = [1, 3, 4, 6, 7, 8, 12, 13];
 
-/// What a register of 13 ones gives at its last stage.
+/// Output of a register of 13 stages that starts with ones, taken from its last stage.
 fn register(taps: &[u32], chips: usize) -> Vec<bool> {
     // Stage n is the bit of value 2ⁿ⁻¹.
     let feedback = taps.iter().fold(0_u32, |all, stage| all | 1 << (stage - 1));
@@ -106,7 +106,7 @@ pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     Some(chips.take(CODE_CHIPS as usize).collect())
 }
 
-/// By how many chips XB is advanced, of I5 and of Q5, for numbers 1 to 210.
+/// Advance of XB in chips for I5 and for Q5, for numbers 1 to 210.
 #[rustfmt::skip]
 const ADVANCES: [[u16; 2]; 210] = [
     [266, 1701], [365, 323], [804, 5292], [1138, 2020], [1509, 5429], [1559, 7136], [1756, 1041], [2084, 5947],

@@ -1,4 +1,4 @@
-//! Which GPS satellites send the civil signals that came after L1 C/A, and since when.
+//! Table of the GPS satellites that send civil signals newer than L1 C/A, with the date of each beginning.
 //!
 //! A number sends L2C with CNAV from the day on which a satellite of Block IIR-M, IIF or III took it, and L5
 //! from that of Block IIF or III: these are the days on which they were set healthy (notices of the
@@ -10,7 +10,7 @@
 
 use crate::time::Epoch;
 
-/// What a satellite can send.
+/// Set of signals that a satellite can send.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Sends {
     /// L2C: Block IIR-M.
@@ -57,24 +57,24 @@ const SINCE: [(u8, &str, Sends); 28] = [
     (32, "2016-03-09T00:00:00", L2AndL5),
 ];
 
-/// What the satellite of a number sends at a time.
+/// Returns the set of signals that the satellite with this number sends at a time.
 fn of(number: u8, at: Epoch) -> Option<Sends> {
     let own = SINCE.iter().filter(|(known, ..)| *known == number);
     let mut begun = own.filter(|(_, since, _)| Epoch::parse(since).is_ok_and(|since| at.since(since) >= 0.0));
     begun.next().map(|(.., sends)| *sends)
 }
 
-/// Whether a satellite sends L2C with CNAV at a time.
+/// True if a satellite sends L2C with CNAV at a time.
 pub fn sends_l2c(number: u8, at: Epoch) -> bool {
     of(number, at).is_some()
 }
 
-/// Whether a satellite sends L5 at a time.
+/// True if a satellite sends L5 at a time.
 pub fn sends_l5(number: u8, at: Epoch) -> bool {
     matches!(of(number, at), Some(L2AndL5 | L1CToo))
 }
 
-/// Whether a satellite sends L1C with CNAV-2 at a time.
+/// True if a satellite sends L1C with CNAV-2 at a time.
 pub fn sends_l1c(number: u8, at: Epoch) -> bool {
     of(number, at) == Some(L1CToo)
 }

@@ -63,17 +63,17 @@ pub static L1: Signal = Signal {
     ],
 };
 
-/// Whether the satellite of a number sends it at a time.
+/// True if the satellite with this number sends the signal at a time.
 pub fn sent(number: u8, at: Epoch) -> bool {
     number == 10 && Epoch::parse("2023-06-24T00:00:00").is_ok_and(|since| at.since(since) >= 0.0)
 }
 
-/// Which of the two codes of a satellite.
+/// Component to which a code of a satellite belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Code {
-    /// Of the data.
+    /// Code of the data component.
     Data,
-    /// Of the pilot.
+    /// Code of the pilot.
     Pilot,
 }
 
@@ -125,7 +125,7 @@ const fn cells(of: u32, places: &[u32]) -> u64 {
 }
 
 impl Registers {
-    /// What the second register gives, of first states.
+    /// Output of the second register for its two first states.
     fn chips(&self, [mut first, mut second]: [u64; 2]) -> impl Iterator<Item = bool> {
         let step = |register: u64, back: u64| (register << 1 | back & 1) & ((1 << self.cells) - 1);
         std::iter::repeat_with(move || {

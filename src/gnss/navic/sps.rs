@@ -39,7 +39,7 @@ pub static S: Signal = Signal {
     ..L5
 };
 
-/// What both carriers have, with the codes of L5.
+/// Component that both carriers share, with the codes of L5.
 const SPS: Component = Component {
     power_share: 1.0,
     phase_cycles: 0.0,
@@ -51,13 +51,13 @@ const SPS: Component = Component {
     message: Some(&SPS_NAV),
 };
 
-/// Where G2 begins on L5 for PRN 1 to 14: stage 10, whose chip comes first, to stage 1.
+/// Initial states of G2 on L5 for PRN 1 to 14: stage 10, whose chip comes first, to stage 1.
 #[rustfmt::skip]
 const L5_STARTS: [u16; 14] = [
     0b11_1010_0111, 0b00_0010_0110, 0b10_0011_0100, 0b01_0111_0010, 0b11_1011_0000, 0b00_0110_1011, 0b00_0001_0100,
     0b01_0011_0000, 0b00_1001_1000, 0b11_0110_0100, 0b00_0100_1100, 0b11_0111_1100, 0b10_1101_0010, 0b01_1110_1010,
 ];
-/// The same on S.
+/// Initial states of G2 on S for PRN 1 to 14: stage 10, whose chip comes first, to stage 1.
 #[rustfmt::skip]
 const S_STARTS: [u16; 14] = [
     0b00_1110_1111, 0b01_0111_1101, 0b10_0011_0001, 0b00_1010_1011, 0b10_1001_0001, 0b01_0010_1100, 0b00_1000_1110,

@@ -28,7 +28,8 @@ const GRID: usize = 39;
 /// Powers of the sine of the dip in the map of the frequency, for each multiple of the longitude
 /// (2.5.5.3.2.2).
 const FREQUENCY_POWERS: [usize; 9] = [12, 12, 9, 5, 2, 1, 1, 1, 1];
-/// The same of the transmission factor (2.5.5.3.2.3).
+/// Powers of the sine of the dip in the map of the transmission factor, for each multiple of the longitude
+/// (2.5.5.3.2.3).
 const FACTOR_POWERS: [usize; 7] = [7, 8, 6, 3, 2, 1, 1];
 
 fn number(index: usize) -> f64 {

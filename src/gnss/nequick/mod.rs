@@ -84,7 +84,7 @@ struct Line {
     perigee_km: Vector3<f64>,
     /// Unit vector towards the satellite.
     along: Vector3<f64>,
-    /// Where user and satellite are.
+    /// Distances of user and satellite along the line, in kilometres.
     from_km: f64,
     to_km: f64,
 }

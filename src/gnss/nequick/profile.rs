@@ -14,7 +14,7 @@ const TWILIGHT_DEG: f64 = 86.232_927_962_116_15;
 /// Electrons per cubic metre in the unit of densities.
 const DENSITY: f64 = 1e11;
 
-/// What is the same at every place: the Sun, and the maps for its time and strength.
+/// State that is common to all positions: the Sun, and the maps for its time and strength.
 #[derive(Clone, Debug)]
 pub struct Sun {
     month: u8,
@@ -160,7 +160,7 @@ impl Layer {
         if height_km > self.peak_km { self.above_km } else { self.below_km }
     }
 
-    /// What it gives at the peak of a layer, as an amplitude.
+    /// Density of the layer at a height, such as another layer's peak, expressed as an amplitude.
     fn amplitude_at(&self, height_km: f64) -> f64 {
         let e = exponential((height_km - self.peak_km) / self.thickness_km(height_km));
         4.0 * self.amplitude * e / ((1.0 + e) * (1.0 + e))

@@ -18,7 +18,7 @@ const RMC_FIELDS: usize = 12;
 const VTG_FIELDS: usize = 9;
 const ZDA_FIELDS: usize = 7;
 
-/// What is wrong with a sentence.
+/// Error in a sentence.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum SentenceError {
     /// Bytes that are not ASCII.
@@ -27,9 +27,9 @@ pub enum SentenceError {
     /// A checksum that is not the exclusive or of the characters between `$` and `*`.
     #[error("the checksum is wrong: '{found}', expected {expected:02X}")]
     Checksum {
-        /// What follows the `*`.
+        /// Text after the `*`.
         found: String,
-        /// What the characters add up to.
+        /// Checksum of the characters.
         expected: u8,
     },
     /// Less than the sentence has.
@@ -41,17 +41,17 @@ pub enum SentenceError {
         need: usize,
         /// Three letters, as GGA.
         kind: String,
-        /// Whether a checksum holds.
+        /// True if the sentence has a valid checksum.
         checked: bool,
     },
     /// A field that does not have its form.
     #[error("{what} '{text}': expected {expected}")]
     Field {
-        /// What the field is.
+        /// Meaning of the field.
         what: &'static str,
-        /// What it holds.
+        /// Text of the field.
         text: String,
-        /// What it may hold.
+        /// Values that the field may have.
         expected: &'static str,
     },
 }
@@ -75,16 +75,16 @@ pub fn sentences(line: &[u8]) -> impl Iterator<Item = &[u8]> {
 /// A sentence whose checksum holds, or that has none.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sentence<'t> {
-    /// Who speaks, as `GN`.
+    /// Talker identifier, such as `GN`.
     pub talker: &'t str,
-    /// What it is, as `GGA`.
+    /// Sentence type, such as `GGA`.
     pub kind: &'t str,
-    /// Whether it has a checksum.
+    /// True if the sentence has a checksum.
     pub checked: bool,
     fields: Vec<&'t str>,
 }
 
-/// What a GGA sentence says of a fix.
+/// Fix of a GGA sentence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gga<'t> {
     /// UTC time of day, `hhmmss.ss` as written.
@@ -113,12 +113,12 @@ impl Gga<'_> {
     }
 }
 
-/// What an RMC sentence says.
+/// Content of an RMC sentence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rmc<'t> {
     /// UTC time of day, `hhmmss.ss` as written.
     pub time: &'t str,
-    /// Whether its status is A; V is the receiver's warning.
+    /// True if the status is A; V is the receiver's warning.
     pub valid: bool,
     /// Year, month and day, where the date is there.
     pub date: Option<[u32; 3]>,
@@ -165,7 +165,7 @@ impl<'t> Sentence<'t> {
         self.fields.get(index).copied().unwrap_or_default()
     }
 
-    /// That the fields are there: the first `least` under a checksum, `all` without one.
+    /// Checks the number of fields: at least `least` with a checksum, `all` without one.
     fn long_enough(&self, least: usize, all: usize) -> Read<()> {
         let (have, need) = (self.fields.len(), if self.checked { least } else { all });
         let short = || SentenceError::Short { have, need, kind: self.kind.to_owned(), checked: self.checked };
@@ -193,7 +193,7 @@ impl<'t> Sentence<'t> {
         Ok(Some(Gga { time, latitude_deg, longitude_deg, altitude_m, separation_m, satellites, decimals }))
     }
 
-    /// What an RMC sentence says; `None` of one without a time.
+    /// Returns the content of an RMC sentence, or `None` if it has no time.
     ///
     /// # Errors
     /// [`SentenceError`]: too few fields, one that has not its form.

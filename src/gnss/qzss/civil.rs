@@ -59,7 +59,7 @@ pub static CNAV2: Message = Message {
     ..cnav2::CNAV2
 };
 
-/// What clock and health of sets of CNAV mean.
+/// Meaning of clock and health in ephemerides of CNAV.
 pub static CNAV_SETS: SetForm = SetForm {
     name: "CNAV of QZSS",
     group_delay_s: |set, signal| (cnav::CNAV_SETS.group_delay_s)(set, like(signal)),
@@ -68,7 +68,7 @@ pub static CNAV_SETS: SetForm = SetForm {
     ..cnav::CNAV_SETS
 };
 
-/// The same of sets of CNAV-2.
+/// Meaning of clock and health in ephemerides of CNAV-2.
 pub static CNAV2_SETS: SetForm = SetForm {
     name: "CNAV-2 of QZSS",
     group_delay_s: |set, signal| (cnav2::CNAV2_SETS.group_delay_s)(set, like(signal)),

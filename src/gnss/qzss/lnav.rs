@@ -25,7 +25,7 @@ pub static LNAV: Message = Message {
     ..lnav::LNAV
 };
 
-/// What clock and health of its sets mean: one group delay, and bits of health by signal.
+/// Meaning of clock and health in ephemerides of LNAV: one group delay, and health bits by signal.
 pub static LNAV_SETS: SetForm = SetForm {
     name: "LNAV of QZSS",
     serves: |signal| (lnav::LNAV_SETS.serves)(like(signal)),
@@ -47,7 +47,8 @@ fn of(signal: &Signal) -> u16 {
     own.into_iter().find(|(other, _)| *other == signal).map_or(OF_L1_CA, |(_, bits)| bits)
 }
 
-/// Whether L1, L2, L5 and L1C are not to be used, L1 if neither L1 C/A nor L1C/B is.
+/// Health of L1, L2, L5 and L1C, true if the signal must not be used. L1 is unhealthy if neither L1 C/A nor
+/// L1C/B is usable.
 pub(super) fn unhealthy(set: &Ephemeris) -> [bool; 4] {
     const EITHER_ON_L1: u16 = 0b1_0001;
     let bad = |bits| set.health & bits != 0;

@@ -1,4 +1,4 @@
-//! What every message of QZSS has of that of GPS: sets and readers that bear other names.
+//! QZSS messages that reuse a GPS message: ephemerides and readers under QZSS's own message names.
 
 use crate::broadcast::{Ephemeris, SetForm};
 use crate::gps;

@@ -22,14 +22,14 @@ fn is_of_the_first_five(number: u8) -> bool {
     matches!(number, 1..=4 | 7)
 }
 
-/// Whether a satellite sends L1 C/A at a time.
+/// True if a satellite sends L1 C/A at a time.
 pub fn sends_l1ca(number: u8, at: Epoch) -> bool {
     let last = Epoch::parse("2025-08-21T00:00:00");
     let still = number != 4 || last.is_ok_and(|last| at.since(last) < 0.0);
     is_of_the_first_five(number) && planted!("gnss.qzss.l1cb", still, true)
 }
 
-/// Whether a satellite sends L2C at a time.
+/// True if a satellite sends L2C at a time.
 pub fn sends_l2c(number: u8, _: Epoch) -> bool {
     is_of_the_first_five(number)
 }

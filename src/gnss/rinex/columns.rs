@@ -61,31 +61,31 @@ const UTC: &str = "GPUT";
 const GALILEO: &str = "GAGP";
 const GALILEO_OLD: &str = "GPGA";
 
-/// What is in a file.
+/// Content of a file.
 #[derive(Default)]
 pub(super) struct Contents {
     pub records: Vec<Record>,
-    /// Of the messages whose orbits are not read.
+    /// Group delays from the messages whose orbits are not read.
     pub delays: Vec<Delays>,
     pub klobuchar: Option<Klobuchar>,
-    /// As NavIC sends them.
+    /// Klobuchar coefficients as NavIC sends them.
     pub klobuchar_navic: Option<Klobuchar>,
-    /// As BeiDou sends them.
+    /// Klobuchar coefficients as BeiDou sends them.
     pub klobuchar_beidou: Option<Klobuchar>,
-    /// As BeiDou's third generation sends them.
+    /// BDGIM coefficients of BeiDou's third generation.
     pub bdgim: Option<Bdgim>,
     /// Effective ionisation coefficients of Galileo.
     pub nequick: Option<[f64; 3]>,
     pub leap_seconds: Option<i64>,
     /// Seconds after the last or next change, week and day at whose end it comes.
     pub leap_event: Option<(i64, i64, u8)>,
-    /// Of GPS against UTC: A0, A1, reference time of week, week as written.
+    /// Polynomial of GPS time against UTC: A0, A1, reference time of week, week as written.
     pub utc: Option<Polynomial>,
-    /// The same of Galileo's time against GPS time.
+    /// Polynomial of Galileo's time against GPS time: A0, A1, reference time of week, week as written.
     pub galileo: Option<Polynomial>,
     /// Records of other systems and messages.
     pub others: usize,
-    /// What was left out, and why.
+    /// Records that were left out, with the reason.
     pub reasons: Vec<String>,
 }
 
@@ -166,7 +166,7 @@ fn keep_first<T>(kept: &mut Option<(String, T)>, age: String, found: T) {
     }
 }
 
-/// What a header's line is. A foreign letter before it, of two bytes or more, moves a comment's label to the
+/// Label of a header line. A foreign character before it, of two bytes or more, shifts the label to the
 /// right.
 fn label(line: &str) -> &str {
     let label = line.get(LABEL..).unwrap_or("").trim();
@@ -178,15 +178,15 @@ enum Group {
     Record(Box<Record>),
     /// Group delays of one of the newer messages.
     Delays(Delays),
-    /// Of which system, when and by which satellite, in an order that sorts, and what it said.
+    /// Klobuchar coefficients with their system, and with time and satellite in a sortable text.
     Ionosphere(System, String, Klobuchar),
-    /// The same of BDGIM's coefficients.
+    /// BDGIM coefficients with time and satellite in a sortable text.
     Bdgim(String, Bdgim),
-    /// The same of Galileo's effective ionisation.
+    /// Effective ionisation of Galileo with time and satellite in a sortable text.
     Ionisation(String, [f64; 3]),
-    /// The same of GPS time against UTC.
+    /// Polynomial of GPS time against UTC with time and satellite in a sortable text.
     Utc(String, Polynomial),
-    /// The same of Galileo's time against GPS time.
+    /// Polynomial of Galileo's time against GPS time, with time and satellite in a sortable text.
     Galileo(String, Polynomial),
     Other,
 }
@@ -205,7 +205,7 @@ impl Form {
         if self.version < 3 { 3 } else { 4 }
     }
 
-    /// Whether a record begins with this line.
+    /// True if a record begins with this line.
     fn begins(&self, line: &str) -> bool {
         match self.version {
             4.. => line.starts_with('>'),
@@ -291,7 +291,7 @@ impl Form {
         contents.bdgim = thirds.first();
     }
 
-    /// What a record holds, by its lines without and with blank ones.
+    /// Parses a record from its lines without blank ones (`group`) and with them (`whole`).
     fn group(&self, group: &[Line<'_>], whole: &[Line<'_>]) -> Result<Group, String> {
         let Some((first, title)) = group.first() else { return Ok(Group::Other) };
         let refuse = |what: &str| {

@@ -1,4 +1,4 @@
-//! Which record's group delays belong to which set.
+//! Assignment of group delays from other records to the ephemerides of their satellites.
 
 use std::collections::BTreeMap;
 

@@ -92,8 +92,8 @@ pub(super) fn ephemeris(record: &Record) -> Result<Ephemeris, String> {
     }
 }
 
-/// How far apart the reference times of BeiDou's orbit and clock may be: as long as a set is used. Of 2218
-/// records of two days three have them an hour apart.
+/// Largest difference in seconds between the reference times of BeiDou's orbit and clock: the time for which
+/// an ephemeris is used. Among 2218 records of two days, three differ by an hour.
 const REFERENCES_S: f64 = 4.0 * 3600.0;
 
 /// The rest of a set of BeiDou, by its own time (BDS-SIS-ICD-B1I 3.0, tables 5-6 and 5-8; RINEX 3.05, table

@@ -9,13 +9,13 @@ impl Signal {
         self.components.iter().filter_map(|component| component.message)
     }
 
-    /// Whether a message of it says its time.
+    /// True if one of the signal's messages states its time.
     pub fn is_dated(&self) -> bool {
         self.messages().any(Message::is_dated)
     }
 
-    /// Of some signals those that give the time of this one, whose message does not say it, and where its
-    /// satellites are: signals of the same satellites whose sets serve this one.
+    /// Selects the signals that supply time and ephemeris for this one, whose message does not state its
+    /// time. They belong to the same satellites, and their ephemerides serve this signal.
     pub fn dated_by(
         &'static self,
         signals: impl IntoIterator<Item = &'static Self>,

@@ -82,7 +82,7 @@ pub fn all() -> Vec<&'static Signal> {
     SIGNALS.iter().chain(added.iter()).copied().collect()
 }
 
-/// Why a signal cannot be added.
+/// Reason for which a signal cannot be added.
 #[derive(Debug, Error, PartialEq)]
 #[error("there is another signal named '{0}'")]
 pub struct NameTaken(&'static str);
@@ -94,21 +94,21 @@ pub struct Signal {
     pub name: &'static str,
     /// RINEX 3 band and attribute, for `C1C`, `L1C`, `D1C`, `S1C`.
     pub rinex: &'static str,
-    /// Whose satellites send it.
+    /// System whose satellites send the signal.
     pub system: System,
-    /// By which its codes and messages are timed.
+    /// Time scale of the codes and messages.
     pub time: &'static TimeScale,
     /// First and last number of the constellation's satellites; codes of others are reserved for other
     /// transmitters.
     pub constellation: [u8; 2],
-    /// Its carrier.
+    /// Carrier of the signal.
     pub carrier: Carrier,
-    /// Whether the satellite of a number sends it at a time.
+    /// Function that returns true if the satellite with this number sends the signal at a time.
     pub sent: fn(u8, Epoch) -> bool,
     /// Least power received on the ground that its documents promise, of all components together; where none
     /// is known a link budget is refused.
     pub minimum_power_dbw: Option<f64>,
-    /// What is sent on that carrier; powers add up to one.
+    /// Components on the carrier; their power shares add up to one.
     pub components: &'static [Component],
 }
 
@@ -151,11 +151,11 @@ pub struct Component {
     /// The code of a satellite by its number: `code_chips` values. +1 for a logical 0, −1 for a logical 1,
     /// and 0 where the code of another component has its turn. `None` where the document assigns none.
     pub code: fn(u8) -> Option<Vec<i8>>,
-    /// What the waveform of a chip is the sum of.
+    /// Layers whose sum is the waveform of a chip.
     pub layers: &'static [Layer],
     /// Secondary code: a chip for each period of the code.
     pub secondary_code: SecondaryCode,
-    /// What modulates it; a pilot has none.
+    /// Message that modulates the component; a pilot has none.
     pub message: Option<&'static Message>,
 }
 
@@ -173,14 +173,14 @@ pub struct Layer {
     pub chips: &'static [bool],
 }
 
-/// Which layers of its components a signal is made with, by a transmitter or as a replica.
+/// Layers of its components with which a signal is generated, by a transmitter or as a replica.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Layers {
     /// All, with their weights and phases.
     #[default]
     Whole,
-    /// Of each component the one with the largest power, as it is in the whole.
+    /// Layer of each component with the largest power, at the amplitude that it has in the whole.
     Strongest,
 }
 
@@ -188,7 +188,7 @@ impl Layers {
     /// Both, by the words of files.
     pub const NAMES: [(&'static str, Self); 2] = [("whole", Self::Whole), ("strongest", Self::Strongest)];
 
-    /// Its word in files.
+    /// Word for the value in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Whole => "whole",
@@ -202,7 +202,7 @@ impl Layers {
 pub enum SecondaryCode {
     /// No secondary code.
     None,
-    /// The same for all satellites: values of ±1.
+    /// Secondary code that all satellites share: values of ±1.
     Shared(&'static [i8]),
     /// A satellite's own by its number; `chips` values of ±1.
     PerSatellite {
@@ -213,7 +213,7 @@ pub enum SecondaryCode {
     },
 }
 
-/// Of a signal that every satellite of its system has always sent.
+/// Returns true at all times, for a signal that every satellite of its system has always sent.
 pub fn always(_: u8, _: Epoch) -> bool {
     true
 }
@@ -259,12 +259,12 @@ impl Signal {
         self.components.first().and_then(|component| (component.code)(number))
     }
 
-    /// Whether one of its components has that message.
+    /// True if one of the signal's components carries the message.
     pub fn carries(&self, message: &Message) -> bool {
         self.components.iter().any(|component| component.message == Some(message))
     }
 
-    /// This signal of one satellite.
+    /// Returns the link of this signal and one satellite.
     pub fn link(&'static self, sv: Sv) -> Link {
         Link { sv, signal: self }
     }
@@ -291,7 +291,7 @@ impl Signal {
         }
     }
 
-    /// How far from the carrier the main lobes of its spectrum reach.
+    /// Distance in Hz from the carrier to the outer end of the main lobes.
     pub fn lobe_hz(&self) -> f64 {
         self.components.iter().fold(0.0_f64, |most, component| most.max(component.lobe_hz()))
     }
@@ -329,7 +329,8 @@ impl Link {
         }
     }
 
-    /// Whether another satellite's signal is the same but for its message: one signal, carrier and code.
+    /// True if another satellite's signal differs only in its message: it has the same signal, carrier and
+    /// code.
     pub fn is_alike(self, other: Self) -> bool {
         let same = |component: &Component| {
             let of = |sv: Sv| ((component.code)(sv.number), component.secondary_code.of(sv.number));
@@ -339,7 +340,7 @@ impl Link {
         self == other || self.signal == other.signal && on_one_channel && self.signal.components.iter().all(same)
     }
 
-    /// Whether a satellite of the constellation sends it, not another transmitter that borrows its code.
+    /// True if a satellite of the constellation sends it, not another transmitter that borrows its code.
     pub fn is_of_constellation(self) -> bool {
         let [first, last] = self.signal.constellation;
         (first..=last).contains(&self.sv.number)
@@ -365,7 +366,8 @@ impl Layer {
     /// BOC(m, n) with m = 6 n.
     pub const BOC61: Self = Self { pulse: &[1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1], ..Self::BPSK };
 
-    /// How far from the carrier the main lobes reach, in chip rates: 1 for BPSK, (m + n)/n for BOC(m, n).
+    /// Distance from the carrier to the outer end of the main lobes, in chip rates: 1 for BPSK, (m + n)/n for
+    /// BOC(m, n).
     pub fn lobe_chips(&self) -> f64 {
         // Half a period of the square wave is its longest run of one sign; a cosine's begin and end in the
         // middle of one.
@@ -374,7 +376,7 @@ impl Layer {
         if longest == steps { 1.0 } else { 1.0 + 0.5 * steps as f64 / longest as f64 }
     }
 
-    /// Whether chip `index` of a code period has this pulse.
+    /// True if chip `index` of a code period has this pulse.
     pub fn covers(&self, index: usize) -> bool {
         self.chips.is_empty() || self.chips.get(index % self.chips.len()).copied().unwrap_or(false)
     }
@@ -439,7 +441,7 @@ impl Component {
         self.layers.iter().rev().max_by(|a, b| power(a).total_cmp(&power(b)))
     }
 
-    /// How far from the carrier the main lobes of the spectrum reach: those of the strongest layer.
+    /// Distance in Hz from the carrier to the outer end of the main lobes of the strongest layer.
     pub fn lobe_hz(&self) -> f64 {
         self.chip_rate_hz * self.strongest().map_or(0.0, Layer::lobe_chips)
     }
@@ -449,7 +451,8 @@ impl Component {
         self.shape_of(Layers::Whole)
     }
 
-    /// The same of some of its layers: their power over that of the whole is the correlation at no delay.
+    /// Correlation and spectrum of some of the layers. Their power relative to the whole is the correlation
+    /// at zero delay.
     pub fn shape_of(&self, layers: Layers) -> Shape {
         self.shape_between(layers, layers)
     }
@@ -596,7 +599,7 @@ mod tests {
         }
     }
 
-    /// What holds for every signal.
+    /// Checks the properties that every signal must have.
     pub(super) fn complete(signal: &'static Signal) {
         let power: f64 = signal.components.iter().map(|c| c.power_share).sum();
         assert!((power - 1.0).abs() < 1e-12, "{signal}");

@@ -21,8 +21,9 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Of a waveform of `sent` layers with one of `made` layers, where the code is not zero: the part in
-    /// phase, and of delays of either sign the mean. [`Self::density`] is that of the cross spectrum then.
+    /// Cross correlation of a waveform of `sent` layers with one of `made` layers, where the code is not
+    /// zero. It is the in-phase part, averaged over delays of both signs. [`Self::density`] is then that of
+    /// the cross spectrum.
     pub fn between(sent: &[Layer], made: &[Layer], chip_rate_hz: f64) -> Self {
         let both = || sent.iter().chain(made);
         let steps = both().fold(1, |all, layer| super::least_common_multiple(all, layer.pulse.len().max(1)));

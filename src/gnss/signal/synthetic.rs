@@ -91,7 +91,7 @@ pub static QUADRATURE: Signal = Signal {
     ],
 };
 
-/// The same with data whose symbols begin where the secondary codes do.
+/// Test signal with quadrature data whose symbols begin where the secondary codes do.
 pub static QUADRATURE_DATA: Signal = Signal {
     name: "synthetic B with data",
     components: &[
@@ -161,7 +161,7 @@ pub static MULTIPLEXED: Signal = Signal {
     ],
 };
 
-/// The same with data of a symbol a period on the shorter code.
+/// Test signal with multiplexed codes and data of one symbol per period on the shorter code.
 pub static MULTIPLEXED_DATA: Signal = Signal {
     name: "synthetic D with data",
     components: &[

@@ -16,11 +16,11 @@ pub struct Tone {
     /// Half cycles in a chip, negative below the carrier. Of an odd number the sign changes from chip to chip
     /// where the pulses begin anew.
     pub half_cycles: i32,
-    /// Its amplitude and phase at a chip's beginning, over the component's.
+    /// Amplitude and phase of the line at a chip's beginning, relative to the component's.
     pub gain: Complex64,
 }
 
-/// Of a line that has more than this of the power there is no second.
+/// Share of the power above which a line is the only strong one.
 const MOST: f64 = 0.5;
 
 impl Component {
@@ -38,20 +38,20 @@ impl Component {
         lines.into_iter().find(|tone| tone.gain.norm_sqr() > MOST && tone.half_cycles != 0)
     }
 
-    /// Where the middle of its spectrum is, from the carrier.
+    /// Frequency of the spectrum's middle relative to the carrier, in Hz.
     pub fn side_hz(&self) -> f64 {
         self.tone().map_or(0.0, |tone| tone.side_hz(self.chip_rate_hz))
     }
 }
 
 impl Signal {
-    /// How far from the carrier the sides of its sub-carrier are; 0 without one.
+    /// Distance in Hz of the subcarrier's sidebands from the carrier; 0 without a subcarrier.
     pub fn sides_hz(&self) -> f64 {
         self.components.iter().map(|component| component.side_hz().abs()).fold(0.0, f64::max)
     }
 
-    /// Whether another signal is one of these sides, received alone: a satellite that sends this one sends
-    /// that one too.
+    /// True if another signal is one of this signal's sidebands, received alone. A satellite that sends this
+    /// signal also sends that one.
     pub fn has_side(&self, other: &Self) -> bool {
         let sides = self.components.iter().map(Component::side_hz).filter(|side_hz| *side_hz != 0.0);
         let at = |hz: f64| (self.centre_hz() + hz - other.centre_hz()).abs() < 1.0;
@@ -65,7 +65,7 @@ impl Tone {
         0.5 * f64::from(self.half_cycles) * chip_rate_hz
     }
 
-    /// Whether both are the sides of one sub-carrier.
+    /// True if both lines are opposite sidebands of one subcarrier.
     pub fn is_opposite(&self, other: &Self) -> bool {
         self.half_cycles == -other.half_cycles
     }
@@ -79,7 +79,8 @@ impl Tone {
         })
     }
 
-    /// What both sides together correlate to, `chips` apart, over what chips without a sub-carrier do.
+    /// Correlation of both sidebands together at a delay of `chips`, relative to that of chips without a
+    /// subcarrier.
     pub fn both_sides(&self, chips: f64) -> f64 {
         libm::cos(PI * f64::from(self.half_cycles) * chips)
     }

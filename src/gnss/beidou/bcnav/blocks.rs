@@ -27,11 +27,11 @@ const ELECTRONS: &str = "7.8";
 const ACCURACY: &str = "7.15 and 7.16";
 const HEALTH: &str = "7.14 to 7.17";
 
-/// What messages say.
+/// Content of the messages.
 #[derive(Clone, Debug)]
 pub(in crate::beidou) struct Content {
     pub set: Ephemeris,
-    /// When the message is sent.
+    /// Transmission time of the message.
     pub sent: Epoch,
     pub kind: f64,
     pub page: f64,
@@ -204,7 +204,7 @@ pub(in crate::beidou) const fn flags<const AT: u16>() -> Of {
     plain!("integrity_flags", const { [(AT, 3)] }, Whole, 0, HEALTH, flags)
 }
 
-/// Those of B1C in another signal's message.
+/// Field of B1C's integrity flags in another signal's message.
 pub(in crate::beidou) const fn flags_b1c<const AT: u16>() -> Of {
     plain!("integrity_flags_b1c", const { [(AT, 3)] }, Whole, 0, HEALTH, flags_b1c)
 }

@@ -1,5 +1,5 @@
-//! What the messages of B1C, B2a and B2b have alike: blocks of fields, sets of elements that are carried from
-//! D1, and, of the last two, messages of one length with a type each.
+//! Parts that the messages of B1C, B2a and B2b share: blocks of fields, and ephemerides that are derived from
+//! D1. B2a and B2b also share messages of one length with a type each.
 //!
 //! Sources: BDS-SIS-ICD-B1C 1.0, BDS-SIS-ICD-B2a 1.0 and BDS-SIS-ICD-B2b 1.0, section 7. A set of D1 is
 //! carried to the nearest reference time that the messages can express, and to their steps. Group delays, all
@@ -32,7 +32,7 @@ use blocks::{Content, Of, STEP_S, electrons, kind, signed};
 /// Fields of BDGIM's coefficients, their places counted from the first of them.
 static ELECTRONS: [Of; 9] = electrons::<0>();
 
-/// How the messages describe the ionosphere; `unit` says which of their units do.
+/// Ionosphere content of the messages. `unit` is true for the units that carry it.
 pub(super) const fn ionosphere(unit: fn(Epoch) -> bool) -> IonosphereForm {
     IonosphereForm { model: Model::Bdgim, unit, coefficients }
 }
@@ -108,7 +108,7 @@ pub(super) fn record_lines(set: &Ephemeris, raw: Raw<'_>, delays: RecordLine) ->
     lines
 }
 
-/// The same of B-CNAV3, which has one delay and no issues.
+/// RINEX record lines of B-CNAV3, which has one delay and no issues.
 pub(super) fn record_lines_of_b2b(set: &Ephemeris, raw: Raw<'_>) -> Vec<RecordLine> {
     let mut lines = first_lines(set, raw);
     let [accuracy, health, flags] = status(raw);
@@ -264,7 +264,8 @@ pub(super) fn adjust(tables: &Tables, ephemeris: &mut Ephemeris, parameter: &str
     found
 }
 
-/// When what began at a second of the week of BDT was sent, by the lower bits of its week and a time near it.
+/// Transmission time of a message that began at a second of the BDT week. The lower bits of its week and a
+/// time near it resolve the week.
 pub(super) fn sent_at(week: i64, of_week_s: i64, near: Epoch) -> Epoch {
     Epoch::new(near.nearest_week(week + BDT_WEEK, 8192) * WEEK_S + of_week_s, 0.0)
 }

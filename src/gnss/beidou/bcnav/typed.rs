@@ -24,12 +24,12 @@ use crate::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
 /// Bits of a check, and of a satellite's number.
 const CHECK_BITS: usize = 24;
 const NUMBER_BITS: usize = 6;
-/// Of what the preamble's symbols and the number's say, the part that is for them where a message is tried:
+/// Least agreement of soft symbols with the preamble and the satellite's number at which a message is tried:
 /// 0.89 at an amplitude of √2 standard deviations, near which the codes begin to fail. Of data 22 symbols
 /// reach it once in a thousand.
 const LEAST_SHARE: f32 = 0.65;
 
-/// How the messages of a kind are made.
+/// Layout of the messages of one kind.
 pub(in crate::beidou) struct Layout {
     pub message: &'static Message,
     /// First symbols of a message, and how many.
@@ -76,7 +76,7 @@ impl Layout {
         all.find(|field| names.contains(&field.name))
     }
 
-    /// By what the set of a message is distinguished from others; `None` of those that do not say it.
+    /// Issue that distinguishes one ephemeris from another; `None` for messages that do not state it.
     fn issue(&self, bits: &Vec<bool>) -> Option<i64> {
         self.field(self.type_of(bits), self.issues).map(|field| field.read(bits) & self.issue_bits)
     }
@@ -144,14 +144,14 @@ impl Layout {
         (self.second.read(bits) - planted!("gnss.bcnav.second", 0, 1)) * self.message.unit_s
     }
 
-    /// When a message began that says the week; `None` of others.
+    /// Start time of a message that states the week; `None` for other messages.
     fn sent_at(&self, bits: &Vec<bool>, near: Epoch) -> Option<Epoch> {
         let week = self.field(self.type_of(bits), &["week"])?.read(bits);
         Some(sent_at(week, self.begun_s(bits), near))
     }
 }
 
-/// How much of what soft symbols say is for some bits; below zero where they are upside down.
+/// Agreement of soft symbols with given bits, −1 to 1. It is negative if the symbols are inverted.
 fn share(bits: impl Iterator<Item = bool>, soft: &[f32]) -> f32 {
     let (mut sum, mut all) = (0.0, f32::MIN_POSITIVE);
     for (one, value) in bits.zip(soft) {
@@ -197,7 +197,7 @@ impl Sender for Messages {
 struct Part {
     kind: u8,
     bits: Vec<bool>,
-    /// What distinguishes its set, as far as known.
+    /// Issue of the ephemeris, as far as known.
     issue: Option<i64>,
     begun_s: i64,
 }
@@ -210,7 +210,7 @@ pub(in crate::beidou) struct TypedReader {
     frames: Frames,
     /// The latest messages of a set, the newest last.
     parts: Vec<Part>,
-    /// What the set that was reported last said.
+    /// Parameters of the ephemeris that was reported last.
     complete: Option<Parameters>,
     accuracies: Accuracies,
 }

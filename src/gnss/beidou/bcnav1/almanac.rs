@@ -26,7 +26,7 @@ const INCLINATION_SEMICIRCLES: f64 = 0.30;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in crate::beidou) struct Entry {
     pub number: f64,
-    /// Of its orbit.
+    /// Type of the orbit, followed by the almanac's elements and clock terms.
     pub kind: f64,
     pub eccentricity: f64,
     pub delta_i_rad: f64,
@@ -45,7 +45,7 @@ pub(in crate::beidou) struct Entry {
 }
 
 impl Entry {
-    /// What elements come to at an almanac's reference time, both labelled by BDT.
+    /// Almanac elements of an ephemeris at an almanac's reference time, both labelled by BDT.
     fn of(set: &Ephemeris, toa: Epoch) -> Self {
         let mean = set.mean_at(toa);
         let semicircles = if set.sv.is_geostationary() { 0.0 } else { INCLINATION_SEMICIRCLES };
@@ -67,7 +67,7 @@ impl Entry {
         }
     }
 
-    /// Whether both almanacs can carry it.
+    /// True if both almanacs can represent the entry.
     fn fits(&self) -> bool {
         let fields = MEDIUM.iter().chain(&PLACE);
         let content = || blank(Ephemeris::blank(Sv { system: System::BeiDou, number: 1 }, Epoch::new(0, 0.0)));
@@ -82,7 +82,7 @@ pub(super) struct Almanacs {
 }
 
 impl Almanacs {
-    /// Those of what a scene knows.
+    /// Collects the almanacs of the satellites that a scene contains.
     pub fn of(common: &Common) -> Self {
         let toa = almanac_time(BDT.label(common.reference.unwrap_or(Epoch::new(0, 0.0))));
         let own = common.almanac.iter().filter(|set| set.sv.system == System::BeiDou);
@@ -103,7 +103,7 @@ impl Almanacs {
     }
 }
 
-/// Whether the frame that begins then is page 1 for sure, where the coefficients are known.
+/// True if the frame that begins at `start` is always page 1 when ionosphere coefficients are known.
 pub(super) fn is_first(start: Epoch) -> bool {
     start.seconds().div_euclid(FRAME_S).rem_euclid(2) == 1
 }

@@ -27,7 +27,7 @@ static DELAY: [Of; 4] = [
     plain!("tgd_b1cp_s", [(557, 12)], Signed, -34, DELAYS, set.tgd_s),
     plain!("reserved", [(569, 7)], Whole, 0, DELAYS, reserved),
 ];
-/// What all pages of subframe 3 begin with.
+/// Fields with which all pages of subframe 3 begin.
 static HEADER: [Of; 4] = [
     plain!("page", [(0, 6)], Whole, 0, HEALTH, page),
     blocks::health::<6>(),
@@ -35,18 +35,18 @@ static HEADER: [Of; 4] = [
     blocks::sismai::<11>(),
 ];
 
-/// What page 1 has beside it.
+/// Field that only page 1 has after the header.
 static ALONG: [Of; 1] = [blocks::accuracy_along::<15>()];
 static ACCURACIES: [Of; 4] = blocks::accuracies::<20>();
 static ELECTRONS: [Of; 9] = blocks::electrons::<42>();
 static UTC: [Of; 9] = blocks::utc::<116>();
 
-/// Of subframe 2, of every page of subframe 3, and of both, all of which are a set's.
+/// Fields of subframe 2, all of which belong to the ephemeris.
 pub(super) static TWO: &Tables = &[&BEGIN, &FIRST_HALF, &SECOND_HALF, &CLOCK, &DELAY];
 pub(super) static THREE: &Tables = &[&HEADER];
 pub(super) static SET: &Tables = &[&BEGIN, &FIRST_HALF, &SECOND_HALF, &CLOCK, &DELAY, &HEADER];
 
-/// Of page 1 of subframe 3 beside what is of a set.
+/// Fields of page 1 of subframe 3 that do not belong to the ephemeris.
 pub(super) static BESIDE: &Tables = &[&ALONG, &ACCURACIES, &ELECTRONS, &UTC];
 
 /// Every field by the subframe that carries it.

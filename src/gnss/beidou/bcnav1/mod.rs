@@ -137,11 +137,11 @@ pub(super) static CODE_3: LazyLock<Ldpc64> = LazyLock::new(|| Ldpc64::packed(BIT
 pub struct Frame {
     /// Eighteen seconds of the hour at its beginning.
     pub time: u32,
-    /// Whether symbols were upside down.
+    /// True if the symbols were inverted.
     pub inverted: bool,
     /// Bits of subframe 2 with their check.
     pub two: Vec<bool>,
-    /// Those of subframe 3; `None` where it fails its check.
+    /// Bits of subframe 3 with their check; `None` if the check fails.
     pub three: Option<Vec<bool>>,
 }
 
@@ -153,7 +153,7 @@ impl Frame {
         (hour * HOUR_S + count * FRAME_S).rem_euclid(WEEK_S)
     }
 
-    /// When it began, its week near `near`.
+    /// Start time of the frame, with its week near `near`.
     pub fn sent_at(&self, near: Epoch) -> Epoch {
         sent_at(number(self.two.get(..13).unwrap_or_default()) as i64, self.of_week_s(), near)
     }
@@ -164,8 +164,8 @@ pub fn first_symbols(number: u8, time: u32) -> Vec<bool> {
     NUMBER_CODE.encode(u32::from(number)).chain(TIME_CODE.encode(time)).collect()
 }
 
-/// Where a row of the interleaver is among the rows of 48 symbols of both subframes, one after the other: two
-/// of subframe 2, one of subframe 3, in turn, and what is left of subframe 2 (6.2.3, figure 6-4).
+/// Index of an interleaver row among the rows of 48 symbols of subframe 2 followed by subframe 3. Rows come
+/// in turn, two of subframe 2 and one of subframe 3, then the rest of subframe 2 (6.2.3, figure 6-4).
 fn row_of(row: usize) -> usize {
     const ROWS_2: usize = 2 * BITS_2 / 48;
     match (row / 3, row % 3) {
@@ -183,8 +183,8 @@ pub fn encoded(number: u8, time: u32, two: &[bool], three: &[bool]) -> Vec<bool>
     first_symbols(number, time).into_iter().chain(INTERLEAVER.interleave(&written)).collect()
 }
 
-/// How much of what 72 soft symbols say is for a satellite's number and a time, the likeliest, and that time;
-/// below zero where they are upside down.
+/// Likeliest time of a frame from 72 soft symbols and a satellite's number, with their agreement, −1 to 1.
+/// The agreement is negative if the symbols are inverted.
 pub fn likely_time(number: u8, soft: &[f32]) -> (u32, f32) {
     let (first, rest) = soft.split_at(NUMBER_SYMBOLS.min(soft.len()));
     let number = NUMBER_CODE.correlation(u32::from(number), first);

@@ -11,9 +11,9 @@ use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::Epoch;
 
-/// Of what 72 symbols say, the part that a time explains where a frame is tried: 0.89 at an amplitude of √2
-/// standard deviations, near which the codes begin to fail, with 0.05 of scatter; the best of all times among
-/// data has less than half.
+/// Least agreement of 72 symbols with a time at which a frame is tried. Symbols with an amplitude of √2
+/// standard deviations, near which the codes begin to fail, agree by 0.89 ± 0.05. The best of all times among
+/// data symbols agrees by less than half.
 const LEAST_SHARE: f32 = 0.65;
 
 /// Reads B-CNAV1.
@@ -21,7 +21,7 @@ const LEAST_SHARE: f32 = 0.65;
 pub struct BCnav1Reader {
     sv: Sv,
     frames: Frames,
-    /// What the set that was reported last said.
+    /// Parameters of the ephemeris that was reported last.
     complete: Option<Parameters>,
     /// The coefficients of the ionosphere that were reported last, and of which issue.
     electrons: Option<(u32, Parameters)>,

@@ -72,7 +72,7 @@ pub(super) static CODE: LazyLock<Ldpc64> = LazyLock::new(|| Ldpc64::packed(BITS 
 const HEAD: &str = "6.2.1";
 const DELAYS: &str = "7.6, table 7-7";
 
-/// How its messages are made.
+/// Layout of the B-CNAV2 messages.
 static LAYOUT: Layout = Layout {
     message: &B_CNAV2,
     preamble: (0xE2_4DE8, 24),
@@ -100,7 +100,7 @@ static BEGIN: [Of; 5] = [
     blocks::iode::<53>(),
 ];
 static FIRST_HALF: [Of; 9] = blocks::first_half::<61>();
-/// What all messages but 10 begin with.
+/// Fields with which all messages except type 10 begin.
 static HEADER: [Of; 4] =
     [blocks::health::<30>(), blocks::flags::<32>(), blocks::sismai::<35>(), blocks::flags_b1c::<39>()];
 static SECOND_HALF: [Of; 10] = blocks::second_half::<42>();
@@ -121,7 +121,7 @@ static TEN: &Tables = &[&BEGIN, &FIRST_HALF];
 static ELEVEN: &Tables = &[&HEADER, &SECOND_HALF];
 static THIRTY: &Tables = &[&HEADER, &CLOCK, &DELAY, &ELECTRONS];
 static THIRTY_FOUR: &Tables = &[&HEADER, &ACCURACIES_34, &CLOCK_34, &ISSUE_34, &UTC];
-/// Those with parameters of a set.
+/// Fields of the messages that carry parameters of an ephemeris.
 static SET: &Tables = &[&BEGIN, &FIRST_HALF, &HEADER, &SECOND_HALF, &CLOCK, &DELAY];
 
 /// A set as B-CNAV2 has it.

@@ -73,7 +73,7 @@ pub(super) static CODE: LazyLock<Ldpc64> = LazyLock::new(|| Ldpc64::packed(BITS 
 const HEAD: &str = "6.2.1";
 const DELAYS: &str = "7.6";
 
-/// How its messages are made.
+/// Layout of the B-CNAV3 messages.
 static LAYOUT: Layout = Layout {
     message: &B_CNAV3,
     preamble: (0xEB90, 16),
@@ -106,7 +106,7 @@ static HEALTH: [Of; 1] = [blocks::health::<460>()];
 
 static TEN: &Tables = &[&FIRST_HALF, &SECOND_HALF, &STATUS];
 static THIRTY: &Tables = &[&TIME, &CLOCK, &DELAY, &ELECTRONS, &UTC, &ACCURACIES, &ALONG, &HEALTH];
-/// Those with parameters of a set.
+/// Fields of the messages that carry parameters of an ephemeris.
 static SET: &Tables = &[&FIRST_HALF, &SECOND_HALF, &STATUS, &TIME, &CLOCK, &DELAY, &HEALTH];
 
 /// The set with the number of its reference time, if that is the clock's too.

@@ -19,7 +19,7 @@ pub type D1Set = Bits<{ D1_PARTS * SUBFRAME_BITS }>;
 /// Pages 1 to 10 of D2's subframe 1.
 pub type D2Set = Bits<{ D2_PARTS * SUBFRAME_BITS }>;
 
-/// What a set says.
+/// Content of an ephemeris in D1 and D2.
 #[derive(Clone, Debug)]
 pub(super) struct Orbit {
     pub ephemeris: Ephemeris,
@@ -90,7 +90,7 @@ const OF_D1: [Of; 35] = [
 
 pub(super) static D1_SET: [Of; 35] = OF_D1;
 
-/// Where D2 has the same parameters, in the same order: page p begins at 300 (p − 1).
+/// Bit positions of D1's parameters in D2, in the same order. Page p begins at bit 300 (p − 1).
 #[rustfmt::skip]
 const IN_D2: [&[(u16, u8)]; 35] = [
     &[(46, 1)], &[(47, 5)], &[(60, 4)], &[(64, 13)], &[(77, 5), (90, 12)], &[(102, 10)], &[(120, 10)],

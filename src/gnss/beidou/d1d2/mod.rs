@@ -112,7 +112,7 @@ const D2_PAGE: (u16, u8) = (42, 4);
 /// The Neuman-Hofman code (5.1.1): 0000 0100 1101 0100 1110, first chip in the highest of twenty bits.
 const NEUMAN_HOFMAN: u32 = 0b0000_0100_1101_0100_1110;
 
-/// The same as signs, +1 for a logical 0.
+/// Neuman-Hofman code as signs, +1 for a logical 0.
 const NEUMAN_HOFMAN_SIGNS: [i8; D1_SYMBOLS] = {
     let (mut signs, mut place) = ([1; D1_SYMBOLS], 0);
     while place < D1_SYMBOLS {
@@ -306,7 +306,7 @@ fn orbit_of(sv: Sv, parts: &[Subframe], sent: Epoch) -> (Orbit, Vec<(&'static st
     }
 }
 
-/// When a part was sent, by its second and a week near `near`, or by the week in the first part.
+/// Transmission time of a part. The week is near `near`, or the first part states it.
 fn sent_at(first: &Subframe, is_d2: bool, near: Epoch) -> Epoch {
     let week = first.piece(if is_d2 { (64, 13) } else { (60, 13) });
     let week = near.nearest_week(i64::from(week) + BDT_WEEK, 8192);

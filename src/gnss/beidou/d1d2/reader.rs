@@ -255,7 +255,8 @@ C06 2026 03 09 11 00 00-5.751254502684e-05-2.089706185870e-11-1.355252715607e-18
      1.260000000000e+05 2.000000000000e+00
 ";
 
-    /// What is read of frames, each with its set, in seconds after the orbit's reference time of the first.
+    /// Ephemerides decoded from frames. Each frame has its start, in seconds after the first reference time,
+    /// and its ephemeris.
     fn read(frames: &[(i64, &Ephemeris)]) -> Vec<Ephemeris> {
         let first = frames[0].1;
         let (sender, mut reader) = ((D1_D2.sender)(&Common::default()).unwrap(), (D1_D2.reader)(first.sv));

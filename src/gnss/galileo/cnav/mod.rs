@@ -91,7 +91,7 @@ const DUMMY: [i64; 8] = [
 ];
 /// Bits that nobody reads.
 const RESERVED: u32 = 0x3FFF;
-/// What a message is filled with to whole pages.
+/// Bit pattern that fills a message up to whole pages.
 const FILLING: u32 = 0x5555_5555;
 
 /// Places of the reserved bits, and of the page of the service.
@@ -111,7 +111,7 @@ const HEAD: [Field; 5] = [
     Field::new("has_page", &[(30, 8)], Whole, 0, HEADER),
 ];
 
-/// What a page encodes, 53 octets, in eight pieces.
+/// Encoded content of a page, 53 octets in eight fields.
 const BODY: [Field; 8] = [
     Field::new("has_encoded_1", &[(38, 32), (70, 21)], Whole, 0, ENCODED),
     Field::new("has_encoded_2", &[(91, 32), (123, 21)], Whole, 0, ENCODED),
@@ -123,8 +123,8 @@ const BODY: [Field; 8] = [
     Field::new("has_encoded_8", &[(409, 32), (441, 21)], Whole, 0, ENCODED),
 ];
 
-/// Of a message of type 1 its first field, the time of the hour, and the bits after it that say what
-/// follows, with its masks' numbers.
+/// First field of a type 1 message, the time of the hour. [`FOLLOWING`] are the bits that state what follows,
+/// with the numbers of the masks.
 const TIME_OF_HOUR: Field = Field::new("has_time_of_hour_s", &[(38, 12)], Whole, 0, "HAS message type 1, header");
 const FOLLOWING: (u16, u8) = (50, 20);
 
@@ -200,7 +200,7 @@ fn sum_of_pattern(symbols: &[f32]) -> f32 {
     symbols.iter().zip(bits_of(PATTERN, PATTERN_SYMBOLS)).map(|(soft, bit)| if bit { -soft } else { *soft }).sum()
 }
 
-/// Whether a page is one of a satellite that has no message of the service.
+/// True if the page comes from a satellite that has no message of the service.
 pub fn is_dummy(page: &Vec<bool>) -> bool {
     page.piece(HEADER_PLACE) == DUMMY_HEADER
 }

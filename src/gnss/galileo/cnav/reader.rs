@@ -26,7 +26,7 @@ impl CnavReader {
     }
 }
 
-/// Whether symbols may begin with the pattern, either way up.
+/// True if the symbols may begin with the pattern, normal or inverted.
 fn may_begin(symbols: &[f32]) -> bool {
     let pattern = bits_of(PATTERN, PATTERN_SYMBOLS);
     let wrong = symbols.iter().zip(pattern).filter(|(soft, bit)| (**soft < 0.0) != *bit).count();

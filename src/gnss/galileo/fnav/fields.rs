@@ -88,7 +88,7 @@ pub(super) static PAGE_3: [Of; 11] = [
     tow(&[(186, 20)]),
 ];
 
-/// Of page 4 what belongs to the set …
+/// Fields of page 4 that belong to the ephemeris.
 #[rustfmt::skip]
 pub(super) static PAGE_4: [Of; 3] = [
     issue(&[(6, 10)]),

@@ -245,7 +245,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
 /// Parameters by which sets and senders are distinguished, and what all satellites say alike.
 const FIXED_PARAMETERS: [&str; 7] = ["iodnav", "svid", "week", "tow_s", "ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"];
 
-/// Those of pages 1 to 4.
+/// Names of the adjustable parameters in pages 1 to 4.
 fn adjustable() -> Vec<&'static str> {
     let names = of_set().into_iter().flatten().map(|element| element.field.name);
     names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
@@ -298,7 +298,7 @@ fn time_of_week(page: &Vec<bool>) -> Option<i64> {
     Some(i64::from(page.piece((first, 20)))).filter(|tow_s| *tow_s < WEEK_S)
 }
 
-/// By how much the system's time is ahead of GPS time according to page 4.
+/// Offset of the system's time ahead of GPS time, decoded from page 4.
 fn gps_offset(page: &Vec<bool>, near: Epoch) -> Option<TimePolynomial> {
     offset_of(PAGE_4_GPS.each_ref().map(|element| (element.field, element.field.read(page))), near)
 }

@@ -28,7 +28,7 @@ pub struct FnavReader {
     failures: u32,
     /// The latest of pages 1 to 4 by their types.
     pages: BTreeMap<u8, Vec<bool>>,
-    /// Those of the set that was reported last.
+    /// Parameters of the ephemeris that was reported last.
     complete: Option<Parameters>,
 }
 
@@ -46,7 +46,7 @@ impl FnavReader {
         }
     }
 
-    /// Whether what may be a page begins with the pattern, either way up.
+    /// True if a possible page begins with the pattern, normal or inverted.
     fn has_pattern(&self) -> bool {
         [false, true]
             .into_iter()

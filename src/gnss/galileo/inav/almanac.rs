@@ -1,4 +1,4 @@
-//! What I/NAV says of other satellites and of GPS time: words 7 to 10.
+//! Almanacs and GPS time offset of I/NAV: words 7 to 10.
 //!
 //! Source: Galileo OS SIS ICD 2.1, 5.1.10 (almanac) and 5.1.8 (offset of GPS time). They carry three
 //! satellites a minute, a whole almanac in twelve minutes. Reference orbits: 29 600 km, 56°.
@@ -49,13 +49,13 @@ pub(in crate::galileo) struct Entry {
 }
 
 impl Entry {
-    /// Whether the fields can hold it: those of the two satellites on eccentric orbits cannot.
+    /// True if the fields can hold the entry. The two satellites on eccentric orbits do not fit.
     fn fits(&self) -> bool {
         self.delta_sqrt_a_sqrtm.abs() < 7.9 && self.eccentricity < 0.031 && self.delta_i_rad.abs() < 0.19
     }
 
-    /// What elements come to at an almanac's reference time. The correction of the mean motion goes into the
-    /// axis, for an almanac has no other place for it.
+    /// Almanac elements of an ephemeris at an almanac's reference time. The axis absorbs the correction of
+    /// the mean motion, for which an almanac has no field.
     fn of(set: &Ephemeris, toa: Epoch) -> Self {
         let mean = set.mean_at(toa);
         Self {
@@ -85,12 +85,12 @@ pub(in crate::galileo) struct Triple {
     offset: Offset,
 }
 
-/// By how much the system's time is ahead of GPS time, if something is said of it.
+/// Offset of the system's time ahead of GPS time; `None` if the message does not state it.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::galileo) struct Offset(pub Option<TimePolynomial>);
 
 impl Triple {
-    /// What I/NAV sends in the minute of `start`.
+    /// Almanac words that I/NAV sends in the minute of `start`.
     pub(super) fn at(start: Epoch, sets: &[Ephemeris], reference: Epoch, offset: Option<TimePolynomial>) -> Self {
         let turn = start.tow_whole_s().div_euclid(TRIPLE_S).rem_euclid(TRIPLES) as u8;
         Self::of(turn, sets, reference, offset)
@@ -124,7 +124,7 @@ impl Offset {
     }
 }
 
-/// What an offset's fields hold when nothing is said: all ones.
+/// Field values that mean "no offset": all bits are ones.
 const NO_OFFSET: [f64; 4] = [-1.0 / 34_359_738_368.0, -1.0 / 2_251_799_813_685_248.0, 255.0, 63.0];
 
 type Of = Element<Triple>;
@@ -239,13 +239,13 @@ pub(super) static GPS_OFFSET: [Of; 4] = [
     element(Field::new("ggto_week", &[(122, 6)], Whole, 0, OFFSET), |t| t.offset.field(3), |_, _| {}),
 ];
 
-/// By how much the system's time is ahead of GPS time according to word 10, its week near `near`; `None`
-/// where all bits are ones and nothing is said.
+/// Offset of the system's time ahead of GPS time from word 10, with its week near `near`. `None` if all bits
+/// are ones, which means that no offset is stated.
 pub fn gps_offset(word: &u128, near: Epoch) -> Option<TimePolynomial> {
     offset_of(GPS_OFFSET.each_ref().map(|element| (element.field, element.field.read(word))), near)
 }
 
-/// The same of the four fields and their integers, by which any message says it.
+/// Offset of the system's time ahead of GPS time from the four fields and their integers, for any message.
 pub(in crate::galileo) fn offset_of([a0, a1, hours, week]: [(Field, i64); 4], near: Epoch) -> Option<TimePolynomial> {
     if (a0.1, a1.1, hours.1, week.1) == (-1, -1, 255, 63) {
         return None;

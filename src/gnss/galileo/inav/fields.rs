@@ -13,14 +13,14 @@ use crate::time::{Epoch, WEEK_S};
 /// Continuous GPS week of week 0 of Galileo's system time (5.1.2).
 pub const GST_WEEK: i64 = 1024;
 
-/// What words 1 to 5 say.
+/// Content of words 1 to 5.
 #[derive(Clone, Debug)]
 pub(in crate::galileo) struct Orbit {
     pub ephemeris: Ephemeris,
     pub nequick: [f64; 3],
 }
 
-/// What word 6 says (5.1.7), and its own time.
+/// Content of word 6 (5.1.7) and its time of transmission.
 #[derive(Clone, Debug, Default)]
 pub(in crate::galileo) struct Utc {
     pub a0_s: f64,

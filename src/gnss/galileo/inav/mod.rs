@@ -85,7 +85,7 @@ pub static INAV_SETS: SetForm = SetForm {
     rinex_sources: Some(513.0),
 };
 
-/// What differs from one carrier to the other.
+/// Differences between the two carriers of I/NAV.
 struct On {
     message: &'static Message,
     /// Type of the word that begins at a time.
@@ -120,10 +120,10 @@ const TAIL_BITS: usize = 6;
 const WORD_BITS: usize = 128;
 const EVEN_WORD_BITS: usize = 112;
 const WORD_BEGIN: usize = 2;
-/// Where the check begins in the odd part, and its length (5.1.9.4); before it, it covers everything.
+/// First bit of the check in the odd part (5.1.9.4). The check covers everything before it.
 const CHECK_BEGIN: usize = 82;
 const CHECK_BITS: usize = 24;
-/// Where the bits before the check begin in the odd part, and those after it (4.3.2.3).
+/// First bit in the odd part of the bits before the check, and of those after it (4.3.2.3).
 const RESERVED_BEGIN: usize = 18;
 const RESERVED_BITS: usize = 64;
 const LAST_BEGIN: usize = 106;
@@ -286,7 +286,7 @@ pub fn page(word: &u128, start: Epoch) -> [Vec<bool>; 2] {
     page_with(word, (ON_E1B.rest)(start))
 }
 
-/// The same with the rest of the odd part.
+/// The two parts of a page around a word, with the given remaining bits of the odd part.
 fn page_with(word: &u128, (reserved, last): (u64, u8)) -> [Vec<bool>; 2] {
     let mut even = vec![false; PART_BITS];
     let mut odd = vec![false; PART_BITS];
@@ -304,7 +304,7 @@ fn page_with(word: &u128, (reserved, last): (u64, u8)) -> [Vec<bool>; 2] {
     [even, odd]
 }
 
-/// What the check covers.
+/// Bits that the check covers.
 fn covered<'a>(even: &'a [bool], odd: &'a [bool]) -> impl Iterator<Item = bool> + 'a {
     even.iter().take(PART_BITS - TAIL_BITS).chain(odd.iter().take(CHECK_BEGIN)).copied()
 }
@@ -329,7 +329,7 @@ pub fn decode_soft(symbols: &[f32]) -> Option<([Vec<bool>; 2], bool)> {
     decode_any(symbols).filter(|(parts, _)| !is_alert(parts))
 }
 
-/// Whether the type of a page is that of an alert, whose content is reserved (4.3.2.3).
+/// True if the page type is that of an alert, whose content is reserved (4.3.2.3).
 fn is_alert(parts: &[Vec<bool>; 2]) -> bool {
     parts.iter().any(|part| part[1])
 }
@@ -430,7 +430,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
 /// Parameters by which sets and senders are distinguished, and what all satellites say alike.
 const FIXED_PARAMETERS: [&str; 7] = ["iodnav", "svid", "week", "tow_s", "ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"];
 
-/// Those of words 1 to 5.
+/// Names of the adjustable parameters in words 1 to 5.
 fn adjustable() -> Vec<&'static str> {
     let names = of_set().into_iter().flatten().map(|element| element.field.name);
     names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()

@@ -19,7 +19,7 @@ const FAILURES: u32 = 5;
 #[derive(Clone, Debug)]
 pub struct InavReader {
     sv: Sv,
-    /// That of its carrier.
+    /// Message of the reader's carrier.
     message: &'static Message,
     /// The latest symbols, a page at most; `next` numbers the one to come.
     symbols: VecDeque<f32>,
@@ -31,7 +31,7 @@ pub struct InavReader {
     words: BTreeMap<u8, u128>,
     /// The issue of data of the latest of words 1 to 4.
     issue: Option<u32>,
-    /// Those of the set that was reported last.
+    /// Words of the ephemeris that was reported last.
     complete: Option<[u128; 5]>,
     /// Numbers of the first symbols of the latest page with reduced elements, and of the latest one that said
     /// its time, with that time.
@@ -45,7 +45,7 @@ impl InavReader {
         Self::of(&INAV, sv)
     }
 
-    /// The same of either carrier.
+    /// Creates a reader of either carrier.
     pub(super) fn of(message: &'static Message, sv: Sv) -> Self {
         Self {
             sv,
@@ -62,7 +62,7 @@ impl InavReader {
         }
     }
 
-    /// Whether both parts of what may be a page begin with the pattern, the same way up.
+    /// True if both parts of a possible page begin with the pattern, both normal or both inverted.
     fn has_patterns(&self) -> bool {
         let is_one = |place: usize| self.symbols.get(place).is_some_and(|soft| *soft < 0.0);
         let pattern = |first: usize, flip: bool| {

@@ -26,7 +26,7 @@ const AXIS_STEP_M: f64 = 256.0;
 
 const REDUCED: &str = "5.1.11";
 
-/// What word 16 says.
+/// Content of word 16.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Reduced {
     delta_axis_m: f64,
@@ -46,9 +46,9 @@ fn begin(start: Epoch) -> Epoch {
 }
 
 impl Reduced {
-    /// What is nearest to a set over the ten minutes after the beginning of the sub-frame of `start`: the
-    /// Keplerian orbit through its place in their middle, on the nearest axis that can be sent. `None` for
-    /// what is no orbit or does not fit the fields.
+    /// Reduced elements nearest to an ephemeris over the ten minutes after the beginning of the sub-frame of
+    /// `start`. The Keplerian orbit passes through the satellite's position in their middle, on the nearest
+    /// axis that can be sent. `None` if there is no such orbit or it does not fit the fields.
     pub(super) fn of(set: &Ephemeris, start: Epoch) -> Option<Self> {
         let middle = begin(start).plus_s(0.5 * VALID_S);
         let mut reduced = Self::through(set.sv, &set.state(middle).ok()?);

@@ -80,7 +80,7 @@ pub(super) fn completed(issue: u32, words: [Option<&u128>; 4], redundant: [Optio
     }))
 }
 
-/// Whether a word is one of those with redundancy.
+/// True if a word is one of those with redundancy.
 pub(super) fn is_redundant(word: &u128) -> bool {
     REDUNDANT.contains(&word_type(word))
 }

@@ -125,7 +125,7 @@ pub(super) static STRING_4: [Of; 6] = [
     element(Field::new("slot", &[(70, 5)], Whole, 0, IMMEDIATE), |e| f64::from(e.sv.number), |_, _| {}),
 ];
 
-/// What string 5 says of the system's time.
+/// Content of string 5 about the system's time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct SystemTime {
     /// Number of the four years, from 1996 on.

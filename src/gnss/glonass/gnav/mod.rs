@@ -64,8 +64,9 @@ pub static GNAV: Message = Message {
     rinex: Some(Records { set: |_| "FDMA", common: "FDMA", fields: Vec::new, lines: None }),
 };
 
-/// What clock and health of a set mean: the clock is that of G1, and G2 leaves the antenna later by a
-/// parameter (4.4, Δτ). Health is the first bit of B and the flag l; the other bits of B are not the user's.
+/// Meaning of clock and health in ephemerides of GNAV. The clock is that of G1, and G2 leaves the antenna
+/// later by a parameter (4.4, Δτ). Health is the first bit of B and the flag l; users ignore the other bits
+/// of B.
 pub static GNAV_SETS: SetForm = SetForm {
     name: "GNAV",
     group_delay_s: |set, signal| {
@@ -279,8 +280,8 @@ pub fn elements(sv: Sv, strings: [&GlonassString; 4], sent: Epoch) -> Ephemeris 
     Ephemeris { toe, toc: toe, ..found }
 }
 
-/// When the frame began of which these are strings 1, 4 and 5. Where string 5 leaves out the interval of four
-/// years, a time that is known to within a year gives it.
+/// Start time of the frame with these strings 1, 4 and 5. If string 5 lacks the four-year interval, a time
+/// that is known to within a year supplies it.
 ///
 /// # Errors
 /// What in them is no time or date.
@@ -353,7 +354,7 @@ pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     of_set().into_iter().any(|table| add_to(table, parameter, ephemeris, by))
 }
 
-/// How many of the last symbols of a string are those of the time mark.
+/// Number of the last symbols of a string that agree with the time mark.
 fn alike(mark: impl Iterator<Item = f32>) -> usize {
     mark.zip(bits_of(u128::from(MARK), MARK_SYMBOLS)).filter(|(soft, one)| (*soft < 0.0) == *one).count()
 }
@@ -364,7 +365,8 @@ mod tests {
     use crate::message::{Common, Read};
     use crate::satellite::System;
 
-    /// What a reader finds in two frames from a time on whose strings 5 say an interval of four years.
+    /// Results of a reader for two frames from `start` on whose strings 5 state the four-year interval
+    /// `sent`.
     fn read_with(sent: i64, start: Epoch, known: Option<Epoch>) -> Vec<Read> {
         let sender = (GNAV.sender)(&Common::default()).unwrap();
         let sv = Sv { system: System::Glonass, number: 5 };

@@ -38,7 +38,7 @@ pub struct GnavReader {
     parts: BTreeMap<u8, Placed>,
     /// The latest string 1 whose frame could be dated, and when that frame began.
     dated: Option<(u64, Epoch)>,
-    /// Those of the set that was reported last.
+    /// Parameters of the ephemeris that was reported last.
     complete: Option<Vec<(&'static str, i64)>>,
     /// A time that is known to within a year.
     known: Option<Epoch>,
@@ -97,8 +97,8 @@ impl GnavReader {
         news
     }
 
-    /// When the string with that first symbol began, by strings 1, 4 and 5 of the last frame, or of the one
-    /// before. In the first frame of a day, strings 4 and 5 of the frame before it have another date.
+    /// Start time of the string whose first symbol is `begin`, from strings 1, 4 and 5 of the last frame or
+    /// the one before. In the first frame of a day, strings 4 and 5 of the frame before it have another date.
     fn begun(&mut self, begin: u64) -> Option<Result<Epoch, String>> {
         let [one, four, five] = [1, 4, 5].map(|number| self.parts.get(&number));
         if let (Some((placed, one)), Some((at_four, four)), Some((at_five, five))) = (one, four, five) {

@@ -62,7 +62,7 @@ const fn top(pieces: &'static [(u16, u8)]) -> Of {
     element(Field::new("top_5min", pieces, Whole, 0, CLOCK), |c| c.top, |c, v| c.top = v)
 }
 
-/// What every message begins with, its count that of the message after (20.3.2).
+/// Fields with which every message begins. The count is that of the next message (20.3.2).
 #[rustfmt::skip]
 pub(super) static HEADER: [Of; 5] = [
     plain!("preamble", [(0, 8)], Whole, 0, HEAD, preamble),

@@ -108,7 +108,7 @@ const BETWEEN_L2_L1_HZ: f64 = 1_400e6;
 
 const CODE: Convolutional = Convolutional { second_inverted: false };
 
-/// What messages say, together.
+/// Content of all messages together.
 #[derive(Clone, Debug)]
 struct Content {
     set: Ephemeris,
@@ -264,7 +264,7 @@ pub fn checked(bits: Vec<bool>) -> Option<Vec<bool>> {
     is_message(&bits).then_some(bits)
 }
 
-/// Whether bits are a message: their beginning, before the sum over all of them.
+/// True if bits form a message: the preamble and the check over all bits are right.
 fn is_message(bits: &[bool]) -> bool {
     let begins = bits.get(..8).is_some_and(|begin| number(begin) as f64 == PREAMBLE);
     begins && bits.len() == BITS && crc24q(bits.iter().copied()) == 0
@@ -360,7 +360,7 @@ const FIXED_PARAMETERS: [&str; 14] = [
     "toc_5min",
 ];
 
-/// Those of messages 10, 11 and 30.
+/// Names of the adjustable parameters in messages 10, 11 and 30.
 fn adjustable() -> Vec<&'static str> {
     let names = of_set().into_iter().flatten().map(|element| element.field.name);
     names.filter(|name| !FIXED_PARAMETERS.contains(name) && !name.starts_with("ura_ned")).collect()

@@ -22,7 +22,7 @@ pub struct CnavReader {
     code: Running,
     /// The latest messages by type.
     messages: BTreeMap<u8, Vec<bool>>,
-    /// What the set that was reported last said.
+    /// Parameters of the ephemeris that was reported last.
     complete: Option<Parameters>,
 }
 
@@ -61,7 +61,7 @@ impl CnavReader {
         news
     }
 
-    /// When a message of type 10 was sent, its week near `near`.
+    /// Transmission time of a message of type 10, with its week near `near`.
     fn sent_at(&self, bits: &[bool], near: Epoch) -> Option<Epoch> {
         let week = number(bits.get(38..51)?) as i64;
         let begun_s = near.nearest_week(week, 8192) * WEEK_S + self.begun_s(bits);

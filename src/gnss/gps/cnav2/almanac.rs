@@ -56,7 +56,7 @@ impl Entry {
         }
     }
 
-    /// What elements come to at an almanac's reference time.
+    /// Almanac elements of an ephemeris at an almanac's reference time.
     pub fn of(set: &Ephemeris, toa: Epoch) -> Self {
         let inclination_rad = set.mean_at(toa).inclination_rad;
         let is_geostationary = set.sv.system == System::Qzss && inclination_rad < INCLINED * GPS_PI;
@@ -82,7 +82,7 @@ impl Entry {
         }
     }
 
-    /// Whether both almanacs can carry it.
+    /// True if both almanacs can represent the entry.
     fn fits(&self) -> bool {
         let fields = MEDIUM_PAGE.iter().chain(&PACKET);
         let content = |entry| Content { entries: [entry; PACKETS], ..super::nothing() };
@@ -104,7 +104,7 @@ pub(super) struct Almanacs {
 }
 
 impl Almanacs {
-    /// Those of what a scene knows.
+    /// Collects the almanacs of the satellites that a scene contains.
     pub fn of(common: &Common) -> Self {
         let toa = almanac_time(common.reference.unwrap_or(Epoch::new(0, 0.0)));
         let own = common.almanac.iter().filter(|set| matches!(set.sv.system, System::Gps | System::Qzss));
@@ -125,7 +125,7 @@ impl Almanacs {
     }
 }
 
-/// Whether the frame that begins then is page 1 for sure.
+/// True if the frame that begins at `start` is always page 1.
 pub(super) fn is_first(start: Epoch) -> bool {
     start.seconds().div_euclid(FRAME_S).rem_euclid(ROUND) != 1
 }

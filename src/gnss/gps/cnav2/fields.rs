@@ -76,14 +76,14 @@ pub(super) static SET: [Of; 34] = [
     plain!("op_week", [(566, 8)], Whole, 0, TIME, op_week),
 ];
 
-/// What every page of subframe 3 begins with.
+/// Fields with which every page of subframe 3 begins.
 #[rustfmt::skip]
 pub(super) static HEADER: [Of; 2] = [
     element(Field::new("prn", &[(0, 8)], Whole, 0, HEAD), |c| f64::from(c.set.sv.prn()), |_, _| {}),
     plain!("page", [(8, 6)], Whole, 0, HEAD, page),
 ];
 
-/// What page 1 of subframe 3 says of other signals and of the ionosphere.
+/// Fields of page 1 of subframe 3 for the delays of other signals and the ionosphere.
 #[rustfmt::skip]
 pub(super) static DELAY: [Of; 12] = [
     plain!("alpha_0", [(112, 8)], Signed, -30, IONOSPHERE, klobuchar.alpha[0]),
@@ -100,7 +100,7 @@ pub(super) static DELAY: [Of; 12] = [
     plain!("isc_l5q5_s", [(215, 13)], Signed, -35, CORRECTIONS, set.isc_s[3]),
 ];
 
-/// What it says of UTC.
+/// Fields of page 1 of subframe 3 for UTC.
 #[rustfmt::skip]
 pub(super) static OF_UTC: [Of; 9] = [
     plain!("utc_a0_s", [(14, 16)], Signed, -35, UTC, utc.a0_s),

@@ -113,7 +113,7 @@ static FRAME: Subframes = Subframes {
     is_right: |bits| crc24q(bits.iter().copied()) == 0,
 };
 
-/// What frames say.
+/// Content of the frames.
 #[derive(Clone, Debug)]
 struct Content {
     set: Ephemeris,
@@ -136,11 +136,11 @@ struct Content {
 pub struct Frame {
     /// Count of eighteen seconds at which the next frame begins.
     pub time: u32,
-    /// Whether symbols were upside down.
+    /// True if the symbols were inverted.
     pub inverted: bool,
     /// Bits of subframe 2 with their check.
     pub two: Vec<bool>,
-    /// Those of subframe 3; `None` where it fails its check.
+    /// Bits of subframe 3 with their check; `None` if the check fails.
     pub three: Option<Vec<bool>>,
 }
 
@@ -153,7 +153,7 @@ impl Frame {
         (interval * INTERVAL_S + before.rem_euclid(FRAMES) * FRAME_S).rem_euclid(WEEK_S)
     }
 
-    /// When it began, its week near `near`.
+    /// Start time of the frame, with its week near `near`.
     pub fn sent_at(&self, near: Epoch) -> Epoch {
         let week = number(self.two.get(..13).unwrap_or_default()) as i64;
         Epoch::new(near.nearest_week(week, 8192) * WEEK_S + self.of_week_s(), 0.0)
@@ -286,7 +286,7 @@ fn of_two(two: &Vec<bool>) -> Parameters {
     found
 }
 
-/// The same with those in page 1.
+/// Raw integers of the ephemeris in subframe 2, together with those in page 1.
 fn of_set_in(two: &Vec<bool>, page_1: &Vec<bool>) -> Parameters {
     let mut found = of_two(two);
     found.extend(integers(&DELAY, page_1));
@@ -323,7 +323,7 @@ fn blank(set: Ephemeris) -> Content {
     }
 }
 
-/// The same of no satellite in particular.
+/// Content in which everything is blank, for a placeholder satellite.
 fn nothing() -> Content {
     blank(Ephemeris::blank(Sv::gps(1), Epoch::new(0, 0.0)))
 }

@@ -1,4 +1,5 @@
-//! What subframes 4 and 5 say of the whole constellation: almanac, health, ionosphere and UTC, page by page.
+//! Content of subframes 4 and 5 about the whole constellation: almanac, health, ionosphere and UTC, page by
+//! page.
 //!
 //! Source: IS-GPS-200N, 20.3.3.5 and table 20-V. An almanac is an ephemeris without its
 //! corrections, moved to a common reference time; it is good to a few kilometres for days.
@@ -90,7 +91,7 @@ impl Almanac {
 pub struct Utc {
     /// GPS time minus UTC beyond whole seconds at the reference time.
     pub a0_s: f64,
-    /// Its rate, s/s.
+    /// Rate of GPS time minus UTC, in s/s.
     pub a1_sps: f64,
     /// Reference time in its week.
     pub tot_s: f64,
@@ -106,12 +107,13 @@ pub struct Utc {
     pub leap_after_s: i64,
 }
 
-/// What a message says of UTC, as a navigation file gives it.
+/// UTC parameters of a message, in the form of a navigation file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct UtcData {
     /// GPS time minus UTC in whole seconds.
     pub leap_s: i64,
-    /// What is left of it, its reference time a multiple of 4096 s inside its week (IS-GPS-200N,
+    /// Remainder of the offset beyond whole seconds. Its reference time is a multiple of 4096 s inside its
+    /// week (IS-GPS-200N, 20.3.3.5.2.4). Absent means none, referred to the almanac's time.
     /// 20.3.3.5.2.4); absent means none, referred to the almanac's time.
     pub polynomial: Option<TimePolynomial>,
     /// The last change of the whole seconds, or the next one: those after it, and the week and day at whose

@@ -126,7 +126,7 @@ fn opened(symbols: &[bool]) -> Option<(bool, Vec<(&'static str, i64)>)> {
     }
 }
 
-/// What all satellites say alike: the pages of subframes 4 and 5.
+/// Parameters that all satellites send alike: the pages of subframes 4 and 5.
 #[derive(Clone, Debug)]
 pub struct Broadcast {
     /// Pages 1..=25 of subframe 4, then those of subframe 5.
@@ -257,13 +257,13 @@ pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
         || add_to(&SUBFRAME_3, parameter, ephemeris, by)
 }
 
-/// Why words are no subframe, or subframes no ephemeris.
+/// Reason for which words are no subframe, or subframes no ephemeris.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum SubframeError {
     /// A word with a wrong bit.
     #[error("word {word} fails its parity")]
     Parity {
-        /// Its number, from 1.
+        /// Number of the word, from 1.
         word: u8,
     },
     /// No subframe begins here.
@@ -283,7 +283,7 @@ pub enum SubframeError {
     /// A count beyond the week.
     #[error("the count of the time of week is {count}: expected below 100800")]
     TowCount {
-        /// Of 6 s since its beginning.
+        /// Count of 6 s units since the beginning of the week.
         count: u32,
     },
     /// Words whose last bits the parity should have made zero.
@@ -304,13 +304,14 @@ pub enum SubframeError {
     BeyondWeek {
         /// Name of the field.
         name: &'static str,
-        /// Its value.
+        /// Value of the field, in seconds.
         value_s: i64,
     },
 }
 
 impl SubframeError {
-    /// Whether it is of ten words that were read: the preamble and each word's parity were right.
+    /// True if the error concerns ten words that were received correctly: the preamble and each word's parity
+    /// were right.
     pub fn is_read(&self) -> bool {
         !matches!(self, Self::Parity { .. } | Self::Preamble { .. })
     }
@@ -325,7 +326,7 @@ pub struct Subframe {
     pub tow_count: u32,
     /// The signal's accuracy may be worse than the URA says (IS-GPS-200N, 20.3.3.2).
     pub alert: bool,
-    /// Whether P is encrypted to Y (IS-GPS-200N, 20.3.3.2).
+    /// True if P is encrypted to Y (IS-GPS-200N, 20.3.3.2).
     pub antispoof: bool,
     /// 24 bits a word, inversion removed.
     pub data: [u32; 10],

@@ -3,9 +3,9 @@
 //!
 //! Source: IS-GPS-200N, 20.3.5.2 and table 20-XIV. Any one or two wrong bits of the 32 are detected.
 
-/// Which of the data bits d1..d24 (d1 is bit 23) enter D25..D30 (IS-GPS-200N, table 20-XIV).
+/// Masks of the data bits d1..d24 (d1 is bit 23) that enter D25..D30 (IS-GPS-200N, table 20-XIV).
 const MASKS: [u32; 6] = [0xEC_7CD2, 0x76_3E69, 0xBB_1F34, 0x5D_8F9A, 0xAE_C7CD, 0x2D_EA27];
-/// Which previous bit enters D25..D30: true for D29*, false for D30* (IS-GPS-200N, table 20-XIV).
+/// Previous bit that enters D25..D30: true for D29*, false for D30* (IS-GPS-200N, table 20-XIV).
 const FROM_D29: [bool; 6] = [true, false, true, false, false, true];
 
 /// The 24 data bits of a word.

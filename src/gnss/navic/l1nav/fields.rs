@@ -13,7 +13,7 @@ const DELAYS: &str = "subframe 2, group delays";
 const HEAD: &str = "subframe 3, header";
 const ELECTRONS: &str = "message type 10";
 
-/// What the semi-major axis counts from.
+/// Reference value of the semi-major axis, in metres.
 const REFERENCE_AXIS_M: f64 = 42_164_200.0;
 /// Step of the reference time of orbit and clock.
 pub(super) const STEP_S: i64 = 300;
@@ -73,7 +73,7 @@ pub(super) static SET: [Of; 32] = [
     element(Field::new("prn", &[(570, 6)], Whole, 0, TIME), |c| f64::from(c.set.sv.prn()), |_, _| {}),
 ];
 
-/// What every message of subframe 3 begins with: its type, and whether it must not be used.
+/// Fields with which every message of subframe 3 begins: its type, and a flag for "must not be used".
 #[rustfmt::skip]
 pub(super) static HEADER: [Of; 2] = [
     plain!("message_type", [(0, 6)], Whole, 0, HEAD, kind),

@@ -111,7 +111,7 @@ static FRAME: Subframes = Subframes {
     is_right: |bits| crc24q(bits.iter().copied()) == 0,
 };
 
-/// What frames say.
+/// Content of the frames.
 #[derive(Clone, Debug)]
 struct Content {
     set: Ephemeris,
@@ -138,7 +138,7 @@ impl Frame {
         (interval * INTERVAL_S + before * FRAME_S).rem_euclid(WEEK_S)
     }
 
-    /// When it began, its week near `near`.
+    /// Start time of the frame, with its week near `near`.
     pub fn sent_at(&self, near: Epoch) -> Epoch {
         let week = number(self.0.two.get(..13).unwrap_or_default()) as i64;
         Epoch::new(near.nearest_week(week + NAVIC_WEEK, 8192) * WEEK_S + self.of_week_s(), 0.0)
@@ -221,9 +221,9 @@ fn form(set: &Ephemeris) -> Ephemeris {
     }
 }
 
-/// By how much the clock is ahead for a user of a signal alone: of the carrier that shares the clock with L5
-/// the group delay, of L5 what that is on its carrier, and of the third the delay less its correction; of L1
-/// that of the pilot, which receivers follow.
+/// Group delay in seconds of a signal relative to the ephemeris clock. The carrier that shares the clock with
+/// L5 has the transmitted delay, and L5 has this delay scaled to its carrier. The remaining carrier has the
+/// delay less its correction. On L1 the correction is that of the pilot, which receivers track.
 fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
     let (shares, other_hz) = match set.reference_flag {
         0 => (signal.carries(&L1_NAV), L1.centre_hz()),
@@ -265,7 +265,7 @@ fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
     Some((true, found))
 }
 
-/// Of which no coefficients are known.
+/// Coefficients of a scene without known ionosphere: zeros.
 const NO_ELECTRONS: Klobuchar = Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] };
 
 /// Nothing read yet.

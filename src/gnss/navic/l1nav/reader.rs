@@ -10,9 +10,9 @@ use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::Epoch;
 
-/// Of what 52 symbols say, the part that a time explains where a frame is tried: 0.89 at an amplitude of √2
-/// standard deviations, near which the codes begin to fail, with 0.05 of scatter; the best of all times among
-/// data has about half.
+/// Least agreement of 52 symbols with a time at which a frame is tried. Symbols with an amplitude of √2
+/// standard deviations, near which the codes begin to fail, agree by 0.89 ± 0.05. The best of all times among
+/// data symbols agrees by about half.
 const LEAST_SHARE: f32 = 0.65;
 
 /// Reads NavIC's message on L1.
@@ -20,7 +20,7 @@ const LEAST_SHARE: f32 = 0.65;
 pub struct L1NavReader {
     sv: Sv,
     frames: Frames,
-    /// What the set that was reported last said.
+    /// Parameters of the ephemeris that was reported last.
     complete: Option<Parameters>,
 }
 

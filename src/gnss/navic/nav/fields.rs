@@ -68,7 +68,7 @@ pub(super) static SUBFRAME_2: [Of; 8] = [
     plain!("i0_rad", [(228, 32)], Semicircles, -31, ORBIT, i0_rad),
 ];
 
-/// What message type 7 says of a satellite.
+/// Almanac of a satellite as message type 7 carries it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Almanac {
     pub number: u8,
@@ -90,7 +90,7 @@ pub(super) struct Almanac {
 const TOA_STEP_S: i64 = 16;
 
 impl Almanac {
-    /// That of a set, carried to a reference time.
+    /// Computes the almanac of an ephemeris, propagated to a reference time near `near`.
     pub(super) fn of(set: &Ephemeris, near: Epoch) -> Self {
         let toa = Epoch::new(near.seconds().div_euclid(TOA_STEP_S) * TOA_STEP_S, 0.0);
         let mean = set.mean_at(toa);
@@ -130,7 +130,7 @@ pub(super) static MESSAGE_7: [Element<Almanac>; 13] = [
     plain!("almanac_delay_s", [(242, 8)], Signed, -31, ALMANAC, tgd_s),
 ];
 
-/// What message type 26 says of UTC.
+/// UTC parameters of message type 26.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Utc {
     a0_s: f64,

@@ -85,7 +85,7 @@ const SUBFRAME_SYMBOLS: usize = 600;
 /// Bits of the check and of the tail of zeros.
 const CHECK_BITS: usize = 24;
 const TAIL_BITS: usize = 6;
-/// What real satellites have in the telemetry word.
+/// Content of the telemetry word as real satellites send it.
 const TELEMETRY: u32 = 0x8B;
 /// Message types of subframes 3 and 4.
 const NOTHING: u32 = 0;
@@ -229,7 +229,7 @@ pub fn parameters(subframe: &Subframe) -> Vec<(&'static str, i64)> {
     }
 }
 
-/// What message type 11 says of the ionosphere.
+/// Ionosphere coefficients of message type 11.
 fn coefficients(subframe: &Subframe) -> Coefficients {
     let mut found = Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] };
     read_all(&MESSAGE_11, subframe, &mut found);
@@ -262,7 +262,7 @@ pub fn elements(sv: Sv, one: &Subframe, two: &Subframe, near: Epoch) -> Option<E
     (found.toe == found.toc).then_some(found)
 }
 
-/// When subframe 1 began, by its own week near `near`.
+/// Start time of subframe 1 from its own week, which is near `near`.
 pub fn sent_at(one: &Subframe, near: Epoch) -> Option<Epoch> {
     let week = integers(&SUBFRAME_1, one).iter().find(|(name, _)| *name == "week").map(|(_, raw)| *raw)?;
     let week = near.nearest_week(week + NAVIC_WEEK, 1024);

@@ -29,7 +29,7 @@ pub struct NavReader {
     failures: u32,
     /// The latest of subframes 1 and 2.
     set: BTreeMap<u8, Subframe>,
-    /// Those of the set that was reported last, without the times at which they were sent.
+    /// Parameters of the ephemeris that was reported last, without the transmission times.
     complete: Option<Vec<(&'static str, i64)>>,
 }
 
@@ -47,7 +47,7 @@ impl NavReader {
         }
     }
 
-    /// How many symbols of the pattern stand where it should, the right way up.
+    /// Number of symbols that agree with the synchronisation pattern.
     fn alike(&self) -> usize {
         let pattern = bits_of(u128::from(PATTERN), PATTERN_SYMBOLS);
         self.symbols.iter().zip(pattern).filter(|(soft, one)| (**soft < 0.0) == *one).count()

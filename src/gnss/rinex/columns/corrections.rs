@@ -132,7 +132,7 @@ impl Form {
     }
 }
 
-/// Whether coefficients of BDGIM are within what the messages' fields carry, the fifth below zero and the
+/// Checks that BDGIM coefficients are in the range of the messages' fields, the fifth below zero and the
 /// first above (BDS-SIS-ICD-B1C 1.0, 7.8).
 fn possible(alpha_tecu: &[f64]) -> Result<(), String> {
     match alpha_tecu.iter().find(|alpha| !(-31.875..=127.875).contains(*alpha)) {
@@ -146,12 +146,12 @@ fn possible(alpha_tecu: &[f64]) -> Result<(), String> {
 pub(super) struct Thirds(BTreeMap<String, [Option<[f64; 3]>; 3]>);
 
 impl Thirds {
-    /// Which of the lines this is, if one of them.
+    /// Index of the line among the three, if it is one of them.
     fn place(line: &str) -> Option<usize> {
         ["BDS1", "BDS2", "BDS3"].iter().position(|name| line.starts_with(name))
     }
 
-    /// Whether this is one of the lines.
+    /// True if the line is one of the three.
     pub(super) fn has(line: &str) -> bool {
         Self::place(line).is_some()
     }
@@ -198,8 +198,8 @@ pub(super) fn system_time(line: &str) -> Result<Polynomial, String> {
     }
 }
 
-/// What follows the present number of leap seconds in versions 3 and 4: that after the change, its week and
-/// its day.
+/// Leap-second event from the header line of versions 3 and 4, after the present leap seconds. It has the
+/// leap seconds after the change, its week and its day.
 pub(super) fn leap_event(line: &str) -> Option<(i64, i64, u8)> {
     let whole = |from: usize| line.get(from..from + 6).and_then(|text| text.trim().parse::<i64>().ok());
     let (after_s, week, day) = (whole(6)?, whole(12)?, whole(18)?);

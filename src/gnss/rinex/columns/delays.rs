@@ -18,7 +18,7 @@ pub(in crate::rinex) struct Delays {
     pub all: Vec<(&'static str, f64, bool)>,
 }
 
-/// Where a record has its delays, by lines and fields that count from 0.
+/// Positions of the delays in a record, by lines and fields that count from 0.
 pub(super) struct Layout {
     lines: usize,
     /// The delay from which corrections are taken, where there is one for all.

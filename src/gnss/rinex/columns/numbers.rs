@@ -18,7 +18,7 @@ pub(super) fn fields(line: &str, start: usize, width: usize, count: usize) -> Re
     (0..count).map(field).collect()
 }
 
-/// As many numbers of a header's line, none of them blank.
+/// Parses `N` numbers of a header line, none of them blank.
 pub(super) fn numbers<const N: usize>(line: &str, start: usize, width: usize) -> Result<[f64; N], String> {
     // A time mark and a satellite may follow in version 3.
     let found = fields(line.get(..start + width * N).unwrap_or(line), start, width, N)?;

@@ -14,9 +14,9 @@ use crate::time::Epoch;
 const FIELDS: usize = 31;
 /// Lines of a record: satellite, epoch and clock, then seven lines of the orbit.
 const LINES: usize = 8;
-/// The same of GLONASS: without and with the line of later versions.
+/// Number of lines in a GLONASS record, without and with the line of later versions.
 const LINES_OF_GLONASS: std::ops::RangeInclusive<usize> = 4..=5;
-/// Those with which records begin, in their order, …
+/// Names of the fields with which records begin, in their order.
 const FIRST: [&str; 20] = [
     "af0", "af1", "af2", "iode", "crs", "deltaN", "m0", "cuc", "e", "cus", "sqrta", "toe", "cic", "omega0", "cis",
     "i0", "crc", "omega", "omegaDot", "idot",
@@ -83,12 +83,12 @@ pub(super) const MESSAGES: [(char, &[&str]); 7] = [
 
 /// A record in form.
 pub(in crate::rinex) struct Record {
-    /// Whether it is one of F/NAV.
+    /// True if the record is one of F/NAV.
     pub is_fnav: bool,
     /// Number of its first line.
     pub line: usize,
     pub sv: Sv,
-    /// As written, in the time by which the system's records are dated.
+    /// Reference time of the clock as written, in the time scale of the system's records.
     pub toc: Epoch,
     pub(super) values: [Option<f64>; FIELDS],
 }
@@ -114,7 +114,7 @@ impl Record {
         self.values.get(at).copied().flatten()
     }
 
-    /// Whether a Galileo record of version 3, which has both messages in one form, is one of F/NAV.
+    /// True if a Galileo record of version 3, which has one form for both messages, is one of F/NAV.
     pub(super) fn says_fnav(&self) -> Result<bool, String> {
         let sources = self.get("sources").unwrap_or(0.0) as u32;
         if sources & SENT_FNAV != 0 {
@@ -128,7 +128,7 @@ impl Record {
     }
 }
 
-/// Why a record is left out: at which line, and by its first line's columns.
+/// Text of the reason for which a record is left out, with its line and the first columns of that line.
 fn refusal(line: usize, title: &str, what: &str) -> String {
     let label: String = title.chars().take(23).collect();
     format!("line {line} ({}): {what}", label.trim_end())
@@ -202,8 +202,8 @@ impl Form {
     }
 }
 
-/// Whether it is a satellite of GLONASS beyond the constellation's slots, under trial or in reserve, whose
-/// channel is not known.
+/// True for a GLONASS satellite beyond the constellation's slots, under trial or in reserve, whose channel is
+/// unknown.
 pub(super) fn is_spare(satellite: &str) -> bool {
     let number = satellite.strip_prefix('R').and_then(|number| number.parse::<u8>().ok());
     number.is_some_and(|number| number > SLOTS)

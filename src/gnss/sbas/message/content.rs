@@ -1,4 +1,4 @@
-//! What the blocks of corrections say, encoded and decoded by the tables of [`super::corrections`].
+//! Content of the correction blocks, encoded and decoded by the tables of [`super::corrections`].
 //!
 //! Source: RTCA DO-229D, A.4.4.1 to A.4.4.10.
 
@@ -29,7 +29,8 @@ pub(super) fn take_word(numbers: &mut Vec<u8>, first: u8, bits: f64) {
     numbers.sort_unstable();
 }
 
-/// The same of a mask.
+/// Bits of a mask as a number: those of thirty satellites or points from `first` on, the most significant
+/// first.
 pub(super) fn word(numbers: &[u8], first: u8) -> f64 {
     let own = numbers.iter().filter_map(|number| number.checked_sub(first)).filter(|place| *place < 30);
     f64::from(own.fold(0_u32, |word, place| word | 1 << (29 - place)))
@@ -123,7 +124,7 @@ impl Content {
         }
     }
 
-    /// What a block of a type says; `None` where nothing of it is carried.
+    /// Decodes a block of this type; `None` if the type carries no corrections.
     pub fn read(kind: u8, bits: &Vec<bool>) -> Option<Self> {
         let fast = |part, is_test| Self::Fast(read(&FAST, bits, Fast { part, is_test, ..Fast::default() }));
         Some(match kind {

@@ -116,7 +116,7 @@ pub(super) static MIXED: [&[Element<Fast>]; 3] = [
     &indicators!(Fast, udrei, "udrei", 86, MIXED_CLAUSE, 1 2 3 4 5 6),
 ];
 
-/// Whether half a block of long-term corrections has rates.
+/// Flag for rates in half a block of long-term corrections.
 pub(super) const VELOCITY_CODE: Field = Field::new("velocity_code", &[(0, 1)], Whole, 0, LONG_CLAUSE);
 
 /// A half and the issue of the mask.

@@ -62,7 +62,7 @@ pub static SBAS: Message = Message {
     rinex: Some(Records { set: |_| "SBAS", common: "SBAS", fields: tables, lines: None }),
 };
 
-/// What clock and health of its sets mean: the clock is that of L1.
+/// Meaning of clock and health in SBAS ephemerides: the clock is that of L1.
 pub static SBAS_SETS: SetForm = SetForm {
     name: "SBAS",
     group_delay_s: |_, _| 0.0,
@@ -79,7 +79,7 @@ const OF_TIME: u8 = 12;
 const EMPTY: u8 = 63;
 /// Types in the order in which they are sent.
 const ORDER: [u8; 6] = [OF_TIME, OF_PLACE, EMPTY, EMPTY, EMPTY, EMPTY];
-/// How blocks begin, in turn from a multiple of six seconds on (A.4.3.2).
+/// Preambles of successive blocks, in turn from a multiple of six seconds on (A.4.3.2).
 const PREAMBLES: [u128; 3] = [0x53, 0x9A, 0xC6];
 /// Bits of a block without and with its check; symbols of a second.
 const DATA_BITS: usize = 226;
@@ -95,7 +95,7 @@ const NO_UTC: f64 = 7.0;
 
 const CODE: Convolutional = Convolutional { second_inverted: false };
 
-/// What type 12 says.
+/// Content of message type 12.
 #[derive(Clone, Copy, Debug, Default)]
 struct NetworkTime {
     utc_standard: f64,
@@ -161,7 +161,7 @@ impl Blocks {
     }
 }
 
-/// Whether bits are a block: one of the three beginnings, and the check.
+/// True if bits form a block: one of the three preambles, and a correct check.
 fn is_block(bits: &[bool]) -> bool {
     let begins = bits.get(..8).is_some_and(|begin| PREAMBLES.contains(&number(begin)));
     begins && bits.len() == BITS && crc24q(bits.iter().copied()) == 0

@@ -19,7 +19,7 @@ pub struct SbasReader {
     time: Option<(u64, Epoch)>,
     /// The latest block of type 9 likewise.
     place: Option<(u64, Vec<bool>)>,
-    /// What the set that was reported last said.
+    /// Parameters of the ephemeris that was reported last.
     complete: Option<Parameters>,
 }
 
@@ -29,7 +29,7 @@ impl SbasReader {
         Self { sv, code: Running::new(BITS, is_block), time: None, place: None, complete: None }
     }
 
-    /// When the block with that first symbol began.
+    /// Start time of the block whose first symbol is `begin`.
     fn begun(&self, begin: u64) -> Option<Epoch> {
         let (timed, at) = self.time?;
         Some(at.plus_s((begin as f64 - timed as f64) / RATE_HZ))

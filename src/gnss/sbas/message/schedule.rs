@@ -1,4 +1,4 @@
-//! When which corrections are sent.
+//! Schedule of the correction messages.
 //!
 //! Of each round of six seconds the first two have types 12 and 9. Then come the fast corrections of all
 //! satellites of the mask, as each six seconds at least there is an indicator of their accuracy; of a last
@@ -31,7 +31,7 @@ const ISSUE: u8 = 0;
 /// The largest delay of a point of the grid; one step more says that it is not to be used (A.4.4.10).
 const LARGEST_DELAY_M: f64 = 63.75;
 
-/// What takes turns.
+/// Block that is sent when its turn comes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Turn {
     Mask,
@@ -48,7 +48,7 @@ fn masked(network: &dyn Network) -> &[u8] {
     all.get(..PARTS * FAST_SLOTS).unwrap_or(all)
 }
 
-/// What takes turns, with so many halves of long-term corrections, two a block.
+/// Blocks that take turns, for `halves` half blocks of long-term corrections, two to a block.
 fn turns(network: &dyn Network, halves: usize) -> Vec<Turn> {
     let blocks = halves.div_ceil(2);
     let bands = network.bands();
@@ -63,7 +63,7 @@ fn turns(network: &dyn Network, halves: usize) -> Vec<Turn> {
         .collect()
 }
 
-/// What a network says of other satellites in the block that begins at `start`; `None` for nothing.
+/// Content that a network sends in the block that begins at `start`; `None` if there is none.
 pub(super) fn said(network: &dyn Network, start: Epoch) -> Option<Content> {
     let at = At { network, start, numbers: masked(network) };
     let parts = at.numbers.len().div_ceil(FAST_SLOTS);
@@ -96,7 +96,7 @@ fn empty() -> Half {
     Half::Steady { iodp: ISSUE, both: [LongTerm::default(); 2] }
 }
 
-/// What a network knows at a time.
+/// Knowledge of a network at a time.
 struct At<'n> {
     network: &'n dyn Network,
     start: Epoch,
@@ -112,7 +112,7 @@ impl At<'_> {
         self.numbers.get(place).map(|number| self.network.satellite(*number, self.start))
     }
 
-    /// Whether a satellite of a part of the mask has not been out of use for long.
+    /// True if a satellite in a part of the mask became unusable within the last rounds.
     fn is_new_alarm(&self, part: usize) -> bool {
         let before = self.start.plus_s(-(NEW_ROUNDS * ROUND_S) as f64);
         let own = self.numbers.iter().skip(part * FAST_SLOTS).take(FAST_SLOTS);
@@ -206,7 +206,7 @@ mod tests {
 
     use super::*;
 
-    /// So many satellites, two of which have rates, and points of two bands.
+    /// Network with satellites of these numbers, two of which have rates, and grid points of two bands.
     #[derive(Debug)]
     struct Made {
         numbers: Vec<u8>,
