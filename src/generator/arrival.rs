@@ -1,4 +1,4 @@
-//! How a satellite's signal arrives at one reading of the receiver's clock.
+//! Arrival of a satellite's signal at one time of the receiver's clock.
 //!
 //! One definition serves samples and truth: with T the clock's reading, t the true time and τ the light time,
 //! the delay of the code is (T − t) + τ + (delays of the ray) − (satellite clock); that of the carrier takes
@@ -20,13 +20,13 @@ use gnss::time::Epoch;
 /// A satellite's signal as it arrives at one reading of the receiver's clock.
 #[derive(Clone, Debug)]
 pub struct Seen {
-    /// Where and when it was sent, and along which line of sight.
+    /// Time and position of emission, and the line of sight.
     pub emission: Emission,
     /// The satellite's clock minus GPS time at emission, for this signal.
     pub satellite_clock_s: f64,
     /// The rays as effects leave them, the direct one first.
     pub rays: Vec<Ray>,
-    /// What each ray brings to the antenna: delay, carrier phase and power.
+    /// Delay, carrier phase and power of each ray at the antenna.
     pub arrivals: Vec<Arrival>,
 }
 
@@ -38,8 +38,8 @@ pub(super) fn received(scene: &Scene, from: &Constellation, local: Epoch) -> (Ep
     (scene.receiver_clock.true_time(start, local), elapsed_s, from.motion(&scene.trajectory, elapsed_s))
 }
 
-/// What arrives from the true satellite `sv` when the receiver's clock reads `local`; `None` without an
-/// ephemeris.
+/// Computes the arrival from the true satellite `sv` at the time `local` of the receiver's clock; `None`
+/// without an ephemeris.
 ///
 /// # Errors
 /// Those of the orbit.
@@ -47,7 +47,8 @@ pub fn seen(scene: &Scene, sv: Sv, signal: &Signal, local: Epoch) -> Result<Opti
     seen_from(scene, &Constellation::authentic(), sv, signal, local)
 }
 
-/// What a constellation sends as `sv` that arrives when the receiver's clock reads `local`.
+/// Computes the arrival of the signal that a constellation sends as `sv`, at the time `local` of the
+/// receiver's clock.
 ///
 /// # Errors
 /// Those of the orbit.
@@ -144,9 +145,9 @@ fn arriving(scene: &Scene, signal: &Signal, Arriving { emission, bias_s, gain }:
     Seen { emission, satellite_clock_s, rays, arrivals }
 }
 
-/// Whether `sv` is in the scene's sky when the receiver's clock reads `local`: it has a message to send and
-/// is above the mask, or from space not behind the Earth. Health is the scene's to judge, through its
-/// exclusions.
+/// True if `sv` is in the scene's sky at the time `local` of the receiver's clock. It must have a message to
+/// send, and be above the mask, or from space not behind the Earth. Health does not matter here; the scene
+/// applies it through its exclusions.
 ///
 /// # Errors
 /// Those of the orbit.
@@ -154,7 +155,7 @@ pub fn in_view(scene: &Scene, sv: Sv, local: Epoch) -> Result<bool, OrbitError> 
     in_view_from(scene, &Constellation::authentic(), sv, local)
 }
 
-/// Whether `sv` is in the sky of the place that a constellation's signals are made for.
+/// True if `sv` is in the sky of the position for which a constellation's signals are made.
 ///
 /// # Errors
 /// Those of the orbit.
@@ -162,7 +163,7 @@ pub fn in_view_from(scene: &Scene, from: &Constellation, sv: Sv, local: Epoch) -
     Ok(presence_from(scene, from, sv, local)?.end().is_none())
 }
 
-/// Where `sv` is in the sky of the place that a constellation's signals are made for.
+/// Presence of `sv` in the sky of the position for which a constellation's signals are made.
 ///
 /// # Errors
 /// Those of the orbit.

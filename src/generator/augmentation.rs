@@ -73,18 +73,18 @@ impl Departure {
     }
 }
 
-/// What a network is made of.
+/// Inputs of the ground network.
 #[derive(Clone)]
 pub struct Ground {
     /// True orbits, and what is broadcast of them.
     pub catalogue: Arc<Catalogue>,
-    /// What goes wrong with messages.
+    /// Faults of messages.
     pub message_faults: Vec<MessageFault>,
-    /// What clocks do beside that.
+    /// Clock errors beyond the message faults.
     pub departures: Vec<(Sv, Departure)>,
     /// The scene's start.
     pub start: Epoch,
-    /// Whether it is in test mode.
+    /// True if the network reports test mode.
     pub is_test: bool,
     /// Satellites that an operator has put out of use.
     pub do_not_use: Vec<Sv>,

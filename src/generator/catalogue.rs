@@ -1,5 +1,4 @@
-//! Which broadcast set each satellite sends at each time, and the smooth orbit that the generator takes for
-//! true.
+//! Broadcast ephemeris of each satellite at each time, and the smooth orbit that the generator takes as true.
 //!
 //! A set of GPS goes on the air two hours before its reference time (IS-GPS-200N, 20.3.4.4), or when it was
 //! first received if its reference time is off the two-hour grid, which marks a fresh upload; it stays
@@ -32,7 +31,8 @@ const CONTRADICTION_M: f64 = 2000.0;
 /// records of 2020 have 11 min at least; of 283 records of NavIC of a day in 2026 all but one have 12 s to
 /// 252 s.
 const DELAY_S: f64 = 600.0;
-/// The same for clocks: 300 m.
+/// Largest plausible difference in seconds between the clocks of two ephemerides, 300 m: beyond it they
+/// contradict each other.
 const CONTRADICTION_S: f64 = 1e-6;
 /// Half of what distances to satellites in round orbits vary by: those of GLONASS have eccentricities below
 /// 0.01.
@@ -55,9 +55,9 @@ struct Timeline {
 /// sending of the next one. Open where no set comes before or after.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Silence {
-    /// When it begins; `None` where it has always been.
+    /// Beginning; `None` if it has always lasted.
     pub from: Option<Epoch>,
-    /// When it ends; `None` where it never does.
+    /// End; `None` if it never ends.
     pub until: Option<Epoch>,
 }
 
@@ -67,8 +67,8 @@ pub struct Catalogue {
     satellites: BTreeMap<Sv, Timeline>,
     precise: Option<Orbits>,
     departures: Vec<Displacement>,
-    /// By how much a system's time is ahead of GPS time, whole seconds apart; zero for those that are not
-    /// here.
+    /// Offset of a system's time ahead of GPS time, in seconds, without the whole seconds between both; zero
+    /// for systems without an entry.
     time_offsets_s: BTreeMap<System, f64>,
 }
 
@@ -119,12 +119,13 @@ impl Catalogue {
         self.time_offsets_s.insert(system, offset_s);
     }
 
-    /// By how much a system's time is ahead of GPS time, whole seconds apart.
+    /// Offset of a system's time ahead of GPS time, in seconds, without the whole seconds between both.
     pub fn time_offset_s(&self, system: System) -> f64 {
         self.time_offsets_s.get(&system).copied().unwrap_or(0.0)
     }
 
-    /// What is true besides the broadcast sets, in words: precise orbits, and departures.
+    /// Describes the differences between the truth and the broadcast ephemerides: precise orbits, and orbit
+    /// errors.
     pub fn describe(&self) -> (Option<String>, Vec<String>) {
         let precise = self.precise.as_ref().map(Orbits::describe);
         (precise, self.departures.iter().map(Displacement::describe).collect())
@@ -143,7 +144,7 @@ impl Catalogue {
         timeline.sets.get(span.set?)
     }
 
-    /// When `sv` has nothing to send, as far as it concerns `from..=to`, in order of time.
+    /// Intervals in which `sv` has nothing to send, as far as they concern `from..=to`, in order of time.
     pub fn silences(&self, sv: Sv, from: Epoch, to: Epoch) -> Vec<Silence> {
         let Some(timeline) = self.satellites.get(&sv) else { return vec![Silence { from: None, until: None }] };
         let before = Silence { from: None, until: timeline.spans.first().map(|span| span.from) };
@@ -158,7 +159,8 @@ impl Catalogue {
         std::iter::once(before).chain(gaps).filter(concerns).collect()
     }
 
-    /// When some satellite of a system sends a set, in order of time: no two of the spans touch.
+    /// Intervals in which at least one satellite of a system sends an ephemeris, in order of time. No two of
+    /// them touch.
     pub fn sending(&self, system: System) -> Vec<(Epoch, Epoch)> {
         let own = self.satellites.iter().filter(|(sv, _)| sv.system == system).map(|(_, timeline)| timeline);
         let on_air = own.flat_map(|timeline| {
@@ -180,8 +182,8 @@ impl Catalogue {
         all
     }
 
-    /// Whether what reaches an antenna from `from` to `to` has an orbit and was sent without a break. `false`
-    /// may be too cautious within a second of either end.
+    /// True if all signals that arrive from `from` to `to` have an orbit and were sent without interruption.
+    /// The result may be `false` too early within a second of either end.
     pub fn sent_throughout(&self, sv: Sv, from: Epoch, to: Epoch) -> bool {
         // Signals are on their way for less than a second.
         let from = from.plus_s(-1.0);
@@ -194,14 +196,15 @@ impl Catalogue {
         sets.iter().min_by(|a, b| a.toe.since(at).abs().total_cmp(&b.toe.since(at).abs()))
     }
 
-    /// Whether `sv` sends a set at `at` that calls no signal of its system among `signals` healthy.
+    /// True if `sv` sends an ephemeris at `at` that reports no signal of its system among `signals` as
+    /// healthy.
     pub fn is_sick(&self, sv: Sv, at: Epoch, signals: &[&'static Signal]) -> bool {
         let own = || signals.iter().filter(|signal| signal.system == sv.system);
         let good = |set: &Ephemeris, signal: &Signal| set.is_healthy_on(signal).unwrap_or(set.is_healthy());
         self.sent_at(sv, at).is_some_and(|set| !own().any(|signal| good(set, signal)))
     }
 
-    /// Whether `sv` sends a set at `at` that says it is healthy.
+    /// True if `sv` sends an ephemeris at `at` that reports it healthy.
     pub fn healthy(&self, sv: Sv, at: Epoch) -> bool {
         self.sent_at(sv, at).is_some_and(|set| set.is_healthy())
     }
@@ -224,7 +227,8 @@ impl Catalogue {
         Ok(found.map(|(state, clock)| (departed(state), ClockState { offset_s: clock.offset_s + ahead_s, ..clock })))
     }
 
-    /// By how much the clock of a satellite is ahead for `signal` of what [`Self::truth`] says for L1 C/A.
+    /// Clock offset in seconds of a satellite for `signal`, minus that of [`Self::truth`], which is for L1
+    /// C/A.
     ///
     /// From the group delays of the broadcast sets, through hand-overs as smoothly as the clock.
     pub fn signal_clock_s(&self, sv: Sv, at: Epoch, signal: &Signal) -> f64 {
@@ -265,8 +269,8 @@ fn weights(timeline: &Timeline, at: Epoch) -> impl Iterator<Item = (&Ephemeris, 
     })
 }
 
-/// How far the change to span `index` is done at `at`, 0 to 1, and the rate of that: a quintic
-/// between two sets, a jump where one side has none.
+/// Progress at `at` of the change to span `index`, 0 to 1, and its rate per second. The change is a quintic
+/// between two ephemerides, and a jump if one side has none.
 fn step(timeline: &Timeline, index: usize, at: Epoch) -> (f64, f64) {
     let Some(span) = timeline.spans.get(index) else { return (0.0, 0.0) };
     let since_s = at.since(span.from);
@@ -295,7 +299,7 @@ fn compare(a: &Ephemeris, b: &Ephemeris) -> std::cmp::Ordering {
     })
 }
 
-/// Whether two records differ in nothing but when they were received.
+/// True if two records differ only in the time of reception.
 fn same_elements(a: &Ephemeris, b: &Ephemeris) -> bool {
     Ephemeris { transmitted: b.transmitted, ..a.clone() } == *b
 }
@@ -315,10 +319,10 @@ fn contradict(a: &Ephemeris, b: &Ephemeris) -> bool {
     }
 }
 
-/// Whether elements are those of the nominal constellation (the fields are wider): a 12 h sidereal orbit of
-/// 55° and small eccentricity for GPS, one of 14 h and 56° for Galileo, one of a day, 0° to 33°, for NavIC,
-/// 0° to 50° and less round for QZSS, and 0° to 60° for BeiDou, of which others take 13 h; of a state vector
-/// whether it is as far away as the system's orbits.
+/// True if elements belong to the nominal constellation (the fields are wider). GPS has 12 h sidereal orbits
+/// of 55° and small eccentricity, Galileo 14 h and 56°. NavIC has one day and 0° to 33°, QZSS one day and 0°
+/// to 50°. BeiDou has 0° to 60°, one day or 13 h. A state vector must have the distance of the system's
+/// orbits.
 fn plausible(set: &Ephemeris) -> bool {
     if let Some(vector) = set.vector {
         return (vector.position_m.norm() - set.sv.orbit_m()).abs() < ROUND_M;
@@ -372,8 +376,9 @@ fn leave_out_rogues(sets: &mut Vec<Ephemeris>, warnings: &mut Vec<String>) {
     sets.retain(|_| kept.next().unwrap_or(true));
 }
 
-/// When a set goes on the air. Those of Galileo and NavIC, of every ten minutes at best, do so after their
-/// reference time, and a file says when a receiver had the whole set: some minutes later.
+/// Time of first transmission of an ephemeris. Galileo and NavIC, which renew it every ten minutes at best,
+/// send it after its reference time. A file states when a receiver had decoded it completely, some minutes
+/// later.
 ///
 /// BeiDou's sets are those of an hour, and go on the air with it, those of QZSS with the hour before theirs.
 fn first_sent(set: &Ephemeris) -> Epoch {

@@ -1,4 +1,5 @@
-//! What the motion asks of a carrier loop: acceleration and jerk along the line of sight to each satellite.
+//! Dynamics that the motion imposes on a carrier loop: acceleration and jerk along the line of sight to each
+//! satellite.
 //!
 //! With u from the antenna to the satellite the range's second derivative is u·(a_s − a) + |Δv across u|²/ρ,
 //! all in the Earth's axes; the satellite's share and u are taken at 240 instants, the body's at ten places
@@ -35,9 +36,10 @@ pub struct LineOfSight {
     pub jerk_mps3: f64,
     /// From the least to the largest second derivative: what no step of it exceeds.
     pub swing_mps2: f64,
-    /// When the jerk is largest, true seconds after the scene's start.
+    /// Time of the largest jerk, in true seconds after the scene's start.
     pub jerk_s: f64,
-    /// Of the direct ray of the first signal at that time; without jerk, when it comes into view.
+    /// C/N0 in dB-Hz of the first signal's direct ray at that time. Without jerk it is taken when the
+    /// satellite comes into view.
     pub cn0_dbhz: Option<f64>,
 }
 
@@ -94,7 +96,7 @@ pub fn lines_of_sight(scene: &Scene) -> Result<Vec<LineOfSight>, OrbitError> {
     Ok(found)
 }
 
-/// What is seen of a satellite at each instant.
+/// Acceleration and jerk towards a satellite at each instant.
 fn looks(scene: &Scene, sv: Sv, duration_s: f64) -> Result<Vec<Option<Look>>, OrbitError> {
     let at = |k: u32| {
         let t_s = duration_s * f64::from(k) / f64::from(INSTANTS);

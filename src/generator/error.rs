@@ -1,4 +1,4 @@
-//! Why a scene could not be generated.
+//! Errors of generation.
 
 use thiserror::Error;
 
@@ -7,7 +7,7 @@ use crate::truth::TruthError;
 use gnss::broadcast::OrbitError;
 use gnss::gps::lnav::FieldError;
 
-/// Why a scene could not be generated.
+/// Reason for which a scene could not be generated.
 #[derive(Debug, Error)]
 pub enum GenerateError {
     /// An orbit that cannot be computed.

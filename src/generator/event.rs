@@ -1,4 +1,4 @@
-//! What may be switched while a scene is sent, as a line of text says it.
+//! Events that switch sources while a scene is sent, written as lines of text.
 //!
 //! `power G05 -10` · `spoofer 1 3` · `jammer 1 off` · `jammer 1 on` · `spoofer 1 off` · `astray G05 30 0.5`
 //! (metres, metres a second) · `astray G05 0`. A power is in decibels over that of the scene, `off` none at
@@ -29,7 +29,7 @@ pub enum Event {
     Astray(Sv, f64, f64),
 }
 
-/// Why a line is no event, or is none of the scene.
+/// Reason for which a line is not a valid event, or not one of the scene.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum EventError {
     /// A line that says nothing known.
@@ -106,7 +106,7 @@ impl FromStr for Event {
 }
 
 impl Event {
-    /// Whether the scene has what is to be switched.
+    /// Checks that the scene contains the source that is switched.
     ///
     /// # Errors
     /// [`EventError::NoSuch`].

@@ -28,7 +28,7 @@ pub enum Grade {
     Reference,
 }
 
-/// How a chip's edge falls between samples. Each keeps the mean power of the waveform at one.
+/// Model of a chip edge between samples. Each model keeps the mean power of the waveform at one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CodeEdge {
     /// The chip at the sample's instant.
@@ -39,7 +39,7 @@ pub enum CodeEdge {
     BandLimited,
 }
 
-/// How samples are evaluated.
+/// Arithmetic in which samples are evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arithmetic {
     /// Lanes of single precision, anchored again at the 64-bit phase every 4096 samples at least.
@@ -53,13 +53,14 @@ pub enum Arithmetic {
 pub struct Fidelity {
     /// The level that it was chosen by.
     pub grade: Grade,
-    /// How code edges fall between samples.
+    /// Model of code edges between samples.
     pub code_edge: CodeEdge,
-    /// What of waveforms of several layers is sent. Every level sends all of them.
+    /// Layers that are transmitted of waveforms with several layers. Every level of fidelity transmits all of
+    /// them.
     pub waveform: Layers,
-    /// Of the carrier and the code's place, sample by sample.
+    /// Arithmetic of the carrier phase and the code phase at each sample.
     pub carrier: Arithmetic,
-    /// Of the thermal noise's radius and angle; the random words are the same.
+    /// Arithmetic of the thermal noise's radius and angle; the random words are the same for all.
     pub noise: Arithmetic,
     /// Largest error of the carrier between knots.
     pub knot_tolerance_cycles: f64,
@@ -72,7 +73,7 @@ impl Grade {
     pub const NAMES: [(&'static str, Self); 3] =
         [("fast", Self::Fast), ("balanced", Self::Balanced), ("reference", Self::Reference)];
 
-    /// Its name in a scenario.
+    /// Name of the level in a scenario.
     pub fn name(self) -> &'static str {
         name_of(&Self::NAMES, self)
     }
@@ -83,12 +84,12 @@ impl CodeEdge {
     pub const NAMES: [(&'static str, Self); 3] =
         [("nearest", Self::Nearest), ("area", Self::Area), ("band_limited", Self::BandLimited)];
 
-    /// Its name in a scenario.
+    /// Name of the edge model in a scenario.
     pub fn name(self) -> &'static str {
         name_of(&Self::NAMES, self)
     }
 
-    /// As the scene's facts state it.
+    /// Edge model in the form of the scene's facts.
     pub fn fact(self) -> Edge {
         match self {
             Self::Nearest => Edge::Nearest,
@@ -102,7 +103,7 @@ impl Arithmetic {
     /// Both and their names in a scenario.
     pub const NAMES: [(&'static str, Self); 2] = [("f32", Self::F32), ("f64", Self::F64)];
 
-    /// Its name in a scenario.
+    /// Name of the arithmetic in a scenario.
     pub fn name(self) -> &'static str {
         name_of(&Self::NAMES, self)
     }
@@ -162,8 +163,8 @@ impl Fidelity {
         level
     }
 
-    /// What to warn of edges that leave the code of one of the `signals` metres off at a rate where chips
-    /// meet the same places of every sample.
+    /// Warning text for edges that bias the code of one of the `signals` by metres. It occurs at rates that
+    /// are commensurate with the chip rate.
     pub fn warning(&self, rate_hz: f64, signals: &[&Signal]) -> Option<String> {
         let (signal, bias_m) = worst(signals, |signal| standing_bias_m(self.code_edge, signal, rate_hz))?;
         (bias_m > self.allowed_m).then(|| {
@@ -183,7 +184,7 @@ fn worst<'s>(signals: &[&'s Signal], figure: impl Fn(&Signal) -> f64) -> Option<
     signals.iter().map(|signal| (*signal, figure(signal))).max_by(|(_, a), (_, b)| a.total_cmp(b))
 }
 
-/// What a scene says of its fidelity: a level, and knobs of its own.
+/// Fidelity settings of a scene: a level, and knobs of its own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wishes {
     /// The level.
@@ -233,20 +234,20 @@ impl Wishes {
 /// One knob as a plan shows it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choice {
-    /// Its key in `[fidelity]`.
+    /// Key of the knob in `[fidelity]`.
     pub knob: &'static str,
-    /// What was chosen.
+    /// Chosen value.
     pub value: String,
-    /// Whether the level would have chosen another value.
+    /// True if the level would choose another value.
     pub own: bool,
-    /// What it does to the samples, and for how much.
+    /// Effect on the samples, with its size.
     pub error: String,
-    /// Its time a sample on one core.
+    /// Time per sample on one core.
     pub cost: String,
 }
 
-/// What was chosen for each knob at a sample rate, the error to expect of it and its cost; of the noise's
-/// arithmetic where there is `noise`, and of the waveform where one of the `signals` has several layers.
+/// Lists the value of each knob at a sample rate, with its expected error and its cost. The noise arithmetic
+/// is listed if there is `noise`. The waveform is listed if one of the `signals` has several layers.
 pub fn choices(chosen: Fidelity, rate_hz: f64, noise: bool, signals: &[&Signal]) -> Vec<Choice> {
     let level = Fidelity::suited(chosen.grade, rate_hz, chosen.allowed_m, signals);
     let edge = chosen.code_edge;
@@ -308,8 +309,7 @@ pub fn choices(chosen: Fidelity, rate_hz: f64, noise: bool, signals: &[&Signal])
     found
 }
 
-/// What the kernels take for a sample of every signal with one value of a knob, over what they take with
-/// another.
+/// Ratio of the kernels' time per sample with one value of a knob to that with another, over all signals.
 fn multiple(
     edges: [CodeEdge; 2],
     arithmetics: [Arithmetic; 2],
@@ -324,7 +324,8 @@ fn multiple(
     format!("{:.1} x {other}", all_ns(0) / all_ns(1))
 }
 
-/// Of a component with several layers, the power that is left out and how many fewer sequences are made.
+/// Knob of the layers: the power that is left out of a component, and the ratio by which fewer sequences are
+/// made.
 fn layers_choice(chosen: Fidelity, level: Fidelity, signals: &[&Signal]) -> Option<Choice> {
     let components = || signals.iter().flat_map(|signal| signal.components).filter(|one| one.layers.len() > 1);
     let missing_db = |component: &Component| {

@@ -1,5 +1,5 @@
-//! What all signals of a satellite have in common when they arrive: orbit, light time, clocks and place in
-//! the sky.
+//! Quantities that all signals of a satellite share on arrival: orbit, light time, clocks and position in the
+//! sky.
 //!
 //! It is computed once for an instant, and kept for the other signals and for other front ends that ask for
 //! the same one: those at one sample rate do. What is kept is what would be computed again, so no bit depends
@@ -18,12 +18,12 @@ use gnss::time::Epoch;
 /// Instants that are kept of a satellite: some 300 KB.
 const KEPT: usize = 1024;
 
-/// How one satellite of a constellation arrives at one reading of the receiver's clock, whatever the signal.
+/// Arrival of one satellite of a constellation at one time of the receiver's clock, for any signal.
 #[derive(Clone, Debug)]
 pub struct Arriving {
-    /// Where and when it was sent.
+    /// Time and position of emission.
     pub emission: Emission,
-    /// By how much the receiver's clock is ahead of the sender's.
+    /// Clock offset of the receiver minus that of the sender, in seconds.
     pub bias_s: f64,
     /// Factor on the power of every ray.
     pub gain: f64,
@@ -40,7 +40,8 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// What arrives when the clock reads `local`, computed by `find` if it is not known.
+    /// Returns the arrival at the time `local` of the receiver's clock. If it is not stored, `find` computes
+    /// it.
     ///
     /// # Errors
     /// Those of `find`.
@@ -65,7 +66,7 @@ impl Geometry {
     }
 }
 
-/// Where the antenna is at the readings of the receiver's clock that are known.
+/// Antenna positions at the stored times of the receiver's clock.
 #[derive(Debug, Default)]
 pub struct Places {
     known: Mutex<BTreeMap<(i64, u64), Place>>,
@@ -83,7 +84,7 @@ impl Places {
     }
 }
 
-/// Whether satellites arrive alike in two scenes at one reading of the clock.
+/// True if satellites arrive identically in two scenes at one time of the clock.
 pub fn is_shared(one: &Scene, other: &Scene) -> bool {
     Arc::ptr_eq(&one.catalogue, &other.catalogue)
         && one.clock.start == other.clock.start

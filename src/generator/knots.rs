@@ -21,7 +21,7 @@ pub const AMPLITUDE_ERROR: f64 = 1e-3;
 /// of its middle, so the staircase does not bias it, and its rms error is 45 dB below the ray.
 pub const AMPLITUDE_STEP: f64 = 1e-2;
 
-/// What one ray's signal says at one reading of the receiver's clock.
+/// Signal of one ray at one time of the receiver's clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arrival {
     /// Reading of the receiver's clock minus the time sent, as the code says.
@@ -43,7 +43,7 @@ impl Arrival {
     }
 }
 
-/// Where polynomials are made.
+/// Placement of the knots between which polynomials are fitted.
 #[derive(Clone, Debug)]
 pub struct Grid {
     /// Samples of a root part: a power of two, or a tick.
@@ -83,7 +83,7 @@ pub struct Part {
     pub paths: Vec<Path>,
     /// Largest error met at the points of comparison.
     pub error_cycles: f64,
-    /// The same of amplitudes, each of its ray's largest.
+    /// Largest amplitude error met at the points of comparison, relative to the ray's largest amplitude.
     pub amplitude_error: f64,
 }
 
@@ -144,7 +144,7 @@ impl Grid {
         Self { root_samples: 1 << longest.ilog2(), breaks, tolerance_cycles, carrier_hz }
     }
 
-    /// The same grid with roots of so many samples, where there is such a number.
+    /// Sets the root spacing to `samples`, if it is given.
     pub fn with_roots_of(self, samples: Option<u64>) -> Self {
         Self { root_samples: samples.map_or(self.root_samples, |samples| samples.max(1)), ..self }
     }

@@ -1,4 +1,4 @@
-//! How strong each part of a scene is against full scale, in dBFS.
+//! Power of each part of a scene relative to full scale, in dBFS.
 //!
 //! dBFS here are 20 lg of a component's root mean square over full scale: a complex tone whose circle touches
 //! full scale has −3.01 dBFS. Full scale is that of the sample format, or of the converter where the scene
@@ -52,7 +52,7 @@ impl Span {
 /// A source of interference.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Source {
-    /// Its kind as a scenario writes it.
+    /// Kind of the source as a scenario writes it.
     pub kind: &'static str,
     /// While it is on, at the antenna; of pulses the mean. `None` when it is never on in the scene.
     pub jn0_dbhz: Option<Span>,
@@ -74,11 +74,11 @@ pub struct Spoofed {
 pub struct Levels {
     /// Full scale in LSB of the scene's gain, and what it is.
     pub full_scale_lsb: f64,
-    /// What full scale is that of, in words.
+    /// Component to which full scale refers, in words.
     pub scale: String,
     /// Level of a power over noise density of 1 Hz.
     unit_dbfs: f64,
-    /// What a playback takes off satellites and spoofers.
+    /// Attenuation in dB that a playback applies to satellites and spoofers.
     attenuation_db: f64,
     /// Level of the thermal noise; `None` without noise.
     pub noise_dbfs: Option<f64>,

@@ -10,7 +10,7 @@ pub const HALF_WIDTH: usize = 8;
 /// Kaiser's shape parameter: 60 dB in the stop band.
 const BETA: f64 = 5.65;
 
-/// What the filter leaves of a frequency.
+/// Frequency response of the filter.
 #[derive(Debug)]
 pub struct Response {
     /// The impulse response from its middle on, at [`Response::CELLS`] points a sample.
@@ -21,7 +21,7 @@ impl Response {
     /// Points a sample: images lie sixteen times the rate away, where the filter leaves nothing.
     const CELLS: usize = 16;
 
-    /// Of the filter of that cut-off, in cycles a sample.
+    /// Computes the response of the filter with this cut-off, in cycles per sample.
     pub fn new(cutoff_cps: f64) -> Self {
         let points = 0..=HALF_WIDTH * Self::CELLS;
         Self { impulse: points.map(|k| impulse(k as f64 / Self::CELLS as f64, cutoff_cps)).collect() }

@@ -1,4 +1,4 @@
-//! What satellites send as messages, and what goes wrong between the uploaded data and the antenna.
+//! Messages that satellites send, and the faults between the uploaded data and the antenna.
 //!
 //! Wrong content (bad health, wrong parameters) is sent with a right check and the old issue of data; wrong
 //! symbols are flipped in what was encoded, so that the check shows them. Times are those of sending, to the
@@ -18,13 +18,14 @@ use gnss::time::{Epoch, TimeScale};
 /// Bits of a word by which a fault gives a bit's place (IS-GPS-200N, 20.3.2).
 const WORD_BITS: u64 = 30;
 
-/// What the satellites of a scene send, by form of message.
+/// Encoders of a scene's messages, by form of message.
 pub struct Senders {
     all: Vec<(&'static Message, Box<dyn Sender>)>,
 }
 
 impl Senders {
-    /// Those of the messages of some signals, which say `common` besides each satellite's own elements.
+    /// Creates the encoders for the messages of some signals. They send `common` besides each satellite's own
+    /// elements.
     ///
     /// # Errors
     /// A value that a message cannot carry.
@@ -39,7 +40,7 @@ impl Senders {
         Ok(Self { all })
     }
 
-    /// Who encodes a message; `None` if no signal of the scene has it.
+    /// Returns the encoder of a message; `None` if no signal of the scene has it.
     pub fn of(&self, message: &Message) -> Option<&dyn Sender> {
         self.all.iter().find(|(known, _)| *known == message).map(|(_, sender)| sender.as_ref())
     }
@@ -50,20 +51,20 @@ impl Senders {
 pub struct MessageFault {
     /// `None` for all.
     pub satellites: Option<Vec<Sv>>,
-    /// When it is sent.
+    /// Interval of transmission in which the fault acts.
     pub on: Range<Epoch>,
-    /// What goes wrong.
+    /// Kind of the fault.
     pub kind: Kind,
 }
 
-/// What is wrong.
+/// Kind of a message fault.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Kind {
     /// Each symbol by itself, with a probability.
     BitErrors {
         /// Probability of a wrong symbol.
         rate: f64,
-        /// Where the random numbers come from.
+        /// Source of the random numbers.
         stream: Stream,
     },
     /// One symbol of every unit with this number, by a word of 30 of them and its place in it, both counted
@@ -82,7 +83,7 @@ pub enum Kind {
     Parameter {
         /// Name in the message's table.
         name: &'static str,
-        /// What is added, in the parameter's unit.
+        /// Value that is added, in the parameter's unit.
         add: f64,
     },
     /// Every unit is an alert page, its check right.
@@ -90,7 +91,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Why it cannot befall a message; `None` where it can.
+    /// Reason for which the fault cannot occur in a message; `None` if it can.
     pub fn foreign(&self, message: &Message) -> Option<String> {
         match self {
             Self::Parameter { name, .. } if !(message.adjustable)().contains(name) => {
@@ -106,7 +107,7 @@ impl Kind {
 /// The symbols of a unit.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Sent {
-    /// As encoded, every check right …
+    /// Symbols as encoded, with correct checks.
     pub encoded: Vec<bool>,
     /// … and as they left the antenna.
     pub symbols: Vec<bool>,
@@ -118,16 +119,16 @@ pub struct Sent {
 /// beginning.
 #[derive(Clone, Copy, Debug)]
 pub struct Slot {
-    /// Its form.
+    /// Form of message.
     pub message: &'static Message,
     /// The scale of the sender's clock.
     pub time: &'static TimeScale,
-    /// Its number since that clock's beginning.
+    /// Number of the unit since the beginning of the clock's scale.
     pub unit: i64,
 }
 
 impl Slot {
-    /// When it begins.
+    /// Start time of the unit.
     pub fn start(&self) -> Epoch {
         self.time.instant(self.message.unit_start(self.unit))
     }
@@ -143,7 +144,7 @@ impl MessageFault {
         self.satellites.as_ref().is_none_or(|list| list.contains(&sv))
     }
 
-    /// What it makes of the content of a subframe sent at `start`.
+    /// Applies the fault to the content of a subframe that is sent at `start`.
     fn spoil(&self, message: &Message, ephemeris: &mut Ephemeris, start: Epoch) {
         if !self.on.contains(&start) {
             return;
@@ -157,7 +158,7 @@ impl MessageFault {
         }
     }
 
-    /// Whether it flips a symbol, counted from 0, of a unit.
+    /// True if the fault inverts this symbol of a unit, counted from 0.
     fn flips(&self, sv: Sv, slot: &Slot, symbol: u64) -> bool {
         let message = slot.message;
         if !self.on.contains(&slot.start().plus_s(message.symbol_s * symbol as f64)) {
@@ -228,7 +229,7 @@ pub fn unit(
 }
 
 impl MessageFault {
-    /// What it does, for the plan; times in seconds since `start`.
+    /// Describes the fault for the plan; times are in seconds since `start`.
     pub fn describe(&self, start: Epoch) -> String {
         let who = self
             .satellites

@@ -1,4 +1,4 @@
-//! What a true orbit departs by from the one that is taken for true: ephemeris errors and manoeuvres.
+//! Errors of the true orbit relative to the broadcast or precise one: ephemeris errors and manoeuvres.
 //!
 //! An offset in the satellite's own axes (radially outwards, along the track, across it), from the beginning
 //! or grown over a time by a quintic whose speed and acceleration begin and end at zero, so that phases stay
@@ -23,7 +23,7 @@ pub struct Displacement {
     pub along_m: f64,
     /// Along the angular momentum.
     pub cross_m: f64,
-    /// When it begins to grow and how long it grows; it is there from the beginning if absent.
+    /// Beginning and duration in seconds of the growth. If absent, the displacement exists from the start.
     pub growth: Option<(Epoch, f64)>,
 }
 
@@ -65,7 +65,7 @@ impl Displacement {
         }
     }
 
-    /// What it does, for the plan.
+    /// Describes the error for the plan.
     pub fn describe(&self) -> String {
         let names: Vec<String> = self.satellites.iter().map(Sv::to_string).collect();
         let growth =

@@ -1,4 +1,4 @@
-//! What a scene will compute, reported before it is computed.
+//! Plan of a scene: the report of what will be computed, before it is computed.
 //!
 //! Satellites are placed at a few hundred instants, effects act on them there, and sizes and times follow
 //! from counts. What concerns the synthesiser (knots, speed, memory) is given to it, and so are the levels
@@ -38,7 +38,7 @@ pub struct InView {
     pub azimuth_deg: f64,
     /// Elevation then.
     pub elevation_deg: f64,
-    /// Of its first signal; `None` when nothing in the scene says how strong it is.
+    /// C/N0 in dB-Hz of the satellite's first signal; `None` if the scene defines no signal power.
     pub cn0_dbhz: Option<f64>,
     /// Power of all its signals and rays over noise density, weakest and strongest of the instants.
     pub power_dbhz: Option<Span>,
@@ -54,20 +54,20 @@ pub struct InView {
 pub struct Model {
     /// Table or thing, as a scenario calls it.
     pub name: String,
-    /// Whether the scene has it.
+    /// True if the scene contains the model.
     pub present: bool,
-    /// What it does, or what would bring it.
+    /// Effect of the model, or the key that would add it.
     pub why: String,
 }
 
-/// What a scene will compute.
+/// Report of the computations for a scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Plan {
     /// Name of the scene.
     pub name: String,
     /// Name of the front end, where the scenario gives it one.
     pub front_end: Option<String>,
-    /// What the receiver's clock reads at sample 0.
+    /// Time of sample 0 by the receiver's clock.
     pub start: String,
     /// Length of the scene.
     pub duration_s: f64,
@@ -75,15 +75,15 @@ pub struct Plan {
     pub signals: Vec<&'static str>,
     /// Elevation below which satellites are left out.
     pub mask_deg: f64,
-    /// Whether the scene begins so high that the Earth takes the mask's place.
+    /// True if the scene begins so high that the Earth's limb replaces the elevation mask.
     pub in_space: bool,
     /// Largest speed and acceleration of the antenna during the scene.
     pub speed_mps: f64,
     /// Largest acceleration of the antenna.
     pub acceleration_mps2: f64,
-    /// Those in view at any time, highest first.
+    /// Satellites that are in view at any time, highest first.
     pub satellites: Vec<InView>,
-    /// What is computed, and what is not.
+    /// Models that are computed, and models that are not.
     pub models: Vec<Model>,
     /// The parts of the sum against full scale.
     pub levels: Levels,
@@ -92,10 +92,10 @@ pub struct Plan {
     /// Time for a sample of all that is sent, in ns on one core of this machine, measured.
     #[serde(skip)]
     pub sample_ns: f64,
-    /// The same for each signal of each satellite.
+    /// Time in ns per sample for each signal of each satellite, on one core of this machine, measured.
     #[serde(skip)]
     pub signal_sample_ns: f64,
-    /// What was chosen for each knob of fidelity.
+    /// Chosen value of each fidelity knob.
     pub knobs: Vec<Choice>,
     /// Rate, format and tuning, in words.
     pub sampling: String,
@@ -108,7 +108,7 @@ pub struct Plan {
     /// Processor time to generate them, from what was measured.
     #[serde(skip)]
     pub time_s: f64,
-    /// What the synthesiser will do.
+    /// Work of the synthesiser.
     pub machinery: Machinery,
 }
 
@@ -154,7 +154,8 @@ impl Plan {
 }
 
 impl Plan {
-    /// What was measured of this machine: apart from the plan, which is the same on all.
+    /// Describes the speed measured on this machine. It is separate from the plan, which is the same on all
+    /// machines.
     pub fn speed(&self) -> String {
         let Self { time_s, sample_ns, signal_sample_ns, .. } = self;
         format!(
@@ -225,8 +226,8 @@ pub(crate) fn strength_dbhz(scene: &Scene, sight: &Sight) -> (Option<f64>, Optio
     (direct_hz.and_then(dbhz), dbhz(sum_hz))
 }
 
-/// When a satellite came or went by the step at `t_s`; where an ephemeris did it, the instant that `edge`
-/// takes of its absence.
+/// Time in seconds at which a satellite came into view or left it, by the step at `t_s`. If an ephemeris
+/// caused it, the time is the instant that `edge` returns for the silence.
 fn change_s(scene: &Scene, sv: Sv, t_s: f64, by: PassEnd, edge: impl Fn(&Silence) -> Option<Epoch>) -> f64 {
     let start = scene.clock.start;
     let silences = scene.catalogue.silences(sv, start, start.plus_s(t_s));

@@ -31,7 +31,7 @@ const HALF: usize = NODES / 2;
 /// Epochs of a table at most: more than a year every 15 minutes.
 const MOST_EPOCHS: i64 = 50_000;
 
-/// What the table does not have of a satellite.
+/// Satellite parameters that the orbit table does not contain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hardware {
     /// L1 C/A against the combination that clocks belong to.
@@ -79,7 +79,7 @@ impl Orbits {
         (at(HALF as i64 - 1), at(count - HALF as i64))
     }
 
-    /// What it is, for the plan.
+    /// Describes the orbits for the plan.
     pub fn describe(&self) -> String {
         let lowered: Vec<f64> = self.satellites.values().map(|track| track.hardware.antenna_m).collect();
         let antenna = match lowered.iter().fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(*x), b.max(*x))) {
@@ -90,7 +90,7 @@ impl Orbits {
         format!("precise orbits and clocks of {} satellites every {} s, {antenna}", self.satellites.len(), self.step_s)
     }
 
-    /// Whether there is a position and a clock all the time from `from` to `to`.
+    /// True if positions and clocks exist for all times from `from` to `to`.
     pub fn covers(&self, sv: Sv, from: Epoch, to: Epoch) -> bool {
         let Some(track) = self.satellites.get(&sv) else { return false };
         let index = |at: Epoch| (at.seconds() - self.first_s).div_euclid(self.step_s);

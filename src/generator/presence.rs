@@ -1,4 +1,4 @@
-//! Whether a satellite is in the scene's sky, and if not, why not.
+//! Presence of a satellite in the scene's sky, and the reason for its absence.
 //!
 //! A satellite sets, hides behind the Earth, or has nothing to send because no ephemeris of the navigation
 //! file fits. The last is a limit of the data and not of nature, so it has its own name in the plan, in the
@@ -22,21 +22,22 @@ const EXTRAPOLATED_S: f64 = 43_200.0;
 /// Spacing of the instants at which the sky without an ephemeris is looked at: satellites move 5° in it.
 const LOOK_S: f64 = 600.0;
 
-/// Where a satellite is.
+/// Presence of a satellite in the sky.
 #[derive(Clone, Debug)]
 pub enum Presence {
     /// In view: where and when it sent what arrives.
     InView(Box<Emission>),
     /// Below the elevation mask.
     BelowMask,
-    /// As seen from space.
+    /// Behind the Earth, as seen from space.
     BehindEarth,
     /// Nothing in the navigation file is sent at this time, or precise orbits have none.
     NoEphemeris,
 }
 
 impl Presence {
-    /// What ends the view, or precedes it, when this follows or comes before; `None` while in view.
+    /// Reason for which a view ends if this state follows, or begins if it comes before; `None` while in
+    /// view.
     pub fn end(&self) -> Option<PassEnd> {
         match self {
             Self::InView(_) => None,
@@ -47,8 +48,8 @@ impl Presence {
     }
 }
 
-/// Where `sv` is for an antenna with `motion` at true time `time`. A satellite that the scene leaves out is
-/// present too.
+/// Computes the presence of `sv` for an antenna with `motion` at true time `time`. A satellite that the scene
+/// excludes counts as present.
 ///
 /// # Errors
 /// Those of the orbit.
@@ -69,7 +70,7 @@ pub fn presence(scene: &Scene, sv: Sv, time: Epoch, motion: &Motion) -> Result<P
 pub struct Missing {
     /// The satellite that has nothing to send.
     pub sv: Sv,
-    /// When the ephemerides leave off and begin again, as far as the navigation file has any there.
+    /// End and new beginning of the ephemerides, as far as the navigation file has any there.
     pub silence: Silence,
 }
 
@@ -146,7 +147,7 @@ pub fn warning(missing: &[Missing], start: Epoch) -> Option<String> {
 pub struct Passes {
     /// First sample in view and what came before, of the pass that lasts; the others are whole.
     open: Option<(u64, PassEnd)>,
-    /// Why the satellite was not in view when last looked at; `None` before the first look.
+    /// Reason for the absence of the satellite at the last check; `None` before the first check.
     absent: Option<PassEnd>,
     whole: Vec<(u64, u64, PassEnd, PassEnd)>,
 }

@@ -1,4 +1,4 @@
-//! What reaches the antenna: rays, the sight line that they belong to, and the effects that act on them.
+//! Rays that reach the antenna, their line of sight, and the effects that act on them.
 
 use nalgebra::Vector3;
 
@@ -34,7 +34,7 @@ pub struct Sight {
 /// One path from the satellite to the antenna.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// What the path adds to the geometric delay of the code …
+    /// Additional delay of the code along the path, in seconds, beyond the geometric delay.
     pub code_delay_s: f64,
     /// … and to that of the carrier.
     pub carrier_delay_s: f64,
@@ -66,7 +66,7 @@ impl<E: Effect + ?Sized> Effect for std::sync::Arc<E> {
 pub trait Effect: Send + Sync {
     /// Name as a scenario writes it.
     fn name(&self) -> &'static str;
-    /// What it does, for the plan.
+    /// Describes the effect for the plan.
     fn describe(&self) -> String;
     /// Acts on every ray of `signal` along `sight`, or adds rays.
     fn act(&self, sight: &Sight, signal: &Signal, rays: &mut Vec<Ray>);

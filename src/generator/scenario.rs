@@ -62,28 +62,29 @@ use gnss::satellite::Sv;
 use gnss::signal::{Layers, Signal};
 use gnss::time::Epoch;
 
-/// What an absent table comes to; a test holds these against the declared defaults.
+/// Elevation mask in degrees if `[satellites]` is absent. A test compares the constants with the declared
+/// defaults.
 const MASK_DEG: f64 = 5.0;
 const TRUTH_INTERVAL_S: f64 = 0.1;
 /// Largest scenario text that is read.
 const MAX_BYTES: usize = 1 << 20;
 
-/// Why a scenario is refused.
+/// Reason for which a scenario is refused.
 #[derive(Debug, Error)]
 pub enum ScenarioError {
     /// A text that is no TOML, or cannot be read at all.
     #[error("{place}: {message}")]
     Toml {
-        /// Where in the text.
+        /// Position in the text.
         place: Place,
-        /// What the parser reports.
+        /// Message of the parser.
         message: String,
     },
     /// A key that no table has.
     #[error("{place}: unknown key '{key}'{}; known here: \
              {known}", nearest.as_ref().map_or(String::new(), |n| format!(": did you mean '{n}'?")))]
     UnknownKey {
-        /// Where in the text.
+        /// Position in the text.
         place: Place,
         /// The key, with the tables that it is in.
         key: String,
@@ -95,47 +96,47 @@ pub enum ScenarioError {
     /// A value out of its range or of another type.
     #[error("{place}: {key} = {value}: expected {expected}")]
     Value {
-        /// Where in the text.
+        /// Position in the text.
         place: Place,
         /// The key, with the tables that it is in.
         key: String,
         /// The value as written.
         value: String,
-        /// What is expected.
+        /// Values that are expected.
         expected: String,
     },
     /// Things that cannot be together.
     #[error("{origin}: {key}: {reason}")]
     Conflict {
-        /// What errors call the scenario: its path.
+        /// Path of the scenario, for error messages.
         origin: String,
         /// The key that is at fault.
         key: &'static str,
-        /// What is wrong.
+        /// Description of the error.
         reason: String,
     },
     /// A file that the scenario names and that cannot be used.
     #[error("{origin}: {key} = {path:?}: {reason}")]
     File {
-        /// What errors call the scenario: its path.
+        /// Path of the scenario, for error messages.
         origin: String,
         /// The key that names it.
         key: &'static str,
         /// The file as written.
         path: PathBuf,
-        /// What is wrong.
+        /// Description of the error.
         reason: String,
     },
     /// A file that the scenario names and that cannot be read.
     #[error("{origin}: {key} = {path:?}: cannot be read: {error}")]
     Read {
-        /// What errors call the scenario: its path.
+        /// Path of the scenario, for error messages.
         origin: String,
         /// The key that names it.
         key: &'static str,
         /// The file as written.
         path: PathBuf,
-        /// What the system reports.
+        /// Error of the operating system.
         error: std::io::Error,
     },
     /// A scenario that [`Scenario::open`] cannot read.
@@ -143,7 +144,7 @@ pub enum ScenarioError {
     Open {
         /// The scenario.
         path: PathBuf,
-        /// What the system reports.
+        /// Error of the operating system.
         error: std::io::Error,
     },
     /// All that is wrong, in the order of the text: two at least.
@@ -164,7 +165,7 @@ impl ScenarioError {
         whole.strip_prefix(&format!("{place}: ")).map_or(whole.clone(), str::to_owned)
     }
 
-    /// Where it is in the text, if at a place there.
+    /// Returns the position in the text, if the error has one.
     pub fn place(&self) -> Option<&Place> {
         match self {
             Self::Toml { place, .. } | Self::UnknownKey { place, .. } | Self::Value { place, .. } => Some(place),
@@ -192,13 +193,13 @@ impl ScenarioError {
 /// A scenario whose every value is within its range. What is absent is `None` or not in the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scenario {
-    /// What errors call it: its path.
+    /// Path of the scenario, for error messages.
     pub origin: String,
-    /// Where [`Scenario::scene`] looks for the files that it names.
+    /// Directory in which [`Scenario::scene`] looks for the files that the scenario names.
     pub directory: PathBuf,
     /// Name of the scene: letters, digits, '-' and '_'.
     pub name: String,
-    /// What the receiver's clock reads at sample 0, and where the scene's true time counts from.
+    /// Time of sample 0 by the receiver's clock, from which the scene's true time also counts.
     pub start: Epoch,
     /// Length of the scene by the receiver's clock.
     pub duration_s: f64,
@@ -210,7 +211,8 @@ pub struct Scenario {
     pub navigation: Vec<PathBuf>,
     /// The day to which the first day of the files is moved; none leaves them as they are.
     pub moved_to: Option<Epoch>,
-    /// By how much Galileo's time is ahead of GPS time; none means what the navigation file says, or zero.
+    /// Offset of Galileo's time ahead of GPS time, in seconds. Absent means the value of the navigation file,
+    /// or zero.
     pub galileo_ahead_s: Option<f64>,
     /// Elevation below which satellites are left out.
     pub mask_rad: f64,
@@ -218,23 +220,23 @@ pub struct Scenario {
     pub only: Option<Vec<Sv>>,
     /// Satellites that are left out.
     pub excluded: Vec<Sv>,
-    /// Whether satellites that report themselves unhealthy are sent too.
+    /// True if satellites that report themselves unhealthy are transmitted too.
     pub include_unhealthy: bool,
     /// True orbits and clocks; absent means those that are broadcast.
     pub orbits: Option<OrbitsSpec>,
-    /// What augmentation systems say of other satellites; absent means nothing.
+    /// Content of augmentation messages about other satellites; absent means none.
     pub sbas: Option<SbasSpec>,
     /// Faults of satellites' clocks and orbits.
     pub satellite_faults: Vec<SatelliteFault>,
     /// Faults of navigation messages.
     pub message_faults: Vec<MessageSpec>,
-    /// How the antenna moves.
+    /// Motion of the antenna.
     pub motion: MotionSpec,
-    /// How the body turns that carries the antenna; absent means an antenna that points up.
+    /// Attitude of the body that carries the antenna; absent means an antenna that points up.
     pub attitude: Option<Attitude>,
     /// One at least.
     pub front_ends: Vec<FrontEnd>,
-    /// How strong signals are.
+    /// Power of the signals.
     pub power: Power,
     /// Reflections.
     pub multipath: Vec<Echo>,
@@ -248,9 +250,9 @@ pub struct Scenario {
     pub scintillation: Option<Strength>,
     /// The receiver's clock.
     pub receiver_clock: ClockSpec,
-    /// Whether there is thermal noise.
+    /// True if there is thermal noise.
     pub noise: bool,
-    /// Of a scene with one front end.
+    /// Playback of a scene with one front end.
     pub playback: Option<PlaybackSpec>,
     /// Sources of interference.
     pub interference: Vec<InterferenceSpec>,
@@ -258,7 +260,7 @@ pub struct Scenario {
     pub spoofers: Vec<SpooferSpec>,
     /// Spacing of the truth's ticks.
     pub truth_interval_s: f64,
-    /// What the judge is to expect of a receiver.
+    /// Expectations about a receiver, for the judge.
     pub expect: Expect,
     /// For the receiver's own parser.
     pub receiver: Option<toml::Table>,

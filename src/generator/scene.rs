@@ -38,7 +38,7 @@ const LIMB_M: f64 = 50e3;
 
 /// Everything that the generator computes for the samples of one front end, and nothing that it does not.
 pub struct Scene {
-    /// Its name.
+    /// Name of the scene.
     pub name: String,
     /// Name of the front end, where the scenario gives it one.
     pub front_end_name: Option<String>,
@@ -48,21 +48,21 @@ pub struct Scene {
     pub samples: u64,
     /// The receiver's clock reading at sample 0, and its sample rate.
     pub clock: SampleClock,
-    /// How the receiver's clock departs from GPS time.
+    /// Offset of the receiver's clock from GPS time.
     pub receiver_clock: ReceiverClock,
-    /// Where what changes quickly has its nodes.
+    /// Node spacing of quantities that change quickly.
     pub nodes: Nodes,
-    /// What describes the samples: format, rate, centre, start.
+    /// Description of the samples: format, rate, centre, start.
     pub metadata: IfMetadata,
     /// Antenna motion over true time since `clock.start`.
     pub trajectory: Trajectory,
-    /// What the satellites send of themselves, and orbits and clocks as they are.
+    /// Broadcast ephemerides, and true orbits and clocks.
     pub catalogue: Arc<Catalogue>,
-    /// What the satellites send besides their own ephemeris.
+    /// Messages that the satellites send besides their own ephemerides.
     pub messages: Arc<Senders>,
-    /// What goes wrong with what they send.
+    /// Faults of messages.
     pub message_faults: Vec<MessageFault>,
-    /// What satellites' clocks do that they do not broadcast.
+    /// Satellite clock errors that are not broadcast.
     pub satellite_clocks: Arc<SatelliteClocks>,
     /// The signals that satellites send.
     pub signals: Vec<&'static Signal>,
@@ -70,32 +70,32 @@ pub struct Scene {
     pub excluded: Vec<Sv>,
     /// Satellites below this elevation are not computed for a user below [`SPACE_M`].
     pub mask_rad: f64,
-    /// What acts on rays, in order.
+    /// Effects on rays, in order.
     pub effects: Vec<Box<dyn Effect>>,
     /// Quick fading of satellites.
     pub scintillation: Option<Arc<Scintillation>>,
     /// A transmitter that plays the satellites' signals back, before anything else is added.
     pub playback: Option<Playback>,
-    /// What the antenna receives besides satellites, in order.
+    /// Sources of interference, in order.
     pub interference: Vec<Interferer>,
-    /// What is switched while the scene is sent, where its motion is pushed.
+    /// Switches that act while the scene is sent, if its motion is pushed.
     pub switches: Option<Arc<Switches>>,
-    /// Who sends other satellites' signals over the true ones.
+    /// Spoofers, which send other satellites' signals over the true ones.
     pub spoofers: Vec<Arc<Constellation>>,
     /// Thermal noise; absent means none.
     pub noise: bool,
-    /// What the front end does to the sum, in the order of the hardware.
+    /// Front-end stages that act on the sum, in the order of the hardware.
     pub front_end: Vec<Box<dyn Stage>>,
     /// Standard deviation of the noise per component, in LSB of the sample format (the gain). Without noise
     /// the same gain scales the signals: a ray has amplitude `sqrt(cn0_hz / rate) * sqrt(2) * noise_lsb`.
     pub noise_lsb: f32,
-    /// How samples are made.
+    /// Fidelity with which samples are made.
     pub fidelity: Fidelity,
     /// Spacing of truth records.
     pub truth_interval_s: f64,
-    /// What the judge is to expect of a receiver, and what it must know of satellites.
+    /// Expectations about a receiver, for the judge.
     pub expect: Expect,
-    /// What the judge must know of satellites.
+    /// Satellite faults that the judge must know.
     pub faults: Vec<Fault>,
 }
 
@@ -125,7 +125,7 @@ impl Scene {
         own.filter(move |signal| !is_link_outside(&self.metadata, signal.link(sv)))
     }
 
-    /// Whether a satellite is in view: above the mask, or from space not behind the Earth.
+    /// True if a satellite is in view: above the mask, or from space not behind the Earth.
     pub fn sees(&self, sight: &Sight) -> bool {
         if sight.user.height_m < SPACE_M {
             sight.look.elevation_rad >= self.mask_rad
@@ -151,7 +151,7 @@ impl Scene {
         })
     }
 
-    /// What moves the phases of the signals quickly.
+    /// Sources that change the phases of the signals quickly.
     pub fn fast_phases(&self) -> fast_phase::Sources<'_> {
         fast_phase::Sources {
             nodes: self.nodes,
@@ -162,7 +162,7 @@ impl Scene {
         }
     }
 
-    /// How the signals that a constellation (0 for the true one) sends as `sv` are switched at a sample.
+    /// Switch state at a sample of the signals that a constellation (0 for the true one) sends as `sv`.
     pub fn switched(&self, constellation: usize, sv: Sv, sample: u64) -> Switched {
         let switched = |all: &Arc<Switches>| all.of_constellation(constellation, sv, all.tick_of(sample));
         self.switches.as_ref().map_or_else(Switched::default, switched)
@@ -173,7 +173,7 @@ impl Scene {
         self.receiver_clock.true_elapsed_s(self.clock.start, self.clock.epoch(n))
     }
 
-    /// What the receiver does to a wave of interference.
+    /// Receiver's effect on an interfering wave.
     pub fn tuning(&self) -> Tuning {
         let clocks = (self.clock, &self.receiver_clock);
         Tuning::new(&self.metadata, clocks, &self.signals, f64::from(self.noise_lsb))
@@ -198,7 +198,7 @@ pub fn sources<'s>(scenes: impl Iterator<Item = &'s Scene>) -> Vec<(usize, &'s I
     found
 }
 
-/// Whether the Earth, with its air up to [`LIMB_M`], lies between two places.
+/// True if the Earth, with its atmosphere up to [`LIMB_M`], lies between two positions.
 fn occulted(from_m: &Vector3<f64>, to_m: &Vector3<f64>) -> bool {
     // Axes in which the ellipsoid is the unit sphere.
     let equator_m = SEMI_MAJOR_AXIS_M + LIMB_M;
@@ -210,22 +210,22 @@ fn occulted(from_m: &Vector3<f64>, to_m: &Vector3<f64>) -> bool {
     (from + along * share).norm_squared() < 1.0
 }
 
-/// Where a frequency appears in samples at that rate, from minus half of it to half; negative in real samples
-/// means mirrored.
+/// Frequency in Hz at which `hz` appears in samples at that rate, from minus half of the rate to half. A
+/// negative value in real samples means mirrored.
 pub fn folded_hz(hz: f64, rate_hz: f64) -> f64 {
     hz - rate_hz * (hz / rate_hz).round()
 }
 
-/// Where the main lobes of a signal without Doppler lie in the samples' spectrum, from and to, in hertz:
-/// those of all its satellites.
+/// Lower and upper end in Hz of a signal's main lobes in the samples' spectrum, without Doppler, for all its
+/// satellites.
 pub fn main_lobe_hz(metadata: &IfMetadata, signal: &Signal) -> (f64, f64) {
     let (lowest_hz, highest_hz) = signal.carriers_hz();
     let (one_hz, other_hz) = (metadata.if_hz(lowest_hz), metadata.if_hz(highest_hz));
     (one_hz.min(other_hz) - signal.lobe_hz(), one_hz.max(other_hz) + signal.lobe_hz())
 }
 
-/// Whether the main lobes lie wholly outside the band of complex samples. Of real samples the band is not
-/// known: an IF beyond half the rate is how bandpass sampling works.
+/// True if the main lobes lie wholly outside the band of complex samples. The band of real samples is
+/// unknown: with bandpass sampling, an IF may exceed half the rate.
 pub fn is_outside(metadata: &IfMetadata, signal: &Signal) -> bool {
     is_beyond(metadata, main_lobe_hz(metadata, signal))
 }

@@ -1,4 +1,4 @@
-//! Where a satellite was, and what its clock said, when it sent what the antenna receives now.
+//! Position and clock of a satellite at the emission of the signal that the antenna receives now.
 //!
 //! The light time solves |s(t − τ) − u| = cτ in the axes of reception, taken as inertial. The orbit is
 //! evaluated at a guess of τ and taken as straight from there, so that one Newton step leaves half the
@@ -35,7 +35,7 @@ pub struct Emission {
     pub travel_s: f64,
     /// Satellite's L1 C/A clock minus GPS time at emission (relativity and T_GD in).
     pub satellite_clock_s: f64,
-    /// Its rate against GPS time.
+    /// Rate of the satellite clock against GPS time, in s/s.
     pub satellite_clock_drift: f64,
 }
 
@@ -44,9 +44,9 @@ pub struct Emission {
 pub struct Place {
     /// True GPS time.
     pub time: Epoch,
-    /// The same since the scene's start.
+    /// True time since the scene's start, in seconds.
     pub elapsed_s: f64,
-    /// Its motion.
+    /// Motion of the antenna.
     pub motion: Motion,
     user: Geodetic,
     /// East, north and up there.
@@ -65,8 +65,8 @@ fn earth_rotation() -> Vector3<f64> {
     Vector3::new(0.0, 0.0, EARTH_ROTATION_RADPS)
 }
 
-/// What `sv` sent that reaches an antenna with `motion` (in the ECEF axes of `received`) at true GPS time
-/// `received`; `None` when no ephemeris fits.
+/// Emission from `sv` that reaches an antenna with `motion` (in the ECEF axes of `received`) at true GPS time
+/// `received`. `None` when no ephemeris fits.
 ///
 /// # Errors
 /// [`OrbitError`] from the elements.
@@ -204,7 +204,8 @@ impl Arc {
         Ok(Some(Self { sv, middle, nodes_s, differences, guess: (LIGHT_TIME_S, 0.0) }))
     }
 
-    /// The same with a guess of the light time for who is near a place in ECEF: one evaluation will do there.
+    /// Adds a guess of the light time for users near a position in ECEF, metres. One evaluation suffices
+    /// there.
     pub fn near(self, place_m: &Vector3<f64>) -> Self {
         let (State { position_m, velocity_mps }, _) = self.at(self.middle);
         let sight_m = position_m - place_m;
@@ -227,7 +228,7 @@ impl Arc {
         (state, ClockState { offset_s: row[6], drift: row[7] })
     }
 
-    /// As [`emission`].
+    /// Emission from the arc's satellite that reaches a place, like the function [`emission`].
     ///
     /// # Errors
     /// None by itself.

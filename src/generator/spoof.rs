@@ -1,4 +1,4 @@
-//! Whose signals reach the antenna: the true constellation, or that of a spoofer.
+//! Constellations whose signals reach the antenna: the true one, or that of a spoofer.
 //!
 //! A spoofer sends what would arrive from the true satellites at a claimed place and by a clock of its
 //! own, with the same messages; every signal of it goes through the machinery of the true ones. It may begin
@@ -19,16 +19,16 @@ use gnss::time::SampleClock;
 /// Pieces of a power ramp, each linear in power: of 60 dB, a piece is 0.9 dB and off by 0.02 dB at most.
 const RAMP_PIECES: u32 = 64;
 
-/// Where the signals are made for.
+/// Position for which the signals are made.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Place {
-    /// Where the antenna is.
+    /// Position of the antenna.
     Antenna,
-    /// Where it moves by a trajectory of its own.
+    /// Position that moves along a trajectory of its own.
     Claimed(Box<Trajectory>),
 }
 
-/// How the place is moved away from where it began.
+/// Drag of the claimed position away from where it began.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drag {
     /// True time since the scene's start.
@@ -44,7 +44,7 @@ pub struct Drag {
 /// Power over that of the true signals (what the scene's effects give at the claimed place).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Advantage {
-    /// When it is switched on.
+    /// Power advantage at the moment of switching on, in dB.
     pub start_db: f64,
     /// After the ramp.
     pub end_db: f64,
@@ -59,11 +59,11 @@ pub struct Constellation {
     pub number: usize,
     /// The place that its signals are made for.
     pub place: Place,
-    /// How the claimed place is moved; absent means that it stays.
+    /// Drag of the claimed position; absent means that it stays.
     pub drag: Option<Drag>,
-    /// Its clock minus GPS time at the scene's start, and its gain in seconds a second.
+    /// Clock offset from GPS time at the scene's start, in seconds.
     pub clock_bias_s: f64,
-    /// Gain of its clock, in seconds a second.
+    /// Rate of the clock offset, in s/s.
     pub clock_drift: f64,
     /// `None` for all in view of the claimed place.
     pub satellites: Option<Vec<Sv>>,
@@ -74,7 +74,7 @@ pub struct Constellation {
 }
 
 impl Drag {
-    /// What it adds to the motion, `t_s` true seconds after the scene's start.
+    /// Motion that the drag adds, `t_s` true seconds after the scene's start.
     fn motion(&self, t_s: f64) -> Motion {
         let t_s = (t_s - self.start_s).max(0.0);
         let full_s = self.speed_mps / self.acceleration_mps2;
@@ -137,7 +137,7 @@ impl Constellation {
         known.then_some(own_mps + dragged_mps)
     }
 
-    /// Its clock minus GPS time, `t_s` true seconds after the scene's start.
+    /// Clock minus GPS time in seconds, `t_s` true seconds after the scene's start.
     pub fn clock_s(&self, t_s: f64) -> f64 {
         self.clock_bias_s + self.clock_drift * t_s
     }
@@ -149,7 +149,7 @@ impl Constellation {
         libm::pow(10.0, (start_db + (end_db - start_db) * share) / 10.0)
     }
 
-    /// Whether it sends the signals of a satellite at all.
+    /// True if it sends the signals of a satellite at all.
     pub fn sends(&self, sv: Sv) -> bool {
         self.satellites.as_ref().is_none_or(|list| list.contains(&sv))
     }
@@ -172,7 +172,8 @@ impl Constellation {
         breaks
     }
 
-    /// Those, and the times at which its power changes its slope.
+    /// Times in seconds at which the motion's acceleration or its slope jumps, or the slope of the power
+    /// changes.
     pub fn breaks_s(&self, antenna: &Trajectory) -> Vec<f64> {
         let mut breaks = self.motion_breaks_s(antenna);
         if let Some(Advantage { ramp_s, .. }) = self.advantage.filter(|a| a.ramp_s > 0.0) {
@@ -192,7 +193,7 @@ impl Constellation {
         (if self.on_s.start.is_finite() { sample(self.on_s.start) } else { 0 })..end
     }
 
-    /// What it does, for the plan.
+    /// Describes the spoofer for the plan.
     pub fn describe(&self) -> String {
         let place = match &self.place {
             Place::Antenna => "the antenna's true place".to_owned(),

@@ -36,7 +36,7 @@ use crate::truth::{Record, Sink};
 use gnss::record::{NavigationRow, PassRow};
 use gnss::satellite::Sv;
 
-/// How the work is cut; no choice changes a byte.
+/// Partition of the work; no option changes a byte of the output.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
     /// Runs of 4096 samples in a block.
@@ -53,7 +53,7 @@ impl Default for Options {
     }
 }
 
-/// What a run of the generator did.
+/// Summary of a generator run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Generated {
     /// Samples made.
@@ -66,7 +66,7 @@ pub struct Generated {
     pub knots: u64,
     /// Largest error of the carrier met between their knots.
     pub worst_knot_cycles: f64,
-    /// What the scene allows of it.
+    /// Knot tolerance that the scene allows, in cycles.
     pub knot_tolerance_cycles: f64,
 }
 
@@ -187,7 +187,7 @@ impl<'a> Stream<'a> {
         self.advance(self.front.batch_end(), truth, packed)
     }
 
-    /// The same with the samples before `to`, counted in the scene, for the next batch.
+    /// Like `next`, but makes samples only up to `to`, counted in the scene.
     ///
     /// # Errors
     /// As [`Stream::next`], and [`GenerateError::Unpushed`] where the motion is not known so far.

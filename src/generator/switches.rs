@@ -1,5 +1,5 @@
-//! What is switched while a scene is sent: powers of satellites, spoofers and jammers, and satellites that
-//! stray.
+//! Switches that act while a scene is sent: powers of satellites, spoofers and jammers, and satellites whose
+//! ranges drift.
 //!
 //! A change holds from the first sample of a tick on. Signals have their polynomials tick by tick, so every
 //! change is exact to the sample, and a replay that knows of later ones sends the same bits. Limits: changes
@@ -16,7 +16,7 @@ use gnss::time::Rate;
 /// Changes of a scene at most.
 pub const MOST: usize = 100_000;
 
-/// What can be switched.
+/// Source that can be switched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Source {
     /// A true satellite, all its signals.
@@ -27,12 +27,12 @@ pub enum Source {
     Spoofer(usize),
 }
 
-/// How a source is switched from a tick on.
+/// Switch state of a source from a tick on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Switched {
     /// Factor on its power.
     pub gain: f64,
-    /// What its pseudorange and carrier have too much, in metres, at sample `since` …
+    /// Error of pseudorange and carrier in metres at sample `since`.
     pub astray_m: f64,
     /// … and by how much that grows a second.
     pub astray_mps: f64,
@@ -41,20 +41,20 @@ pub struct Switched {
 }
 
 impl Default for Switched {
-    /// As the scene is without switches.
+    /// State of the scene without switches.
     fn default() -> Self {
         Self { gain: 1.0, astray_m: 0.0, astray_mps: 0.0, since: 0 }
     }
 }
 
 impl Switched {
-    /// What ranges have too much at a place between samples, as if the satellite's clock were behind by as
+    /// Range error in metres at a position between samples, as if the satellite's clock were behind by as
     /// much.
     pub fn astray_m(&self, sample: f64, rate: Rate) -> f64 {
         self.astray_m + self.astray_mps * (sample - self.since as f64) / rate.hz()
     }
 
-    /// What arrives at a place between samples, as switched.
+    /// Applies the switch state to an arrival at a position between samples.
     pub fn act(&self, arrival: Arrival, carrier_hz: f64, sample: f64, rate: Rate) -> Arrival {
         if *self == Self::default() {
             return arrival;
@@ -75,11 +75,11 @@ pub struct Stray {
     pub sv: Sv,
     /// First sample of it.
     pub first: u64,
-    /// What its ranges have too much then.
+    /// Range error at that time, in metres.
     pub m: f64,
-    /// What that gains a second.
+    /// Rate of the range error, in m/s.
     pub mps: f64,
-    /// By how much they jump there.
+    /// Jump of the range error at that time, in metres.
     pub step_m: f64,
 }
 
@@ -152,7 +152,7 @@ impl Switches {
         found
     }
 
-    /// How a source is switched in a tick.
+    /// Switch state of a source in a tick.
     pub fn at(&self, source: Source, tick: u64) -> Switched {
         let rows = self.rows.read().unwrap_or_else(PoisonError::into_inner);
         let Some(changes) = rows.get(&source) else { return Switched::default() };
@@ -160,7 +160,7 @@ impl Switches {
         next.checked_sub(1).and_then(|last| changes.get(last)).map_or_else(Switched::default, |(_, switched)| *switched)
     }
 
-    /// How the source with that constellation's number (0 for the true one) is switched in a tick.
+    /// Switch state in a tick of the source with this constellation number (0 for the true one).
     pub fn of_constellation(&self, number: usize, sv: Sv, tick: u64) -> Switched {
         self.at(if number == 0 { Source::Satellite(sv) } else { Source::Spoofer(number) }, tick)
     }

@@ -46,7 +46,7 @@ impl Nodes {
         (node as u64, share as f64 / 18_446_744_073_709_551_616.0)
     }
 
-    /// The same of a place between samples, as one number; before the first sample that of the first.
+    /// Position between samples as one number of nodes. Before the first sample it is that of the first.
     pub fn place(self, rate: Rate, sample: f64) -> f64 {
         if rate == self.rate {
             return sample.max(0.0) / self.ticks as f64;

@@ -89,7 +89,7 @@ impl PowerLaw {
 /// An oscillator's phase noise over the samples of a scene.
 #[derive(Debug)]
 pub struct Oscillator {
-    /// Its power law of fractional frequency.
+    /// Power law of the fractional frequency.
     pub law: PowerLaw,
     cell_s: f64,
     tracks: Vec<Track>,
@@ -101,14 +101,14 @@ pub struct Oscillator {
     known: Mutex<Known>,
 }
 
-/// What has been drawn.
+/// Random values that have been drawn.
 #[derive(Debug, Default)]
 struct Known {
     /// States at the beginning of each block of cells.
     blocks: Vec<Vec<State>>,
     /// Phase at the beginnings of a block's cells, by block.
     coarse_s: BTreeMap<u64, Arc<Vec<f64>>>,
-    /// What is quicker than the spline through coarse nodes, at the nodes of a cell.
+    /// Phase in seconds at the nodes of a cell, without the spline through coarse nodes.
     quick_s: BTreeMap<u64, Arc<Vec<f64>>>,
 }
 
@@ -209,7 +209,7 @@ impl Oscillator {
         states.iter_mut().zip(&self.tracks).for_each(|(state, track)| *state = track.next(*state, cell));
     }
 
-    /// What the spline leaves at the nodes of a cell.
+    /// Phase residual from the spline, in seconds, at the nodes of a cell.
     fn cell(&self, cell: u64) -> Arc<Vec<f64>> {
         let found = self.known.lock().unwrap_or_else(PoisonError::into_inner).quick_s.get(&cell).cloned();
         found.unwrap_or_else(|| {

@@ -139,7 +139,7 @@ pub struct Table {
     values: Vec<(f64, f64)>,
 }
 
-/// Why a table is refused.
+/// Reason for which a table is refused.
 #[derive(Debug, Error)]
 pub enum PatternError {
     /// A table that is no CSV file.
@@ -147,7 +147,7 @@ pub enum PatternError {
     Csv {
         /// The file.
         name: String,
-        /// What the CSV reader reports.
+        /// Error of the CSV reader.
         source: csv::Error,
     },
     /// A number that is out of range.
@@ -157,11 +157,11 @@ pub enum PatternError {
         name: String,
         /// Line of the table, from 1.
         row: usize,
-        /// Its column.
+        /// Column of the table.
         column: &'static str,
         /// The value that is there.
         value: f64,
-        /// What is expected.
+        /// Values that are expected.
         expected: &'static str,
     },
     /// Rows that form no complete grid of azimuths and elevations.

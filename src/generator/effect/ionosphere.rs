@@ -35,7 +35,7 @@ pub struct KlobucharIonosphere {
 }
 
 impl KlobucharIonosphere {
-    /// By GPS's coefficients.
+    /// Creates the effect from GPS coefficients.
     pub fn of_gps(model: Klobuchar) -> Self {
         Self { model, defined_hz: L1_HZ }
     }
@@ -49,7 +49,8 @@ impl KlobucharIonosphere {
     }
 }
 
-/// What electrons do to every ray: the code comes later by a group delay, the carrier as much earlier.
+/// Applies the effect of electrons to every ray: the code is delayed by a group delay in seconds, the carrier
+/// is advanced by as much.
 pub(super) fn delay_groups(rays: &mut [Ray], delay_s: f64) {
     for ray in rays {
         ray.code_delay_s += planted!("generator.ionosphere.code", delay_s, 0.9 * delay_s);
@@ -71,7 +72,7 @@ impl Effect for KlobucharIonosphere {
     }
 }
 
-/// How much of the ionosphere lies above a height, from 1 on the ground to 0 at its top.
+/// Fraction of the ionosphere above a height in metres, from 1 on the ground to 0 at its top.
 pub(crate) fn share_above(height_m: f64) -> f64 {
     1.0 - smooth((height_m - SHELL_M) / (TOP_M - SHELL_M))
 }

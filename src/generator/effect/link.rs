@@ -45,7 +45,7 @@ pub struct LinkBudget {
     pub noise_figure_db: f64,
     /// Losses in the receiver.
     pub implementation_loss_db: f64,
-    /// Whatever else a scene takes away.
+    /// Additional losses of the scene, in dB.
     pub extra_loss_db: f64,
 }
 
@@ -70,8 +70,8 @@ impl LinkBudget {
         self.budget(sight, carrier_hz).0
     }
 
-    /// What no C/N0 on the Earth's surface exceeds with a receiving antenna of `peak_dbic`: the best of both
-    /// patterns at once, from a satellite at the zenith.
+    /// Upper bound of C/N0 in dB-Hz on the Earth's surface with a receiving antenna of `peak_dbic`. It
+    /// assumes the best of both patterns at once, from a satellite at the zenith.
     pub fn strongest_dbhz(&self, peak_dbic: f64, carrier_hz: f64) -> f64 {
         let blocks = self.blocks.iter().map(|(_, block)| block.peak_dbi());
         let transmit_db = blocks.fold(self.block.peak_dbi(), f64::max);
@@ -166,7 +166,7 @@ impl Effect for LinkBudget {
     }
 }
 
-/// The same C/N0 for every satellite.
+/// Effect that gives every satellite the same C/N0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FixedCn0 {
     /// C/N0 of every satellite, in dB-Hz.

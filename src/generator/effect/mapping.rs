@@ -19,17 +19,17 @@ use gnss::vmf3::{MappingBc, Vmf3};
 
 /// Sine of the elevation from which on the functions were fitted: 3° (Niell 1996).
 const FITTED_SIN: f64 = 0.052_335_956;
-/// By how much the sine is raised at the horizon, so that Niell's hydrostatic factor at 45° is 33.4 there.
+/// Increase of the sine at the horizon, chosen so that Niell's hydrostatic factor at 45° is 33.4 there.
 const RAISED_SIN: f64 = 0.0034;
-/// What stands for a sine of zero in one over it: the hydrostatic factor of rays traced along the horizon of
-/// the standard atmosphere grows by 0.5 a kilometre of height up to 10 km, and [`height_correction`] has that
-/// at 0.56°.
+/// Replacement for a sine of zero in one over it. The hydrostatic factor of rays traced along the horizon of
+/// the standard atmosphere grows by 0.5 per kilometre of height up to 10 km. [`height_correction`] has that
+/// slope at 0.56°.
 const LEAST_SIN: f64 = 0.009_77;
 const YEAR_DAYS: f64 = 365.25;
 /// Day of the year about which seasons turn (Niell 1996; Böhm et al. 2006).
 const WINTER_DAY: f64 = 28.0;
 
-/// How a zenith delay grows towards the horizon.
+/// Growth of a zenith delay towards the horizon.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mapping {
     /// A flat atmosphere: 1/sin of the elevation for both parts.
@@ -42,7 +42,7 @@ pub enum Mapping {
     Vmf3(Coefficients, Box<Vmf3>),
 }
 
-/// Where VMF's coefficients a come from.
+/// Source of VMF's coefficients a.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Coefficients {
     /// From a grid of TU Wien's, by place and time.
@@ -77,7 +77,7 @@ impl Mapping {
         }
     }
 
-    /// What it is, for the plan.
+    /// Describes the mapping function for the plan.
     pub fn describe(&self) -> &'static str {
         match self {
             Self::Cosecant => "cosecant mapping",
@@ -114,7 +114,7 @@ fn sin(elevation_rad: f64) -> f64 {
     libm::sin(elevation_rad.clamp(0.0, FRAC_PI_2))
 }
 
-/// How far a sine is below what was fitted: 1 at the horizon, 0 at 3° and above.
+/// Distance of a sine below the fitted range: 1 at the horizon, 0 at 3° and above.
 fn below(sin: f64) -> f64 {
     ((FITTED_SIN - sin) / FITTED_SIN).max(0.0)
 }
@@ -131,7 +131,7 @@ fn bounded(sin: f64) -> f64 {
     sin + LEAST_SIN * below * below * below
 }
 
-/// What height adds to the hydrostatic factor (Niell 1996, equation 6).
+/// Height correction of the hydrostatic factor (Niell 1996, equation 6).
 fn height_correction(sin: f64, height_m: f64) -> f64 {
     let sin = bounded(sin);
     (1.0 / sin - herring(sin, HEIGHT)) * height_m * 1e-3

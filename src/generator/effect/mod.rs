@@ -1,4 +1,4 @@
-//! What nature and hardware do to the rays of a satellite, one file a cause.
+//! Effects of nature and hardware on the rays of a satellite, one file for each cause.
 
 pub mod antenna;
 pub mod bdgim;

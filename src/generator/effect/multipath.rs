@@ -15,7 +15,7 @@ use gnss::satellite::Sv;
 use gnss::signal::Signal;
 use gnss::time::Epoch;
 
-/// Where a ray's detour comes from.
+/// Geometry of a reflected ray's detour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Detour {
     /// The excess at the scene's start and its rate.
@@ -42,13 +42,13 @@ pub enum Detour {
 /// One reflected ray.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Echo {
-    /// How much longer its way is.
+    /// Additional path length.
     pub detour: Detour,
-    /// Of the direct ray's.
+    /// Amplitude relative to the direct ray.
     pub amplitude: f64,
-    /// What the reflection adds to the carrier, in cycles; the field turned round is half a cycle.
+    /// Carrier phase that the reflection adds, in cycles; a reversal of the field is half a cycle.
     pub phase_cycles: f64,
-    /// Those that have it; all if the list is empty.
+    /// Satellites that have the echo; all if the list is empty.
     pub satellites: Vec<Sv>,
 }
 
@@ -69,7 +69,7 @@ impl Multipath {
         distance_m - self.towards(azimuth_rad).dot(&(user_m - self.origin_m))
     }
 
-    /// What a detour adds to the path along `sight`; `None` where nothing is reflected.
+    /// Additional path length of a detour along `sight`, in metres; `None` where nothing is reflected.
     pub fn excess_m(&self, detour: &Detour, sight: &Sight) -> Option<f64> {
         let wave = (sight.user_m - sight.satellite.position_m) / sight.range_m;
         let excess_m = match *detour {

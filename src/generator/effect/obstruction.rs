@@ -1,5 +1,4 @@
-//! What obstructs the sky: a horizon by azimuth, a sector up to a roof, or buildings by their
-//! place.
+//! Obstructions of the sky: a horizon by azimuth, a sector up to a roof, or buildings at given positions.
 //!
 //! Horizon and sector take their loss from power within an edge of given width. A building is four walls;
 //! each is a screen whose nearest edge diffracts (ITU-R P.526-15, 4.1, equation 31), so that the edge of its

@@ -22,12 +22,13 @@ const MODIFIED_HEIGHT_M: f64 = 506.7e3;
 /// Mean radius of the Earth where no map gives one.
 pub const EARTH_RADIUS_M: f64 = 6371e3;
 
-/// How a vertical column becomes a slant one.
+/// Conversion of a vertical electron content to a slant one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mapping {
     /// 1/cos of the zenith angle at the shell.
     SingleLayer,
-    /// The same with 0.9782 of the zenith angle and a shell at 506.7 km, close to a Chapman profile's.
+    /// Modified single-layer mapping: 0.9782 of the zenith angle and a shell at 506.7 km, close to a Chapman
+    /// profile.
     ModifiedSingleLayer,
 }
 
@@ -42,7 +43,7 @@ pub struct Shell {
     pub mapping: Mapping,
 }
 
-/// Where a line of sight meets the shell.
+/// Point at which a line of sight crosses the shell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pierce {
     /// Geocentric latitude.
@@ -54,8 +55,9 @@ pub struct Pierce {
 }
 
 impl Shell {
-    /// Where the line from a `user` on the ground towards `look` leaves the shell; below the horizon the line
-    /// goes through the Earth and leaves on the far side, so that nothing steps at 0°.
+    /// Computes the point at which the line from a `user` on the ground towards `look` leaves the shell.
+    /// Below the horizon the line crosses the Earth and leaves on the far side, so the result is continuous
+    /// at 0°.
     pub fn pierce(&self, user: Geodetic, look: Look) -> Pierce {
         let zenith_angle = |share: f64, height_m: f64| {
             let zenith_rad = share * (FRAC_PI_2 - look.elevation_rad);
@@ -80,18 +82,18 @@ impl Shell {
     }
 }
 
-/// Where the vertical electron content comes from.
+/// Source of the vertical electron content.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Content {
-    /// The same above every place at every time, in TEC units.
+    /// Constant content everywhere at all times, in TEC units.
     Constant(f64),
     /// Off maps, in which the time of the scene is `later_s` later.
     Maps {
         /// The maps of the file.
         maps: Box<Maps>,
-        /// By how much the scene's time is later in the maps.
+        /// Time of the maps minus time of the scene, in seconds.
         later_s: f64,
-        /// How values between two maps are found.
+        /// Method of interpolation between two maps.
         interpolation: Interpolation,
     },
 }
@@ -101,7 +103,7 @@ pub enum Content {
 pub struct ShellIonosphere {
     /// Vertical content by place and time.
     pub content: Content,
-    /// Where the electrons are taken to be.
+    /// Shell in which the electrons are assumed.
     pub shell: Shell,
 }
 

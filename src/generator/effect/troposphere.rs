@@ -84,7 +84,7 @@ pub fn zenith_wet_m(temperature_k: f64, vapour_hpa: f64) -> f64 {
     0.002_277 * (1255.0 / temperature_k + 0.05) * vapour_hpa
 }
 
-/// Where pressure, temperature and humidity come from.
+/// Source of pressure, temperature and humidity.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Air {
     /// One weather, and the standard atmosphere's change with height.
@@ -130,7 +130,7 @@ impl Troposphere {
         2.0 * self.upward_m(Geodetic { height_m, ..user }, 0.0, at) - self.upward_m(user, below_rad, at)
     }
 
-    /// The same of a ray from the horizon or above.
+    /// Slant delay in metres of a ray from the horizon or above.
     fn upward_m(&self, user: Geodetic, elevation_rad: f64, at: Epoch) -> f64 {
         let (zenith_hydrostatic_m, zenith_wet_m) = self.zenith_m(user, at);
         if zenith_hydrostatic_m <= 0.0 {
@@ -141,8 +141,8 @@ impl Troposphere {
     }
 }
 
-/// Of a ray from below the horizon the angle below it, bounded, and the height of its lowest point. Beyond
-/// the ray that grazes the ground the angle comes to rest within [`BENT_RAD`].
+/// Bounded angle below the horizon and height of the lowest point, for a ray from below the horizon. Beyond
+/// the ray that grazes the ground the angle stays within [`BENT_RAD`].
 fn lowest_point(height_m: f64, below_rad: f64) -> (f64, f64) {
     let radius_m = EARTH_RADIUS_M + height_m;
     let grazing_rad = libm::acos((EARTH_RADIUS_M / radius_m).min(1.0));

@@ -88,7 +88,8 @@ impl WindUp {
         heading + origin + (rest - rest.round()) + fast
     }
 
-    /// What the geometry gives modulo one, and what the spin adds with its turns counted.
+    /// Geometric wind-up modulo one cycle, and the wind-up of the antenna's spin with its turns counted, in
+    /// cycles.
     fn slow_cycles(&self, sight: &Sight, t_s: f64) -> (f64, f64) {
         let wave = (sight.user_m - sight.satellite.position_m) / sight.range_m;
         let Some(body) = self.trajectory.orientation(t_s) else { return (0.0, 0.0) };
@@ -122,7 +123,7 @@ impl WindUp {
         (angle_cycles(&wave, &satellite, &still), -sense * (body.spin_cycles + beyond))
     }
 
-    /// The same with its turns counted from knot to knot of the trajectory.
+    /// Wind-up of the heading in cycles, with its turns counted from knot to knot of the trajectory.
     fn heading_cycles(&self, t_s: f64) -> f64 {
         let raw = self.trajectory.heading_cycles(t_s);
         if let Some(grown) = self.trajectory.grown() {

@@ -1,5 +1,5 @@
-//! What changes too quickly for knots: the noise of the receiver's oscillator, scintillation, faults of
-//! satellites' clocks.
+//! Phases that change too quickly for knots: noise of the receiver's oscillator, scintillation, and faults of
+//! satellite clocks.
 //!
 //! Such a thing is known at nodes on an absolute grid of samples, less than a millisecond apart, and is
 //! linear between them, but for a clock that steps at one; runs of the synthesiser end at nodes, so samples
@@ -17,7 +17,7 @@ use crate::clock::nodes::Nodes;
 use gnss::satellite::Sv;
 use gnss::time::{Rate, SampleClock};
 
-/// What is added to a satellite's signal at one sample.
+/// Phase and amplitude that are added to a satellite's signal at one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FastPhase {
     /// To the delay of the code.
@@ -42,10 +42,10 @@ impl FastPhase {
     }
 }
 
-/// What moves the phases of a scene's signals quickly.
+/// Sources that change the phases of a scene's signals quickly.
 #[derive(Clone, Copy, Debug)]
 pub struct Sources<'a> {
-    /// Where it is known.
+    /// Nodes at which the phases are computed.
     pub nodes: Nodes,
     /// Sample numbers as readings of the receiver's clock.
     pub clock: SampleClock,
@@ -58,7 +58,7 @@ pub struct Sources<'a> {
 }
 
 impl Sources<'_> {
-    /// Whether any of them moves a signal that fades with satellite `fading`.
+    /// True if any source changes a signal that fades with satellite `fading`.
     fn any(&self, fading: Option<Sv>) -> bool {
         self.receiver_clock.oscillator.is_some()
             || self.scintillation.is_some()

@@ -18,21 +18,21 @@ pub struct Change {
     pub from_node: u64,
     /// Number of the node at which it ends.
     pub until_node: u64,
-    /// What it does between them.
+    /// Effect on the clock between the two nodes.
     pub kind: ChangeKind,
 }
 
-/// What a change does to the clock.
+/// Kind of a clock change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ChangeKind {
     /// Ahead by so much between the nodes.
     Step {
-        /// By how much the clock is ahead.
+        /// Clock offset in seconds, positive ahead.
         step_s: f64,
     },
     /// Gains so much a second between the nodes and keeps what it gained.
     Ramp {
-        /// What it gains, in seconds a second.
+        /// Drift in s/s.
         drift: f64,
     },
 }
@@ -46,12 +46,12 @@ pub struct SatelliteClock {
     pub noise: Vec<Oscillator>,
 }
 
-/// Those clocks that depart.
+/// Clocks of the satellites that differ from the broadcast.
 #[derive(Debug, Default)]
 pub struct SatelliteClocks {
     /// The departing clocks by satellite.
     pub clocks: BTreeMap<Sv, SatelliteClock>,
-    /// What they do, for the plan.
+    /// Descriptions of the clock errors for the plan.
     pub descriptions: Vec<String>,
 }
 
@@ -80,7 +80,7 @@ impl SatelliteClock {
         })
     }
 
-    /// The same at a place between samples.
+    /// Clock minus its broadcast value, in seconds, at a position between samples.
     pub fn at_s(&self, sources: &Sources<'_>, sample: f64) -> f64 {
         let place = sources.nodes.place(sources.clock.rate, sample);
         let node = place.floor();

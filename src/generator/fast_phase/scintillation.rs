@@ -58,7 +58,7 @@ const BANDS_HZ: [f64; 11] = [
 /// Place of the reference among them.
 const REFERENCE: usize = 8;
 
-/// How strong a scintillation is, on L1.
+/// Strength of a scintillation on L1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Strength {
     /// Standard deviation of the intensity over its mean.
@@ -72,12 +72,12 @@ pub struct Strength {
 }
 
 impl Strength {
-    /// Whether it changes anything.
+    /// True if the strength changes any signal.
     pub fn is_felt(&self) -> bool {
         self.s4 > 0.0 || self.sigma_phi_rad.is_some_and(|sigma| sigma > 0.0)
     }
 
-    /// The same on another carrier.
+    /// Strength scaled to another carrier.
     fn on(&self, carrier_hz: f64) -> Self {
         let ratio = REFERENCE_HZ / carrier_hz;
         Self {
@@ -131,7 +131,7 @@ impl Strength {
 }
 
 impl Fade {
-    /// Of a strength on a carrier.
+    /// Creates the fading of a strength on a carrier.
     fn new(strength: &Strength, carrier_hz: f64) -> Self {
         let own = strength.on(carrier_hz);
         let apart = |band_hz: &f64| libm::log(band_hz / carrier_hz).abs();
@@ -149,7 +149,7 @@ impl Fade {
 /// The fading of every satellite in a scene.
 #[derive(Debug)]
 pub struct Scintillation {
-    /// How strong it is, and for whom.
+    /// Strength of the scintillation, and the satellites that it affects.
     pub strength: Strength,
     /// Nodes of the fast phase in one of the fading.
     step: u64,
@@ -159,12 +159,12 @@ pub struct Scintillation {
     fades: Mutex<BTreeMap<(Sv, u64), Fade>>,
 }
 
-/// What is known of a satellite's fading on a carrier.
+/// State of a satellite's fading on a carrier.
 #[derive(Debug)]
 struct Fade {
     /// Share of the mean.
     share: f64,
-    /// Of the added phase noise.
+    /// Standard deviation of the added phase noise, in radians.
     added_rad: f64,
     /// Place of the carrier's ξ among the bands'.
     band: usize,

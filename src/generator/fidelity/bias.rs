@@ -1,4 +1,4 @@
-//! What edges between samples do to a code: errors of pseudoranges by waveform and sample rate.
+//! Code bias of the edge models: pseudorange errors by waveform and sample rate.
 //!
 //! Where a Doppler moves the code over the samples the error moves with it and a loop averages it; a code at
 //! rest keeps it.
@@ -28,9 +28,9 @@ pub fn code_bias_m(edge: CodeEdge, signal: &Signal, rate_hz: f64) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The same where a Doppler of the carrier moves the code over the grid, behind a code loop of `LOOP_HZ`: the
-/// error repeats with each sample that the code moves by, and a first-order loop of noise bandwidth B passes
-/// `1 / √(1 + (2πν / 4B)²)` of it.
+/// Error in metres of a signal's code if a Doppler of the carrier moves the code over the sampling grid,
+/// behind a code loop of `LOOP_HZ`. The error repeats with each sample that the code moves by. A first-order
+/// loop of noise bandwidth B passes `1 / √(1 + (2πν / 4B)²)` of it.
 pub fn moving_bias_m(edge: CodeEdge, signal: &Signal, rate_hz: f64, doppler_hz: f64) -> f64 {
     let samples_per_s = doppler_hz / signal.centre_hz() * rate_hz;
     code_bias_m(edge, signal, rate_hz) / libm::hypot(1.0, std::f64::consts::TAU * samples_per_s / (4.0 * LOOP_HZ))
@@ -54,8 +54,8 @@ pub fn allowed_m(cn0_dbhz: Option<f64>) -> f64 {
     })
 }
 
-/// The same where every chip meets the same few places between samples, as it does where a fold is a whole
-/// number of chip rates away; zero where none is.
+/// Error in metres of a signal's code if every chip meets the same few positions between samples. This occurs
+/// if a fold is a whole number of chip rates away. The error is zero otherwise.
 pub(super) fn standing_bias_m(edge: CodeEdge, signal: &Signal, rate_hz: f64) -> f64 {
     let of = |component: &Component| {
         let folds = Folds::new(edge, component, rate_hz);

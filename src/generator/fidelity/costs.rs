@@ -1,4 +1,4 @@
-//! What samples of a signal cost in the kernels, as the bench `trade` measured it.
+//! Cost of a signal's samples in the kernels, as the bench `trade` measured it.
 
 use std::sync::LazyLock;
 

@@ -1,4 +1,4 @@
-//! What the synthesiser will do for a scene: knots, memory and speed.
+//! Work of the synthesiser for a scene: knots, memory and speed.
 
 use std::time::Instant;
 
@@ -13,14 +13,14 @@ use crate::synth::{Edge, RUN_SAMPLES};
 /// Roots of each satellite's grid that a plan looks at.
 const PLANNED_ROOTS: u64 = 16;
 
-/// What the plan cannot know of itself.
+/// Figures of the synthesiser that depend on the scene and the machine.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Machinery {
     /// Shortest and longest time between knots of the signal's delay, and why it is that.
     pub knot_spacing_s: f64,
     /// Longest time between knots.
     pub longest_knot_spacing_s: f64,
-    /// Why they are so.
+    /// Reason for the knot spacing.
     pub knot_reason: String,
     /// Memory of the generator's blocks, which does not grow with the scene.
     pub block_bytes: u64,
@@ -29,8 +29,7 @@ pub struct Machinery {
     pub knots_s: f64,
 }
 
-/// What the plan reports of the synthesiser: knots met along the scene, memory of a batch, and the usual
-/// speed.
+/// Computes the synthesiser's figures: knots along the scene, memory of a batch, and the usual speed.
 ///
 /// # Errors
 /// Those of orbits.

@@ -1,4 +1,4 @@
-//! What a scene has and what it has not, by the tables of its scenario.
+//! Models that a scene contains, and models that it does not, by the tables of its scenario.
 
 use super::Model;
 use crate::scene::{CodeEdge, Scene, is_outside};

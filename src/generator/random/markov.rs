@@ -16,24 +16,24 @@ pub type State = [f64; 2];
 pub enum Process {
     /// Phase that walks; `level` is its variance a second, h0 / 2.
     WhiteFrequency {
-        /// Its variance a second.
+        /// Variance per second.
         level: f64,
     },
     /// Frequency that walks; `level` is its variance a second, 2 π² h−2.
     FrequencyWalk {
-        /// Its variance a second.
+        /// Variance per second.
         level: f64,
     },
     /// Frequency that returns to zero; stationary `variance`.
     Frequency {
-        /// Its stationary variance.
+        /// Stationary variance.
         variance: f64,
         /// Time after which its autocorrelation is 1/e.
         tau_s: f64,
     },
     /// Phase that returns to zero; stationary `variance` in s².
     Phase {
-        /// Its stationary variance.
+        /// Stationary variance in s².
         variance: f64,
         /// Time after which its autocorrelation is 1/e.
         tau_s: f64,
@@ -93,7 +93,7 @@ impl Process {
         }
     }
 
-    /// What steps the process by `dt_s`.
+    /// Computes the step of the process over `dt_s`.
     pub fn step(self, dt_s: f64) -> Step {
         let Covariance { xx, xy, yy } = self.gained(dt_s);
         let slope = if yy > 0.0 { xy / yy } else { 0.0 };
@@ -101,7 +101,8 @@ impl Process {
         Step { transition: self.transition(dt_s), frequency: yy.sqrt(), slope, own }
     }
 
-    /// What a path of `steps` steps of `dt_s` gains, at each of them, from a change of its end.
+    /// Gain matrices of a path of `steps` steps of `dt_s`: the response at each step to a change of the
+    /// path's end.
     pub fn bridge(self, dt_s: f64, steps: usize) -> Vec<Matrix> {
         let whole = self.gained(dt_s * steps as f64);
         let inverse = inverse(whole);

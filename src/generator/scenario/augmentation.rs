@@ -16,7 +16,7 @@ use gnss::satellite::{Sv, System};
 /// `[sbas]`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SbasSpec {
-    /// Whether the system says that it is in test mode.
+    /// True if the system reports test mode.
     pub test: bool,
     /// Satellites that it says must not be used.
     pub do_not_use: Vec<Sv>,
@@ -64,7 +64,7 @@ impl Scenario {
     }
 }
 
-/// What a fault does to clocks. Its times are those of arrival, a fifteenth of a second after sending.
+/// Clock errors of a fault. Its times are those of arrival, a fifteenth of a second after sending.
 fn departures(fault: &SatelliteFault) -> Vec<(Sv, Departure)> {
     let each = |satellites: &[Sv], departure: Departure| satellites.iter().map(|sv| (*sv, departure.clone())).collect();
     match fault {

@@ -1,5 +1,4 @@
-//! What of the spectrum a front end's samples hold: where they are centred, and which signals lie in their
-//! band.
+//! Band of a front end's samples: its centre frequency, and the signals that lie in it.
 
 use super::front_end::{FrontEnd, Tuned, is_place_of_real};
 use super::{Overrides, Scenario, ScenarioError};

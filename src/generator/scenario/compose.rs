@@ -35,18 +35,18 @@ use gnss::time::SampleClock;
 /// user, are no longer a receiver's world.
 const LARGEST_SPEED_MPS: f64 = 0.1 * SPEED_OF_LIGHT_MPS;
 
-/// What the command line changes in a scenario.
+/// Values of a scenario that the command line overrides.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Overrides {
     /// In place of the scenario's.
     pub seed: Option<u64>,
-    /// Of every front end.
+    /// Sample format of every front end.
     pub format: Option<Format>,
-    /// Whether files may lie outside the scenario's directory.
+    /// True if files may lie outside the scenario's directory.
     pub allow_outside: bool,
 }
 
-/// What the front ends of a scene have in common.
+/// Parts that the front ends of a scene share.
 struct World {
     seed: u64,
     nodes: Nodes,
@@ -64,7 +64,7 @@ struct World {
     scintillation: Option<Arc<Scintillation>>,
 }
 
-/// What the samples of a front end are.
+/// Band and format of a front end's samples.
 struct Band<'s> {
     front_end: &'s FrontEnd,
     metadata: IfMetadata,
@@ -165,7 +165,7 @@ impl Scenario {
         self.conflict(key, error.to_string())
     }
 
-    /// What front ends share. Nothing in it depends on which of them there are.
+    /// Composes the parts that front ends share. They do not depend on the choice of front ends.
     fn world(&self, bands: &[Band<'_>], files: &Files<'_>, warnings: &mut Vec<String>) -> Result<World, ScenarioError> {
         let Files { directory, overrides } = *files;
         let trajectory = self.turned(self.trajectory_of(&self.motion, directory, overrides, warnings)?)?;

@@ -50,7 +50,7 @@ fn terms(table: &Table<'_>) -> Result<Terms, ScenarioError> {
 }
 
 impl Scenario {
-    /// What is wrong with satellites and messages, as the judge needs it.
+    /// Lists the faults of satellites and messages in the form that the judge needs.
     pub(super) fn faults(&self) -> Vec<Fault> {
         let fault = |kind: FaultKind, satellites: Option<&[_]>, from_s, to_s| Fault {
             kind,

@@ -7,7 +7,7 @@ use super::{Overrides, Scenario, ScenarioError};
 /// Largest navigation file, packed.
 const MAX_NAVIGATION_BYTES: u64 = 64 << 20;
 
-/// Where a scenario's files are.
+/// Location of a scenario's files.
 pub(super) struct Files<'a> {
     pub directory: &'a Path,
     pub overrides: &'a Overrides,

@@ -16,7 +16,7 @@ const MOST: usize = 16;
 /// Sample rate where none is written.
 const RATE_HZ: f64 = 2.6e6;
 
-/// What its samples are centred on.
+/// Frequency on which the samples are centred.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tuned {
     /// The carrier of its first signal appears there in the samples.
@@ -24,7 +24,7 @@ pub enum Tuned {
         /// The carrier's frequency in the samples.
         if_hz: f64,
     },
-    /// That radio frequency appears at 0 Hz.
+    /// Radio frequency that appears at 0 Hz.
     Centre {
         /// Radio frequency at 0 Hz in the samples.
         center_hz: f64,
@@ -38,24 +38,24 @@ pub struct FrontEnd {
     pub name: Option<String>,
     /// The sample rate.
     pub rate: Rate,
-    /// Which frequencies the samples hold.
+    /// Tuning: the frequencies that the samples contain.
     pub tuned: Tuned,
-    /// Whether the spectrum is mirrored.
+    /// True if the spectrum is mirrored.
     pub inverted: bool,
-    /// How samples are packed.
+    /// Packing of the samples.
     pub format: Format,
     /// The gain, if the scenario sets it.
     pub noise_lsb: Option<f32>,
     /// The signals that it is for; absent means those of the scene's that reach into its band.
     pub signals: Option<Vec<&'static Signal>>,
-    /// What the hardware does to them.
+    /// Hardware stages that act on the samples.
     pub stages: Stages,
-    /// How they are made.
+    /// Fidelity of the samples.
     pub fidelity: Wishes,
 }
 
 impl FrontEnd {
-    /// Its first signal in a scene with `signals`.
+    /// Returns the first signal of the front end in a scene with `signals`.
     pub(super) fn first_signal(&self, signals: &[&'static Signal]) -> Option<&'static Signal> {
         self.signals.as_deref().unwrap_or(signals).first().copied()
     }
@@ -129,7 +129,7 @@ pub(super) fn front_ends(root: &Table<'_>, allowed_m: f64, refusals: &mut Refusa
     Some(found)
 }
 
-/// What may be at the top of a scenario but not beside several front ends.
+/// Errors for keys at the top of a scenario that are not allowed beside several front ends.
 fn alone(root: &Table<'_>, count: usize) -> Vec<ScenarioError> {
     let mut refused = Vec::new();
     for table in ["local_oscillator", "filter", "iq", "adc"].into_iter().filter(|table| root.has(table)) {
@@ -148,7 +148,7 @@ fn alone(root: &Table<'_>, count: usize) -> Vec<ScenarioError> {
     refused
 }
 
-/// What the tables of front ends have in common.
+/// Reader of the tables of front ends, with their common values.
 struct Reader<'r, 't> {
     root: &'r Table<'t>,
     many: bool,
@@ -252,8 +252,8 @@ fn format(table: &Table<'_>) -> Result<Format, ScenarioError> {
     }
 }
 
-/// Whether real samples can hold a carrier there: above half the rate they hold a band folded, as bandpass
-/// sampling does; on a multiple of it, one over itself.
+/// True if real samples can contain a carrier at this frequency. Above half the rate they contain a folded
+/// band, as in bandpass sampling. On a multiple of half the rate the band overlaps itself.
 pub(super) fn is_place_of_real(if_hz: f64, rate: Rate) -> bool {
     if_hz > 0.0 && (if_hz / (0.5 * rate.hz())).fract() != 0.0
 }

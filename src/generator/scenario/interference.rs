@@ -12,7 +12,7 @@ use gnss::gps::l1ca::L1_CA;
 use gnss::samples::Format;
 use gnss::satellite::Sv;
 
-/// How strong an interferer is.
+/// Strength of an interferer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Strength {
     /// Over `power.cn0_dbhz`, or behind a link budget over the strongest satellite at the scene's start, at
@@ -36,7 +36,7 @@ pub enum Strength {
 }
 
 impl Strength {
-    /// Its key in a scenario.
+    /// Key of the strength in a scenario.
     pub fn key(&self) -> &'static str {
         match self {
             Self::OverSignal { .. } => "js_db",
@@ -46,7 +46,7 @@ impl Strength {
     }
 }
 
-/// What it sends, as written.
+/// Waveform of an interferer, as written.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Kind {
     /// A continuous wave.
@@ -92,17 +92,17 @@ pub enum Kind {
     Recording {
         /// The file.
         path: PathBuf,
-        /// How its samples are packed.
+        /// Packing of the file's samples.
         format: Format,
-        /// Its sample rate.
+        /// Sample rate of the file, in Hz.
         rate_hz: f64,
-        /// Whether it begins anew at its end.
+        /// True if the file restarts at its end.
         repeat: bool,
     },
 }
 
 impl Kind {
-    /// Its name in a scenario.
+    /// Name of the waveform in a scenario.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Cw => "cw",
@@ -120,24 +120,24 @@ impl Kind {
 /// One `[[interference]]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InterferenceSpec {
-    /// What it sends.
+    /// Waveform of the source.
     pub kind: Kind,
     /// Radio frequency of its centre.
     pub center_hz: f64,
     /// How strong it is.
     pub strength: Strength,
-    /// Where it is; absent where it has no place.
+    /// Position of the source; absent for a source without one.
     pub place: Option<Geodetic>,
     /// True time since the scene's start; to the scene's end if absent.
     pub on_s: f64,
-    /// When it is switched off; never where absent.
+    /// Time of switching off, in seconds; absent means never.
     pub off_s: Option<f64>,
 }
 
 /// `[spoofer.drag]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DragSpec {
-    /// When it begins, true seconds since the scene's start.
+    /// Start of the drag, in true seconds since the scene's start.
     pub start_s: f64,
     /// Direction of the drag, clockwise from north.
     pub azimuth_rad: f64,
@@ -154,19 +154,19 @@ pub struct DragSpec {
 pub struct SpooferSpec {
     /// Power over the true signals'.
     pub advantage: Advantage,
-    /// When it is switched on, true seconds since the scene's start.
+    /// Time of switching on, in true seconds since the scene's start.
     pub on_s: f64,
-    /// When it is switched off; never where absent.
+    /// Time of switching off, in seconds; absent means never.
     pub off_s: Option<f64>,
     /// Satellites that it imitates; absent means all in view of the claimed place.
     pub satellites: Option<Vec<Sv>>,
-    /// Its clock minus GPS time at the scene's start.
+    /// Clock minus GPS time at the scene's start, in seconds.
     pub clock_bias_s: f64,
     /// Gain of its clock, in seconds a second.
     pub clock_drift: f64,
     /// The claimed motion; absent means that of the antenna.
     pub motion: Option<MotionSpec>,
-    /// How the claimed place is moved; absent means that it stays.
+    /// Drag of the claimed position; absent means that it stays.
     pub drag: Option<DragSpec>,
 }
 

@@ -1,4 +1,4 @@
-//! How strong the satellites are, as written: a link budget, or fixed ratios.
+//! Signal power as written: a link budget, or fixed ratios.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -14,10 +14,10 @@ use gnss::gps::l1ca::L1_CA;
 use gnss::satellite::Sv;
 use gnss::signal::Signal;
 
-/// How strong the satellites are.
+/// Power of the satellites' signals.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Power {
-    /// The same for all but those listed.
+    /// One C/N0 for all satellites except those listed.
     Fixed {
         /// C/N0 of all satellites without a value of their own, in dB-Hz.
         cn0_dbhz: f64,
@@ -44,16 +44,16 @@ pub enum Power {
 /// The antennas of the satellites that a scene does not name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transmit {
-    /// That of one block for all satellites.
+    /// Antenna of one block for all satellites.
     Block(Block),
-    /// What flew at the scene's date.
+    /// Antennas of the satellites that were in orbit at the scene's date.
     Constellation,
 }
 
 /// The receiving antenna, with its file not yet read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum AntennaSpec {
-    /// The same gain in every direction.
+    /// Antenna with equal gain in every direction.
     Isotropic,
     /// A patch antenna.
     Patch,

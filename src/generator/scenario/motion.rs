@@ -9,7 +9,7 @@ use crate::vehicle::rocket::Rocket;
 use crate::vehicle::route::{Limits, Turning, Waypoint};
 use gnss::earth::Geodetic;
 
-/// How a trajectory file is written.
+/// Format of a trajectory file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileKind {
     /// Rows of time and place.
@@ -27,27 +27,27 @@ pub enum MotionSpec {
     Waypoints {
         /// The places, with the speeds between them.
         points: Vec<Waypoint>,
-        /// What accelerations the route may have.
+        /// Limits of the route's acceleration.
         limits: Limits,
     },
     /// Rows of a file.
     File {
         /// The file.
         path: PathBuf,
-        /// What the file holds.
+        /// Format of the file.
         kind: FileKind,
         /// Longest time between two rows.
         max_gap_s: f64,
-        /// How far the motion may be from its rows.
+        /// Largest distance in metres between the motion and its rows.
         tolerance_m: Option<f64>,
     },
     /// A powered flight.
     Rocket(Rocket),
     /// A free flight round the Earth.
     Orbit(Orbit),
-    /// What is pushed while the scene is sent, tick by tick.
+    /// Motion that is pushed while the scene is sent, tick by tick.
     Pushed {
-        /// Where it rests before the first push.
+        /// Position before the first push.
         place: Geodetic,
         /// Length of a tick.
         tick_s: f64,
@@ -60,7 +60,7 @@ pub enum MotionSpec {
     },
     /// The ticks of a live run again.
     Ticks {
-        /// Their log.
+        /// Path of the log of ticks.
         path: PathBuf,
         /// Table of what was switched meanwhile.
         events: Option<PathBuf>,

@@ -1,4 +1,4 @@
-//! What obstructs the sky, as written: `[[obstruction]]`.
+//! Obstructions of the sky, as written: `[[obstruction]]`.
 
 use super::ScenarioError;
 use super::read::Table;

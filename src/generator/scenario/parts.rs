@@ -22,8 +22,8 @@ use gnss::satellite::{Sv, System};
 use gnss::signal::Signal;
 use gnss::time::{BDT, Epoch, TimePolynomial, WEEK_S};
 
-/// How long before a change of UTC's whole seconds it is announced, and sent: about half a year (IERS,
-/// Bulletin C, which comes out in January and July).
+/// Time in seconds between the announcement of a leap second and its date: about half a year. Satellites send
+/// it from then on (IERS, Bulletin C, which appears in January and July).
 const ANNOUNCED_S: f64 = 26.0 * WEEK_S as f64;
 /// Step of the reference time of UTC's polynomial (IS-GPS-200N, table 20-IX).
 const UTC_STEP_S: i64 = 4096;
@@ -35,7 +35,7 @@ const LISTED: usize = 4;
 /// Orbits, messages, and who is left out.
 pub(super) struct Sky {
     pub catalogue: Catalogue,
-    /// What they say alike.
+    /// Parameters that all satellites send alike.
     pub common: Common,
     pub excluded: Vec<Sv>,
 }
@@ -103,7 +103,7 @@ fn middle(file: &Navigation) -> Option<Epoch> {
     times.get(times.len() / 2).map(|middle| Epoch::new(*middle, 0.0))
 }
 
-/// How far a file is from a time.
+/// Time in seconds between a file's data and a time.
 fn far_s(file: &Navigation, at: Epoch) -> f64 {
     middle(file).map_or(f64::INFINITY, |middle| at.since(middle).abs())
 }
@@ -222,7 +222,7 @@ pub(super) fn sky(
     Ok(Sky { catalogue, common, excluded })
 }
 
-/// Why a message of the scene cannot carry a set; `None` where all can.
+/// Reason for which a message of the scene cannot carry an ephemeris; `None` if all can.
 fn unsendable(scenario: &Scenario, set: &Ephemeris) -> Option<String> {
     let own = scenario.signals.iter().filter(|signal| signal.system == set.sv.system);
     let mut sent = own.flat_map(|signal| signal.components.iter().filter_map(|c| Some((signal.time, c.message?))));
@@ -238,7 +238,8 @@ fn unsendable(scenario: &Scenario, set: &Ephemeris) -> Option<String> {
     })
 }
 
-/// Which satellites have no group delay of a signal by a record of its own message; `None` where all have.
+/// Names of the satellites without a group delay of a signal in a record of its own message; `None` if all
+/// have one.
 fn without_delays(catalogue: &Catalogue, signal: &Signal, at: Epoch) -> Option<String> {
     let sends = |sv: &Sv| sv.system == signal.system && (signal.sent)(sv.number, at);
     let sets: Vec<&Ephemeris> =
@@ -275,7 +276,7 @@ pub(super) fn utc(scenario: &Scenario, navigation: &Navigation) -> UtcData {
     UtcData { leap_s, polynomial: navigation.utc, event }
 }
 
-/// What the satellites send about the ionosphere is what the scenario gives, or what the file says.
+/// Ionosphere and time parameters that satellites send: those of the scenario, or those of the file.
 fn common(scenario: &Scenario, navigation: &Navigation, almanac: Vec<Ephemeris>) -> Common {
     let given = scenario.ionosphere.as_ref().and_then(Ionosphere::sent);
     Common {
@@ -292,7 +293,7 @@ fn common(scenario: &Scenario, navigation: &Navigation, almanac: Vec<Ephemeris>)
     }
 }
 
-/// Those who encode what satellites say.
+/// Creates the encoders of the satellites' messages.
 pub(super) fn messages(scenario: &Scenario, common: &Common) -> Result<Senders, ScenarioError> {
     let scene = scenario.ionosphere.as_ref();
     let is_given = scene.is_some_and(|own| own.sent().is_some() || own.sent_bdgim_tecu().is_some());
@@ -301,15 +302,15 @@ pub(super) fn messages(scenario: &Scenario, common: &Common) -> Result<Senders, 
         .map_err(|e| scenario.conflict(key, format!("the navigation message cannot carry it: {e}")))
 }
 
-/// What BeiDou's satellites of the third generation send of the ionosphere: as the scene has it, or else the
-/// file.
+/// BDGIM coefficients that BeiDou's satellites of the third generation send: those of the scene, or those of
+/// the file.
 fn bdgim(scenario: &Scenario, navigation: &Navigation) -> Option<Bdgim> {
     let given = scenario.ionosphere.as_ref().and_then(Ionosphere::sent_bdgim_tecu);
     given.map_or(navigation.bdgim, Bdgim::given)
 }
 
-/// What NavIC's satellites send of the ionosphere: as the file has it, or else the bulge of GPS's model,
-/// where that is the scene's or the file has nothing of NavIC.
+/// Klobuchar coefficients that NavIC's satellites send: those of the file, or GPS's model. GPS's model is
+/// used if it is the scene's, or if the file has none of NavIC.
 fn klobuchar_navic(scenario: &Scenario, navigation: &Navigation) -> Option<Klobuchar> {
     let scene = scenario.ionosphere.as_ref();
     let of_gps = scene.and_then(Ionosphere::sent);
@@ -318,8 +319,8 @@ fn klobuchar_navic(scenario: &Scenario, navigation: &Navigation) -> Option<Klobu
     own.or(of_gps.or(navigation.klobuchar).map(|model| model.bulge_on(NAVIC_HZ)))
 }
 
-/// Why no ephemeris fits: the time of the scene at which none is sent, and the nearest spans in which some
-/// are.
+/// Text of the reason for which no ephemeris fits. It has the time of the scene at which none is sent, and
+/// the nearest intervals in which some are.
 fn outside(catalogue: &Catalogue, system: System, scenario: &Scenario, end: Epoch) -> String {
     let spans = catalogue.sending(system);
     let is_within = |at: Epoch| spans.iter().any(|(from, until)| *from <= at && at < *until);

@@ -1,4 +1,4 @@
-//! What lies between satellites and antenna, as written, and the effects that it becomes.
+//! Propagation between satellites and antenna as written, and the effects that it becomes.
 
 use std::path::{Path, PathBuf};
 
@@ -22,10 +22,10 @@ use gnss::time::Epoch;
 use gnss::vienna::{Gpt3, MappingGrid, Vienna};
 use gnss::vmf3::Vmf3;
 
-/// What the ionosphere truly is, and what the satellites say that it is.
+/// True ionosphere, and the ionosphere that the satellites broadcast.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ionosphere {
-    /// What delays the signals.
+    /// Electrons that delay the signals.
     pub truth: Electrons,
     /// Coefficients that the satellites send; absent means those of `truth`, or else the navigation file's.
     pub broadcast: Option<Klobuchar>,
@@ -35,7 +35,7 @@ pub struct Ionosphere {
     pub broadcast_bdgim_tecu: Option<[f64; 9]>,
 }
 
-/// Where the electrons are.
+/// Distribution of the electrons.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Electrons {
     /// Klobuchar's model with the given coefficients, or those of the navigation file.
@@ -44,11 +44,11 @@ pub enum Electrons {
     NequickG(Option<[f64; 3]>),
     /// BDGIM with the given coefficients, or those of the navigation file.
     Bdgim(Option<Bdgim>),
-    /// The same vertical content everywhere.
+    /// Constant vertical content everywhere.
     Constant {
         /// Vertical content, in TECU.
         vtec_tecu: f64,
-        /// Where the electrons are taken to be.
+        /// Shell in which the electrons are assumed.
         shell: Shell,
     },
     /// Maps from a file; `map_start` is the instant of the maps that applies at the scene's start.
@@ -57,9 +57,9 @@ pub enum Electrons {
         file: PathBuf,
         /// The time in the file at which the scene begins; absent means the scene's own.
         map_start: Option<Epoch>,
-        /// How values between two maps are found.
+        /// Method of interpolation between two maps.
         interpolation: Interpolation,
-        /// How the delay grows towards the horizon.
+        /// Growth of the delay towards the horizon.
         mapping: Mapping,
     },
 }
@@ -111,7 +111,7 @@ fn coefficients(table: &Table<'_>, alpha: &str, beta: &str) -> Result<Option<Klo
 }
 
 impl Ionosphere {
-    /// What the satellites send, if the scenario says it.
+    /// Klobuchar coefficients that the satellites broadcast, if the scenario states them.
     pub(super) fn sent(&self) -> Option<Klobuchar> {
         self.broadcast.or(match self.truth {
             Electrons::Klobuchar(given) => given,
@@ -119,7 +119,7 @@ impl Ionosphere {
         })
     }
 
-    /// Whether Klobuchar's model is taken for true.
+    /// True if Klobuchar's model is the true ionosphere.
     pub(super) fn is_klobuchar(&self) -> bool {
         matches!(self.truth, Electrons::Klobuchar(_))
     }
@@ -209,11 +209,11 @@ pub struct NeutralAtmosphere {
     pub weather: Weather,
     /// Taken for the weather, and for the mapping if that wants coefficients.
     pub gpt3_file: Option<PathBuf>,
-    /// How the delay grows towards the horizon.
+    /// Growth of the delay towards the horizon.
     pub mapping: MappingKind,
 }
 
-/// Which mapping function is wanted.
+/// Mapping function that the scenario selects.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MappingKind {
     /// One over the sine of the elevation.

@@ -25,7 +25,7 @@ pub struct Table<'t> {
     at: usize,
     table: &'t DeTable<'t>,
     keys: &'static [Key],
-    /// What every key is, where keys are satellites.
+    /// Description of each key in a table whose keys are satellites.
     each: Option<&'static Key>,
     /// The word that says which kind of its tables it is.
     kind: Option<&'t str>,
@@ -45,7 +45,7 @@ impl<'t> Table<'t> {
         Self { source, path: path.to_owned(), at, table, keys, each: None, kind }
     }
 
-    /// The same table, known to be of this kind though it may not say so.
+    /// Returns the table with `kind` as its kind, which it need not state itself.
     pub fn of_kind(&self, kind: &'static str) -> Self {
         Self { kind: Some(kind), ..self.clone() }
     }
@@ -177,7 +177,7 @@ impl<'t> Table<'t> {
         }
     }
 
-    /// Whether the table has the key.
+    /// True if the table has the key.
     pub fn has(&self, name: &str) -> bool {
         self.get(name).is_some()
     }

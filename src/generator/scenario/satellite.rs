@@ -46,22 +46,24 @@ pub enum SatelliteFault {
     Step {
         /// The satellites concerned.
         satellites: Vec<Sv>,
-        /// By how much it is ahead.
+        /// Clock offset in seconds, positive ahead.
         step_s: f64,
-        /// When it begins, in seconds of true time since the scene's start.
+        /// Start of the fault, in seconds of true time since the scene's start.
         on_s: f64,
-        /// When it ends; to the end of the scene where absent.
+        /// End of the fault, in seconds of true time since the scene's start; absent means the end of the
+        /// scene.
         off_s: Option<f64>,
     },
     /// A clock that gains until the end and keeps what it gained.
     Ramp {
         /// The satellites concerned.
         satellites: Vec<Sv>,
-        /// What it gains, in seconds a second.
+        /// Clock drift in s/s.
         drift: f64,
-        /// When it begins, in seconds of true time since the scene's start.
+        /// Start of the fault, in seconds of true time since the scene's start.
         on_s: f64,
-        /// When it ends; to the end of the scene where absent.
+        /// End of the fault, in seconds of true time since the scene's start; absent means the end of the
+        /// scene.
         off_s: Option<f64>,
     },
     /// A clock that is noisier than it broadcasts.
@@ -81,7 +83,8 @@ pub enum SatelliteFault {
         along_m: f64,
         /// Along the angular momentum.
         cross_m: f64,
-        /// When the offset begins to grow and for how long; absent means from the beginning.
+        /// Start and duration in seconds of the offset's growth; absent means that it exists from the
+        /// beginning.
         growth_s: Option<(f64, f64)>,
     },
 }
@@ -91,15 +94,15 @@ pub enum SatelliteFault {
 pub struct MessageSpec {
     /// The satellites concerned; absent means all.
     pub satellites: Option<Vec<Sv>>,
-    /// When it begins, in seconds of true time since the scene's start.
+    /// Start of the fault, in seconds of true time since the scene's start.
     pub on_s: f64,
-    /// When it ends; to the end of the scene where absent.
+    /// End of the fault, in seconds of true time since the scene's start; absent means the end of the scene.
     pub off_s: Option<f64>,
-    /// What goes wrong.
+    /// Kind of the fault.
     pub kind: MessageKind,
 }
 
-/// What goes wrong with a message.
+/// Kind of a message fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MessageKind {
     /// Symbols that are wrong at random.
@@ -122,7 +125,7 @@ pub enum MessageKind {
     Parameter {
         /// Name in the message's table.
         name: &'static str,
-        /// What is added, in the parameter's unit.
+        /// Value that is added, in the parameter's unit.
         add: f64,
     },
     /// Alert pages in place of all others.
@@ -273,7 +276,7 @@ impl OrbitsSpec {
     }
 }
 
-/// What a fault of true orbits comes to; those of no size are left out.
+/// Displacements of the true orbits that faults cause; those of zero size are left out.
 pub(super) fn departures(scenario: &Scenario) -> Vec<Displacement> {
     let departure = |fault: &SatelliteFault| match fault {
         SatelliteFault::Orbit { satellites, radial_m, along_m, cross_m, growth_s } => {

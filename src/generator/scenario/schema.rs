@@ -7,7 +7,7 @@
 
 use std::fmt::Write as _;
 
-/// What a key's value may be.
+/// Permitted values of a key.
 #[derive(Clone, Copy, Debug)]
 pub enum Value {
     /// A number.
@@ -16,18 +16,18 @@ pub enum Value {
         least: f64,
         /// The largest allowed.
         most: f64,
-        /// Its unit.
+        /// Unit of the number.
         unit: &'static str,
     },
     /// An array of so many numbers.
     Numbers {
-        /// How many.
+        /// Number of elements.
         count: usize,
         /// The smallest allowed.
         least: f64,
         /// The largest allowed.
         most: f64,
-        /// Its unit.
+        /// Unit of the numbers.
         unit: &'static str,
     },
     /// An array of any number of numbers.
@@ -36,7 +36,7 @@ pub enum Value {
         least: f64,
         /// The largest allowed.
         most: f64,
-        /// Its unit.
+        /// Unit of the numbers.
         unit: &'static str,
     },
     /// A whole number.
@@ -72,14 +72,14 @@ pub enum Value {
     Foreign(&'static str),
 }
 
-/// What holds if a key is absent.
+/// Meaning of an absent key.
 #[derive(Clone, Copy, Debug)]
 pub enum Absent {
     /// The scenario is refused.
     Required,
     /// Nothing of the kind.
     Optional,
-    /// This number.
+    /// Default number.
     Number(f64),
     /// Something else, in words.
     Means(&'static str),
@@ -88,15 +88,15 @@ pub enum Absent {
 /// One key of a table.
 #[derive(Clone, Copy, Debug)]
 pub struct Key {
-    /// As it is written.
+    /// Name of the key as a scenario writes it.
     pub name: &'static str,
-    /// What it may be.
+    /// Permitted values.
     pub value: Value,
-    /// What holds without it.
+    /// Meaning if the key is absent.
     pub absent: Absent,
     /// Kinds of the table that know it; empty for all.
     pub kinds: &'static [&'static str],
-    /// What it means, for the reference.
+    /// Meaning of the key, for the reference.
     pub meaning: &'static str,
 }
 
@@ -191,7 +191,7 @@ pub const fn foreign(name: &'static str, found: &'static str, meaning: &'static 
 }
 
 impl Key {
-    /// The same key, which must be there.
+    /// Returns the key as a required one.
     pub const fn required(self) -> Self {
         Self { absent: Absent::Required, ..self }
     }
@@ -201,22 +201,22 @@ impl Key {
         Self { absent: Absent::Number(number), ..self }
     }
 
-    /// What holds if the key is absent, in words.
+    /// Returns the key with the meaning of its absence, in words.
     pub const fn or_else(self, words: &'static str) -> Self {
         Self { absent: Absent::Means(words), ..self }
     }
 
-    /// The same key, which only tables of these kinds know.
+    /// Returns the key as one that only tables of these kinds have.
     pub const fn of(self, kinds: &'static [&'static str]) -> Self {
         Self { kinds, ..self }
     }
 
-    /// Whether a table of this kind knows it.
+    /// True if a table of this kind has the key.
     pub fn is_of(&self, kind: &str) -> bool {
         self.kinds.is_empty() || self.kinds.contains(&kind)
     }
 
-    /// What the value is expected to be, for refusals and the reference.
+    /// Describes the permitted values, for refusals and the reference.
     pub fn expected(&self) -> String {
         let with = |unit: &str| if unit.is_empty() { String::new() } else { format!(" {unit}") };
         match self.value {
@@ -251,7 +251,7 @@ impl Key {
         }
     }
 
-    /// What holds if it is absent, for the reference.
+    /// Describes the meaning of an absent key, for the reference.
     pub fn default_text(&self) -> String {
         match self.absent {
             Absent::Required => "required".to_owned(),
@@ -274,13 +274,13 @@ pub fn short(number: f64) -> String {
 /// One table of the reference, without the tables in it.
 #[derive(Clone, Debug)]
 pub struct Listed {
-    /// As a file writes it: `[front_end]`, `[[interference]]`; empty at the top.
+    /// Heading as a file writes it: `[front_end]`, `[[interference]]`; empty for the top level.
     pub heading: String,
-    /// Its full name: `front_end`.
+    /// Full name of the table: `front_end`.
     pub path: String,
-    /// What it means, for the reference.
+    /// Meaning of the table, for the reference.
     pub meaning: String,
-    /// Its keys.
+    /// Keys of the table.
     pub keys: Vec<&'static Key>,
 }
 
@@ -316,7 +316,7 @@ fn walk(found: &mut Vec<Listed>, keys: &'static [Key], (path, many): (&str, bool
     }
 }
 
-/// Whether a table with keys is the one that is listed: `[spoofer.motion]` is `[motion]` again.
+/// True if a table with these keys is the listed one: `[spoofer.motion]` is `[motion]` again.
 fn same(listed: &[&'static Key], keys: &'static [Key]) -> bool {
     !keys.is_empty() && listed.len() == keys.len() && listed.iter().zip(keys).all(|(a, b)| a.name == b.name)
 }

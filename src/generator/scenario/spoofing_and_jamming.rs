@@ -113,7 +113,7 @@ impl Source<'_> {
         }))
     }
 
-    /// Its whole power over noise density at the antenna when the scene starts.
+    /// Total power over noise density in dB-Hz at the antenna when the scene starts.
     fn jn0_dbhz(&self, path: Option<&Way>) -> Result<f64, ScenarioError> {
         let budget = match &self.scenario.power {
             Power::Fixed { cn0_dbhz, .. } => match self.spec.strength {

@@ -1,5 +1,4 @@
-//! What the front end does to samples, as written: filter, mixer, balance, converter; and the playback before
-//! it.
+//! Front-end stages as written: filter, mixer, balance and converter, and the playback before them.
 
 use super::ScenarioError;
 use super::front_end::{FrontEnd, Tuned};

@@ -116,7 +116,7 @@ impl Scenario {
 /// Accelerations that nobody means, from which a warning is due: a tenth of g.
 const ROUGH_MPS2: f64 = 1.0;
 
-/// What to say of positions whose digits shake the motion.
+/// Warning for positions whose rounding disturbs the motion.
 fn rough(name: &str, digits: Option<Digits>) -> Option<String> {
     let Digits { step_m, interval_s, acceleration_mps2 } =
         digits.filter(|digits| digits.acceleration_mps2 > ROUGH_MPS2)?;

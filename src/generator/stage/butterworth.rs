@@ -14,7 +14,7 @@ use num_complex::Complex64;
 
 use crate::low_pass::kaiser;
 
-/// What is left out of an endless response, against its largest value.
+/// Truncation level of an endless response, relative to its largest value.
 const CUT: f64 = 1e-5;
 /// Half width of the window in samples, and its shape: 60 dB, led through in 0.03 of the sample rate.
 const REACH: usize = 64;
@@ -28,7 +28,7 @@ pub(super) struct Analogue {
 }
 
 impl Analogue {
-    /// Of half power at ±`width`/2 cycles a sample.
+    /// Computes the prototype with half power at ±`width`/2 cycles per sample.
     pub(super) fn new(order: u32, width: f64) -> Self {
         let omega = PI * width;
         let poles: Vec<Complex64> = (0..order)

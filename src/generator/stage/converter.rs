@@ -26,7 +26,7 @@ pub struct Converter {
     pub window_runs: Option<u32>,
     /// Deviation for which a fixed gain is made, in LSB.
     pub nominal_lsb: f32,
-    /// Whether levels are the format's integers instead of odd ones.
+    /// True if levels are the format's integers; otherwise they are odd ones.
     pub whole: bool,
 }
 

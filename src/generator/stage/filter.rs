@@ -22,7 +22,7 @@ pub enum Shape {
     BrickWall,
     /// A Butterworth filter, causal.
     Butterworth {
-        /// Its order.
+        /// Order of the filter.
         order: u32,
     },
 }
@@ -37,7 +37,7 @@ const MAX_TAPS: usize = 8192;
 /// A band-pass filter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Filter {
-    /// What its response looks like.
+    /// Shape of the response.
     pub shape: Shape,
     /// Width between the points of half power (both sides of the IF together).
     pub bandwidth_hz: f64,
@@ -48,11 +48,11 @@ pub struct Filter {
     /// The response by ascending lag; imaginary parts are zero for a filter around zero.
     re: Vec<f32>,
     im: Vec<f32>,
-    /// Whether only the in-phase plane is sent.
+    /// True if only the in-phase plane is sent.
     real: bool,
 }
 
-/// Why a filter cannot be made.
+/// Reason for which a filter cannot be made.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FilterError {
     /// A band that the sample rate cannot hold.

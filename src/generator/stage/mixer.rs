@@ -21,9 +21,9 @@ const GROUP_NODES: u64 = 1024;
 /// A local oscillator that is off its frequency, or noisy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Oscillator {
-    /// By how much it is tuned too low: carriers lie higher by so much.
+    /// Offset in Hz by which the oscillator is tuned too low: carriers lie higher by this offset.
     pub offset_hz: f64,
-    /// Its phase noise; absent means none.
+    /// Phase noise of the oscillator; absent means none.
     pub noise: Option<PhaseNoise>,
     rate: Rate,
 }
@@ -126,7 +126,7 @@ impl Stage for Oscillator {
 pub struct Balance {
     /// Amplitude of Q over that of I, less one.
     pub gain: f64,
-    /// By how much Q is short of 90 degrees behind I.
+    /// Phase error in radians: 90 degrees minus the angle by which Q lags I.
     pub phase_rad: f64,
     /// Direct current in I, in LSB.
     pub dc_i_lsb: f32,

@@ -1,4 +1,4 @@
-//! What acts on samples after the satellites are added: noise, and all that a front end does.
+//! Stages that act on samples after the satellites are added: noise, and all front-end hardware.
 //!
 //! A stage is a function of the absolute sample number and of a bounded number of samples before it, so the
 //! stream is the same however it is cut and wherever it starts. The scene fixes the order, which is that of
@@ -49,14 +49,14 @@ impl<'a> Block<'a> {
 pub trait Stage: Send + Sync {
     /// Name as a scenario writes it.
     fn name(&self) -> &'static str;
-    /// What it does, for the plan.
+    /// Describes the stage for the plan.
     fn describe(&self) -> String;
-    /// What it does, for the judge's spectrum; nothing where it leaves that alone.
+    /// Describes the stage for the judge's spectrum; `None` if the stage does not change the spectrum.
     fn spec(&self) -> Option<StageSpec> {
         None
     }
-    /// Of a converter: its full scale, in LSB before it, when a component of deviation `deviation_lsb`
-    /// enters.
+    /// Full scale of a converter, in LSB before it, for an input component of standard deviation
+    /// `deviation_lsb`.
     fn full_scale_lsb(&self, _deviation_lsb: f64) -> Option<f64> {
         None
     }

@@ -24,7 +24,7 @@ const LEADS_PER_BLOCK: u64 = 8;
 /// A front end on its way to samples. A batch is prepared, then rendered; truth may be written in between.
 pub(super) struct Front<'a> {
     pub scene: &'a Scene,
-    /// Of band-limited edges, where the scene has them.
+    /// Filter of band-limited edges, if the scene has them.
     filter: Option<Filter>,
     level: Level,
     pub transmitters: Vec<Transmitter>,
@@ -99,18 +99,18 @@ impl<'a> Front<'a> {
         self.next - self.part.start
     }
 
-    /// Where a batch from the next sample on ends. From the second batch on blocks begin with runs.
+    /// End of a batch that begins at the next sample. From the second batch on, blocks begin with runs.
     pub fn batch_end(&self) -> u64 {
         self.end_after(self.batch)
     }
 
-    /// Where so many samples from the run of the next sample on end, a multiple of runs or the end of the
-    /// part.
+    /// End of `samples` samples from the run of the next sample on. It is a multiple of runs or the end of
+    /// the part.
     pub fn end_after(&self, samples: u64) -> u64 {
         (run_begin(self.next) + samples).min(self.part.end)
     }
 
-    /// Whether there are samples to make before `to`.
+    /// True if samples before `to` remain to be made.
     pub fn is_before(&self, to: u64) -> bool {
         self.next < to
     }
@@ -160,20 +160,20 @@ impl<'a> Front<'a> {
         self.next = to.max(from);
     }
 
-    /// What was sent.
+    /// Navigation data that were sent.
     pub fn navigation(&mut self) -> BTreeSet<NavigationRow> {
         let mut navigation = BTreeSet::new();
         self.transmitters.iter_mut().for_each(|t| navigation.append(&mut t.symbols.navigation));
         navigation
     }
 
-    /// When the true satellites were in view, by the numbers of this front end's samples.
+    /// Passes of the true satellites, by the numbers of this front end's samples.
     pub fn passes(&self) -> impl Iterator<Item = PassRow> {
         let authentic = self.transmitters.iter().filter(|t| t.from.number == 0);
         authentic.flat_map(|t| t.passes.rows(t.sv, &self.part))
     }
 
-    /// What was done.
+    /// Summary of the work.
     pub fn done(&self) -> Generated {
         let seen: BTreeSet<Sv> =
             self.transmitters.iter().filter(|t| t.seen && t.from.number == 0).map(|t| t.sv).collect();

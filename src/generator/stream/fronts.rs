@@ -84,7 +84,7 @@ impl<'a> Fronts<'a> {
         Ok(true)
     }
 
-    /// Where the next slice ends, for every front end; `None` where nothing is left.
+    /// End of the next slice for every front end; `None` if nothing is left.
     fn ends(&self) -> Option<Vec<Ends>> {
         let first = self.fronts.first()?;
         let to = first.end_after(self.slice);
@@ -115,7 +115,7 @@ impl<'a> Fronts<'a> {
         Ok(self.fronts.iter().map(Front::done).collect())
     }
 
-    /// When satellites were in view, by the numbers of the first front end's samples: each satellite once.
+    /// Passes of the satellites, by the numbers of the first front end's samples: each satellite once.
     fn passes(&self) -> BTreeSet<PassRow> {
         let (mut rows, mut known) = (BTreeSet::new(), BTreeSet::new());
         let Some(first) = self.fronts.first() else { return rows };

@@ -71,7 +71,7 @@ impl<'a> Generator<'a> {
         Ok(Self { scene, stream: Some(Stream::new(scene, &mut (), options)?), next: 0, done: None })
     }
 
-    /// What was done, once the last batch was returned.
+    /// Returns the summary of the run, after the last batch was returned.
     pub fn done(&self) -> Option<&Generated> {
         self.done.as_ref()
     }

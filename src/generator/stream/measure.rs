@@ -12,14 +12,14 @@ use crate::synth::band::Filter;
 use crate::synth::isa::Level;
 use crate::synth::{Kernel, RUN_SAMPLES};
 
-/// What a stretch of the scene's samples holds.
+/// Statistics of a segment of the scene's samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Stretch {
     /// Components: two a sample, one of real samples.
     pub components: u64,
     /// Sum of their squares before a converter or the format rounds them, in LSB of the scene's gain.
     pub square_lsb2: f64,
-    /// Those that were clipped.
+    /// Number of components that were clipped.
     pub clipped: u64,
     /// Time for a sample of all that is made, with what stages look back at.
     pub sample_s: f64,

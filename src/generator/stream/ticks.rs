@@ -103,7 +103,8 @@ impl Tick {
     }
 }
 
-/// What is true of the signals that a constellation sends: each once, though several front ends receive it.
+/// True values of the signals that a constellation sends. Each signal appears once, even if several front
+/// ends receive it.
 fn rows(fronts: &[Front<'_>], from: &Constellation, at: &Tick, origin: u64) -> Result<Vec<truth::Truth>, OrbitError> {
     let (Some(first), Some(sample)) = (fronts.first(), at.samples.first().copied()) else { return Ok(Vec::new()) };
     let mut known: BTreeSet<(Sv, &str)> = BTreeSet::new();

@@ -42,8 +42,8 @@ pub struct Filter {
 #[repr(align(64))]
 pub(super) struct Cell([[f64; WIDTH]; 4]);
 
-/// The same in [`UNIT`]s: a whole number in the middle of the cell, and polynomials of what is more elsewhere
-/// from the linear term up (error below 1.6 units, 3e-9).
+/// Cell in [`UNIT`]s: a whole number in the middle of the cell, and polynomials of the difference elsewhere,
+/// from the linear term up. The error is below 1.6 units, 3e-9.
 ///
 /// The number in the middle and the sum that becomes a whole number are rounded, by half a unit each. What is
 /// more stays below 2^22 units, so that roundings of the place within the cell, of the linear coefficient, of
@@ -171,7 +171,7 @@ impl Filter {
         &self.cells
     }
 
-    /// The same in [`UNIT`]s.
+    /// Responses to a change from −1 to 1, less the change itself, in [`UNIT`]s.
     #[inline(always)]
     pub(super) fn unit_cells(&self) -> &[UnitCell] {
         &self.unit_cells

@@ -18,7 +18,7 @@ pub const MARGIN_STEPS: u64 = 160;
 /// margin.
 pub const MAX_STEP: f64 = 15.0;
 
-/// How a sequence runs.
+/// Timing of a sequence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pace {
     /// Steps in one code period.
@@ -38,7 +38,7 @@ pub struct Spreading {
     /// Signs, most significant bit first, continued cyclically for two words; a set bit is −1.
     words: Vec<u64>,
     pace: Pace,
-    /// Whether the secondary code inverts each of its periods; empty without one.
+    /// Inversion of each code period by the secondary code; empty without a secondary code.
     secondary_code: Arc<[bool]>,
 }
 
@@ -65,7 +65,7 @@ impl CodeTime {
         f64::from(self.step) + self.fraction as f64 / CODE_ONE as f64
     }
 
-    /// The same in 2^-48 steps.
+    /// Time since the beginning of the period, in 2^-48 steps.
     pub fn phase(self) -> u128 {
         u128::from(self.step) << CODE_BITS | u128::from(self.fraction)
     }
@@ -139,7 +139,7 @@ impl Spreading {
         Self { words: packed(negative, negative.len() + 128), pace, secondary_code }
     }
 
-    /// How it runs.
+    /// Returns the timing of the sequence.
     pub fn pace(&self) -> &Pace {
         &self.pace
     }

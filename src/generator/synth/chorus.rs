@@ -21,7 +21,7 @@ const DENSER: u64 = DENSEST + 1;
 /// The sequences of a ray made ready.
 #[derive(Default)]
 pub(super) struct Chord {
-    /// That of the first sequence.
+    /// Carrier of the first sequence.
     carrier: Carrier,
     /// In phase with it, and a quarter of a turn ahead.
     in_phase: Vec<Layer>,
@@ -46,7 +46,7 @@ struct Layer {
     begins: u64,
 }
 
-/// How many steps a sample spans.
+/// Number of steps in a sample.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Density {
     /// One at most.

@@ -13,7 +13,7 @@ use gnss::samples::Format;
 /// An instruction set for which kernels are compiled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {
-    /// What every processor of the target has.
+    /// Instructions that every processor of the target has.
     Baseline,
     /// 256-bit vectors.
     Avx2,
@@ -30,7 +30,7 @@ impl Level {
         Self::ALL.into_iter().rev().find(|level| level.is_available()).unwrap_or(Self::Baseline)
     }
 
-    /// Whether this processor can run it.
+    /// True if this processor can run the level.
     pub fn is_available(self) -> bool {
         match self {
             Self::Baseline => true,

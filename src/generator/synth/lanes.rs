@@ -120,7 +120,8 @@ impl Carrier {
         }
     }
 
-    /// The same of a wave that is a quarter of a turn ahead of it.
+    /// Adds `amplitude` times a wave a quarter of a turn ahead of the carrier over a group, its earlier half
+    /// backwards.
     #[inline(always)]
     pub fn turn_ahead(&self, group: usize, amplitude: f32, [before, after]: &[Side; 2], sums: &mut Sums) {
         let Self { cos, sin, re, im } = self;
@@ -229,7 +230,7 @@ fn pass<const AREA: bool>(rays: &[&[Run<'_>]], i: &mut [f32], q: &mut [f32], buf
     }
 }
 
-/// Whether a ray is one run of at most one code step a sample.
+/// True if a ray is one run of at most one code step per sample.
 fn is_plain(runs: &[Run<'_>]) -> bool {
     matches!(runs, [run] if run.step <= CODE_ONE)
 }

@@ -56,23 +56,23 @@ pub struct Run<'a> {
     pub turns_step: u64,
     /// Peak amplitude of the carrier, in LSB.
     pub amplitude: f64,
-    /// What band-limited edges make of a step: a pulse in place of a level.
+    /// Response of band-limited edges to a step: a pulse instead of a level.
     pub pulse: Option<&'a Pulse>,
 }
 
 impl Run<'_> {
-    /// Whether one carrier turns both, a multiple of a quarter of a turn apart.
+    /// True if one carrier serves both runs, which are a multiple of a quarter of a turn apart.
     pub fn shares_carrier(&self, other: &Run<'_>) -> bool {
         self.turns_step == other.turns_step && self.turns.wrapping_sub(other.turns) << 2 == 0
     }
 
-    /// How many quarters of a turn it is ahead of one that shares its carrier, 0 to 3.
+    /// Quarters of a turn by which the run is ahead of one that shares its carrier, 0 to 3.
     #[inline(always)]
     fn quarters_ahead(&self, other: &Run<'_>) -> u64 {
         self.turns.wrapping_sub(other.turns) >> (u64::BITS - 2)
     }
 
-    /// Whether both have the same pulse and their chips at the same places.
+    /// True if both runs have the same pulse and their chips at the same positions.
     fn pulses_with(&self, other: &Run<'_>) -> bool {
         let same = |(a, b): (&Pulse, &Pulse)| std::ptr::eq(a, b);
         let places = |run: &Run<'_>| (run.position, run.step);
@@ -88,21 +88,21 @@ fn to_step(position: u64, step: u64) -> f64 {
     if edge >= position { (edge - position) as f64 } else { -((position - edge) as f64) }
 }
 
-/// How a code edge falls between samples, with what it needs at hand.
+/// Model of a code edge between samples, with the data that it needs.
 #[derive(Clone, Copy, Debug)]
 pub enum Edge<'a> {
     /// At the nearest sample.
     Nearest,
-    /// By the share of the sample on either side.
+    /// Share of the sample's area on either side of the edge.
     Area,
     /// Through a low-pass filter.
     BandLimited(&'a Filter),
 }
 
-/// How samples are made: the edge model, the arithmetic and the instruction set.
+/// Configuration of the synthesis: the edge model, the arithmetic and the instruction set.
 #[derive(Clone, Copy, Debug)]
 pub struct Kernel<'a> {
-    /// How code edges fall between samples.
+    /// Model of code edges between samples.
     pub edge: Edge<'a>,
     /// Arithmetic of the kernel.
     pub arithmetic: Arithmetic,

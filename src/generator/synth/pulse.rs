@@ -26,13 +26,13 @@ const SUMS: usize = 2;
 /// The response of a filter to a pulse of one chip.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pulse {
-    /// Of equal steps of the chip.
+    /// Levels of equal steps of the chip.
     levels: Vec<f64>,
     /// Chips a sample without a Doppler.
     step: f64,
     /// Blocks of a response.
     blocks: usize,
-    /// By cell and block.
+    /// Polynomial terms by cell and block.
     terms: Vec<[[f64; BLOCK]; TERMS]>,
 }
 
@@ -81,7 +81,7 @@ impl Pulse {
         (1..=MOST).find(|blocks| blocks * BLOCK >= taps)
     }
 
-    /// Whether it is the response to those levels.
+    /// True if the pulse is the response to these levels.
     pub(super) fn is_of(&self, levels: &[f64], step: f64) -> bool {
         self.levels == levels && self.step == step
     }
@@ -93,7 +93,7 @@ impl Pulse {
         self.edges(|from_middle, change| change * filter.step(since - from_middle * samples))
     }
 
-    /// What a stretch of the chip adds to that, times the stretch.
+    /// Derivative of the response with respect to the relative lengthening of the chip.
     fn stretch(&self, filter: &Filter, since: f64) -> f64 {
         // The response's slope over the finest points of the filter's own table.
         const BESIDE: f64 = 1.0 / 4096.0;
@@ -118,7 +118,7 @@ impl Pulse {
         sum
     }
 
-    /// How much longer the chips of a run are than without a Doppler.
+    /// Relative lengthening of a run's chips by the Doppler.
     fn stretch_of(&self, run: &Run<'_>) -> f64 {
         self.step * CODE_ONE as f64 / run.step as f64 - 1.0
     }

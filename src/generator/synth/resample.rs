@@ -22,7 +22,7 @@ const BETA: f64 = 7.857;
 pub struct Position {
     /// Number of the sample.
     pub whole: i64,
-    /// What is left of a sample, in 2^-32.
+    /// Fraction of a sample, in 2^-32.
     pub fraction: u32,
     /// Source samples a sample, in 2^-32.
     pub step: u64,

@@ -22,14 +22,14 @@ const BORDER: usize = 64;
 const PLACES: usize = 1024;
 /// Words of signs of all places.
 const WORDS: usize = PLACES / 64;
-/// Where changes lie that no sample is to know of.
+/// Position of changes that reach no sample.
 const NOWHERE: u64 = ((TILE + 2 * BORDER) as u64) << CODE_BITS;
 /// Sums in which changes take turns.
 const SUMS: usize = 3;
 /// Values of a sum. Those of equal places in two sums are no multiple of 4096 bytes apart, which a processor
 /// would take for the same place for a while.
 const LENGTH: usize = PLACES + 128;
-/// Where in a sum the tile is: each value stands half a response late.
+/// Index of the tile in a sum: each value is delayed by half a response.
 const BODY: usize = BORDER + HALF_WIDTH;
 /// Longest step, in 2^-48 code steps, at which a sample has no more than nine changes in its reach.
 const LONGEST_IN_UNITS: u64 = CODE_ONE / 2;
@@ -40,7 +40,7 @@ const LONGEST_APART: u64 = CODE_ONE / WIDTH as u64;
 trait Number: Copy {
     /// Responses to changes in a part of a sample.
     type Cell;
-    /// Where in its cell a change is.
+    /// Position of a change within its cell.
     type Within: Copy;
     const ZERO: Self;
 
@@ -312,8 +312,8 @@ fn highest_of(bits: u64) -> u64 {
 }
 
 impl Changes {
-    /// Those that reach the tile that begins with the run, with others that reach nothing up to a multiple of
-    /// `together`.
+    /// Finds the changes that reach the tile at the run's beginning. Changes without effect fill the list up
+    /// to a multiple of `together`.
     #[inline(always)]
     fn find(&mut self, run: &Run<'_>, together: usize) {
         let reach = HALF_WIDTH as u64 * run.step;

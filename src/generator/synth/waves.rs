@@ -85,13 +85,13 @@ impl Waves {
         self.amplitude
     }
 
-    /// What is in phase with the first run.
+    /// Wave in phase with the first run.
     #[inline(always)]
     pub fn in_phase(&self) -> &[f64; TILE] {
         &self.in_phase.0
     }
 
-    /// What is a quarter of a turn ahead of it, if anything is.
+    /// Wave a quarter of a turn ahead of the first run, if there is one.
     #[inline(always)]
     pub fn quadrature(&self) -> Option<&[f64; TILE]> {
         self.has_quadrature.then_some(&self.quadrature.0)

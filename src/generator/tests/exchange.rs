@@ -19,7 +19,7 @@ const SCENE: &str = "name = \"x\"\nstart = 2020-11-29T12:50:30\nduration_s = 0.5
     [[front_end]]\nname = \"b1\"\ncenter_hz = 1561.098e6\nsample_rate_hz = 4.1e6\n\
     [[front_end]]\nname = \"e5a\"\ncenter_hz = 1176.45e6\nsample_rate_hz = 10.3e6\n[truth]\ninterval_s = 0.05\n";
 
-/// What `F14.3` leaves of a value.
+/// Value after rounding by `F14.3`.
 fn printed(value: f64) -> f64 {
     format!("{value:.3}").parse().unwrap()
 }

@@ -106,7 +106,7 @@ fn made(scenes: &[Scene], options: &Options) -> (Vec<Vec<u8>>, Vec<Generated>, t
     (bytes, done, directory)
 }
 
-/// As [`made`], of the scene of one front end through the stream that single ones take.
+/// Generates like [`made`], but a scene of one front end by the stream for single front ends.
 fn alone(scenes: &[Scene], options: &Options) -> (Vec<u8>, Generated, tempfile::TempDir) {
     let [scene] = scenes else { panic!("{}", scenes.len()) };
     let directory = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! What is rendered of every kind of signal, against their definition evaluated slowly and in another way.
+//! Tests of every kind of signal against its definition, evaluated slowly and in another way.
 //!
 //! The definition counts steps since the beginning of the system's time as 128-bit integers, and takes chip,
 //! secondary code and pulse from the component's tables. It shares no line with strips, sequences or pairs of

@@ -43,7 +43,7 @@ struct Sent {
     spreading: Spreading,
     pulse: Option<Arc<Pulse>>,
     data: Option<Data>,
-    /// Of the amplitude, for unit mean power of the component's waveform and its share.
+    /// Factor on the amplitude, for unit mean power of the component's waveform and its share.
     gain: f64,
     /// Carrier phase relative to the signal's, in samples: the other way round in an inverted spectrum.
     turns: u64,
@@ -62,7 +62,7 @@ fn in_chords(sent: &mut [Sent]) {
 
 /// A satellite's signal in a scene.
 pub struct Transmitter {
-    /// Whose signal it is.
+    /// Constellation that sends the signal.
     pub from: Arc<Constellation>,
     /// Samples in which that one sends.
     on: Range<u64>,
@@ -70,14 +70,14 @@ pub struct Transmitter {
     pub sv: Sv,
     /// The signal.
     pub signal: &'static Signal,
-    /// What is known of the satellite for its other signals too, where it has any.
+    /// Geometry that the satellite's other signals share, if it has any.
     pub geometry: Option<Arc<Geometry>>,
-    /// Where the antenna is, for all satellites, where nodes are dense.
+    /// Antenna positions for all satellites, if nodes are dense.
     pub places: Option<Arc<Places>>,
     /// The orbit over the running span of roots, where nodes are dense, by the span's number.
     arc: Option<(u64, Option<sky::Arc>)>,
     if_hz: f64,
-    /// Of the IF, in 2^-64 turn a sample.
+    /// Phase step of the IF, in 2^-64 turn per sample.
     tone_step: u64,
     sent: Vec<Sent>,
     grid: Grid,
@@ -85,14 +85,14 @@ pub struct Transmitter {
     view: BTreeMap<u64, bool>,
     /// Sample from which the satellite has been in view.
     since: Option<u64>,
-    /// When it has been in view in what was prepared.
+    /// Passes in the prepared samples.
     pub passes: Passes,
     roots: BTreeSet<u64>,
     parts: Vec<Part>,
     fast: FastPhases,
-    /// What is sent, and has been.
+    /// Symbols that are sent and were sent.
     pub symbols: Symbols,
-    /// Whether it has been in view in what was prepared.
+    /// True if the satellite was in view in the prepared samples.
     pub seen: bool,
     /// Polynomials made.
     pub knots: u64,
@@ -103,12 +103,12 @@ pub struct Transmitter {
 /// Buffers of one worker.
 #[derive(Default)]
 pub struct Scratch {
-    /// What [`Transmitter::arrange`] has gathered.
+    /// Runs that [`Transmitter::arrange`] has gathered.
     pub bank: Bank,
     anchor: Option<Anchor>,
 }
 
-/// What satellites share at the first sample of a run; 128-bit divisions that are worth keeping.
+/// Values that satellites share at the first sample of a run. They save 128-bit divisions.
 #[derive(Clone, Copy)]
 struct Anchor {
     n: u64,
@@ -343,7 +343,7 @@ impl Transmitter {
         self.symbols.prepare(scene, &self.from, (self.sv, self.signal), [first, last], scene.clock.epoch(from))
     }
 
-    /// Whether the satellite is sent and in view at a sample of the prepared stretch.
+    /// True if the satellite is sent and in view at a sample of the prepared segment.
     pub fn in_view(&self, scene: &Scene, sample: u64) -> bool {
         self.on.contains(&sample)
             && self.view.get(&(scene.clock.rate.elapsed(sample).0 as u64)).copied().unwrap_or(false)

@@ -15,10 +15,10 @@ use gnss::satellite::Sv;
 const SATELLITE_MPS: f64 = 5000.0;
 /// No leap is longer, so that ranges stay about what they are.
 const LEAP_S: f64 = 600.0;
-/// What lever arms and departures of a satellite may add to an elevation: 200 m at 20 000 km.
+/// Largest change of an elevation by lever arms and orbit errors of a satellite: 200 m at 20 000 km.
 const SLACK_RAD: f64 = 1e-5;
 
-/// How far back a satellite is sure to have been in view.
+/// Time before a sight for which a satellite was certainly in view.
 pub(super) struct Leap {
     /// Largest speed of the antenna; `None` where it is not known.
     user_mps: Option<f64>,

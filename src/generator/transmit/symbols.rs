@@ -12,11 +12,11 @@ use gnss::satellite::Sv;
 use gnss::signal::{Component, Signal};
 use gnss::time::Epoch;
 
-/// What a satellite sends in a stretch of time.
+/// Symbols that a satellite sends in a segment of time.
 pub struct Symbols {
     /// Units by their number since 1980-01-06T00:00:00 of the system's time, of each form of message.
     units: Vec<(&'static Message, BTreeMap<i64, Vec<bool>>)>,
-    /// What has been sent so far.
+    /// Navigation data that have been sent so far.
     pub navigation: BTreeSet<NavigationRow>,
 }
 
@@ -39,7 +39,7 @@ impl Symbols {
         Self { units, navigation: BTreeSet::new() }
     }
 
-    /// Whether nothing modulates the signal.
+    /// True if nothing modulates the signal.
     pub fn is_empty(&self) -> bool {
         self.units.is_empty()
     }
@@ -97,8 +97,8 @@ impl Symbols {
         Ok(())
     }
 
-    /// Whether a code period of a component is sent inverted, and the period at which its symbol ends: those
-    /// before have the same sign.
+    /// Sign of a component's code period, true if inverted, and the period at which its symbol ends. The
+    /// periods before that one have the same sign.
     pub fn negative(&self, data: Option<Data>, period: i64) -> (bool, i64) {
         let Some(Data { form, periods_per_symbol }) = data else { return (false, i64::MAX) };
         let Some((message, units)) = self.units.get(form) else { return (false, i64::MAX) };

@@ -1,4 +1,4 @@
-//! What is true at one reading of the receiver's clock, as records and as the files that the judge reads.
+//! True values at one time of the receiver's clock, as records and as the files that the judge reads.
 //!
 //! Delays and phases are those of [`arrival`](crate::arrival), which samples have too. Doppler is
 //! minus the derivative of that same carrier by the receiver's clock, of pushed motion within its tick.
@@ -31,7 +31,7 @@ pub use writer::Writer;
 /// five points leave of a sinusoid of ω is (ω step)⁴/30 of its slope: 3e-6.
 const DOPPLER_STEP_S: f64 = 0.01;
 const DOPPLER_STEP_TURNS: f64 = 1.0 / 64.0;
-/// Its share of a tick of pushed motion: five points lie in half a tick.
+/// Step of the difference quotient as a share of a tick of pushed motion: five points lie in half a tick.
 const DOPPLER_STEP_TICKS: f64 = 1.0 / 8.0;
 
 /// Doppler: minus the derivative of the carrier, by a stencil of five points 10 ms apart that does not
@@ -89,11 +89,11 @@ fn doppler_hz(
     Ok(Some(planted!("generator.truth.doppler", -sum, sum) / (12.0 * step_s)))
 }
 
-/// What is true of a satellite at a sample: the observation of its first ray, its place in the sky, and
-/// the other rays as they come beside the first.
+/// True values of a satellite at a sample: the observation of its first ray, its position in the sky, and the
+/// other rays relative to the first.
 pub type Truth = (Observation, SkyRow, Vec<RayRow>);
 
-/// What is true of `sv` at a sample.
+/// Computes the true values of `sv` at a sample.
 ///
 /// # Errors
 /// Those of the orbit.

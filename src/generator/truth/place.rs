@@ -1,5 +1,5 @@
-//! Where the antenna was, as NMEA 0183 and as tracks for maps: what a receiver without errors would have
-//! said.
+//! True positions of the antenna as NMEA 0183 and as tracks for maps: the output of a receiver without
+//! errors.
 //!
 //! The satellites of the sentences are those of the truth, all of them in the solution; dilutions of
 //! precision are those of their directions with a clock for each system. Limits: where there are fewer
@@ -95,7 +95,8 @@ impl Sink for Nmea {
     }
 }
 
-/// Of the position, the horizontal position and the height; `None` where the directions determine none.
+/// Dilution of precision of the position, the horizontal position and the height; `None` if the directions
+/// determine none.
 fn dilutions(seen: &[Seen]) -> Option<[f64; 3]> {
     let mut systems: Vec<System> = seen.iter().map(|seen| seen.sv.system).collect();
     systems.sort();

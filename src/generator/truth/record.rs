@@ -13,7 +13,7 @@ use thiserror::Error;
 use crate::scene::Scene;
 use gnss::record::{InterferenceRow, NavigationRow, Observation, PassRow, RayRow, SkyRow, TrajectoryRow};
 
-/// Why a sink does not take the truth.
+/// Reason for which a sink refuses the truth.
 #[derive(Debug, Error)]
 pub enum TruthError {
     /// A file that cannot be created, removed or written.
@@ -21,7 +21,7 @@ pub enum TruthError {
     File {
         /// The file.
         path: PathBuf,
-        /// What the system reports.
+        /// Error of the operating system.
         source: std::io::Error,
     },
     /// A row that cannot be written.
@@ -29,10 +29,10 @@ pub enum TruthError {
     Row {
         /// The table.
         path: PathBuf,
-        /// What the CSV writer reports.
+        /// Error of the CSV writer.
         source: csv::Error,
     },
-    /// What a sink of one's own reports.
+    /// Error of a user's own sink.
     #[error("the truth is not taken: {0}")]
     Refused(Box<dyn std::error::Error + Send + Sync>),
 }
@@ -42,9 +42,9 @@ pub enum TruthError {
 pub enum Record {
     /// Antenna and clocks at a tick.
     Trajectory(TrajectoryRow),
-    /// What an ideal receiver would observe of a signal's first ray.
+    /// Observation of a signal's first ray by an ideal receiver.
     Observation(Observation),
-    /// Where the satellite of the observation before is, and its delays.
+    /// Direction and delays of the satellite in the preceding observation.
     Sky(SkyRow),
     /// Another ray of that satellite.
     Ray(RayRow),
@@ -57,7 +57,7 @@ pub enum Record {
         /// The claimed motion, and the receiver's clock against the spoofer's.
         place: TrajectoryRow,
     },
-    /// What would be observed of a spoofer's signal alone.
+    /// Observation of a spoofer's signal alone.
     Spoofed {
         /// Number of the spoofer, from 1.
         spoofer: usize,

@@ -1,4 +1,4 @@
-//! What was true of the observations, and the messages that were sent, as RINEX files.
+//! True observations and the messages that were sent, as RINEX files.
 
 use std::fs::File;
 use std::io::{self, BufWriter};

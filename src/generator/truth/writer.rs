@@ -28,7 +28,7 @@ impl Table {
         Self::open(directory, name, true)
     }
 
-    /// Of places, whose rows have their geographic columns behind their own.
+    /// Creates a table of positions, whose rows have geographic columns after their own.
     fn of_places(directory: &Path, name: &str) -> Result<Self, TruthError> {
         Self::open(directory, name, false)
     }
@@ -69,7 +69,7 @@ fn header_of(row: &impl Serialize) -> Result<csv::StringRecord, csv::Error> {
     csv::Reader::from_reader(text.as_slice()).headers().cloned()
 }
 
-/// What a spoofer claims: observables like `observations.csv`, places like `trajectory.csv`.
+/// Tables of a spoofer's claims: observables like `observations.csv`, positions like `trajectory.csv`.
 struct Claims {
     observations: Table,
     trajectory: Table,
@@ -88,7 +88,8 @@ pub struct Writer {
     claims: Vec<Claims>,
     navigation: Option<Table>,
     passes: Option<Table>,
-    /// Of a scene in which satellites may stray while it is sent: its facts, which are complete at the end.
+    /// Switches, rate and facts of a scene whose satellites may drift while it is sent. The facts are
+    /// complete at the end.
     driven: Option<(Arc<Switches>, Rate, SceneFacts)>,
 }
 
@@ -138,7 +139,7 @@ fn front_end(scene: &Scene) -> FrontEndFacts {
     }
 }
 
-/// Where edges are band-limited, their cut-off.
+/// Cut-off of band-limited edges in cycles per sample, if the scene has them.
 fn edge_cutoff_cps(scene: &Scene) -> Option<f64> {
     (scene.fidelity.code_edge == CodeEdge::BandLimited).then(|| scene.cutoff_cps())
 }

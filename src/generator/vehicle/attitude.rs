@@ -18,7 +18,7 @@ use gnss::earth::Geodetic;
 /// Weight of the direction at rest against the velocity.
 const REST_MPS: f64 = 1.0;
 
-/// Where the nose points.
+/// Direction of the nose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Nose {
     /// Yaw from north over east, pitch above the horizon, roll to the right.
@@ -30,7 +30,7 @@ pub enum Nose {
         /// Right side down.
         roll_rad: f64,
     },
-    /// As it is pushed; so before anything came.
+    /// Pushed attitude; these angles apply before the first push.
     Pushed {
         /// Clockwise from north.
         yaw_rad: f64,
@@ -48,10 +48,10 @@ pub enum Nose {
     },
 }
 
-/// How a body is turned, and how the antenna is mounted on it.
+/// Attitude of a body, and the mounting of the antenna on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attitude {
-    /// Where the body points.
+    /// Direction of the body.
     pub nose: Nose,
     /// Turns a second about the nose, positive to the right.
     pub spin_hz: f64,
@@ -79,7 +79,7 @@ impl Orientation {
 }
 
 impl Attitude {
-    /// How a body is turned before anything was pushed; `None` where nothing is.
+    /// Attitude of the body before the first push; `None` if no attitude is pushed.
     pub fn first_turn(&self) -> Option<Turn> {
         match self.nose {
             Nose::Pushed { yaw_rad, pitch_rad, roll_rad } => Some(Turn::of(yaw_rad, pitch_rad, roll_rad)),

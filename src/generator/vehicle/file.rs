@@ -38,44 +38,45 @@ const LEAST_RADIUS_M: f64 = 6.3e6;
 /// A degree along a meridian.
 const DEGREE_M: f64 = 111_195.0;
 
-/// Where a file's times lie and how far apart its rows may be.
+/// Time scale of a file's rows and limits of their spacing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// When the scene starts.
+    /// Start of the scene.
     pub start: Epoch,
     /// Longest time between two rows.
     pub max_gap_s: f64,
-    /// How far the motion may be from rows with positions alone; `None` for a motion that passes all.
+    /// Largest distance in metres of the motion from rows with positions alone; `None` for a motion through
+    /// all of them.
     pub tolerance_m: Option<f64>,
 }
 
-/// Why a trajectory file is refused, and where.
+/// Reason for which a trajectory file is refused, and its position.
 #[derive(Debug, Error)]
 #[error("{file}: line {line}: {fault}")]
 pub struct FileError {
     /// The file.
     pub file: String,
-    /// Its line, from 1.
+    /// Line number, from 1.
     pub line: u64,
-    /// What is wrong there.
+    /// Error in the line.
     pub fault: Fault,
 }
 
-/// What is wrong with a row.
+/// Error in a row.
 #[derive(Debug, Error)]
 pub enum Fault {
-    /// It cannot be read.
+    /// The row cannot be read.
     #[error("{0}")]
     Read(std::io::Error),
     /// Bytes that are no UTF-8.
     #[error("not UTF-8 text")]
     NotText,
-    /// What stands in a log of ticks in place of what belongs there.
+    /// Text in a log of ticks that does not belong there.
     #[error("'{what}': expected {expected}")]
     Log {
-        /// What stands there.
+        /// Text that was found.
         what: String,
-        /// What is expected.
+        /// Text that is expected.
         expected: String,
     },
     /// A row beyond the length that is read.
@@ -98,19 +99,19 @@ pub enum Fault {
     /// A file of another kind.
     #[error("{what}: expected {expected}")]
     Foreign {
-        /// What it seems to be.
+        /// Format that the file seems to have.
         what: &'static str,
-        /// What is expected, and how to come to it.
+        /// Format that is expected, and a way to produce it.
         expected: &'static str,
     },
     /// A column that is missing.
     #[error("no column for {what}: expected {expected}; found {found}")]
     Column {
-        /// What the column would give.
+        /// Quantity of the column.
         what: &'static str,
-        /// What is expected.
+        /// Values that are expected.
         expected: &'static str,
-        /// What was found.
+        /// Text that was found.
         found: String,
     },
     /// A column that comes twice.
@@ -126,19 +127,19 @@ pub enum Fault {
         column: String,
         /// The value.
         value: String,
-        /// What is expected.
+        /// Values that are expected.
         expected: &'static str,
     },
     /// Two rows of one time.
     #[error("time {t_s} s repeats that of the row before")]
     SameTime {
-        /// That time, seconds since the scene's start.
+        /// Time of both rows, in seconds since the scene's start.
         t_s: f64,
     },
     /// A row that is earlier than the one before.
     #[error("time {t_s} s is before the row before ({before_s} s): rows must ascend in time")]
     Unsorted {
-        /// That time, seconds since the scene's start.
+        /// Time of the earlier row, in seconds since the scene's start.
         t_s: f64,
         /// Time of the row before.
         before_s: f64,
@@ -176,7 +177,7 @@ pub enum Fault {
     /// Fewer rows than a motion needs.
     #[error("{have} rows: expected at least 2")]
     TooFew {
-        /// How many there are.
+        /// Number of rows.
         have: usize,
     },
     /// More rows than are read.
@@ -187,7 +188,7 @@ pub enum Fault {
     Sentence {
         /// The sentence.
         sentence: String,
-        /// What is wrong.
+        /// Description of the error.
         reason: String,
     },
 }
@@ -217,13 +218,13 @@ fn place(geodetic: bool, [a, b, c]: [(&str, &str); 3]) -> Result<Vector3<f64>, F
     }
 }
 
-/// Which field of a row holds what.
+/// Columns of a row by their meaning.
 struct Columns {
     names: Vec<String>,
     time: Time,
     geodetic: bool,
     position: [usize; 3],
-    /// Whether it is east, north, up, and where.
+    /// Velocity columns, with true for east, north, up and false for ECEF.
     velocity: Option<(bool, [usize; 3])>,
     ignored: Vec<String>,
 }
@@ -281,7 +282,7 @@ impl Columns {
         Ok(Self { names, time, geodetic, position, velocity, ignored })
     }
 
-    /// What the last digit of each coordinate is worth, to the north for both angles.
+    /// Value of the last digit of each coordinate, in metres, to the north for both angles.
     fn steps_m(&self, record: &csv::StringRecord) -> [f64; 3] {
         let unit_m = if self.geodetic { [DEGREE_M, DEGREE_M, 1.0] } else { [1.0; 3] };
         let worth =
@@ -325,7 +326,7 @@ impl Columns {
     }
 }
 
-/// What a first line says of a file that is no table with a header.
+/// Fault for a file that is not a table with a header, recognised by its first line.
 fn foreign(first: &csv::StringRecord) -> Option<Fault> {
     let line = first.get(0).unwrap_or_default().trim().trim_start_matches('\u{feff}');
     if line.contains("$G") || line.starts_with('$') {
@@ -394,7 +395,7 @@ pub struct CsvTrajectory {
     pub trajectory: Trajectory,
     /// Columns that were not used.
     pub ignored: Vec<String>,
-    /// What the digits of positions make of it, where they have no tolerance.
+    /// Effect of the positions' rounding on the motion, if they have no tolerance.
     pub digits: Option<Digits>,
 }
 
@@ -445,7 +446,7 @@ pub struct NmeaTrajectory {
     pub without_fix: usize,
     /// GGA sentences without a geoid separation, for which EGM96's was added.
     pub separations_assumed: usize,
-    /// What the digits of positions make of it, where they have no tolerance.
+    /// Effect of the positions' rounding on the motion, if they have no tolerance.
     pub digits: Option<Digits>,
 }
 

@@ -12,7 +12,7 @@ use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 use super::turn::Turn;
 use super::{Knot, Motion, between};
 
-/// How pushed motion becomes ticks.
+/// Parameters by which pushed motion becomes ticks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joining {
     /// Samples of a tick.
@@ -63,7 +63,7 @@ impl Grown {
         Self { joining, rows: RwLock::new(Rows { rows, ticks: 0, keep: keep.max(2) }) }
     }
 
-    /// How pushed motion becomes ticks.
+    /// Returns the parameters by which pushed motion becomes ticks.
     pub fn joining(&self) -> Joining {
         self.joining
     }
@@ -135,7 +135,7 @@ impl Grown {
         (oldest + place as u64, rows.rows.get(place).map_or(t_s, |row| row.knot.t_s))
     }
 
-    /// When a tick begins; of one that is not kept any more the oldest that is.
+    /// Start time of a tick in seconds. For a tick that is no longer kept, it is that of the oldest one kept.
     pub fn begins_s(&self, tick: u64) -> Option<f64> {
         let rows = self.read();
         let oldest = (rows.ticks + 1).saturating_sub(rows.rows.len() as u64);

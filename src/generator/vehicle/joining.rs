@@ -40,13 +40,13 @@ pub struct Push {
     pub t_s: f64,
     /// Place.
     pub position_m: Vector3<f64>,
-    /// Its derivative, where known.
+    /// Velocity in ECEF, if known, in m/s.
     pub velocity_mps: Option<Vector3<f64>>,
-    /// Its second derivative, where known.
+    /// Acceleration in ECEF, if known, in m/s².
     pub acceleration_mps2: Option<Vector3<f64>>,
-    /// Its third derivative, where known.
+    /// Jerk in ECEF, if known, in m/s³.
     pub jerk_mps3: Option<Vector3<f64>>,
-    /// How the body is turned, where known.
+    /// Attitude of the body, if known.
     pub turn: Option<PushedTurn>,
 }
 
@@ -63,7 +63,7 @@ impl Push {
     }
 }
 
-/// Why a push is not taken.
+/// Reason for which a push is refused.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum Refusal {
     /// A motion that takes no pushes.
@@ -78,9 +78,9 @@ pub enum Refusal {
     /// A derivative of an implausible size.
     #[error("{what} of {value:e}: expected at most {most:e}")]
     Rate {
-        /// Which derivative, with its unit.
+        /// Name of the derivative, with its unit.
         what: &'static str,
-        /// Its size.
+        /// Size of the derivative.
         value: f64,
         /// The most that is taken.
         most: f64,
@@ -102,7 +102,7 @@ pub enum Refusal {
     Far(f64, f64),
 }
 
-/// What a tick was made of.
+/// Origin of a tick's motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Nothing was pushed yet.
@@ -111,7 +111,7 @@ pub enum Kind {
     Fresh,
     /// An older push was extrapolated.
     Extrapolated,
-    /// It moved within itself to where the newest push says.
+    /// A snap: the tick moved to the newest push within its own length.
     Snap,
 }
 
@@ -124,26 +124,26 @@ impl Kind {
         ("snap", Self::Snap),
     ];
 
-    /// Its word in a log.
+    /// Word of the kind in a log.
     pub fn name(self) -> &'static str {
         Self::NAMES.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
     }
 }
 
-/// What a tick became.
+/// Result of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tick {
     /// The motion at its end.
     pub end: Motion,
     /// The turn there, where the attitude is pushed.
     pub turn: Option<Turn>,
-    /// What it was made of.
+    /// Origin of the tick's motion.
     pub kind: Kind,
     /// The push that steered it for the first time, by its number; an older one, or none, gives `None`.
     pub news: Option<u64>,
-    /// How far its end is from the pushed motion.
+    /// Distance in metres of the tick's end from the pushed motion.
     pub gap_m: f64,
-    /// How old the push was at the tick's end; negative while it lies ahead.
+    /// Age in seconds of the push at the tick's end; negative while the push lies ahead.
     pub age_s: f64,
     /// The largest jerk of the tick.
     pub jerk_mps3: f64,
@@ -156,7 +156,7 @@ struct State {
     t_s: f64,
     motion: Motion,
     jerk_mps3: Vector3<f64>,
-    /// Whether its velocity was pushed.
+    /// True if the velocity was pushed.
     own_velocity: bool,
     turn: Option<PushedTurn>,
 }
@@ -167,14 +167,14 @@ pub struct Joiner {
     joining: Joining,
     /// Length of a tick.
     tick_s: f64,
-    /// What is transmitted now.
+    /// Motion that is transmitted now.
     now: Motion,
     /// The push in use, and those that wait for their time.
     used: Option<State>,
     waiting: VecDeque<State>,
     /// Taken so far.
     taken: u64,
-    /// Where the attitude is pushed.
+    /// State of the attitude, if it is pushed.
     turning: Option<Turning>,
 }
 
@@ -184,7 +184,7 @@ impl Joiner {
         Self { joining, tick_s, now, used: None, waiting: VecDeque::new(), taken: 0, turning: None }
     }
 
-    /// The same of a body whose turn is pushed, and is `first` before.
+    /// Adds a pushed attitude, which is `first` before the first push.
     pub fn turning(self, first: Option<Turn>) -> Self {
         Self { turning: first.map(Turning::new), ..self }
     }

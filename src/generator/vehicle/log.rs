@@ -19,7 +19,7 @@ pub const MAX_ROWS: usize = 8_640_001;
 const MAX_ROW_BYTES: u64 = 1 << 12;
 /// The first line.
 const HEADER: &str = "sample,kind,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps,ax_mps2,ay_mps2,az_mps2";
-/// What it goes on with where the attitude is pushed.
+/// Continuation of the header if the attitude is pushed.
 const TURNED: &str = ",qw,qx,qy,qz,wx_radps,wy_radps,wz_radps";
 /// Numbers of a motion, and of a turn.
 const MOTION_NUMBERS: usize = 9;

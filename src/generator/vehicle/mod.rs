@@ -1,4 +1,4 @@
-//! How the antenna moves: one representation for every kind of motion.
+//! Motion of the antenna: one representation for every kind of motion.
 //!
 //! A [`Trajectory`] is a row of knots (time, ECEF position, velocity, acceleration) joined by quintic Hermite
 //! pieces, so position, velocity and acceleration are continuous and each is the exact derivative of the one
@@ -33,9 +33,9 @@ use gnss::earth::Geodetic;
 pub struct Motion {
     /// Place, ECEF.
     pub position_m: Vector3<f64>,
-    /// Its derivative.
+    /// Velocity in ECEF, in m/s.
     pub velocity_mps: Vector3<f64>,
-    /// Its second derivative, in the rotating axes.
+    /// Acceleration in ECEF, in the rotating axes, in m/s².
     pub acceleration_mps2: Vector3<f64>,
 }
 
@@ -72,7 +72,7 @@ pub struct Trajectory {
     breaks_s: Vec<f64>,
     first: Knot,
     attitude: Option<Attitude>,
-    /// Of a motion that is pushed while it is sent; the knots above are then its first alone.
+    /// Motion that is pushed while it is sent. The knots above are then its first one alone.
     grown: Option<Arc<Grown>>,
 }
 
@@ -130,7 +130,7 @@ impl Trajectory {
         }
     }
 
-    /// Whether the body turns as it is pushed.
+    /// True if the attitude of the body is pushed.
     pub fn is_turned(&self) -> bool {
         self.attitude.is_some_and(|attitude| attitude.first_turn().is_some())
     }
@@ -164,7 +164,7 @@ impl Trajectory {
         }
     }
 
-    /// The same motion of a body with an attitude.
+    /// Returns the motion with an attitude of the body.
     pub fn with_attitude(self, attitude: Attitude) -> Self {
         Self { attitude: Some(attitude), ..self }
     }
@@ -179,7 +179,7 @@ impl Trajectory {
         self.attitude.map(|attitude| attitude.at(t_s, &self.body(t_s), self.turn(t_s).as_ref()))
     }
 
-    /// Whether the body spins.
+    /// True if the body spins.
     pub fn spins(&self) -> bool {
         self.attitude.is_some_and(|attitude| attitude.spin_hz != 0.0)
     }
@@ -190,7 +190,7 @@ impl Trajectory {
         self.attitude.map_or(body, |attitude| attitude.antenna(t_s, &body, self.turn(t_s).as_ref()))
     }
 
-    /// How far from the nose's axis a body that spins carries the antenna, in metres, and its turns a second.
+    /// Distance in metres of the antenna from the axis of a spinning body, and its turns per second.
     pub fn circle(&self) -> Option<(f64, f64)> {
         let attitude = self.attitude.as_ref().filter(|attitude| attitude.spin_hz != 0.0)?;
         let radius_m = attitude.lever_arm_m.yz().norm();
@@ -216,7 +216,7 @@ impl Trajectory {
         &self.breaks_s
     }
 
-    /// How many of these a second there are, from the first to the last.
+    /// Number of motion breaks per second, from the first to the last.
     pub fn breaks_a_second(&self) -> f64 {
         let (Some(first), Some(last)) = (self.breaks_s.first(), self.breaks_s.last()) else { return 0.0 };
         (self.breaks_s.len() - 1) as f64 / (last - first).max(1.0)
@@ -227,7 +227,7 @@ impl Trajectory {
         &self.knots
     }
 
-    /// Whether the antenna never moves.
+    /// True if the antenna never moves.
     pub fn is_static(&self) -> bool {
         let swings = self.spins() && self.attitude.is_some_and(|attitude| attitude.lever_arm_m.yz().norm() > 0.0);
         !swings
@@ -291,8 +291,8 @@ pub struct Extremes {
     pub speed_mps: f64,
 }
 
-/// What the quintic between two knots departs by from the left one's parabola: the factors of the third,
-/// fourth and fifth power of the share of the time between them, in metres.
+/// Difference of the quintic between two knots from the left knot's parabola. The values are the factors of
+/// the third, fourth and fifth power of the share of the time between them, in metres.
 fn third_fourth_fifth(left: &Knot, right: &Knot) -> [Vector3<f64>; 3] {
     let h = right.t_s - left.t_s;
     let (a, b) = (&left.motion, &right.motion);

@@ -39,7 +39,7 @@ pub struct Orbit {
     pub mean_anomaly_rad: f64,
 }
 
-/// Why an orbit cannot be flown.
+/// Reason for which an orbit cannot be flown.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum OrbitMotionError {
     /// An orbit that meets the Earth or its air.

@@ -25,7 +25,7 @@ impl Ramp {
         }
     }
 
-    /// How long the change takes.
+    /// Duration of the change, in seconds.
     pub fn duration_s(&self) -> f64 {
         2.0 * self.ramp_s + self.hold_s
     }
@@ -42,7 +42,7 @@ impl Ramp {
         corners
     }
 
-    /// What has changed after `t_s`, and how fast it changes then.
+    /// Change after `t_s`, and its rate per second.
     pub fn at(&self, t_s: f64) -> (f64, f64) {
         let left_s = self.duration_s() - t_s;
         if t_s <= 0.0 {

@@ -27,16 +27,16 @@ const STEP_S: f64 = 0.02;
 /// Longest flight that is integrated: 540 000 knots, 45 MB.
 const LONGEST_FLIGHT_S: f64 = 10_800.0;
 
-/// How the rocket is built and launched.
+/// Construction and launch of the rocket.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rocket {
-    /// Where it starts.
+    /// Position of the launch pad.
     pub pad: Geodetic,
     /// Direction of the thrust at the pad, kept in ECEF.
     pub azimuth_rad: f64,
     /// Elevation of the launch.
     pub elevation_rad: f64,
-    /// When the thrust begins, true seconds since the scene's start.
+    /// Ignition time, in true seconds since the scene's start.
     pub ignition_s: f64,
     /// Thrust over mass while it holds.
     pub thrust_mps2: f64,
@@ -46,11 +46,11 @@ pub struct Rocket {
     pub jerk_mps3: f64,
     /// Cd·A/m; 0 flies in vacuum.
     pub drag_m2pkg: f64,
-    /// Whether gravity has the Earth's oblateness.
+    /// True if gravity includes the Earth's oblateness.
     pub oblate: bool,
 }
 
-/// Why a rocket does not fly.
+/// Reason for which a rocket does not fly.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum RocketError {
     /// Ramps of the thrust that take longer than the burn.
@@ -61,7 +61,7 @@ pub enum RocketError {
     Burn {
         /// Largest acceleration by the thrust.
         thrust_mps2: f64,
-        /// How fast it grows.
+        /// Jerk by which the acceleration grows, in m/s³.
         jerk_mps3: f64,
         /// Time that both ramps take.
         ramps_s: f64,
@@ -73,7 +73,7 @@ pub enum RocketError {
     Weak {
         /// Largest acceleration by the thrust.
         thrust_mps2: f64,
-        /// What gravity leaves of the thrust.
+        /// Thrust acceleration minus gravity, in m/s².
         net_mps2: f64,
     },
 }

@@ -16,15 +16,15 @@ use gnss::earth::Geodetic;
 /// A place on the route and how it is passed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Waypoint {
-    /// Where it is.
+    /// Position of the waypoint.
     pub place: Geodetic,
     /// Speed there; 0 is a stop.
     pub speed_mps: f64,
-    /// How long a stop lasts.
+    /// Duration of a stop, in seconds.
     pub hold_s: f64,
 }
 
-/// How hard the vehicle may turn.
+/// Limit of a vehicle's turns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Turning {
     /// Lateral acceleration held in a turn.
@@ -39,10 +39,10 @@ pub enum Turning {
     },
 }
 
-/// What the vehicle can do.
+/// Limits of a vehicle's motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// How tight turns are.
+    /// Limit of turns.
     pub turning: Turning,
     /// Along the path.
     pub acceleration_mps2: f64,
@@ -50,13 +50,13 @@ pub struct Limits {
     pub jerk_mps3: f64,
 }
 
-/// Why waypoints make no route. Waypoints are counted from 1.
+/// Reason for which waypoints do not form a route. Waypoints are counted from 1.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum RouteError {
     /// Fewer waypoints than a route needs.
     #[error("a route needs at least 2 waypoints, not {have}")]
     TooFew {
-        /// How many there are.
+        /// Number of waypoints.
         have: usize,
     },
     /// A leg that is too short or too long.
@@ -228,8 +228,9 @@ impl Turn {
         steps
     }
 
-    /// How far the antenna moves between two instants of one step: Gauss-Legendre quadrature of five points
-    /// (Abramowitz and Stegun, table 25.4), whose error over 0.05 rad is below 1e-19 of the radius.
+    /// Displacement of the antenna in metres between two instants of one step. Gauss-Legendre quadrature of
+    /// five points is used (Abramowitz and Stegun, table 25.4). Its error over 0.05 rad is below 1e-19 of the
+    /// radius.
     fn displacement(&self, a: f64, b: f64) -> Vector3<f64> {
         const POINTS: [(f64, f64); 3] = [
             (0.0, 0.568_888_888_888_889),

@@ -1,5 +1,4 @@
-//! What acceleration does to a crystal: a shift of its frequency, in proportion to the antenna's
-//! acceleration.
+//! Effect of acceleration on a crystal: a frequency shift in proportion to the antenna's acceleration.
 //!
 //! δf / f = k · |a| / g, with a the acceleration in ECEF (gravity is part of the nominal frequency) along the
 //! most sensitive axis of the crystal. Typical k: 1e-9 a g for a TCXO, 1e-10 for an OCXO (Filler 1988).
@@ -26,7 +25,7 @@ pub struct Shaking {
     trajectory: Trajectory,
     /// ∫ |a| dt from the scene's start to each knot, in m/s.
     until_mps: Vec<f64>,
-    /// The same from the first knot to the start.
+    /// ∫ |a| dt from the first knot to the scene's start, in m/s.
     before_mps: f64,
 }
 

@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 /// Below this a rotation vector's series are exact to the last digit.
 const SMALL_RAD: f64 = 1e-4;
 
-/// How a body is turned, and how fast it turns.
+/// Orientation of a body and its rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turn {
     /// Unit quaternion from body axes (nose, right, down) to north, east, down: scalar first.
@@ -25,12 +25,12 @@ pub struct Turn {
 pub struct PushedTurn {
     /// Yaw clockwise from north, pitch up, roll to the right.
     pub angles_rad: [f64; 3],
-    /// Their derivatives, where known.
+    /// Rates of yaw, pitch and roll in rad/s, if known.
     pub rates_radps: Option<[f64; 3]>,
 }
 
 impl PushedTurn {
-    /// Whether all numbers are finite.
+    /// True if all numbers are finite.
     pub fn is_finite(&self) -> bool {
         self.angles_rad.iter().chain(self.rates_radps.iter().flatten()).all(|value| value.is_finite())
     }
@@ -51,7 +51,7 @@ impl PushedTurn {
 }
 
 impl Turn {
-    /// Of yaw, pitch and roll, at rest.
+    /// Creates an orientation at rest from yaw, pitch and roll in radians.
     pub fn of(yaw_rad: f64, pitch_rad: f64, roll_rad: f64) -> Self {
         let half = |angle: f64| libm::sincos(0.5 * angle);
         let ((sy, cy), (sp, cp), (sr, cr)) = (half(yaw_rad), half(pitch_rad), half(roll_rad));
@@ -114,7 +114,7 @@ pub struct Turning {
     used: Option<(f64, Turn)>,
 }
 
-/// What may be joined in one piece; beyond it a tick goes all the way.
+/// Largest rotation in radians that is joined in one segment. Beyond it a tick covers the whole rotation.
 const MOST_JOINED_RAD: f64 = 2.0;
 
 impl Turning {

@@ -14,7 +14,7 @@ use gnss::satellite::Sv;
 /// Ticks that are kept of a satellite: some batches.
 const KEPT: usize = 1024;
 
-/// Of each satellite the beginnings of ticks.
+/// Beginnings of ticks for each satellite.
 #[derive(Debug, Default)]
 pub struct Counted {
     known: Mutex<BTreeMap<Sv, VecDeque<Beginning>>>,

@@ -42,7 +42,7 @@ pub(super) struct Folds {
     code_s: f64,
     /// Waveforms of chips by equal steps.
     kinds: Vec<Vec<Complex64>>,
-    /// Which of them each chip has, from the beginning of a code on and again; none of a chip of zero.
+    /// Kind of each chip, from the beginning of a code on and repeated; `None` for a chip of zero.
     pattern: Vec<Option<usize>>,
     /// Lines within half the rate by their classes, weighed.
     lines: Vec<Vec<Line>>,
@@ -52,7 +52,7 @@ pub(super) struct Folds {
 /// A line of the spectrum.
 struct Line {
     hz: f64,
-    /// Of each kind of chips, conjugate, with the discriminator's weight.
+    /// Conjugate amplitude for each kind of chips, with the discriminator's weight.
     weighed: Vec<Complex64>,
 }
 
@@ -108,8 +108,8 @@ impl Folds {
         (near_s2 + self.far_s2()).sqrt()
     }
 
-    /// What folds beyond those add that stand: only the nearest chip leaves them. With q places in turn it
-    /// knows the code to a sample in q, evenly.
+    /// Variance in s² that standing folds beyond the computed ones add. Only the model of the nearest chip
+    /// has them. With q positions in turn, the code is known to a sample in q, uniformly distributed.
     fn far_s2(&self) -> f64 {
         let last = self.folds().last().unwrap_or(0);
         let chips = (self.code_s * self.chip_hz) as i32;
@@ -117,7 +117,8 @@ impl Folds {
         far.map_or(0.0, |places| (f64::from(places) * self.rate_hz).powi(-2) / 12.0)
     }
 
-    /// Whether one of the folds is the code itself: chips meet the same places again before the code ends.
+    /// True if one of the folds coincides with the code: chips meet the same positions again before the code
+    /// ends.
     pub(super) fn stand(&self) -> bool {
         self.folds().any(|fold| self.stands(fold))
     }
@@ -127,7 +128,7 @@ impl Folds {
         (chips - chips.round()).abs() * self.code_s * self.chip_hz < 1.0
     }
 
-    /// Those that matter: what an edge leaves falls with their number.
+    /// Folds that matter: the error that an edge model leaves falls with their number.
     fn folds(&self) -> impl Iterator<Item = i32> + use<> {
         let last = match self.edge {
             CodeEdge::Nearest => 32,
@@ -137,7 +138,7 @@ impl Folds {
         1..=last
     }
 
-    /// What a fold adds to the variance of the delay.
+    /// Contribution of a fold to the variance of the delay, in s².
     fn fold_s2(&self, fold: i32) -> f64 {
         let turn = f64::from(fold) * self.rate_hz / self.chip_hz;
         let kinds = self.kinds.len();
@@ -164,7 +165,7 @@ impl Folds {
         (self.chip_hz / self.slope).powi(2) * (standing + variance / (self.chip_hz * self.code_s))
     }
 
-    /// How often a chip of one kind is so many chips after one of another.
+    /// Share of the chips for which a chip of one kind follows one of another at a distance of `chips`.
     fn share(&self, [one, other]: [usize; 2], chips: i32) -> f64 {
         let count = self.pattern.len();
         let is = |at: usize, kind: usize| self.pattern.get(at % count).is_some_and(|own| *own == Some(kind));
@@ -172,8 +173,8 @@ impl Folds {
         (0..count).filter(|&at| is(at, other) && is(at + ahead, one)).count() as f64 / count as f64
     }
 
-    /// What chips of one kind and folded ones of another add, by how many chips they are apart: the part that
-    /// a discriminator reads, which is its own mirror image.
+    /// Contribution of chips of one kind and folded chips of another, by their distance in chips. It contains
+    /// the part that a discriminator measures, which is its own mirror image.
     fn apart(&self, [kind, folded]: [usize; 2], fold: i32) -> Vec<Complex64> {
         let sum = |lines: &Vec<Line>, moved_hz: f64| -> Complex64 {
             let of = |line: &Line| {
@@ -202,7 +203,7 @@ impl Folds {
         (0..by_class.len()).map(of_chips).collect()
     }
 
-    /// What the edge leaves of a line.
+    /// Amplitude that the edge model leaves of a line.
     fn edge(&self, hz: f64) -> f64 {
         match (self.edge, &self.response) {
             (CodeEdge::Area, _) => sinc(hz / self.rate_hz),
@@ -211,7 +212,7 @@ impl Folds {
         }
     }
 
-    /// Of a kind of chips, a chip's energy over its duration.
+    /// Spectrum of a kind of chips: a chip's energy over its duration.
     fn spectrum(&self, kind: usize, hz: f64) -> Complex64 {
         let Some(steps) = self.kinds.get(kind) else { return Complex64::ZERO };
         let step_s = 1.0 / (self.chip_hz * steps.len() as f64);

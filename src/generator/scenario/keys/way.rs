@@ -10,10 +10,10 @@ const IONEX: &[&str] = &["ionex"];
 const ALPHA: (f64, f64) = (-1e-4, 1e-4);
 const BETA: (f64, f64) = (-1e7, 1e7);
 
-/// What word 5 of I/NAV carries at most (Galileo OS SIS ICD, table 65).
+/// Range of the coefficients that word 5 of I/NAV can carry (Galileo OS SIS ICD, table 65).
 const AI: (f64, f64) = (-4.0, 511.75);
 
-/// What the fields of B-CNAV1, B-CNAV2 and B-CNAV3 carry at most, α₅ below zero and α₁ above
+/// Range of the coefficients that B-CNAV1, B-CNAV2 and B-CNAV3 can carry, α₅ below zero and α₁ above
 /// (BDS-SIS-ICD-B1C 1.0, 7.8).
 const BDGIM: (f64, f64) = (-31.875, 127.875);
 

@@ -1,4 +1,4 @@
-//! Where something is wrong in a scenario's text, and all that is wrong with it.
+//! Errors in a scenario's text: their positions, and the list of all of them.
 
 use std::fmt::Display;
 use std::ops::Range;
@@ -10,7 +10,7 @@ pub(super) const ABSENT: &str = "absent";
 
 /// The text of a scenario and where it came from.
 pub struct Source<'t> {
-    /// What the text is called in messages.
+    /// Name of the text in messages.
     pub origin: &'t str,
     /// The whole text.
     pub text: &'t str,

@@ -45,7 +45,7 @@ fn file(leap_s: Option<i64>, later_days: i64) -> String {
     format!("{}{line}{}END OF HEADER\n{records}", &head[..last], &head[last..])
 }
 
-/// What a scene sends alike, or why it cannot be, and its warnings.
+/// Parameters that a scene sends alike, or the error, and its warnings.
 fn sent(text: &str, files: &[(&str, String)]) -> (Result<Common, String>, Vec<String>) {
     let room = tempfile::tempdir().unwrap();
     let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();

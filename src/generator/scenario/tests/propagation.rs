@@ -1,4 +1,4 @@
-//! What lies between satellites and antenna, as a scenario writes it.
+//! Tests of propagation between satellites and antenna, as a scenario writes it.
 
 use super::*;
 use gnss::gps::lnav;

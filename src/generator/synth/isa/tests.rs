@@ -59,8 +59,8 @@ fn difference(a: (&[f32], &[f32]), b: (&[f32], &[f32])) -> f64 {
     of(a.0, b.0).max(of(a.1, b.1))
 }
 
-/// The same numbers in another order, or 1e-9 apart where responses are added: some are rounded to the
-/// other side, by a last place of `f32` below one, and of responses, which overshoot one, above it.
+/// Largest difference between two orders of summation. Some sums are rounded to the other side, by a last
+/// place of `f32` below one. Responses overshoot one, where the last place is larger, and may differ by 1e-9.
 fn exact_bar(edge: Edge<'_>) -> f64 {
     if matches!(edge, Edge::BandLimited(_)) { 1.2e-7 } else { 6.1e-8 }
 }
@@ -102,7 +102,8 @@ fn signals_are_their_twins_at_every_length_and_offset() {
     }
 }
 
-/// As many steps a sample as are taken, so that those at the end of a run lie in the upper half of 16 bits.
+/// Test with the largest permitted steps per sample, so that the last ones of a run lie in the upper half of
+/// 16 bits.
 #[test]
 fn the_longest_runs_are_their_twins_to_the_last_sample() {
     const SAMPLES: usize = 4096;

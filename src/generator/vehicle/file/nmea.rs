@@ -13,7 +13,7 @@ use gnss::nmea::read::{Sentence, SentenceError, time_of_day_s};
 
 const DAY_S: f64 = 86_400.0;
 
-/// What an RMC sentence says.
+/// Content of an RMC sentence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rmc {
     /// Seconds since the scene's start.
@@ -29,11 +29,11 @@ pub struct Rmc {
 /// A fix of a GGA sentence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gga {
-    /// When and where.
+    /// Time and position.
     pub row: Row,
-    /// Who speaks, as `GN`.
+    /// Talker identifier, such as `GN`.
     pub talker: String,
-    /// Whether the sentence lacks a geoid separation, so that EGM96's was taken.
+    /// True if the sentence lacks a geoid separation, so that EGM96's was used.
     pub separation_assumed: bool,
 }
 

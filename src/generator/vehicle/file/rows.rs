@@ -25,7 +25,7 @@ pub(super) struct Rows {
     lines: Vec<u32>,
     max_gap_s: f64,
     tolerance_m: Option<f64>,
-    /// What the last digit of each coordinate is worth, where any row has most digits.
+    /// Value of the last digit of each coordinate in metres, from the row with the most digits.
     steps_m: [f64; 3],
 }
 
@@ -68,13 +68,13 @@ impl Rows {
         Ok(())
     }
 
-    /// What the last digits of the newest row's coordinates are worth. Numbers lose zeros at their end, so
-    /// that the most digits count.
+    /// Records the value of the last digits of the newest row's coordinates, in metres. Numbers lose trailing
+    /// zeros, so the row with the most digits counts.
     pub fn written(&mut self, steps_m: [f64; 3]) {
         self.steps_m.iter_mut().zip(steps_m).for_each(|(least, step_m)| *least = least.min(step_m));
     }
 
-    /// What the digits make of the motion; `None` where the tolerance takes it away.
+    /// Effect of the rounding on the motion; `None` if the tolerance removes it.
     pub fn digits(&self) -> Option<Digits> {
         let step_m = self.steps_m.iter().fold(0.0, |most: f64, step_m| most.max(*step_m));
         if self.tolerance_m.is_some() { None } else { Digits::of(&self.rows, step_m) }

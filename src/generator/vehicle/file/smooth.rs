@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 use crate::vehicle::spline::Row;
 
-/// What the digits of positions make of a motion.
+/// Effect of the positions' rounding on a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Digits {
     /// Worth of the last one.
@@ -25,7 +25,7 @@ pub struct Digits {
 }
 
 impl Digits {
-    /// Of rows with positions alone, whose last digit is worth `step_m`.
+    /// Computes the effect for rows with positions alone, whose last digit is worth `step_m` metres.
     pub(super) fn of(rows: &[Row], step_m: f64) -> Option<Self> {
         let (first, last) = (rows.first()?, rows.last()?);
         let interval_s = (last.t_s - first.t_s) / (rows.len() as f64 - 1.0);
@@ -86,7 +86,7 @@ impl System {
         Self { steps_s, bends }
     }
 
-    /// By how much each row is away from the spline of a factor: αQγ.
+    /// Distance of each row from the spline of a factor, in metres: αQγ.
     fn moves_m(&self, alpha_s3: f64) -> Vec<Vector3<f64>> {
         let rates: Vec<[f64; 3]> = self
             .steps_s
