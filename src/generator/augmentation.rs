@@ -57,7 +57,7 @@ const REFERENCE_S: i64 = 16;
 /// A clock's departure in true time since the scene's start.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Departure {
-    /// Ahead by so many seconds from the first to the second time.
+    /// Clock offset in seconds from the first to the second time.
     Step(f64, f64, f64),
     /// Gains so much a second from the first to the second time, and keeps it.
     Ramp(f64, f64, f64),
@@ -155,7 +155,7 @@ fn bands_around(here: Geodetic) -> Vec<(u8, Vec<u8>)> {
     (0..BANDS).map(of).filter(|(_, own)| !own.is_empty()).collect()
 }
 
-/// To the nearest step of places and fast corrections.
+/// Rounds to the nearest step of positions and fast corrections.
 fn to_step(value_m: f64) -> f64 {
     (value_m / STEP_M).round() * STEP_M
 }

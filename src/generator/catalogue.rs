@@ -38,7 +38,7 @@ const CONTRADICTION_S: f64 = 1e-6;
 /// 0.01.
 const ROUND_M: f64 = 3e5;
 
-/// From when on which set is sent.
+/// Interval in which one ephemeris is sent.
 #[derive(Clone, Copy, Debug)]
 struct Span {
     from: Epoch,
@@ -304,7 +304,8 @@ fn same_elements(a: &Ephemeris, b: &Ephemeris) -> bool {
     Ephemeris { transmitted: b.transmitted, ..a.clone() } == *b
 }
 
-/// Between how far apart reference times sets are compared: none so far that the middle is beyond both fits.
+/// Largest difference in seconds between the reference times of compared ephemerides. Its middle is within
+/// the fit interval of both.
 fn comparable_s(set: &Ephemeris) -> f64 {
     COMPARABLE_S.min(2.0 * set.fit_interval_s())
 }

@@ -34,7 +34,7 @@ pub struct LineOfSight {
     pub acceleration_mps2: f64,
     /// Largest jerk along it.
     pub jerk_mps3: f64,
-    /// From the least to the largest second derivative: what no step of it exceeds.
+    /// Difference of the largest and the least second derivative, in m/s²: an upper bound for any step of it.
     pub swing_mps2: f64,
     /// Time of the largest jerk, in true seconds after the scene's start.
     pub jerk_s: f64,

@@ -189,15 +189,15 @@ fn worst<'s>(signals: &[&'s Signal], figure: impl Fn(&Signal) -> f64) -> Option<
 pub struct Wishes {
     /// The level.
     pub grade: Grade,
-    /// In place of the level's.
+    /// Edge model that replaces the level's.
     pub code_edge: Option<CodeEdge>,
-    /// In place of the level's.
+    /// Layers that replace the level's.
     pub waveform: Option<Layers>,
-    /// In place of the level's.
+    /// Carrier arithmetic that replaces the level's.
     pub carrier: Option<Arithmetic>,
-    /// In place of the level's.
+    /// Noise arithmetic that replaces the level's.
     pub noise: Option<Arithmetic>,
-    /// In place of the level's.
+    /// Knot tolerance in cycles that replaces the level's.
     pub knot_tolerance_cycles: Option<f64>,
     /// Error of the code below which `balanced` chooses.
     pub allowed_m: f64,

@@ -33,7 +33,7 @@ pub struct Arrival {
 }
 
 impl Arrival {
-    /// With what is too quick for knots.
+    /// Adds the phases that change too quickly for knots.
     pub fn with_fast_phase(self, fast: FastPhase) -> Self {
         Self {
             delay_s: self.delay_s + fast.delay_s,

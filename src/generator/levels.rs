@@ -42,7 +42,7 @@ impl Span {
         Self { least: value, most: value }
     }
 
-    /// With a further value.
+    /// Widens the span so that it includes a further value.
     pub fn widen(span: &mut Option<Self>, value: f64) {
         let old = span.unwrap_or(Self::of(value));
         *span = Some(Self { least: old.least.min(value), most: old.most.max(value) });

@@ -109,7 +109,7 @@ impl Kind {
 pub struct Sent {
     /// Symbols as encoded, with correct checks.
     pub encoded: Vec<bool>,
-    /// … and as they left the antenna.
+    /// Symbols as they left the antenna.
     pub symbols: Vec<bool>,
     /// Other units that its redundancy restores.
     pub restored: Vec<Vec<bool>>,
@@ -133,7 +133,7 @@ impl Slot {
         self.time.instant(self.message.unit_start(self.unit))
     }
 
-    /// At which time it is decided which set it is of.
+    /// Time at which the ephemeris of the unit is selected.
     pub fn set_chosen(&self) -> Epoch {
         self.time.instant(self.message.unit_start(self.message.unit_of_set(self.unit)))
     }

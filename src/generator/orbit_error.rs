@@ -19,9 +19,9 @@ pub struct Displacement {
     pub satellites: Vec<Sv>,
     /// Outwards, along the inertial motion, and along the angular momentum.
     pub radial_m: f64,
-    /// Along the inertial motion.
+    /// Displacement along the inertial motion, in metres.
     pub along_m: f64,
-    /// Along the angular momentum.
+    /// Displacement along the angular momentum, in metres.
     pub cross_m: f64,
     /// Beginning and duration in seconds of the growth. If absent, the displacement exists from the start.
     pub growth: Option<(Epoch, f64)>,

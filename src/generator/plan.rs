@@ -34,7 +34,7 @@ const INSTANTS: u32 = 240;
 pub struct InView {
     /// The satellite.
     pub sv: Sv,
-    /// At the first instant at which it is above the mask.
+    /// Azimuth in degrees at the first instant above the mask.
     pub azimuth_deg: f64,
     /// Elevation then.
     pub elevation_deg: f64,
@@ -42,10 +42,12 @@ pub struct InView {
     pub cn0_dbhz: Option<f64>,
     /// Power of all its signals and rays over noise density, weakest and strongest of the instants.
     pub power_dbhz: Option<Span>,
-    /// Time since the start when it comes into view, if not in view from the beginning, and by what …
+    /// Time in seconds since the start when the satellite comes into view, and the cause. `None` if it is in
+    /// view from the beginning.
     pub appears: Option<(f64, PassEnd)>,
-    /// … and when it leaves, if not in view to the end. To the step of the search, but exact where an
-    /// ephemeris begins or ends.
+    /// Time in seconds since the start when the satellite leaves, and the cause. `None` if it is in view to
+    /// the end. The time is exact if an ephemeris begins or ends, and otherwise exact to the step of the
+    /// search.
     pub leaves: Option<(f64, PassEnd)>,
 }
 

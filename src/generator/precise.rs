@@ -72,7 +72,7 @@ impl Orbits {
         Some(Self { first_s, step_s, satellites: precise.satellites.iter().filter_map(track).collect() })
     }
 
-    /// Between which instants there are epochs enough on both sides; the second may lie before the first.
+    /// First and last instant with enough epochs on both sides; the second may lie before the first.
     pub fn reach(&self) -> (Epoch, Epoch) {
         let count = self.satellites.values().map(|track| track.nodes.len()).max().unwrap_or(0) as i64;
         let at = |index: i64| Epoch::new(self.first_s + self.step_s * index, 0.0);

@@ -25,13 +25,14 @@ const LOOK_S: f64 = 600.0;
 /// Presence of a satellite in the sky.
 #[derive(Clone, Debug)]
 pub enum Presence {
-    /// In view: where and when it sent what arrives.
+    /// Satellite in view, with the time and position of emission.
     InView(Box<Emission>),
-    /// Below the elevation mask.
+    /// Satellite below the elevation mask.
     BelowMask,
-    /// Behind the Earth, as seen from space.
+    /// Satellite behind the Earth, as seen from space.
     BehindEarth,
-    /// Nothing in the navigation file is sent at this time, or precise orbits have none.
+    /// Satellite without an ephemeris at this time: none in the navigation file is sent, or precise orbits
+    /// have none.
     NoEphemeris,
 }
 

@@ -36,7 +36,7 @@ pub struct Sight {
 pub struct Ray {
     /// Additional delay of the code along the path, in seconds, beyond the geometric delay.
     pub code_delay_s: f64,
-    /// … and to that of the carrier.
+    /// Additional delay of the carrier along the path, in seconds, beyond the geometric delay.
     pub carrier_delay_s: f64,
     /// Carrier phase that comes from no delay (wind-up, reflection), in cycles.
     pub phase_cycles: f64,

@@ -262,7 +262,7 @@ pub struct Scenario {
     pub truth_interval_s: f64,
     /// Expectations about a receiver, for the judge.
     pub expect: Expect,
-    /// For the receiver's own parser.
+    /// Settings for the receiver's own parser.
     pub receiver: Option<toml::Table>,
 }
 

@@ -37,7 +37,7 @@ pub struct Drag {
     pub direction: Vector3<f64>,
     /// Final speed.
     pub speed_mps: f64,
-    /// Until the speed is reached.
+    /// Acceleration in m/s² until the final speed is reached.
     pub acceleration_mps2: f64,
 }
 
@@ -46,7 +46,7 @@ pub struct Drag {
 pub struct Advantage {
     /// Power advantage at the moment of switching on, in dB.
     pub start_db: f64,
-    /// After the ramp.
+    /// Power advantage after the ramp, in dB.
     pub end_db: f64,
     /// Time from one to the other after switching on, linear in decibels.
     pub ramp_s: f64,

@@ -34,7 +34,7 @@ pub struct Switched {
     pub gain: f64,
     /// Error of pseudorange and carrier in metres at sample `since`.
     pub astray_m: f64,
-    /// … and by how much that grows a second.
+    /// Growth of the range error, in m/s.
     pub astray_mps: f64,
     /// First sample of the tick from which that counts.
     pub since: u64,
@@ -91,7 +91,7 @@ pub struct Switches {
 }
 
 impl Switches {
-    /// None switched yet; a tick has `tick_samples`.
+    /// Creates switches of which none has been used. A tick has `tick_samples` samples.
     pub fn new(tick_samples: u64) -> Self {
         Self { tick_samples: tick_samples.max(1), rows: RwLock::new(BTreeMap::new()) }
     }

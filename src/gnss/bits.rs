@@ -90,7 +90,7 @@ pub enum FieldError {
     OutOfRange {
         /// Name of the field.
         name: &'static str,
-        /// In the unit of its name.
+        /// Value of the field, in the unit that its name states.
         value: f64,
         /// Least value that the field holds.
         minimum: f64,
@@ -102,7 +102,7 @@ pub enum FieldError {
     NotMultiple {
         /// Name of the field.
         name: &'static str,
-        /// In the unit of its name.
+        /// Value of the field, in the unit that its name states.
         value: f64,
         /// Scale factor: the value of one step, in the field's unit.
         step: f64,
@@ -140,7 +140,7 @@ pub enum FieldError {
 /// Interpretation of a field's integer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Not negative, rounded to the nearest step.
+    /// Unsigned integer, rounded to the nearest step.
     Unsigned,
     /// A count or a time: not negative, and refused when not a whole number of steps.
     Whole,

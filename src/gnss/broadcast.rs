@@ -82,17 +82,17 @@ pub struct Ephemeris {
     pub i0_rad: f64,
     /// Rate of the inclination, rad/s.
     pub idot_radps: f64,
-    /// Amplitude of the cosine of twice the argument of latitude, in that argument …
+    /// Amplitude of the cosine harmonic correction to the argument of latitude, in radians.
     pub cuc_rad: f64,
-    /// … and of its sine.
+    /// Amplitude of the sine harmonic correction to the argument of latitude, in radians.
     pub cus_rad: f64,
     /// Amplitude of the cosine harmonic correction to the orbit radius, in metres.
     pub crc_m: f64,
-    /// … and of its sine.
+    /// Amplitude of the sine harmonic correction to the orbit radius, in metres.
     pub crs_m: f64,
     /// Amplitude of the cosine harmonic correction to the inclination, in radians.
     pub cic_rad: f64,
-    /// … and of its sine.
+    /// Amplitude of the sine harmonic correction to the inclination, in radians.
     pub cis_rad: f64,
     /// Clock's offset at its reference time.
     pub af0_s: f64,

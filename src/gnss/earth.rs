@@ -33,7 +33,7 @@ pub struct Geodetic {
 }
 
 impl Geodetic {
-    /// From degrees and metres, as people write a place.
+    /// Creates the position from degrees and metres.
     pub fn from_degrees(latitude_deg: f64, longitude_deg: f64, height_m: f64) -> Self {
         Self { latitude_rad: latitude_deg.to_radians(), longitude_rad: longitude_deg.to_radians(), height_m }
     }
@@ -98,9 +98,9 @@ impl Geodetic {
 /// A direction as seen from a place: azimuth from north over east in [0, 2π), elevation above the horizon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
-    /// From north over east, in [0, 2π).
+    /// Azimuth from north over east, in radians, [0, 2π).
     pub azimuth_rad: f64,
-    /// Above the horizon.
+    /// Elevation above the horizon, in radians.
     pub elevation_rad: f64,
 }
 

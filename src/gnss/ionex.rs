@@ -26,9 +26,10 @@ const POLAR_GAP_DEG: f64 = 5.0;
 /// Method of interpolation between nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpolation {
-    /// From four nodes, as the format's authors propose and every user of the maps does; its slope has steps.
+    /// Bilinear interpolation from four nodes, as the format's authors propose and every user of the maps
+    /// does; its slope has steps.
     Bilinear,
-    /// From sixteen nodes, through each of them, with a continuous slope.
+    /// Bicubic interpolation from sixteen nodes, through each of them, with a continuous slope.
     Bicubic,
 }
 
@@ -38,7 +39,7 @@ pub struct Maps {
     /// One for each map, ascending, at least two.
     epochs: Vec<Epoch>,
     latitudes: Axis,
-    /// Without a last column that repeats the first one.
+    /// Longitudes of the grid, without a last column that repeats the first one.
     longitudes: Axis,
     /// Radius of the Earth and height of the shell above it, as the header gives them.
     pub radius_m: f64,

@@ -242,7 +242,7 @@ pub trait Sender: Send + Sync {
 pub enum Read {
     /// A unit that passed its checks began `symbols` before the end of the newest symbol, at a time of week.
     Unit {
-        /// From its first symbol to the newest, both counted.
+        /// Number of symbols from the unit's first to the newest, both counted.
         symbols: u64,
         /// Seconds of the week at which its first symbol was sent.
         of_week_s: i64,
@@ -251,7 +251,7 @@ pub enum Read {
     },
     /// A unit of a message that does not state its time.
     Undated {
-        /// From its first symbol to the newest, both counted.
+        /// Number of symbols from the unit's first to the newest, both counted.
         symbols: u64,
         /// True if symbols are received inverted.
         inverted: bool,

@@ -49,9 +49,9 @@ pub struct Seen {
     pub sv: Sv,
     /// Strongest signal of the satellite and its C/N0 in dB-Hz; absent if no signal is received.
     pub signal: Option<(&'static Signal, f64)>,
-    /// From north over east.
+    /// Azimuth from north over east, in degrees.
     pub azimuth_deg: f64,
-    /// Above the horizon.
+    /// Elevation above the horizon, in degrees.
     pub elevation_deg: f64,
     /// True if the satellite is used in the solution.
     pub used: bool,
@@ -165,7 +165,7 @@ fn over_ground(place: &Place) -> (f64, f64) {
     (libm::hypot(enu.x, enu.y), libm::atan2(enu.x, enu.y).to_degrees().rem_euclid(360.0))
 }
 
-/// At most 99.99, which stands for all beyond.
+/// Limits a dilution of precision to 99.99, which stands for all larger values.
 fn dilution(value: f64) -> f64 {
     value.min(99.99)
 }
@@ -277,7 +277,8 @@ mod tests {
         assert!(zda(&place(0.0, 0.0, 0.0)).contains("080600.000,01,07,2010,00,00"));
     }
 
-    /// At 38° N 90° W the sea is 30.262 m below the ellipsoid (WW15MGH), in whole centimetres 30.26 m.
+    /// Expected values at 38° N 90° W: the sea is 30.262 m below the ellipsoid (WW15MGH), 30.26 m in whole
+    /// centimetres.
     #[test]
     fn altitude_is_above_the_sea_and_the_separation_stands_beside_it() {
         let text = gga(&place(38.0, -90.0, 100.012_34));

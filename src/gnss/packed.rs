@@ -91,9 +91,9 @@ impl FromStr for Encoding {
 pub enum Components {
     /// One.
     Real,
-    /// In phase, then in quadrature.
+    /// I first, then Q.
     Iq,
-    /// In quadrature, then in phase.
+    /// Q first, then I.
     Qi,
 }
 

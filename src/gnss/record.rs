@@ -38,7 +38,7 @@ pub struct Observation {
     /// Transmission time by the satellite's clock, whole GPS seconds, for the wave that arrives at this
     /// sample. The clock is that of the signal (IS-GPS-200N, 20.3.3.3.3).
     pub sent_s: i64,
-    /// … and the fraction.
+    /// Fraction of the transmission time, in seconds.
     pub sent_fraction_s: f64,
     /// Speed of light times (reading of the receiver's clock − time sent).
     pub pseudorange_m: f64,
@@ -69,9 +69,9 @@ pub struct SkyRow {
     /// Signal to which the clock and the ionosphere delay refer.
     #[serde(with = "by_name")]
     pub signal: &'static Signal,
-    /// From north over east.
+    /// Azimuth from north over east, in degrees.
     pub azimuth_deg: f64,
-    /// Above the horizon.
+    /// Elevation above the horizon, in degrees.
     pub elevation_deg: f64,
     /// Geometric range with light time and Earth rotation.
     pub range_m: f64,
@@ -138,21 +138,21 @@ pub struct RayRow {
 pub struct TrajectoryRow {
     /// Number of the sample, from 0 at the start of the scene or recording.
     pub sample: u64,
-    /// True GPS time of the sample: whole seconds since 1980 …
+    /// True GPS time of the sample, whole seconds since 1980.
     pub gps_s: i64,
-    /// … and the fraction.
+    /// Fraction of the true GPS time, in seconds.
     pub gps_fraction_s: f64,
-    /// Place, ECEF: x …
+    /// ECEF position x, in metres.
     pub x_m: f64,
-    /// … y …
+    /// ECEF position y, in metres.
     pub y_m: f64,
-    /// … and z.
+    /// ECEF position z, in metres.
     pub z_m: f64,
-    /// Velocity, ECEF: x …
+    /// ECEF velocity x, in m/s.
     pub vx_mps: f64,
-    /// … y …
+    /// ECEF velocity y, in m/s.
     pub vy_mps: f64,
-    /// … and z.
+    /// ECEF velocity z, in m/s.
     pub vz_mps: f64,
     /// Reading of the receiver's clock minus true time.
     pub clock_bias_s: f64,
@@ -225,21 +225,21 @@ pub struct InterferenceRow {
 pub struct Fix {
     /// Number of the sample, from 0 at the start of the scene or recording.
     pub sample: u64,
-    /// GPS time of the sample as the receiver found it: whole seconds since 1980 …
+    /// Estimated GPS time of the sample, whole seconds since 1980.
     pub gps_s: i64,
-    /// … and the fraction.
+    /// Fraction of the estimated GPS time, in seconds.
     pub gps_fraction_s: f64,
-    /// Place, ECEF: x …
+    /// Estimated ECEF position x, in metres.
     pub x_m: f64,
-    /// … y …
+    /// Estimated ECEF position y, in metres.
     pub y_m: f64,
-    /// … and z.
+    /// Estimated ECEF position z, in metres.
     pub z_m: f64,
-    /// Velocity, ECEF: x …
+    /// Estimated ECEF velocity x, in m/s.
     pub vx_mps: f64,
-    /// … y …
+    /// Estimated ECEF velocity y, in m/s.
     pub vy_mps: f64,
-    /// … and z.
+    /// Estimated ECEF velocity z, in m/s.
     pub vz_mps: f64,
     /// Reading of the receiver's clock minus GPS time, and its rate.
     pub clock_bias_s: f64,
@@ -249,7 +249,7 @@ pub struct Fix {
     pub sigma_east_m: f64,
     /// North.
     pub sigma_north_m: f64,
-    /// Up.
+    /// Standard deviation of the height, in metres.
     pub sigma_up_m: f64,
     /// Clock, times the speed of light.
     pub sigma_clock_m: f64,
@@ -303,9 +303,9 @@ pub struct SightRow {
     pub sample: u64,
     /// The satellite.
     pub sv: Sv,
-    /// From north over east.
+    /// Azimuth from north over east, in degrees.
     pub azimuth_deg: f64,
-    /// Above the horizon.
+    /// Elevation above the horizon, in degrees.
     pub elevation_deg: f64,
     /// True if the satellite is used in the fix.
     pub used: bool,
@@ -343,7 +343,7 @@ pub struct ClockRow {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IonosphereModel {
-    /// Nothing: the settings say that there is none.
+    /// No correction, because the settings state that there is no ionosphere.
     None,
     /// A typical ionosphere, whose error is in the covariance: no satellite's parameters have been decoded
     /// yet.
@@ -416,7 +416,8 @@ pub struct LineRow {
     pub frequency_hz: f64,
     /// Power of the line over the noise density beside it, in dB-Hz.
     pub jn0_dbhz: f64,
-    /// … and over the satellites' median C/N0 while there was no line; empty if there never was such a time.
+    /// Power of the line relative to the satellites' median C/N0 while there was no line, in dB. It is empty
+    /// if there was always a line.
     pub js_db: Option<f64>,
     /// Power of the line's bin relative to the bins beside it.
     pub statistic: f64,

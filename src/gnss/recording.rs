@@ -11,7 +11,7 @@ use crate::time::{Epoch, Rate};
 /// Arrangement of samples in a file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Samples {
-    /// In whole bytes, as they are received.
+    /// Samples in whole bytes, as the receiver takes them.
     Whole(Format),
     /// Packed, or among those of other channels.
     Interleaved(Interleaved),

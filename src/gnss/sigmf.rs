@@ -26,7 +26,7 @@ const EXTENSION: &str = "gnss_twin";
 /// Reason for which a text does not describe readable samples.
 #[derive(Debug, Error)]
 pub enum SigmfError {
-    /// Not JSON, or not the objects that SigMF asks for.
+    /// Text that is not JSON, or lacks the objects of SigMF.
     #[error("{name}: not SigMF metadata: {error}")]
     Syntax {
         /// Name of the file.

@@ -56,7 +56,7 @@ impl PowerLaw {
         Self { h2: 0.0, h1: 0.0, h0, hm1, hm2 }
     }
 
-    /// From the highest power of frequency to the lowest.
+    /// Returns the coefficients from the highest power of frequency to the lowest.
     pub fn levels(&self) -> [f64; 5] {
         [self.h2, self.h1, self.h0, self.hm1, self.hm2]
     }

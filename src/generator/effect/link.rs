@@ -33,9 +33,9 @@ pub struct LinkBudget {
     /// Power of L1 C/A into the satellite's antenna, dBW; other signals' are as much more as their documents'
     /// minima on the ground.
     pub transmit_dbw: f64,
-    /// The satellites' block …
+    /// Block of all satellites without one of their own.
     pub block: Block,
-    /// … and those that have one of their own.
+    /// Satellites with a block of their own.
     pub blocks: Vec<(Sv, Block)>,
     /// Atmospheric and polarisation losses.
     pub path_loss_db: f64,

@@ -45,7 +45,7 @@ pub enum Mapping {
 /// Source of VMF's coefficients a.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Coefficients {
-    /// From a grid of TU Wien's, by place and time.
+    /// Coefficients from a grid of TU Wien, by position and time.
     Grid(Box<MappingGrid>),
     /// The climatology.
     Gpt3(Box<Gpt3>),

@@ -57,9 +57,9 @@ pub struct Echo {
 pub struct Multipath {
     /// The reflections.
     pub echoes: Vec<Echo>,
-    /// Scene's start, from which excesses and walls are counted …
+    /// Start of the scene, from which excess paths and walls are counted.
     pub start: Epoch,
-    /// … and where the antenna is then (ECEF).
+    /// Position of the antenna at the scene's start, ECEF, in metres.
     pub origin_m: Vector3<f64>,
 }
 

@@ -49,9 +49,9 @@ pub enum Obstacle {
 /// A box on the ground, by metres east, north and up of where the motion starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Building {
-    /// From and to, east of the scene's first place.
+    /// West and east end in metres east of the scene's first position.
     pub east_m: [f64; 2],
-    /// From and to, north of it.
+    /// South and north end in metres north of the scene's first position.
     pub north_m: [f64; 2],
     /// Height of the roof above that place.
     pub top_m: f64,
@@ -110,7 +110,7 @@ fn mixed(share: f64, around: f64) -> f64 {
     share + (1.0 - share) * around
 }
 
-/// From 0 clear of an edge to 1 well behind it, by the depth into the shadow.
+/// Degree of coverage by the depth into the shadow: 0 clear of an edge, 1 well behind it.
 fn covered(depth_rad: f64, edge_rad: f64) -> f64 {
     smooth(depth_rad / edge_rad + 0.5)
 }

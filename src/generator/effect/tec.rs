@@ -39,7 +39,7 @@ pub struct Shell {
     pub radius_m: f64,
     /// Height above the sphere of the maps.
     pub height_m: f64,
-    /// From vertical to slant content.
+    /// Conversion from vertical to slant content.
     pub mapping: Mapping,
 }
 
@@ -87,7 +87,7 @@ impl Shell {
 pub enum Content {
     /// Constant content everywhere at all times, in TEC units.
     Constant(f64),
-    /// Off maps, in which the time of the scene is `later_s` later.
+    /// Content from maps. The scene's time plus `later_s` is the time in the maps.
     Maps {
         /// The maps of the file.
         maps: Box<Maps>,

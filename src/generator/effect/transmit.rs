@@ -15,7 +15,7 @@ use gnss::time::Epoch;
 /// A generation of satellites.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Block {
-    /// None in particular.
+    /// Typical satellite of no particular block.
     Typical,
     /// GPS block IIA.
     Iia,

@@ -98,7 +98,7 @@ pub enum Air {
 pub struct Troposphere {
     /// Zenith delays of the air.
     pub air: Air,
-    /// From zenith to slant delays.
+    /// Mapping function from zenith to slant delays.
     pub mapping: Mapping,
 }
 

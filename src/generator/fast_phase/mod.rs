@@ -20,16 +20,16 @@ use gnss::time::{Rate, SampleClock};
 /// Phase and amplitude that are added to a satellite's signal at one sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FastPhase {
-    /// To the delay of the code.
+    /// Additional delay of the code, in seconds.
     pub delay_s: f64,
-    /// To the pseudorange of the carrier, in cycles at RF.
+    /// Additional pseudorange of the carrier, in cycles at RF.
     pub carrier_cycles: f64,
     /// Factor of the amplitude.
     pub gain: f64,
 }
 
 impl FastPhase {
-    /// Nothing added.
+    /// No addition: zero delay and phase, unit gain.
     pub const STILL: Self = Self { delay_s: 0.0, carrier_cycles: 0.0, gain: 1.0 };
 
     fn between(self, other: Self, u: f64) -> Self {

@@ -25,7 +25,7 @@ pub struct Change {
 /// Kind of a clock change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ChangeKind {
-    /// Ahead by so much between the nodes.
+    /// Constant clock offset between the nodes.
     Step {
         /// Clock offset in seconds, positive ahead.
         step_s: f64,
@@ -96,7 +96,7 @@ impl SatelliteClock {
 }
 
 impl Change {
-    /// At node `at`, which ends or begins the stretch behind node `node`.
+    /// Clock offset in seconds at node `at`, which ends or begins the segment behind node `node`.
     fn offset_s(&self, sources: &Sources<'_>, node: u64, at: u64) -> f64 {
         match self.kind {
             ChangeKind::Step { step_s } if (self.from_node..self.until_node).contains(&node) => step_s,

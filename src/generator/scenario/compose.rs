@@ -1,4 +1,5 @@
-//! From a scenario to scenes: files are loaded, effects put in order, and values checked against each other.
+//! Composition of scenes from a scenario: files are loaded, effects put in order, and values checked against
+//! each other.
 //!
 //! What front ends share (motion, clock, sky, effects) is made once; each front end becomes a scene of its
 //! own, the one that it would be alone.
@@ -31,14 +32,14 @@ use gnss::satellite::Sv;
 use gnss::signal::Signal;
 use gnss::time::SampleClock;
 
-/// Beyond this the equations of [`crate::sky`], which keep no square of speed over light's for the
-/// user, are no longer a receiver's world.
+/// Largest speed in m/s. The equations of [`crate::sky`] neglect the square of the user's speed over that of
+/// light.
 const LARGEST_SPEED_MPS: f64 = 0.1 * SPEED_OF_LIGHT_MPS;
 
 /// Values of a scenario that the command line overrides.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Overrides {
-    /// In place of the scenario's.
+    /// Seed that replaces the scenario's.
     pub seed: Option<u64>,
     /// Sample format of every front end.
     pub format: Option<Format>,

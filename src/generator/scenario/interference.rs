@@ -15,13 +15,13 @@ use gnss::satellite::Sv;
 /// Strength of an interferer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Strength {
-    /// Over `power.cn0_dbhz`, or behind a link budget over the strongest satellite at the scene's start, at
-    /// the antenna.
+    /// Power relative to the satellites at the antenna. The reference is `power.cn0_dbhz`, or with a link
+    /// budget the strongest satellite at the scene's start.
     OverSignal {
         /// Power over the strongest satellite's.
         db: f64,
     },
-    /// At the antenna's port.
+    /// Power at the antenna's port.
     Received {
         /// Power in dBW.
         dbw: f64,

@@ -24,7 +24,7 @@ pub enum Power {
         /// Satellites with a C/N0 of their own, in dB-Hz.
         satellites: Vec<(Sv, f64)>,
     },
-    /// From range, elevation and antennas.
+    /// Power by a link budget from range, elevation and antennas.
     LinkBudget {
         /// The satellites' transmit patterns.
         transmit: Transmit,

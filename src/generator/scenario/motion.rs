@@ -21,9 +21,9 @@ pub enum FileKind {
 /// The motion as meant, with its file not yet read.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MotionSpec {
-    /// At rest.
+    /// Antenna at rest at a position.
     Static(Geodetic),
-    /// From place to place on smooth turns.
+    /// Route through waypoints with smooth turns.
     Waypoints {
         /// The places, with the speeds between them.
         points: Vec<Waypoint>,

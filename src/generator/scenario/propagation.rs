@@ -207,7 +207,7 @@ impl Ionosphere {
 pub struct NeutralAtmosphere {
     /// The weather at the ground.
     pub weather: Weather,
-    /// Taken for the weather, and for the mapping if that wants coefficients.
+    /// File of GPT3, for the weather, and for a mapping function that needs coefficients.
     pub gpt3_file: Option<PathBuf>,
     /// Growth of the delay towards the horizon.
     pub mapping: MappingKind,
@@ -220,7 +220,7 @@ pub enum MappingKind {
     Cosecant,
     /// Niell's functions.
     Niell,
-    /// With coefficients a from this grid, or from GPT3.
+    /// Vienna mapping functions, with coefficients a from this grid, or from GPT3.
     Vienna(Vienna, Option<PathBuf>),
 }
 

@@ -79,9 +79,9 @@ pub enum SatelliteFault {
         satellites: Vec<Sv>,
         /// Outwards.
         radial_m: f64,
-        /// Along the inertial motion.
+        /// Displacement along the inertial motion, in metres.
         along_m: f64,
-        /// Along the angular momentum.
+        /// Displacement along the angular momentum, in metres.
         cross_m: f64,
         /// Start and duration in seconds of the offset's growth; absent means that it exists from the
         /// beginning.

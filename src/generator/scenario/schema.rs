@@ -77,7 +77,7 @@ pub enum Value {
 pub enum Absent {
     /// The scenario is refused.
     Required,
-    /// Nothing of the kind.
+    /// Absence of the feature.
     Optional,
     /// Default number.
     Number(f64),

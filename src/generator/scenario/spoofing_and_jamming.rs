@@ -1,4 +1,4 @@
-//! From `[[interference]]` and `[[spoofer]]` as written to sources in a scene.
+//! Conversion of `[[interference]]` and `[[spoofer]]` as written to sources in a scene.
 
 use std::path::Path;
 use std::sync::Arc;

@@ -1,5 +1,5 @@
-//! From a motion as written to a trajectory: files are read, a body is given its attitude, and spans are
-//! checked. What is pushed grows in `pushed`.
+//! Conversion of a motion as written to a trajectory. Files are read, a body is given its attitude, and spans
+//! are checked. Pushed motion is in `pushed`.
 
 use std::fs::File;
 use std::path::Path;

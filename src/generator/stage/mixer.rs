@@ -37,7 +37,7 @@ pub struct PhaseNoise {
     pub bandwidth_hz: f64,
     spacing: u64,
     response: Vec<f64>,
-    /// From node to node: the share of the phase that stays, and the size of what comes.
+    /// Factor of the phase that remains from node to node, and size of the added noise.
     keeps: f64,
     gains: f64,
     stream: Stream,

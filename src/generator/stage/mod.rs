@@ -20,7 +20,7 @@ use gnss::facts::StageSpec;
 pub struct Block<'a> {
     /// Number of the first sample, a multiple of 4096.
     pub start: u64,
-    /// In-phase and quadrature components, of one length.
+    /// I and Q components, of one length.
     pub i: &'a mut [f32],
     /// Quadrature components.
     pub q: &'a mut [f32],

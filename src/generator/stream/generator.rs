@@ -48,7 +48,7 @@ pub struct Batch {
 /// ```
 pub struct Generator<'a> {
     scene: &'a Scene,
-    /// Taken with the last sample.
+    /// Stream; `None` after the last sample.
     stream: Option<Stream<'a>>,
     next: u64,
     done: Option<Generated>,

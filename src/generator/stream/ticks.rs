@@ -1,4 +1,4 @@
-//! At which samples there is truth, and what of it.
+//! Ticks of the truth: the samples at which truth is recorded, and its content.
 
 use std::collections::BTreeSet;
 

@@ -25,7 +25,7 @@ pub(crate) fn cos_sin<const N: usize>(words: &[u32; N]) -> ([f32; N], [f32; N]) 
     (cos, sin)
 }
 
-/// The upper halves of `start`, `start + step`, …, in 2^-64 turn: words for [`cos_sin`].
+/// Upper halves of `start`, `start + step` and on, in 2^-64 turn: words for [`cos_sin`].
 #[inline(always)]
 pub(crate) fn ramp<const N: usize>(start: u64, step: u64) -> [u32; N] {
     std::array::from_fn(|k| (start.wrapping_add(step.wrapping_mul(k as u64)) >> 32) as u32)

@@ -24,7 +24,8 @@ pub(super) const UNIT_CELLS: usize = 128;
 pub(super) const UNIT: f64 = 1.0 / (1_u32 << 29) as f64;
 /// One in [`UNIT`]s.
 pub(super) const UNITS: i32 = 1 << 29;
-/// Has a last place of one, as has each sum with a number below 2^22: bits of the sum count it.
+/// Constant with a last place of one, like each of its sums with a number below 2^22, so that bits of the sum
+/// count it.
 const COUNTER: f32 = 1.5 * (1 << 23) as f32;
 
 /// A low-pass filter, known by its response to a unit step.
@@ -57,7 +58,7 @@ pub(super) struct UnitCell {
 }
 
 impl Cell {
-    /// At the place `x` within the cell, 0 to 1.
+    /// Values at the position `x` within the cell, 0 to 1.
     #[inline(always)]
     pub(super) fn at(&self, x: f64) -> [f64; WIDTH] {
         let Self([a, b, c, d]) = self;
@@ -70,7 +71,7 @@ impl Cell {
 }
 
 impl UnitCell {
-    /// At the place `x` from the middle of the cell, −½ to ½.
+    /// Values at the position `x` from the middle of the cell, −½ to ½.
     #[inline(always)]
     pub(super) fn at(&self, x: f32) -> [i32; WIDTH] {
         let Self { middle, more: [b, c, d] } = self;

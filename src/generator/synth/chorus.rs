@@ -23,7 +23,7 @@ const DENSER: u64 = DENSEST + 1;
 pub(super) struct Chord {
     /// Carrier of the first sequence.
     carrier: Carrier,
-    /// In phase with it, and a quarter of a turn ahead.
+    /// Layers in phase with the carrier, and layers a quarter of a turn ahead.
     in_phase: Vec<Layer>,
     quadrature: Vec<Layer>,
 }
@@ -289,8 +289,8 @@ fn nearest<const V: usize>(signs: &[u32; V], amplitudes: &[f32; V], place: u32) 
     (1..V).fold(value(0), |sum, v| sum + value(v))
 }
 
-/// Behind a change the mean rises from −`span` to `span`, as far as the edge lies back; elsewhere it is
-/// `span` already.
+/// Mean of the signs in one sample. Behind a change it rises from −`span` to `span`, as far as the edge lies
+/// back; elsewhere it is `span`.
 #[inline(always)]
 fn sparse<const V: usize>(signs: &[u32; V], amplitudes: &[f32; V], span: f32, place: u32) -> f32 {
     let behind = (place & FRACTION) as i32 as f32;

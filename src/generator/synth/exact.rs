@@ -28,11 +28,11 @@ type Side = [f64; LANES];
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 struct Carrier {
-    /// Cosine and sine at half a sample, one and a half … from the middle of a group.
+    /// Cosine and sine at the samples' distances from the middle of a group: ½, 1½, 2½ samples.
     place: (Side, Side),
-    /// From the middle of a tile's first group to that of each.
+    /// Cosine and sine of the turn from the middle of a tile's first group to that of each.
     groups: (Side, Side),
-    /// At the middle of each tile's first group.
+    /// Cosine and sine at the middle of each tile's first group.
     tiles: (Side, Side),
 }
 
@@ -154,7 +154,7 @@ fn add_to(before: &Side, after: &Side, out: &mut [f32]) {
     }
 }
 
-/// `start`, `start + step`, …, in 2^-64 turn.
+/// Phases `start`, `start + step` and on, in 2^-64 turn.
 #[inline(always)]
 fn ramp(start: u64, step: u64) -> [u64; LANES] {
     let mut turns = [0; LANES];

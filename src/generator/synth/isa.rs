@@ -22,7 +22,7 @@ pub enum Level {
 }
 
 impl Level {
-    /// From the narrowest to the widest.
+    /// All levels from the narrowest vectors to the widest.
     pub const ALL: [Self; 3] = [Self::Baseline, Self::Avx2, Self::Avx512];
 
     /// The widest that this processor has.

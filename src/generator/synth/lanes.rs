@@ -39,7 +39,7 @@ pub(super) type Side<T = f32> = [T; HALF];
 pub struct Buffers {
     voices: Vec<Voice>,
     chords: Vec<Chord>,
-    /// On the heap: workers that wait for each other hold many of these.
+    /// Waves on the heap: workers that wait for each other hold many of these.
     waves: Box<Waves>,
 }
 
@@ -63,10 +63,11 @@ struct Voice {
 #[derive(Clone)]
 #[repr(align(64))]
 pub(super) struct Carrier {
-    /// At half a sample, one and a half … from the middle of a group, amplitude one.
+    /// Cosine and sine at the samples' distances from the middle of a group, ½, 1½, 2½ samples, with
+    /// amplitude one.
     pub cos: Side,
     pub sin: Side,
-    /// At the middle of each group.
+    /// Carrier at the middle of each group.
     pub re: [f32; GROUPS],
     pub im: [f32; GROUPS],
 }

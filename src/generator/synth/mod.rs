@@ -80,8 +80,8 @@ impl Run<'_> {
     }
 }
 
-/// From a position to the beginning of a code step, Q16.48 steps. Steps of a run reach beyond 2^15, so
-/// neither is a signed number.
+/// Distance from a position to the beginning of a code step, Q16.48 steps. Steps of a run reach beyond 2^15,
+/// so neither is a signed number.
 #[inline(always)]
 fn to_step(position: u64, step: u64) -> f64 {
     let edge = step * CODE_ONE;
@@ -91,7 +91,7 @@ fn to_step(position: u64, step: u64) -> f64 {
 /// Model of a code edge between samples, with the data that it needs.
 #[derive(Clone, Copy, Debug)]
 pub enum Edge<'a> {
-    /// At the nearest sample.
+    /// Edge at the nearest sample.
     Nearest,
     /// Share of the sample's area on either side of the edge.
     Area,

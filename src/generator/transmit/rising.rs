@@ -1,4 +1,4 @@
-//! Since when a satellite has been in view, for a stream that begins late in a scene.
+//! Start of a satellite's view, for a stream that begins late in a scene.
 //!
 //! Views are decided second by second, and a satellite may have been up for hours before the first sample of
 //! a stream. A satellite well above the mask has been there for some time, because nothing moves faster than
@@ -26,7 +26,8 @@ pub(super) struct Leap {
 }
 
 impl Leap {
-    /// For the antenna of a scene, as a constellation takes it to move, until `until_s` after the start.
+    /// Creates the bound for the antenna of a scene, as a constellation assumes it to move, until `until_s`
+    /// after the start.
     pub fn new(scene: &Scene, from: &Constellation, until_s: f64) -> Self {
         // From space satellites are seen below the horizon, but never hidden above it.
         Self { user_mps: from.fastest_mps(&scene.trajectory, until_s), mask_rad: scene.mask_rad.max(0.0) }

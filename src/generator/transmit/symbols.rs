@@ -28,7 +28,7 @@ pub struct Data {
 }
 
 impl Symbols {
-    /// Nothing sent yet of the messages of a signal.
+    /// Creates the state for the messages of a signal, of which nothing has been sent.
     pub fn new(signal: &Signal) -> Self {
         let mut units: Vec<(&'static Message, BTreeMap<i64, Vec<bool>>)> = Vec::new();
         for message in signal.components.iter().filter_map(|component| component.message) {

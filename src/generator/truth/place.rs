@@ -32,7 +32,7 @@ pub struct Nmea {
 }
 
 impl Nmea {
-    /// In an existing directory.
+    /// Creates the file in an existing directory.
     ///
     /// # Errors
     /// [`TruthError::File`] with the path that cannot be made.
@@ -128,7 +128,7 @@ pub struct Tracks {
 }
 
 impl Tracks {
-    /// In an existing directory; the files are made when the truth begins.
+    /// Creates the writer for an existing directory. The files are made when the truth begins.
     pub fn new(directory: &Path) -> Self {
         Self { directory: directory.to_owned(), tracks: Vec::new() }
     }

@@ -23,7 +23,7 @@ pub struct Rinex {
 }
 
 impl Rinex {
-    /// In an existing directory; files are made when the truth begins.
+    /// Creates the writer for an existing directory. Files are made when the truth begins.
     pub fn new(directory: &Path, version: Version) -> Self {
         let (directory, messages) = (directory.to_owned(), NavigationSets::default());
         Self { directory, version, observations: None, messages, signals: Vec::new(), near: None }

@@ -23,27 +23,27 @@ const REST_MPS: f64 = 1.0;
 pub enum Nose {
     /// Yaw from north over east, pitch above the horizon, roll to the right.
     Fixed {
-        /// Clockwise from north, or from the velocity.
+        /// Yaw in radians, clockwise from north.
         yaw_rad: f64,
-        /// Nose up.
+        /// Pitch in radians, positive nose up.
         pitch_rad: f64,
-        /// Right side down.
+        /// Roll in radians, positive right side down.
         roll_rad: f64,
     },
     /// Pushed attitude; these angles apply before the first push.
     Pushed {
-        /// Clockwise from north.
+        /// Yaw in radians, clockwise from north.
         yaw_rad: f64,
-        /// Nose up.
+        /// Pitch in radians, positive nose up.
         pitch_rad: f64,
-        /// Right side down.
+        /// Roll in radians, positive right side down.
         roll_rad: f64,
     },
-    /// Along the velocity over ground, and in this direction at rest.
+    /// Nose along the velocity over ground, and in the given direction at rest.
     Velocity {
-        /// Clockwise from north, or from the velocity.
+        /// Yaw at rest in radians, clockwise from north.
         yaw_rad: f64,
-        /// Nose up.
+        /// Pitch at rest in radians, positive nose up.
         pitch_rad: f64,
     },
 }
@@ -55,7 +55,7 @@ pub struct Attitude {
     pub nose: Nose,
     /// Turns a second about the nose, positive to the right.
     pub spin_hz: f64,
-    /// From the point that moves along the trajectory to the antenna, in body axes.
+    /// Lever arm in metres from the point that moves along the trajectory to the antenna, in body axes.
     pub lever_arm_m: Vector3<f64>,
     /// Direction in which the antenna looks, in body axes.
     pub boresight: Unit<Vector3<f64>>,
@@ -64,14 +64,14 @@ pub struct Attitude {
 /// A body's axes at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orientation {
-    /// From body axes to ECEF, as if the body had never spun.
+    /// Rotation from body axes to ECEF, as if the body had never spun.
     pub still: Rotation3<f64>,
     /// Turns about the nose since the scene's start, whole ones included.
     pub spin_cycles: f64,
 }
 
 impl Orientation {
-    /// From body axes to ECEF.
+    /// Rotation from body axes to ECEF.
     pub fn axes(&self) -> Rotation3<f64> {
         let turn = TAU * (self.spin_cycles - self.spin_cycles.floor());
         self.still * about_nose(turn)
@@ -124,14 +124,14 @@ impl Attitude {
     }
 }
 
-/// From north, east, down at a place to ECEF.
+/// Rotation from north, east, down at a position to ECEF.
 fn local_axes(place: Geodetic) -> Rotation3<f64> {
     let enu = place.ecef_to_enu();
     let axes = Matrix3::from_columns(&[enu.row(1).transpose(), enu.row(0).transpose(), -enu.row(2).transpose()]);
     Rotation3::from_matrix_unchecked(axes)
 }
 
-/// From body axes to north, east, down.
+/// Rotation from body axes to north, east, down.
 pub(super) fn turned(yaw_rad: f64, pitch_rad: f64, roll_rad: f64) -> Rotation3<f64> {
     let (sin_yaw, cos_yaw) = libm::sincos(yaw_rad);
     let (sin_pitch, cos_pitch) = libm::sincos(pitch_rad);
@@ -158,7 +158,7 @@ mod tests {
         Attitude { nose, spin_hz, lever_arm_m: Vector3::new(0.1, 0.2, -0.3), boresight: -Vector3::z_axis() }
     }
 
-    /// On the equator at longitude 0, north, east, down are z, y, −x of ECEF.
+    /// Motion on the equator at longitude 0, where north, east, down are z, y, −x of ECEF.
     fn there(velocity_mps: Vector3<f64>) -> Motion {
         let position_m = Geodetic::from_degrees(0.0, 0.0, 0.0).to_ecef();
         Motion { position_m, velocity_mps, acceleration_mps2: Vector3::zeros() }

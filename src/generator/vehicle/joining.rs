@@ -105,7 +105,7 @@ pub enum Refusal {
 /// Origin of a tick's motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Nothing was pushed yet.
+    /// No push has arrived.
     Waiting,
     /// A new push steered it.
     Fresh,
@@ -172,7 +172,7 @@ pub struct Joiner {
     /// The push in use, and those that wait for their time.
     used: Option<State>,
     waiting: VecDeque<State>,
-    /// Taken so far.
+    /// Number of pushes taken so far.
     taken: u64,
     /// State of the attitude, if it is pushed.
     turning: Option<Turning>,

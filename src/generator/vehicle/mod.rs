@@ -40,7 +40,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// At rest on the rotating Earth.
+    /// Creates the motion of a point at rest on the rotating Earth.
     pub fn at_rest(position_m: Vector3<f64>) -> Self {
         Self { position_m, velocity_mps: Vector3::zeros(), acceleration_mps2: Vector3::zeros() }
     }
@@ -67,7 +67,7 @@ pub struct Knot {
 /// Antenna motion over true time since the scene's start.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trajectory {
-    /// At least one; times strictly ascending. Who keeps a copy of the trajectory shares them.
+    /// Knots, at least one, with strictly ascending times. Copies of the trajectory share them.
     knots: Arc<[Knot]>,
     breaks_s: Vec<f64>,
     first: Knot,

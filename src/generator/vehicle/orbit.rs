@@ -33,7 +33,7 @@ pub struct Orbit {
     pub inclination_rad: f64,
     /// Longitude of the ascending node in the Earth-fixed axes of the scene's start.
     pub node_longitude_rad: f64,
-    /// From the ascending node to the perigee.
+    /// Argument of the perigee from the ascending node, in radians.
     pub argument_of_perigee_rad: f64,
     /// Mean anomaly at the scene's start.
     pub mean_anomaly_rad: f64,

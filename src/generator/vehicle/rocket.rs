@@ -40,7 +40,7 @@ pub struct Rocket {
     pub ignition_s: f64,
     /// Thrust over mass while it holds.
     pub thrust_mps2: f64,
-    /// From ignition to the end of the thrust, both ramps included.
+    /// Duration in seconds from ignition to the end of the thrust, both ramps included.
     pub burn_s: f64,
     /// Slope of the thrust's ramps.
     pub jerk_mps3: f64,

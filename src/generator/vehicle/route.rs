@@ -44,7 +44,7 @@ pub enum Turning {
 pub struct Limits {
     /// Limit of turns.
     pub turning: Turning,
-    /// Along the path.
+    /// Largest acceleration along the path, in m/s².
     pub acceleration_mps2: f64,
     /// Largest jerk.
     pub jerk_mps3: f64,
@@ -107,7 +107,7 @@ struct Turn {
     side: Vector3<f64>,
     speed_mps: f64,
     angle: Ramp,
-    /// From the waypoint to where the turn begins and ends.
+    /// Distance in metres from the waypoint to the turn's beginning and end.
     reach_m: f64,
 }
 

@@ -8,7 +8,7 @@
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
-/// Below this a rotation vector's series are exact to the last digit.
+/// Angle in radians below which the series of a rotation vector are exact to the last digit.
 const SMALL_RAD: f64 = 1e-4;
 
 /// Orientation of a body and its rate.
@@ -108,7 +108,7 @@ impl Turn {
 /// Turns of ticks from pushed ones.
 #[derive(Clone, Debug)]
 pub struct Turning {
-    /// At the end of the last tick.
+    /// Orientation at the end of the last tick.
     now: Turn,
     /// The newest push in use, and when it holds.
     used: Option<(f64, Turn)>,

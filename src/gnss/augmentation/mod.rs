@@ -210,7 +210,7 @@ pub struct Known {
 }
 
 impl Known {
-    /// Nothing but the indicator of why.
+    /// Creates an estimate with no corrections, only the indicator of the reason.
     pub fn nothing(udrei: u8) -> Self {
         Self { correction_m: 0.0, udrei, degradation: 0, long_term: LongTerm::default(), is_moving: false }
     }

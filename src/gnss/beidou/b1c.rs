@@ -66,7 +66,7 @@ pub static B1C: Signal = Signal {
 /// do not send it.
 pub const THIRD_GENERATION: [u8; 2] = [19, 50];
 
-/// Since when numbers send it.
+/// First dates of transmission by satellite number.
 const SINCE: [(std::ops::RangeInclusive<u8>, &str); 3] =
     [(19..=30, "2020-07-31T00:00:00"), (32..=46, "2020-07-31T00:00:00"), (47..=50, "2026-03-09T00:00:00")];
 

@@ -14,7 +14,7 @@ pub enum OrbitError {
         sv: Sv,
         /// Name of the element.
         element: &'static str,
-        /// In its SI unit.
+        /// Value of the element, in its SI unit.
         value: f64,
         /// Values that describe an orbit.
         expected: &'static str,

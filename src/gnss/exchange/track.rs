@@ -14,9 +14,9 @@ use crate::time::Epoch;
 /// A form of track.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TrackForm {
-    /// For Google Earth and its kin.
+    /// KML for Google Earth and similar programs.
     Kml,
-    /// For GPS programs.
+    /// GPX for GPS programs.
     Gpx,
 }
 

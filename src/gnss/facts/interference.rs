@@ -13,16 +13,16 @@ pub enum Interference {
     Cw,
     /// A frequency that runs across a band and jumps back.
     Chirp {
-        /// From end to end, Hz; negative where the frequency falls.
+        /// Width of the sweep from end to end, in Hz; negative where the frequency falls.
         width_hz: f64,
         /// Sweeps a second.
         repetition_hz: f64,
     },
     /// A frequency that runs to and fro.
     Fmcw {
-        /// From end to end, Hz.
+        /// Width of the sweep from end to end, in Hz.
         width_hz: f64,
-        /// There and back, times a second.
+        /// Rate of complete sweeps up and down, in Hz.
         repetition_hz: f64,
     },
     /// A frequency that follows a cosine.

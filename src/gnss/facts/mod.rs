@@ -33,9 +33,9 @@ pub struct TimeOffset {
 pub enum Fixes {
     /// Fixes must exist, whatever the judge computes from satellites and message.
     Required,
-    /// There must be none.
+    /// No fix may exist.
     None,
-    /// Nothing is judged.
+    /// Fixes are not judged.
     Any,
 }
 
@@ -51,7 +51,7 @@ impl Fixes {
 pub enum Losses {
     /// Losses, slips and absences are not judged.
     Any,
-    /// None is excused, however weak the signal.
+    /// No loss is excused, however weak the signal.
     None,
 }
 
@@ -64,9 +64,9 @@ impl Losses {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sizes {
-    /// Within the judge's limits.
+    /// Errors must stay within the judge's limits.
     Bounded,
-    /// Not judged.
+    /// Errors are not judged.
     Any,
 }
 

@@ -19,7 +19,7 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// For frames of so many symbols.
+    /// Creates the state for frames of `length` symbols.
     pub fn new(length: usize) -> Self {
         Self { length, symbols: VecDeque::with_capacity(length), next: 0, frame: None, failures: 0 }
     }

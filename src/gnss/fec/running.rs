@@ -36,12 +36,12 @@ pub struct Found {
     pub bits: Vec<bool>,
     /// True if the symbols were inverted.
     pub inverted: bool,
-    /// From its first symbol to the newest, both counted.
+    /// Number of symbols from the message's first to the newest, both counted.
     pub symbols: u64,
 }
 
 impl Running {
-    /// Nothing taken yet; `is_message` decides by beginning and check.
+    /// Creates a decoder without symbols. `is_message` decides by preamble and check.
     pub fn new(bits: usize, is_message: fn(&[bool]) -> bool) -> Self {
         Self { bits, is_message, symbols: VecDeque::new(), next: 0, frame: None, failures: 0 }
     }

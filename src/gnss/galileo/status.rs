@@ -52,10 +52,10 @@ impl Status {
     }
 }
 
-/// Between the carriers of E5a and of both sides of E5, and between that and E5b's.
+/// Frequency in Hz above which a carrier is not E5a: below those of E5's centre and of E5b.
 const ABOVE_E5A_HZ: f64 = 1_184e6;
 const BELOW_E5B_HZ: f64 = 1_199e6;
-/// Between those of E5b and E6, and of E6 and E1.
+/// Frequencies in Hz that separate E5b from E6, and E6 from E1.
 const ABOVE_E5_HZ: f64 = 1_240e6;
 const ABOVE_E6_HZ: f64 = 1_400e6;
 

@@ -103,9 +103,9 @@ fn sign(one: bool) -> i8 {
 /// Two registers of as many cells; cell 0, the output, is the most significant of their bits.
 struct Registers {
     cells: u32,
-    /// Cells of which the sum is fed back, of each register to itself, …
+    /// Cells of each register whose sum is fed back to the register itself.
     fed: u64,
-    /// … and those of the first whose sum goes to the second, beside the carry of the others.
+    /// Cells of the first register whose sum goes to the second, beside the carry of the others.
     across: u64,
 }
 

@@ -7,7 +7,7 @@ use super::maps::{Maps, modip_deg};
 
 /// Height of the E layer's peak, in kilometres (2.5.5.5).
 const E_PEAK_KM: f64 = 120.0;
-/// Below this height the layers fade like one of Chapman's (2.5.6.2), in kilometres.
+/// Height in kilometres below which the layers decrease like a Chapman layer (2.5.6.2).
 const BOTTOM_KM: f64 = 100.0;
 /// Zenith angle at which day passes into night, in degrees (2.5.4.7).
 const TWILIGHT_DEG: f64 = 86.232_927_962_116_15;

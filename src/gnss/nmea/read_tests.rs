@@ -35,7 +35,7 @@ fn printed_sentences_are_read() {
     assert!((rmc.speed_mps.unwrap() - 0.06 * 0.514_444_4).abs() < 1e-6 && rmc.course_rad == Some(0.0));
 }
 
-/// Over Zürich the sea is 47.30 m above the ellipsoid by WW15MGH; the receiver's own model has 48.0 m.
+/// Geoid separation over Zürich: 47.30 m above the ellipsoid by WW15MGH; the receiver's own model has 48.0 m.
 #[test]
 fn a_separation_that_is_missing_is_that_of_egm96_and_a_zero_is_none() {
     let height = |separation: &str| {

@@ -22,7 +22,7 @@ pub struct Rmc {
     pub latitude_deg: f64,
     /// Degrees, east positive.
     pub longitude_deg: f64,
-    /// Over ground, to the east and to the north.
+    /// Velocity over ground to the east and to the north, in m/s.
     pub velocity_mps: [f64; 2],
 }
 

@@ -16,7 +16,7 @@ use crate::vehicle::spline::Row;
 /// Effect of the positions' rounding on a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Digits {
-    /// Worth of the last one.
+    /// Value of the last digit, in metres.
     pub step_m: f64,
     /// Time between rows, the mean.
     pub interval_s: f64,

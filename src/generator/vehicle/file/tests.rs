@@ -200,7 +200,7 @@ fn gga_gives_ellipsoidal_height_and_crosses_midnight() {
     assert!((last - Geodetic::from_degrees(-0.5, -0.2, 70.0).to_ecef()).norm() < 1e-8);
 }
 
-/// Over Munich the sea is 45.96 m above the ellipsoid by EGM96's node at 48° N 11° E (WW15MGH: 45.956 m).
+/// Sea level over Munich is 45.96 m above the ellipsoid by EGM96's node at 48° N 11° E (WW15MGH: 45.956 m).
 #[test]
 fn a_height_without_a_separation_is_above_the_sea_and_a_second_talker_is_no_second_fix() {
     let start = Epoch::parse("2010-07-01T10:00:00Z").unwrap();

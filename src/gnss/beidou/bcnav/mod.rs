@@ -133,7 +133,7 @@ fn status(raw: Raw<'_>) -> [Option<f64>; 3] {
     ["sismai", "health", "integrity_flags"].map(|name| raw(name).map(|raw| raw as f64))
 }
 
-/// Nothing read yet.
+/// Creates content in which nothing has been decoded.
 pub(super) fn blank(set: Ephemeris) -> Content {
     let kind = kind(set.sv);
     let sent = set.toe;
@@ -233,7 +233,7 @@ pub(super) fn of_integers(
     Some(content.set)
 }
 
-/// At least as many bits as any subframe or message has.
+/// Upper bound of the bits in a subframe or message.
 const LONGEST_BITS: usize = 600;
 
 /// Parameters by which sets are distinguished, or that are no set's.

@@ -96,7 +96,7 @@ pub(super) static PAGE_4: [Of; 3] = [
     plain!("cis_rad", [(32, 16)], Signed, -29, ORBIT, ephemeris.cis_rad),
 ];
 
-/// … what it says of UTC, with its own time …
+/// Fields of page 4 for UTC, with the UTC parameters' own reference time.
 #[rustfmt::skip]
 pub(super) static PAGE_4_UTC: [Element<Utc>; 9] = [
     plain!("utc_a0_s", [(48, 32)], Signed, -30, UTC, a0_s),
@@ -116,7 +116,7 @@ pub(super) static PAGE_4_UTC: [Element<Utc>; 9] = [
         |u| (u.sent_s % WEEK_S) as f64, |u, v| u.sent_s = v as i64),
 ];
 
-/// … and by how much the system's time is ahead of GPS time, in the order in which it is read.
+/// Fields of page 4 for the offset of the system's time ahead of GPS time, in the order of decoding.
 #[rustfmt::skip]
 pub(super) static PAGE_4_GPS: [Element<Offset>; 4] = [
     element(Field::new("ggto_a0_s", &[(155, 16)], Signed, -35, OFFSET), |o| o.field(0), |_, _| {}),

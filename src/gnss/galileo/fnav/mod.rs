@@ -203,7 +203,7 @@ fn of_set() -> [&'static [Element<Orbit>]; 4] {
     [&PAGE_1, &PAGE_2, &PAGE_3, &PAGE_4]
 }
 
-/// Nothing read yet, sent at `at`.
+/// Creates content in which nothing has been decoded, with the transmission time `at`.
 fn blank(sv: Sv, at: Epoch) -> Orbit {
     Orbit { ephemeris: Ephemeris { form: &FNAV_SETS, ..Ephemeris::blank(sv, at) }, nequick: [0.0; 3] }
 }

@@ -140,8 +140,8 @@ pub(super) fn code() -> Convolutional {
 
 const INTERLEAVER: Interleaver = Interleaver { columns: 30, rows: 8 };
 
-/// From when on satellites send redundancy: the document has it since January 2021, satellites got it later.
-/// The real words that it was compared with are of 2025.
+/// First week in which satellites send redundancy. The document has it since January 2021, and satellites
+/// sent it later. The real words that it was compared with are of 2025.
 const REDUNDANT_SINCE_WEEK: i64 = 2243;
 
 /// The parameters in the symbols of a page, and whether they are a set's.

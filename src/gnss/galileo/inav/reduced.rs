@@ -19,7 +19,7 @@ use super::almanac::{NOMINAL_AXIS_M, NOMINAL_INCLINATION_RAD};
 
 /// Seconds from a sub-frame's nominal beginning to that on E1-B, to which reduced elements refer.
 const BEGIN_S: i64 = 1;
-/// For how long from there they are fitted.
+/// Duration in seconds from the reference time for which the elements are fitted.
 pub const VALID_S: f64 = 600.0;
 /// Step of the semi-major axis.
 const AXIS_STEP_M: f64 = 256.0;

@@ -290,7 +290,7 @@ fn of_set() -> [&'static [Element<Content>]; 4] {
     [&ORBIT_1, &ORBIT_2, &CLOCKS, &DELAY]
 }
 
-/// Nothing read yet.
+/// Creates content in which nothing has been decoded.
 fn blank(set: Ephemeris) -> Content {
     Content {
         set: Ephemeris { form: &CNAV_SETS, ..set },

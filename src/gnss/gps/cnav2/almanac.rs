@@ -31,7 +31,7 @@ pub(super) const MEDIUM: f64 = 4.0;
 const OF_GPS: (f64, f64) = (0.0, 0.30);
 const OF_QZSS: (f64, f64) = (0.06, 0.25);
 const GEOSTATIONARY: (f64, f64) = (0.0, 0.0);
-/// Between inclined and geostationary orbits, in semicircles.
+/// Inclination in semicircles that separates inclined from geostationary orbits.
 const INCLINED: f64 = 0.1;
 
 /// One satellite in both kinds of almanac; number 0 is a packet without satellite.

@@ -305,7 +305,7 @@ fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
     Some((true, found))
 }
 
-/// Nothing read yet.
+/// Creates content in which nothing has been decoded.
 fn blank(set: Ephemeris) -> Content {
     Content {
         set: Ephemeris { form: &CNAV2_SETS, ..set },

@@ -294,9 +294,9 @@ pub enum SubframeError {
     Issue {
         /// Issue of the clock, subframe 1.
         iodc: u16,
-        /// Issue of the ephemeris in subframe 2 …
+        /// Issue of the ephemeris in subframe 2.
         iode_2: i64,
-        /// … and in subframe 3.
+        /// Issue of the ephemeris in subframe 3.
         iode_3: i64,
     },
     /// A reference time that no week has.

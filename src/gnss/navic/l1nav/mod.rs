@@ -268,7 +268,7 @@ fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
 /// Coefficients of a scene without known ionosphere: zeros.
 const NO_ELECTRONS: Klobuchar = Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] };
 
-/// Nothing read yet.
+/// Creates content in which nothing has been decoded.
 fn blank(set: Ephemeris) -> Content {
     Content {
         set: Ephemeris { form: &L1_NAV_SETS, ..set },

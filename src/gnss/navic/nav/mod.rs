@@ -269,7 +269,8 @@ pub fn sent_at(one: &Subframe, near: Epoch) -> Option<Epoch> {
     Some(Epoch::new(week * WEEK_S + began_s(one)?, 0.0))
 }
 
-/// Nothing but equal reference times shows a receiver that subframes 1 and 2 belong together.
+/// Checks that the reference times of orbit and clock are equal. Receivers have no other sign that subframes
+/// 1 and 2 belong together.
 fn check(ephemeris: &Ephemeris) -> Result<(), FieldError> {
     if ephemeris.toe == ephemeris.toc {
         Ok(())

@@ -21,7 +21,7 @@ const FIRST: [&str; 20] = [
     "af0", "af1", "af2", "iode", "crs", "deltaN", "m0", "cuc", "e", "cus", "sqrta", "toe", "cic", "omega0", "cis",
     "i0", "crc", "omega", "omegaDot", "idot",
 ];
-/// … and the rest of an LNAV, of a Galileo and of a NavIC record; spare ones have no name.
+/// Names of the remaining fields of an LNAV, a Galileo and a NavIC record. Spare fields have no name.
 const OF_LNAV: [&str; FIELDS - FIRST.len()] =
     ["l2Codes", "week", "l2p", "accuracy", "health", "tgd", "iodc", "t_tm", "fitInt", "", ""];
 const OF_GALILEO: [&str; FIELDS - FIRST.len()] =

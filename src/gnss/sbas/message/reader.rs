@@ -44,7 +44,7 @@ impl SbasReader {
         (tow_s < WEEK_S).then(|| Epoch::new(near.nearest_week(week, 1024) * WEEK_S + tow_s, 0.0))
     }
 
-    /// Without a time a correction is of no use.
+    /// Reports the content of a block, if its time is known. A correction without a time is of no use.
     fn look_for_content(&self, kind: u8, begin: u64, bits: &Vec<bool>, news: &mut Vec<Read>) {
         let (Some(sent), Some(content)) = (self.begun(begin), Content::read(kind, bits)) else { return };
         news.push(Read::Augmentation(sent, Box::new(content)));
