@@ -1,6 +1,6 @@
 //! Arrival of a satellite's signal at one time of the receiver's clock.
 //!
-//! One definition serves samples and truth: with T the clock's reading, t the true time and τ the light time,
+//! One definition serves samples and truth: with T the clock's time, t the true time and τ the light time,
 //! the delay of the code is (T − t) + τ + (delays of the ray) − (satellite clock); that of the carrier takes
 //! the ray's carrier delay instead, and is counted in cycles at RF.
 
@@ -17,7 +17,7 @@ use gnss::satellite::Sv;
 use gnss::signal::Signal;
 use gnss::time::Epoch;
 
-/// A satellite's signal as it arrives at one reading of the receiver's clock.
+/// A satellite's signal as it arrives at one time of the receiver's clock.
 #[derive(Clone, Debug)]
 pub struct Seen {
     /// Time and position of emission, and the line of sight.
@@ -30,7 +30,7 @@ pub struct Seen {
     pub arrivals: Vec<Arrival>,
 }
 
-/// True time, and the motion that a constellation's signals are made for, when the receiver's clock reads
+/// True time, and the motion for which a constellation's signals are made, at the receiver's clock time
 /// `local`.
 pub(super) fn received(scene: &Scene, from: &Constellation, local: Epoch) -> (Epoch, f64, Motion) {
     let start = scene.clock.start;
@@ -126,7 +126,7 @@ fn arriving(scene: &Scene, signal: &Signal, Arriving { emission, bias_s, gain }:
     for effect in &scene.effects {
         effect.act(&emission.sight, signal, &mut rays);
     }
-    // Small numbers only: no reading of a clock enters a sum of seconds.
+    // Small numbers only: no clock time enters a sum of seconds.
     let sent = emission.sight.received.plus_s(-emission.travel_s);
     let ahead_s = scene.catalogue.signal_clock_s(emission.sight.sv, sent, signal);
     let satellite_clock_s = emission.satellite_clock_s + ahead_s;

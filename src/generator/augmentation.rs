@@ -27,9 +27,9 @@ use gnss::gps::lnav::LNAV;
 use gnss::satellite::{Sv, System};
 use gnss::time::Epoch;
 
-/// Steps of fast corrections and of places (A.4.4.3, A.4.4.7).
+/// Steps of fast corrections and of positions (A.4.4.3, A.4.4.7).
 const STEP_M: f64 = 0.125;
-/// Limits of the fields: a fast correction, a place without and with rates, a rate.
+/// Limits of the fields: a fast correction, a position without and with rates, a rate.
 const LARGEST_FAST_M: f64 = 255.875;
 const LARGEST_STEADY_M: f64 = 31.875;
 const LARGEST_MOVING_M: f64 = 127.875;
@@ -54,7 +54,7 @@ const CLOCK_STEP_S: f64 = 1.0;
 /// Steps of the reference time of long-term corrections.
 const REFERENCE_S: i64 = 16;
 
-/// A clock's departure in true time since the scene's start.
+/// Clock error over true time since the scene's start.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Departure {
     /// Clock offset in seconds from the first to the second time.
@@ -106,7 +106,8 @@ impl fmt::Debug for GroundNetwork {
 }
 
 impl GroundNetwork {
-    /// The network around a place; it corrects the satellites that are above its horizon at one of the times.
+    /// The network around a position; it corrects the satellites that are above its horizon at one of the
+    /// times.
     pub fn around(ground: Ground, motion: &crate::vehicle::Motion, times: &[Epoch]) -> Self {
         let is_up = |sv: Sv, at: Epoch| {
             let found = emission(&ground.catalogue, sv, at, motion).ok().flatten();
@@ -119,7 +120,7 @@ impl GroundNetwork {
         Self { ground, numbers, bands }
     }
 
-    /// Truth minus broadcast of a set that is sent: place in metres, and clock in metres of range.
+    /// Truth minus broadcast of an ephemeris that is sent: position in metres, and clock in metres of range.
     fn difference(&self, sent: &Ephemeris, at: Epoch) -> Option<(Vector3<f64>, f64)> {
         let (state, clock) = self.ground.catalogue.truth(sent.sv, at).ok()??;
         let (said, said_clock) = sent.state_and_clock_l1(at).ok()?;
@@ -130,7 +131,7 @@ impl GroundNetwork {
         Some((state.position_m - said.position_m, SPEED_OF_LIGHT_MPS * ahead_s))
     }
 
-    /// The set that a satellite sends, as it is received.
+    /// The ephemeris that a satellite sends, as it is received.
     fn sent(&self, sv: Sv, at: Epoch) -> Option<Ephemeris> {
         let set = self.ground.catalogue.sent_at(sv, at)?;
         let sent = spoiled(&self.ground.message_faults, &LNAV, sv, set, at).unwrap_or_else(|| (LNAV.form)(set));
@@ -138,7 +139,7 @@ impl GroundNetwork {
     }
 }
 
-/// Points of every band that are near a place, by their numbers.
+/// Points of every band that are near a position, by their numbers.
 fn bands_around(here: Geodetic) -> Vec<(u8, Vec<u8>)> {
     let direction = |(latitude_deg, longitude_deg): Point| {
         let (sin_latitude, cos_latitude) = libm::sincos(f64::from(latitude_deg).to_radians());

@@ -1,10 +1,10 @@
 //! Broadcast ephemeris of each satellite at each time, and the smooth orbit that the generator takes as true.
 //!
-//! A set of GPS goes on the air two hours before its reference time (IS-GPS-200N, 20.3.4.4), or when it was
-//! first received if its reference time is off the two-hour grid, which marks a fresh upload; it stays
-//! until the next one or the end of its curve fit interval. Neighbouring sets disagree by
+//! An ephemeris of GPS goes on the air two hours before its reference time (IS-GPS-200N, 20.3.4.4), or when
+//! it was first received if its reference time is off the two-hour grid, which marks a fresh upload; it stays
+//! until the next one or the end of its curve fit interval. Neighbouring ephemerides disagree by
 //! a metre or two, so the truth passes from one to the next over [`BLEND_S`]: the received phase
-//! stays smooth and the decoded set stays right to that metre.
+//! stays smooth and the decoded ephemeris stays right to that metre.
 //!
 //! Records that their neighbours contradict are left out ([`Catalogue::new`]). Precise orbits may step in
 //! for the true ones ([`Catalogue::follow`]), and faults add to either ([`Catalogue::depart`]); what is sent
@@ -19,17 +19,17 @@ use gnss::satellite::{Sv, System};
 use gnss::signal::Signal;
 use gnss::time::Epoch;
 
-/// Duration of a hand-over, centred on the instant when the broadcast set changes. A step of Δ metres
+/// Duration of a hand-over, centred on the instant when the broadcast ephemeris changes. A step of Δ metres
 /// becomes a rate of at most 1.875 Δ / 720 s: 2.6 mm/s a metre.
 pub const BLEND_S: f64 = 720.0;
-/// Sets further apart than this are not compared.
+/// Ephemerides further apart than this are not compared.
 const COMPARABLE_S: f64 = 6.0 * 3600.0;
-/// Good sets of one satellite agree to some ten metres half way between their reference times, where
+/// Good ephemerides of one satellite agree to some ten metres half way between their reference times, where
 /// they are at most six hours apart.
 const CONTRADICTION_M: f64 = 2000.0;
-/// The longest time from the reference time of a set that is sent after it to its first sending: Galileo's
-/// records of 2020 have 11 min at least; of 283 records of NavIC of a day in 2026 all but one have 12 s to
-/// 252 s.
+/// The longest time from the reference time of an ephemeris that is sent after it to its first sending:
+/// Galileo's records of 2020 have 11 min at least; of 283 records of NavIC of a day in 2026 all but one have
+/// 12 s to 252 s.
 const DELAY_S: f64 = 600.0;
 /// Largest plausible difference in seconds between the clocks of two ephemerides, 300 m: beyond it they
 /// contradict each other.
@@ -51,8 +51,8 @@ struct Timeline {
     spans: Vec<Span>,
 }
 
-/// A time in which a satellite has nothing to send: from the end of one set's fit interval to the first
-/// sending of the next one. Open where no set comes before or after.
+/// A time in which a satellite has nothing to send: from the end of one ephemeris's fit interval to the first
+/// sending of the next one. Open where no ephemeris comes before or after.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Silence {
     /// Beginning; `None` if it has always lasted.
@@ -61,7 +61,7 @@ pub struct Silence {
     pub until: Option<Epoch>,
 }
 
-/// The broadcast sets of every satellite, arranged by when they are sent, and what is true besides.
+/// The broadcast ephemerides of every satellite, arranged by when they are sent, and what is true besides.
 #[derive(Clone, Debug)]
 pub struct Catalogue {
     satellites: BTreeMap<Sv, Timeline>,
@@ -75,10 +75,10 @@ pub struct Catalogue {
 impl Catalogue {
     /// Arranges `sets`, whose order does not matter, and reports in words which were left out.
     ///
-    /// Repeated sets count once. Two sets of a satellite contradict each other when, half way between
-    /// their reference times, their positions differ by more than 2 km or their clocks by more than
-    /// 1 µs; sets more than six hours apart are not compared. While some set is contradicted by more
-    /// others than agree with it, the worst are left out; of equally bad ones only those that do not
+    /// Repeated ephemerides count once. Two ephemerides of a satellite contradict each other when, half way
+    /// between their reference times, their positions differ by more than 2 km or their clocks by more than
+    /// 1 µs; ephemerides more than six hours apart are not compared. While some ephemeris is contradicted by
+    /// more others than agree with it, the worst are left out; of equally bad ones only those that do not
     /// look like a GPS orbit, and all of them if that does not distinguish them.
     pub fn new(sets: Vec<Ephemeris>) -> (Self, Vec<String>) {
         let mut warnings = Vec::new();
@@ -103,18 +103,18 @@ impl Catalogue {
         (Self { satellites, precise: None, departures: Vec::new(), time_offsets_s: BTreeMap::new() }, warnings)
     }
 
-    /// Takes `orbits` for true from here on, instead of the broadcast sets.
+    /// Takes `orbits` for true from here on, instead of the broadcast ephemerides.
     pub fn follow(&mut self, orbits: Orbits) {
         self.precise = Some(orbits);
     }
 
-    /// Adds what true orbits depart by.
+    /// Adds errors of the true orbits.
     pub fn depart(&mut self, departures: Vec<Displacement>) {
         self.departures = departures;
     }
 
-    /// Sets by how much the time of a system, which its satellites' clocks follow, is ahead of GPS time,
-    /// whole seconds apart.
+    /// Sets by how much the time of a system, which its satellites' clocks follow, is ahead of GPS
+    /// time, whole seconds apart.
     pub fn set_time_offset(&mut self, system: System, offset_s: f64) {
         self.time_offsets_s.insert(system, offset_s);
     }
@@ -131,12 +131,12 @@ impl Catalogue {
         (precise, self.departures.iter().map(Displacement::describe).collect())
     }
 
-    /// Satellites of which there is at least one set.
+    /// Satellites of which there is at least one ephemeris.
     pub fn satellites(&self) -> impl Iterator<Item = Sv> {
         self.satellites.keys().copied()
     }
 
-    /// The set that `sv` sends at `at`; `None` when none is within its fit interval.
+    /// The ephemeris that `sv` sends at `at`; `None` when none is within its fit interval.
     pub fn sent_at(&self, sv: Sv, at: Epoch) -> Option<&Ephemeris> {
         let timeline = self.satellites.get(&sv)?;
         let count = timeline.spans.partition_point(|span| span.from <= at);
@@ -190,7 +190,7 @@ impl Catalogue {
         self.silences(sv, from, to).is_empty() && self.precise.as_ref().is_none_or(|orbits| orbits.covers(sv, from, to))
     }
 
-    /// The set of `sv` whose reference time is nearest to `at`.
+    /// The ephemeris of `sv` whose reference time is nearest to `at`.
     pub fn nearest_set(&self, sv: Sv, at: Epoch) -> Option<&Ephemeris> {
         let sets = &self.satellites.get(&sv)?.sets;
         sets.iter().min_by(|a, b| a.toe.since(at).abs().total_cmp(&b.toe.since(at).abs()))
@@ -230,13 +230,13 @@ impl Catalogue {
     /// Clock offset in seconds of a satellite for `signal`, minus that of [`Self::truth`], which is for L1
     /// C/A.
     ///
-    /// From the group delays of the broadcast sets, through hand-overs as smoothly as the clock.
+    /// From the group delays of the broadcast ephemerides, through hand-overs as smoothly as the clock.
     pub fn signal_clock_s(&self, sv: Sv, at: Epoch, signal: &Signal) -> f64 {
         let sets = self.satellites.get(&sv).into_iter().flat_map(|timeline| weights(timeline, at));
         sets.fold(0.0, |sum, (set, weight, _)| sum + (set.given_delay_s() - set.group_delay_s(signal)) * weight)
     }
 
-    /// The broadcast sets' orbit and clock; twice continuously differentiable across hand-overs.
+    /// The broadcast ephemerides' orbit and clock; twice continuously differentiable across hand-overs.
     fn broadcast_truth(&self, sv: Sv, at: Epoch) -> Result<Option<(State, ClockState)>, OrbitError> {
         let Some(timeline) = self.satellites.get(&sv) else { return Ok(None) };
         let mut sum: Option<(State, ClockState)> = None;
@@ -255,7 +255,7 @@ impl Catalogue {
     }
 }
 
-/// The sets that weigh in at `at`, each with its weight and the rate of that.
+/// The ephemerides that weigh in at `at`, each with its weight and the rate of that.
 fn weights(timeline: &Timeline, at: Epoch) -> impl Iterator<Item = (&Ephemeris, f64, f64)> {
     // Those whose spans begin before the blend's end and end after its begin.
     let first = timeline.spans.partition_point(|s| s.from <= at.plus_s(-BLEND_S / 2.0)).saturating_sub(1);
@@ -381,7 +381,8 @@ fn leave_out_rogues(sets: &mut Vec<Ephemeris>, warnings: &mut Vec<String>) {
 /// send it after its reference time. A file states when a receiver had decoded it completely, some minutes
 /// later.
 ///
-/// BeiDou's sets are those of an hour, and go on the air with it, those of QZSS with the hour before theirs.
+/// BeiDou's ephemerides are those of an hour, and go on the air with it, those of QZSS with the hour before
+/// theirs.
 fn first_sent(set: &Ephemeris) -> Epoch {
     if let Some(from) = set.sent_from() {
         return from;

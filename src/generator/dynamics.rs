@@ -2,8 +2,8 @@
 //! satellite.
 //!
 //! With u from the antenna to the satellite the range's second derivative is u·(a_s − a) + |Δv across u|²/ρ,
-//! all in the Earth's axes; the satellite's share and u are taken at 240 instants, the body's at ten places
-//! between its knots. A spin carries the antenna round a circle, which counts for itself
+//! all in the Earth's axes; the satellite's share and u are taken at 240 instants, the body's at ten
+//! positions between its knots. A spin carries the antenna round a circle, which counts for itself
 //! ([`Trajectory::circle`](crate::vehicle::Trajectory::circle)). Limits: of jerk only the body's
 //! share counts, −u·da/dt: the turning of u adds below 0.02 m/s³ for a rocket at 20 g; what an oscillator
 //! makes of acceleration is left out.
@@ -22,7 +22,7 @@ use gnss::satellite::Sv;
 
 /// Instants between start and end at which satellites are placed.
 const INSTANTS: u32 = 240;
-/// Places between two knots at which the body's acceleration is taken.
+/// Positions between two knots at which the body's acceleration is taken.
 const PLACES: u32 = 10;
 
 /// The largest that a satellite's range does while it is in view.

@@ -17,7 +17,7 @@ use gnss::satellite::Sv;
 
 /// Decibels that a power may be changed by.
 const MOST_DB: f64 = 100.0;
-/// Metres, and metres a second, that a satellite may be astray by.
+/// Largest range error of a satellite in metres, and its largest rate in m/s.
 const MOST_ASTRAY: f64 = 1e7;
 
 /// A change of a source.

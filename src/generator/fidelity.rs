@@ -363,7 +363,7 @@ mod tests {
         for rate_hz in [2.046e6, 4.092e6, 5.115e6, 2.5575e6] {
             assert_eq!(suited(Grade::Balanced, rate_hz, &L1_CA), CodeEdge::BandLimited, "{rate_hz}");
         }
-        // At 10.23 Msps the chips of C/A meet ten places: 0.045 m.
+        // At 10.23 Msps the chips of C/A meet ten positions: 0.045 m.
         for rate_hz in [2.6e6, 4e6, 10e6, 10.23e6, 12e6, 25e6, 50e6] {
             assert_eq!(suited(Grade::Balanced, rate_hz, &L1_CA), CodeEdge::Area, "{rate_hz}");
         }

@@ -29,7 +29,7 @@ pub struct Arriving {
     pub gain: f64,
 }
 
-/// Reading of the receiver's clock, whole seconds and the bits of the fraction, and the bits of the guess of
+/// Time of the receiver's clock, whole seconds and the bits of the fraction, and the bits of the guess of
 /// the light time: the last digit of an emission may depend on that.
 type Key = (i64, u64, u64);
 
@@ -73,7 +73,7 @@ pub struct Places {
 }
 
 impl Places {
-    /// The antenna when the clock reads `local`, computed by `find` if it is not known.
+    /// Returns the antenna at the time `local` of the clock. If it is not stored, `find` computes it.
     pub fn at(&self, local: Epoch, find: impl FnOnce() -> Place) -> Place {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         let place = *known.entry((local.seconds(), local.fraction().to_bits())).or_insert_with(find);

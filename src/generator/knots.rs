@@ -24,7 +24,7 @@ pub const AMPLITUDE_STEP: f64 = 1e-2;
 /// Signal of one ray at one time of the receiver's clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arrival {
-    /// Reading of the receiver's clock minus the time sent, as the code says.
+    /// Time of the receiver's clock minus the transmission time, by the code, in seconds.
     pub delay_s: f64,
     /// Pseudorange of the carrier in cycles at RF, absolute: `rho_phi / lambda`.
     pub carrier_cycles: f64,
@@ -129,7 +129,7 @@ impl Cubic {
 }
 
 impl Part {
-    /// The place of sample `n` in the part.
+    /// The position of sample `n` in the part.
     pub fn fraction(&self, n: u64) -> f64 {
         (n as f64 - self.start as f64) / (self.end - self.start) as f64
     }
@@ -154,7 +154,7 @@ impl Grid {
         self.root_samples
     }
 
-    /// Parts that cover root number `root`; stretches where the satellite does not arrive are left out.
+    /// Parts that cover root number `root`; segments in which the satellite does not arrive are left out.
     ///
     /// `observe` gives the rays at a sample, or none where there is no orbit. Errors are its own.
     pub fn root<E>(

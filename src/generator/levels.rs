@@ -3,7 +3,7 @@
 //! dBFS here are 20 lg of a component's root mean square over full scale: a complex tone whose circle touches
 //! full scale has −3.01 dBFS. Full scale is that of the sample format, or of the converter where the scene
 //! has one; floating point has none, and 1 counts as such. Parts have the power that the generator gives them
-//! before the front end's filter. The sum and what is clipped of it are measured on stretches of the scene's
+//! before the front end's filter. The sum and what is clipped of it are measured on segments of the scene's
 //! own samples. Limits: satellites and sources are looked at at some instants, quick fading is left out, and
 //! a sweep counts as if all of it lay in the band.
 
@@ -21,7 +21,7 @@ use crate::stream::{self, GenerateError, Stretch};
 use gnss::broadcast::OrbitError;
 use gnss::satellite::Sv;
 
-/// Stretches of samples that are made, spread evenly over the scene, and the samples of each: with 5e5
+/// Segments of samples that are made, spread evenly over the scene, and the samples of each: with 5e5
 /// components a share of 1e-4 that is clipped is known to a seventh.
 const STRETCHES: u64 = 16;
 const STRETCH_SAMPLES: u64 = 16_384;
@@ -90,13 +90,13 @@ pub struct Levels {
     pub strongest: Option<(Sv, f64)>,
     /// The sum before it is rounded.
     pub sum_dbfs: f64,
-    /// Share of components that are clipped, and the largest of a stretch, which begins at this time.
+    /// Share of components that are clipped over all segments.
     pub clipped_share: f64,
-    /// Largest share of a stretch's components that is clipped, and when that stretch begins in s.
+    /// Largest share of a segment's components that is clipped, and the start of that segment in seconds.
     pub worst: (f64, f64),
     stretches: u64,
     /// Time of this machine for a sample of all that the scene sends, on one core: the median of the
-    /// stretches.
+    /// segments.
     #[serde(skip)]
     pub sample_s: f64,
 }
@@ -193,7 +193,7 @@ fn full_scale(scene: &Scene, deviation_lsb: f64) -> (f64, String) {
     })
 }
 
-/// Stretches spread evenly, and one in the middle of each time that a source is on.
+/// Segments spread evenly, and one in the middle of each time that a source is on.
 fn stretches(scene: &Scene) -> (Vec<Range<u64>>, Vec<Range<u64>>) {
     let length = STRETCH_SAMPLES.min(scene.samples);
     let last = scene.samples - length;

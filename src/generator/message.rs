@@ -15,7 +15,7 @@ use gnss::satellite::Sv;
 use gnss::signal::Signal;
 use gnss::time::{Epoch, TimeScale};
 
-/// Bits of a word by which a fault gives a bit's place (IS-GPS-200N, 20.3.2).
+/// Bits of a word by which a fault gives a bit's position (IS-GPS-200N, 20.3.2).
 const WORD_BITS: u64 = 30;
 
 /// Encoders of a scene's messages, by form of message.
@@ -67,8 +67,8 @@ pub enum Kind {
         /// Source of the random numbers.
         stream: Stream,
     },
-    /// One symbol of every unit with this number, by a word of 30 of them and its place in it, both counted
-    /// from 1.
+    /// One symbol of every unit with this number, by a word of 30 of them and its position in it, both
+    /// counted from 1.
     Bit {
         /// Number of the unit within its frame, from 1.
         subframe: u8,
@@ -79,7 +79,7 @@ pub enum Kind {
     },
     /// The bits of health ([`Ephemeris::health`]).
     Health(u16),
-    /// A parameter of a set of elements by its name in the message's table, wrong by `add` in its unit.
+    /// A parameter of an ephemeris by its name in the message's table, wrong by `add` in its unit.
     Parameter {
         /// Name in the message's table.
         name: &'static str,
@@ -180,7 +180,7 @@ impl MessageFault {
     }
 }
 
-/// The set that `sv` sends as `message` at `start` under `faults`, where they spoil it, in that form.
+/// The ephemeris that `sv` sends as `message` at `start` under `faults`, where they spoil it, in that form.
 pub fn spoiled(
     faults: &[MessageFault],
     message: &Message,
@@ -195,8 +195,8 @@ pub fn spoiled(
     (changed != set).then_some(changed)
 }
 
-/// The unit of a slot that a satellite sends under `faults`: the sets are that of the unit before and its
-/// own.
+/// The unit of a slot that a satellite sends under `faults`: the ephemerides are that of the unit before and
+/// its own.
 ///
 /// # Errors
 /// A value that the message cannot carry.

@@ -2,7 +2,7 @@
 //!
 //! Satellites are placed at a few hundred instants, effects act on them there, and sizes and times follow
 //! from counts. What concerns the synthesiser (knots, speed, memory) is given to it, and so are the levels
-//! ([`crate::levels`]), for which a few stretches of samples are made.
+//! ([`crate::levels`]), for which a few segments of samples are made.
 
 mod machinery;
 mod models;

@@ -2,8 +2,8 @@
 //!
 //! A satellite sets, hides behind the Earth, or has nothing to send because no ephemeris of the navigation
 //! file fits. The last is a limit of the data and not of nature, so it has its own name in the plan, in the
-//! warnings and in `truth/passes.csv`. Limit: while nothing is sent, the sky is that of the nearest set, for
-//! half a day at most.
+//! warnings and in `truth/passes.csv`. Limit: while nothing is sent, the sky is that of the nearest
+//! ephemeris, for half a day at most.
 
 use std::ops::Range;
 
@@ -16,8 +16,8 @@ use gnss::record::{PassEnd, PassRow};
 use gnss::satellite::Sv;
 use gnss::time::Epoch;
 
-/// Farthest from its reference time that a set places a satellite above or below the mask. Half a day on,
-/// real sets of two days are some kilometres off: 1e-4 rad of elevation.
+/// Farthest from its reference time that an ephemeris places a satellite above or below the mask. Half a day
+/// on, real ephemerides of two days are some kilometres off: 1e-4 rad of elevation.
 const EXTRAPOLATED_S: f64 = 43_200.0;
 /// Spacing of the instants at which the sky without an ephemeris is looked at: satellites move 5° in it.
 const LOOK_S: f64 = 600.0;

@@ -153,7 +153,7 @@ pub enum ScenarioError {
 }
 
 impl ScenarioError {
-    /// The message without its place, for a document that is in no file as it was read.
+    /// The message without its position, for a document that is in no file as it was read.
     pub fn without_place(&self) -> String {
         let whole = self.to_string();
         let place = match self {
@@ -173,7 +173,7 @@ impl ScenarioError {
         }
     }
 
-    /// The key and its place, if it is about one.
+    /// The key and its position, if it is about one.
     fn key_at(&self) -> Option<(&Place, &str)> {
         match self {
             Self::UnknownKey { place, key, .. } | Self::Value { place, key, .. } => Some((place, key)),

@@ -46,7 +46,7 @@ pub struct Scene {
     pub seed: u64,
     /// Number of samples.
     pub samples: u64,
-    /// The receiver's clock reading at sample 0, and its sample rate.
+    /// Time of sample 0 by the receiver's clock, and the sample rate.
     pub clock: SampleClock,
     /// Offset of the receiver's clock from GPS time.
     pub receiver_clock: ReceiverClock,
@@ -111,7 +111,7 @@ impl Scene {
     }
 
     /// Seed of what is random in one front end alone: a function of the front end's name, and not of its
-    /// place in a list.
+    /// position in a list.
     pub fn noise_seed(&self) -> u64 {
         let own = |name: &String| Stream::new(self.seed, "front end").named(name).word(0);
         self.front_end_name.as_ref().map_or(self.seed, own)

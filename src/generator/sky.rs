@@ -16,7 +16,7 @@ use gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, SPEED_OF_LIGHT_MPS, look_in, r
 use gnss::satellite::Sv;
 use gnss::time::Epoch;
 
-/// A first guess of the light time, good for any place near the Earth.
+/// A first guess of the light time, good for any position near the Earth.
 pub const LIGHT_TIME_S: f64 = 0.075;
 /// A step of the light time over which the range may be taken as straight: 2 m/s² · step² / 2 is 0.9 nm.
 const STRAIGHT_S: f64 = 3e-5;
@@ -93,7 +93,7 @@ pub fn emission_near(
     emission_of(|at| catalogue.truth(sv, at), sv, &Place::new(received, 0.0, *motion), guess_s)
 }
 
-/// [`emission`] by one set, whether it is sent then or not.
+/// [`emission`] by one ephemeris, whether it is sent then or not.
 ///
 /// # Errors
 /// As [`emission`].
@@ -180,8 +180,8 @@ pub struct Arc {
 }
 
 impl Arc {
-    /// The arc for what is received from `from` to `to`; `None` where the catalogue has no set for some of
-    /// it.
+    /// The arc for what is received from `from` to `to`; `None` where the catalogue has no ephemeris for some
+    /// of it.
     ///
     /// # Errors
     /// [`OrbitError`] from the elements.
@@ -228,13 +228,13 @@ impl Arc {
         (state, ClockState { offset_s: row[6], drift: row[7] })
     }
 
-    /// Emission from the arc's satellite that reaches a place, like the function [`emission`].
+    /// Emission from the arc's satellite that reaches a position, like the function [`emission`].
     ///
     /// # Errors
     /// None by itself.
     pub fn emission(&self, place: &Place) -> Result<Option<Emission>, OrbitError> {
         let (guess_s, gain) = self.guess;
-        // Without a place of its own, the guess is the same number at all times.
+        // Without a position of its own, the guess is the same number at all times.
         let guess_s = if gain == 0.0 { guess_s } else { guess_s + gain * place.time.since(self.middle) };
         emission_of(|at| Ok(Some(self.at(at))), self.sv, place, guess_s)
     }

@@ -1,11 +1,11 @@
 //! Constellations whose signals reach the antenna: the true one, or that of a spoofer.
 //!
-//! A spoofer sends what would arrive from the true satellites at a claimed place and by a clock of its
+//! A spoofer sends what would arrive from the true satellites at a claimed position and by a clock of its
 //! own, with the same messages; every signal of it goes through the machinery of the true ones. It may begin
-//! on top of them (claiming the antenna's true motion) and drag the place off smoothly. Limits: its carriers
-//! are those of the claimed geometry (no phase of its own), its own path's delay is taken as compensated, it
-//! knows the victim's motion and the true orbits without error, and repeats no fault of a satellite's clock
-//! or message.
+//! on top of them (claiming the antenna's true motion) and drag the position off smoothly. Limits: its
+//! carriers are those of the claimed geometry (no phase of its own), its own path's delay is taken as
+//! compensated, it knows the victim's motion and the true orbits without error, and repeats no fault of a
+//! satellite's clock or message.
 
 use std::ops::Range;
 
@@ -41,7 +41,7 @@ pub struct Drag {
     pub acceleration_mps2: f64,
 }
 
-/// Power over that of the true signals (what the scene's effects give at the claimed place).
+/// Power over that of the true signals (what the scene's effects give at the claimed position).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Advantage {
     /// Power advantage at the moment of switching on, in dB.
@@ -57,7 +57,7 @@ pub struct Advantage {
 pub struct Constellation {
     /// 0 for the true satellites; spoofers count from 1.
     pub number: usize,
-    /// The place that its signals are made for.
+    /// The position that its signals are made for.
     pub place: Place,
     /// Drag of the claimed position; absent means that it stays.
     pub drag: Option<Drag>,
@@ -65,7 +65,7 @@ pub struct Constellation {
     pub clock_bias_s: f64,
     /// Rate of the clock offset, in s/s.
     pub clock_drift: f64,
-    /// `None` for all in view of the claimed place.
+    /// `None` for all in view of the claimed position.
     pub satellites: Option<Vec<Sv>>,
     /// `None` for the true satellites.
     pub advantage: Option<Advantage>,

@@ -3,7 +3,7 @@
 //!
 //! A change holds from the first sample of a tick on. Signals have their polynomials tick by tick, so every
 //! change is exact to the sample, and a replay that knows of later ones sends the same bits. Limits: changes
-//! are bounded in number ([`MOST`]); what a satellite strays by is in code and carrier alike.
+//! are bounded in number ([`MOST`]); the range error of a satellite is in code and carrier alike.
 
 use std::collections::BTreeMap;
 use std::sync::{PoisonError, RwLock};
@@ -68,7 +68,7 @@ impl Switched {
     }
 }
 
-/// A satellite that strays from a sample on, until its next change.
+/// Range error of a satellite from a sample on, until its next change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stray {
     /// The satellite.
@@ -127,7 +127,7 @@ impl Switches {
         true
     }
 
-    /// The satellites that strayed: each change by its first sample, with the step that it makes.
+    /// Satellites with range errors: each change by its first sample, with its step.
     pub fn strays(&self, rate: Rate) -> Vec<Stray> {
         let rows = self.rows.read().unwrap_or_else(PoisonError::into_inner);
         let mut found = Vec::new();

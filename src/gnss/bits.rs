@@ -165,7 +165,7 @@ pub fn bits_of(number: u128, count: usize) -> impl Iterator<Item = bool> {
     (0..count).rev().map(move |place| number >> place & 1 == 1)
 }
 
-/// One parameter's place and scale.
+/// One parameter's position and scale.
 #[derive(Clone, Copy, Debug)]
 pub struct Field {
     /// Unit last, as everywhere.
@@ -281,7 +281,7 @@ impl Field {
 
 /// A field bound to a member of what carries it.
 pub struct Element<T> {
-    /// Place and scale.
+    /// Position and scale.
     pub field: Field,
     get: fn(&T) -> f64,
     set: fn(&mut T, f64),
@@ -308,7 +308,7 @@ pub const fn element<T>(field: Field, get: fn(&T) -> f64, set: fn(&mut T, f64)) 
 }
 
 /// [`element`] of a part of the parameters that is kept as the number that the field has: `plain!(name,
-/// places, kind, power of two, clause, path of the part)`.
+/// positions, kind, power of two, clause, path of the part)`.
 macro_rules! plain {
     ($name:literal, $places:expr, $kind:expr, $power:expr, $clause:expr, $($part:tt)+) => {
         $crate::bits::element(

@@ -2,7 +2,7 @@
 //! elements are here, a state vector that is integrated in `vector`.
 //!
 //! Source: IS-GPS-200N, 20.3.3.3.3.1 (clock), 20.3.3.4.3 (orbit, table 20-IV; velocity from its
-//! derivative, table 20-IV part 3). Limits: one set of elements describes an orbit to about 2 m
+//! derivative, table 20-IV part 3). Limits: one ephemeris describes an orbit to about 2 m
 //! within its fit interval.
 
 use nalgebra::Vector3;
@@ -28,7 +28,7 @@ pub use vector::StateVector;
 /// (IS-GPS-200N, 20.3.3.3.3.2).
 pub const GPS_CLOCK_CODE: &str = "1W";
 
-/// A set of broadcast elements of one satellite, in SI units and radians.
+/// A broadcast ephemeris of one satellite, in SI units and radians.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ephemeris {
     /// The satellite.
@@ -122,16 +122,16 @@ pub struct Ephemeris {
 /// Position and velocity in ECEF at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
-    /// Place, ECEF.
+    /// Position, ECEF.
     pub position_m: Vector3<f64>,
     /// Velocity, ECEF.
     pub velocity_mps: Vector3<f64>,
 }
 
-/// A clock's offset from GPS time (reading minus true) and its rate.
+/// Offset of a clock from GPS time in seconds, and its rate in s/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClockState {
-    /// Reading minus true time.
+    /// Clock time minus true time, in seconds.
     pub offset_s: f64,
     /// Rate of the offset, s/s.
     pub drift: f64,
@@ -472,7 +472,7 @@ impl Ephemeris {
     /// `None` if the interval is longer.
     pub fn sent_from(&self) -> Option<Epoch> {
         match self.sv.system {
-            // Sets of a network are those of its next message.
+            // Ephemerides of a network are those of its next message.
             System::Sbas => Some(self.transmitted),
             _ => self.vector.map(|_| self.toe.plus_s(-0.5 * self.fit_interval_s())),
         }
@@ -480,7 +480,7 @@ impl Ephemeris {
 
     /// Curve fit interval around the reference time; of a state vector the half hour in whose middle it is
     /// (GLONASS ICD L1, L2 5.1, 4.4, P1). Of Galileo, NavIC and BeiDou, whose documents have none,
-    /// eight hours: a set is used for four hours after its reference time.
+    /// eight hours: an ephemeris is used for four hours after its reference time.
     ///
     /// Of QZSS two hours (IS-QZSS-PNT-005, 4.1.2.4), of SBAS twelve minutes (RTCA DO-229D, table A-25).
     /// Of GPS four hours, or what the issue of data says when the fit flag is set

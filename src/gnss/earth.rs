@@ -21,7 +21,7 @@ pub const FLATTENING: f64 = 1.0 / 298.257_223_563;
 /// First eccentricity squared.
 pub const ECCENTRICITY_SQUARED: f64 = FLATTENING * (2.0 - FLATTENING);
 
-/// A place by latitude, longitude and height above the ellipsoid.
+/// A position given by latitude, longitude and height above the ellipsoid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geodetic {
     /// Geodetic latitude, north positive.
@@ -51,7 +51,7 @@ impl Geodetic {
         )
     }
 
-    /// The place of an ECEF position.
+    /// Converts an ECEF position in metres.
     ///
     /// Fixed-point iteration on z + e²N sin φ; below 1e-9 m and 1e-14 rad from the ocean floor to
     /// geostationary height. At the geocentre the latitude is 90° and the height minus the polar radius.
@@ -95,7 +95,7 @@ impl Geodetic {
     }
 }
 
-/// A direction as seen from a place: azimuth from north over east in [0, 2π), elevation above the horizon.
+/// A direction as seen from a position: azimuth from north over east in [0, 2π), elevation above the horizon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
     /// Azimuth from north over east, in radians, [0, 2π).

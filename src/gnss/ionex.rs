@@ -110,7 +110,7 @@ impl Maps {
         (first, self.epochs.last().copied().unwrap_or(first))
     }
 
-    /// Vertical electron content in TEC units above a place (longitude of any turn) at GPS time `at`.
+    /// Vertical electron content in TEC units above a position (longitude of any turn) at GPS time `at`.
     ///
     /// Outside the [`Self::span`] the nearest pair of maps is carried on.
     pub fn vertical_tecu(&self, latitude_rad: f64, longitude_rad: f64, at: Epoch, how: Interpolation) -> f64 {
@@ -125,7 +125,7 @@ impl Maps {
         (before * -after_s + after * before_s) / (before_s - after_s)
     }
 
-    /// A value of one map, by place in degrees.
+    /// A value of one map, by position in degrees.
     fn at_node(&self, map: usize, latitude_deg: f64, longitude_deg: f64, how: Interpolation) -> f64 {
         let (rows, columns) = (self.latitudes.count, self.longitudes.count);
         let row = self.latitudes.place(latitude_deg).clamp(0.0, (rows - 1) as f64);
@@ -151,7 +151,7 @@ impl Maps {
 }
 
 impl Axis {
-    /// The place of a coordinate between the nodes, counted from the first.
+    /// The position of a coordinate between the nodes, counted from the first.
     fn place(&self, degrees: f64) -> f64 {
         (degrees - self.first_deg) / self.step_deg
     }

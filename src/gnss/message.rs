@@ -32,8 +32,8 @@ pub struct Message {
     pub bit: fn(Sv) -> &'static [i8],
     /// Duration of a unit, which is encoded in one piece, and when in the week the first one begins.
     pub unit_s: i64,
-    /// Seconds, from one multiple of them to the next, in which all units are of one set: whole units.
-    /// Messages whose units each say of which set they are have those of one unit.
+    /// Seconds, from one multiple of them to the next, in which all units are of one ephemeris: whole units.
+    /// Messages whose units each say of which ephemeris they are have those of one unit.
     pub set_s: i64,
     /// Seconds after the beginning of the week at which its first unit begins.
     pub first_s: i64,
@@ -46,35 +46,35 @@ pub struct Message {
     /// Numbers of the units all of which have to be read before one of those says its whole time; none where
     /// each says it by itself.
     pub dated: &'static [u8],
-    /// Numbers of the units that make up a set of elements.
+    /// Numbers of the units that make up an ephemeris.
     pub set: &'static [u8],
-    /// Numbers of the units each of which carries a set in short.
+    /// Numbers of the units each of which carries an ephemeris in short.
     pub reduced: &'static [u8],
     /// Ionosphere model and the units that carry its coefficients.
     pub ionosphere: IonosphereForm,
-    /// Names of the parameters of a set that bear its issue.
+    /// Names of the parameters of an ephemeris that bear its issue.
     pub set_parameters: fn() -> Vec<&'static str>,
-    /// The set of a satellite by the raw integers of its parameters, read near a time; `None` where some are
-    /// missing or contradict each other.
+    /// The ephemeris of a satellite by the raw integers of its parameters, read near a time; `None` where
+    /// some are missing or contradict each other.
     pub elements: fn(Sv, Raw<'_>, Epoch) -> Option<Ephemeris>,
-    /// The parameters in the symbols of a unit and whether they belong to a set of elements; `None` where the
+    /// The parameters in the symbols of a unit and whether they belong to an ephemeris; `None` where the
     /// unit fails its checks or has no parameters.
     pub parameters: fn(&[bool]) -> Option<(bool, Parameters)>,
     /// A reader of what a satellite sends.
     pub reader: fn(Sv) -> Box<dyn Reader>,
-    /// The set that satellites send in this form, of one in the form of another of their messages: orbits
-    /// are the same, clocks differ by group delays.
+    /// The ephemeris that satellites send in this form, of one in the form of another of their messages:
+    /// orbits are the same, clocks differ by group delays.
     pub form: fn(&Ephemeris) -> Ephemeris,
     /// Meaning of clock and health in ephemerides of this message.
     pub sets: &'static SetForm,
-    /// The set that a receiver decodes when this one is sent.
+    /// The ephemeris that a receiver decodes when this one is sent.
     pub quantised: fn(&Ephemeris) -> Result<Ephemeris, FieldError>,
-    /// Names of the parameters of a set that may be wrong with a right check: all but those that distinguish
-    /// sets and senders apart.
+    /// Names of the parameters of an ephemeris that may be wrong with a right check: all but those that
+    /// distinguish ephemerides and senders apart.
     pub adjustable: fn() -> Vec<&'static str>,
     /// Makes an alert page of a unit; absent where the message has none.
     pub alert: Option<Alert>,
-    /// Adds to the parameter of a set that the tables call so, in its unit; whether there is one.
+    /// Adds to the parameter of an ephemeris that the tables call so, in its unit; whether there is one.
     pub adjust: fn(&mut Ephemeris, &str, f64) -> bool,
     /// RINEX record names of the message. Absent if RINEX has the message in a form that this crate does not
     /// write.
@@ -91,8 +91,9 @@ pub struct Records {
     pub common: &'static str,
     /// The fields of the message, from which offsets of time are read.
     pub fields: fn() -> Vec<(&'static str, Vec<&'static Field>)>,
-    /// Lines after the clock's of sets that version 4 alone has, by the set and its raw parameters; a blank
-    /// field has no value. Absent where sets have the lines that version 3 has, too.
+    /// Lines after the clock's of ephemerides that version 4 alone has, by the ephemeris and its raw
+    /// parameters; a blank field has no value. Absent where ephemerides have the lines that version 3 has,
+    /// too.
     pub lines: Option<fn(&Ephemeris, Raw<'_>) -> Vec<RecordLine>>,
 }
 
@@ -112,7 +113,7 @@ pub struct IonosphereForm {
 
 /// The raw integers of some parameters, by their names in the tables.
 pub type Parameters = Vec<(&'static str, i64)>;
-/// The symbols of a unit without content but that something is wrong, its checks right, in place of those of
+/// The symbols of a unit without content but that something is wrong, its checks right, instead of those of
 /// another; `None` where these fail their own.
 pub type Alert = fn(&[bool]) -> Option<Vec<bool>>;
 /// Gives the raw integer of a parameter by its name.
@@ -136,7 +137,7 @@ pub struct Common {
     pub utc: UtcData,
     /// Galileo's time against GPS time; absent means that nothing is said of it.
     pub galileo: Option<TimePolynomial>,
-    /// One set of elements a satellite, for almanacs, and the time near which they hold.
+    /// One ephemeris a satellite, for almanacs, and the time near which they hold.
     pub almanac: Vec<Ephemeris>,
     /// Time near which the almanac holds.
     pub reference: Option<Epoch>,
@@ -258,10 +259,10 @@ pub enum Read {
     },
     /// The start of a unit with its week, resolved near what the reader was given.
     Time(Epoch),
-    /// A whole set of elements.
+    /// A whole ephemeris.
     Ephemeris(Box<Ephemeris>),
-    /// A set in short, good to metres, for some minutes from its reference time on; whether group delays and
-    /// health were read too, else they are zero.
+    /// An ephemeris in short, good to metres, for some minutes from its reference time on; whether group
+    /// delays and health were read too, else they are zero.
     Reduced {
         /// Orbit as complete elements; all other parameters are zero.
         set: Box<Ephemeris>,
@@ -279,7 +280,7 @@ pub enum Read {
     Sender(Sv),
     /// Raw parameters as decoded.
     Parameters(Vec<NavigationRow>),
-    /// A unit that passed its checks is not used, or parts that did make no set: why.
+    /// A unit that passed its checks is not used, or parts that did make no ephemeris: why.
     Refused(String),
 }
 
@@ -297,7 +298,7 @@ impl Read {
 
 /// Reads the message of one satellite.
 pub trait Reader: fmt::Debug + Send + Sync {
-    /// Takes the next symbol: positive for a logical 0 if it is not upside down, and as large as it is sure.
+    /// Takes the next symbol: positive for a logical 0 if it is not inverted, and as large as it is sure.
     /// `near` resolves weeks.
     fn take(&mut self, soft: f32, near: Epoch) -> Vec<Read>;
     /// Takes a time that is known to within a year. A message whose own date leaves something out is dated
@@ -307,7 +308,7 @@ pub trait Reader: fmt::Debug + Send + Sync {
     fn skip(&mut self);
     /// The time of a unit contradicts those before: where units begin is sought anew.
     fn doubt(&mut self);
-    /// Parts of a set of elements that have not been decoded: subframes, words.
+    /// Parts of an ephemeris that have not been decoded: subframes, words.
     fn missing(&self) -> Vec<u8>;
 }
 
@@ -327,7 +328,7 @@ impl Message {
         (second - self.first_s).div_euclid(self.unit_s)
     }
 
-    /// The unit whose beginning decides of which set a unit is.
+    /// The unit whose beginning decides of which ephemeris a unit is.
     pub fn unit_of_set(&self, unit: i64) -> i64 {
         let units = (self.set_s / self.unit_s).max(1);
         unit.div_euclid(units) * units
@@ -338,10 +339,10 @@ impl Message {
         Epoch::new(unit * self.unit_s + self.first_s, 0.0)
     }
 
-    /// Seconds in which each unit of a set comes whole, whatever the moment from which it is waited for;
-    /// `None` where the message carries no set.
+    /// Seconds in which each unit of an ephemeris comes whole, whatever the moment from which it is waited
+    /// for; `None` where the message carries no ephemeris.
     pub fn set_within_s(&self) -> Option<i64> {
-        // Two rounds of LNAV's pages; no message repeats its set more seldom.
+        // Two rounds of LNAV's pages; no message repeats its ephemeris more seldom.
         const UNITS: i64 = 250;
         let longest_s = |wanted: &u8| {
             let starts = (0..UNITS).map(|unit| self.unit_start(unit)).filter(|start| (self.number)(*start) == *wanted);
@@ -385,7 +386,7 @@ mod tests {
         assert_eq!(within_s(&galileo::e5::E5A), Some(50 + 10));
         assert_eq!(within_s(&beidou::in_phase::B1I), Some(30 + 30));
         assert_eq!(within_s(&glonass::fdma::G1), Some(30 + 2));
-        // Pages of high accuracy carry no set.
+        // Pages of high accuracy carry no ephemeris.
         assert_eq!(within_s(&galileo::e6::E6), None);
     }
 }

@@ -1,4 +1,4 @@
-//! NMEA 0183 sentences: place, time, satellites.
+//! NMEA 0183 sentences: position, time, satellites.
 //!
 //! Source: NMEA 0183, version 4.11 (GGA, RMC, VTG, ZDA, GSA with the system's number, GSV with the signal's).
 //! Times are UTC to a millisecond, positions are written to 1e-7 of a minute (0.2 mm). Heights are above mean
@@ -144,7 +144,7 @@ fn time(at: Epoch) -> (String, [String; 3]) {
     (clock, [part(8, 10), part(5, 7), part(0, 4)])
 }
 
-/// Latitude and longitude with their hemispheres, and the place that they name.
+/// Latitude and longitude with their hemispheres, and the position that they name.
 fn coordinates(position_m: &Vector3<f64>) -> (String, Geodetic) {
     let place = Geodetic::from_ecef(position_m);
     let one = |rad: f64, width: usize, signs: [char; 2]| {

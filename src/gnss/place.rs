@@ -43,7 +43,7 @@ impl<'t> Keys<'t> {
         format!("{}:{line}:{column}", self.origin)
     }
 
-    /// The place of a key, or of what is above it, if that is there; else the name of the text alone.
+    /// The position of a key, or of what is above it, if that is there; else the name of the text alone.
     pub fn place_of(&self, path: &str) -> String {
         let mut path = path;
         loop {

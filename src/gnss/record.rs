@@ -40,7 +40,8 @@ pub struct Observation {
     pub sent_s: i64,
     /// Fraction of the transmission time, in seconds.
     pub sent_fraction_s: f64,
-    /// Speed of light times (reading of the receiver's clock − time sent).
+    /// Pseudorange in metres: speed of light times (time of reception by the receiver's clock − transmission
+    /// time).
     pub pseudorange_m: f64,
     /// Accumulated carrier, growing with range (RINEX sense); the receiver's has an unknown whole number.
     pub carrier_cycles: f64,
@@ -154,7 +155,7 @@ pub struct TrajectoryRow {
     pub vy_mps: f64,
     /// ECEF velocity z, in m/s.
     pub vz_mps: f64,
-    /// Reading of the receiver's clock minus true time.
+    /// Offset of the receiver's clock from true time, in seconds.
     pub clock_bias_s: f64,
     /// Rate of that bias, s/s.
     pub clock_drift: f64,
@@ -177,8 +178,8 @@ impl TrajectoryRow {
     }
 }
 
-/// A place and a time as people and maps have them: what stands behind the columns of a [`TrajectoryRow`] and
-/// of a [`Fix`] in their files, and is not read again.
+/// A position and a time as people and maps have them: what stands behind the columns of a [`TrajectoryRow`]
+/// and of a [`Fix`] in their files, and is not read again.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Geographic {
     /// Geodetic latitude, north positive.
@@ -241,7 +242,7 @@ pub struct Fix {
     pub vy_mps: f64,
     /// Estimated ECEF velocity z, in m/s.
     pub vz_mps: f64,
-    /// Reading of the receiver's clock minus GPS time, and its rate.
+    /// Offset of the receiver's clock from GPS time, in seconds.
     pub clock_bias_s: f64,
     /// Rate of that bias, s/s.
     pub clock_drift: f64,
@@ -259,7 +260,7 @@ pub struct Fix {
     pub correlation_eu: f64,
     /// North and up.
     pub correlation_nu: f64,
-    /// Geometric dilution of precision, place and clock.
+    /// Geometric dilution of precision, position and clock.
     pub gdop: f64,
     /// Dilution of precision of the position.
     pub pdop: f64,
@@ -333,7 +334,8 @@ pub struct ClockRow {
     pub sample: u64,
     /// Name of the time scale.
     pub time_scale: String,
-    /// Reading of the receiver's clock minus that time, whole seconds by which it is behind GPS time apart.
+    /// Offset of the receiver's clock from that time scale, in seconds, without the whole seconds to GPS
+    /// time.
     pub clock_bias_s: f64,
     /// Formal standard deviation.
     pub sigma_clock_m: f64,
@@ -527,7 +529,7 @@ pub enum Event {
     FrameSynchronised,
     /// Elements in short came, which serve until the ephemeris is complete.
     ReducedElements,
-    /// A whole set of elements was read.
+    /// A whole ephemeris was read.
     EphemerisComplete,
     /// The ionosphere's parameters came, for the first time or other than before: fixes are corrected by them
     /// from here on.

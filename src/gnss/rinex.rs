@@ -34,8 +34,8 @@ pub const LARGEST_BYTES: u64 = 256 << 20;
 /// Content of a navigation file for GPS, Galileo, NavIC, BeiDou, GLONASS, QZSS and SBAS.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Navigation {
-    /// Sets of LNAV of GPS and QZSS, Galileo I/NAV, NavIC, BeiDou D1 or D2, GLONASS and SBAS by satellite
-    /// and time of clock; of a Galileo satellite without any of I/NAV those of F/NAV.
+    /// Ephemerides of LNAV of GPS and QZSS, Galileo I/NAV, NavIC, BeiDou D1 or D2, GLONASS and SBAS by
+    /// satellite and time of clock; of a Galileo satellite without any of I/NAV those of F/NAV.
     pub ephemerides: Vec<Ephemeris>,
     /// Coefficients of GPS's model of the ionosphere, where the header has them.
     pub klobuchar: Option<Klobuchar>,
@@ -109,7 +109,7 @@ pub enum NavigationError {
         /// Position and description of the error.
         detail: String,
     },
-    /// No set of elements that can be used.
+    /// No ephemeris that can be used.
     #[error("{name}: no usable ephemeris of GPS, Galileo, NavIC, BeiDou, GLONASS, QZSS or SBAS: found {found}")]
     Nothing {
         /// Name of the file.
@@ -186,8 +186,8 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
             }
         }
     }
-    // Converters join the orbit of a new set of BeiDou to the clock of the one before, for the message has no
-    // mark of a set.
+    // Converters join the orbit of a new ephemeris of BeiDou to the clock of the one before, for the message
+    // has no mark of an ephemeris.
     let whole: BTreeSet<(Sv, i64)> =
         found.iter().filter(|(_, set)| set.toe == set.toc).map(|(_, set)| (set.sv, set.toe.seconds())).collect();
     found.retain(|(line, set)| {
@@ -199,7 +199,7 @@ pub fn read(bytes: &[u8], name: &str) -> Result<Navigation, NavigationError> {
         }
         !is_astray
     });
-    // Of sets of one time the one that was sent last goes first, and stays.
+    // Of ephemerides of one time the one that was sent last goes first, and stays.
     found.sort_by(|(line, a), (other, b)| {
         let of_time = (a.sv, a.toc.seconds(), a.toe.seconds()).cmp(&(b.sv, b.toc.seconds(), b.toe.seconds()));
         let newer = b.transmitted.since(a.transmitted).total_cmp(&0.0);

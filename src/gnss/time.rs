@@ -252,7 +252,7 @@ impl Epoch {
     /// GPS time minus UTC, in whole seconds, at this instant: the new number from the end of an inserted
     /// second on.
     pub fn leap_seconds(self) -> i64 {
-        // The crate holds UTC readings against atomic time, and so changes over up to 37 s early.
+        // The crate holds UTC times against atomic time, and so changes over up to 37 s early.
         let table = |seconds: i64| {
             let at = Self { seconds, ..self }.hifitime(hifitime::TimeScale::UTC);
             // TAI - GPST is 19 s by definition.
@@ -352,10 +352,10 @@ pub fn tone_turns(hz: f64, rate: Rate, n: u64) -> u64 {
     high as u64
 }
 
-/// The clock of a sampler: sample 0 is taken when it reads `start`.
+/// Clock of a sampler: sample 0 is taken at its time `start`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleClock {
-    /// Reading at sample 0.
+    /// Time of sample 0 by the clock.
     pub start: Epoch,
     /// Samples a second, as the sampler's own clock counts them.
     pub rate: Rate,

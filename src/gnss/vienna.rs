@@ -1,5 +1,5 @@
-//! Vienna grids of the neutral atmosphere: GPT3 (weather by place and season) and the coefficients a of the
-//! mapping functions, as TU Wien publishes them.
+//! Vienna grids of the neutral atmosphere: GPT3 (weather by position and season) and the coefficients a of
+//! the mapping functions, as TU Wien publishes them.
 //!
 //! Source: Landskron & Böhm 2018, "VMF3/GPT3: refined discrete and empirical troposphere mapping functions",
 //! and the columns that head the files. Values are bilinear between nodes; beyond the last row towards a pole
@@ -115,7 +115,7 @@ impl<T> Globe<T> {
         for (index, &(line, latitude_deg, longitude_deg)) in places.iter().enumerate() {
             let (row, column) = (index / columns, index % columns);
             let expected = (north_deg - row as f64 * latitude_step_deg, west_deg + column as f64 * longitude_step_deg);
-            // Longitudes may count from -180 on after 180; places are printed to 0.01 degrees.
+            // Longitudes may count from -180 on after 180; positions are printed to 0.01 degrees.
             let turned_deg = (longitude_deg - expected.1 + 180.0).rem_euclid(360.0) - 180.0;
             if (latitude_deg - expected.0).abs() > 0.01 || turned_deg.abs() > 0.01 {
                 let found = format!("node {latitude_deg}, {longitude_deg}");
@@ -129,7 +129,7 @@ impl<T> Globe<T> {
         Ok(Self { north_deg, west_deg, latitude_step_deg, longitude_step_deg, columns, nodes })
     }
 
-    /// The four nodes around a place and their weights, which add up to one.
+    /// The four nodes around a position and their weights, which add up to one.
     fn around(&self, latitude_rad: f64, longitude_rad: f64) -> [(f64, Option<&T>); 4] {
         let rows = self.nodes.len() / self.columns;
         let row = (self.north_deg - latitude_rad.to_degrees()) / self.latitude_step_deg;
@@ -195,7 +195,7 @@ impl MappingGrid {
         Ok(Self { globe: Globe::read(&text, name, 6, &[(2, 1e-5, 1e-2), (3, 1e-5, 1e-2)], node)?, fitted_with })
     }
 
-    /// The coefficients at a place.
+    /// The coefficients at a position.
     pub fn at(&self, latitude_rad: f64, longitude_rad: f64) -> MappingA {
         let mut sum = MappingA::default();
         for (weight, node) in self.globe.around(latitude_rad, longitude_rad) {
@@ -285,7 +285,7 @@ impl Gpt3 {
         Globe::read(&unpack(bytes, name)?, name, 64, &ranges, node).map(Self)
     }
 
-    /// Weather at a place and ellipsoidal height, on a day of the year that counts from 1.0.
+    /// Weather at a position and ellipsoidal height, on a day of the year that counts from 1.0.
     pub fn at(&self, latitude_rad: f64, longitude_rad: f64, height_m: f64, day_of_year: f64) -> Gpt3Weather {
         let terms = season_terms(day_of_year);
         let season = |values: &Season| values.iter().zip(terms).map(|(value, term)| value * term).sum::<f64>();

@@ -1,4 +1,4 @@
-//! VMF3's own coefficients b and c of the mapping functions, by place and season.
+//! VMF3's own coefficients b and c of the mapping functions, by position and season.
 //!
 //! Source: Landskron & Böhm 2018, "VMF3/GPT3: refined discrete and empirical troposphere mapping functions":
 //! each is an expansion in spherical harmonics to degree and order 12, of a mean and of a year's and half a
@@ -90,7 +90,7 @@ impl Vmf3 {
         }
     }
 
-    /// The coefficients at a place on a day of the year that counts from 1.0.
+    /// The coefficients at a position on a day of the year that counts from 1.0.
     pub fn at(&self, latitude_rad: f64, longitude_rad: f64, day_of_year: f64) -> MappingBc {
         let season = season_terms(day_of_year);
         let now = |amplitudes: &Season| amplitudes.iter().zip(season).map(|(a, term)| a * term).sum::<f64>();

@@ -91,7 +91,7 @@ fn sets_change_at_the_two_hour_boundary_and_end_with_their_fit_interval() {
     let toe = |tow_s: f64| catalogue.sent_at(sv, week(tow_s)).map(|set| set.toe.tow_whole_s());
     assert_eq!(toe(374_399.9), Some(374_400));
     assert_eq!(toe(374_400.0), Some(381_600));
-    // Nothing is sent before the first set's window nor after the last one's.
+    // Nothing is sent before the first ephemeris's window nor after the last one's.
     assert_eq!(toe(345_600.0 - 7200.5), None);
     assert_eq!(toe(345_600.0 + 86_400.0 + 14_400.0), None);
     assert!(catalogue.truth(sv, week(300_000.0)).unwrap().is_none());

@@ -1,6 +1,6 @@
-//! The receiver's clock: how far its reading is from GPS time.
+//! The receiver's clock: its offset from GPS time.
 //!
-//! Reading minus true time = bias + drift · t + ageing · t² / 2, t being true time since the start, plus what
+//! Clock minus true time = bias + drift · t + ageing · t² / 2, t being true time since the start, plus what
 //! the antenna's acceleration does to the crystal and the oscillator's own noise ([`Oscillator`]). It moves
 //! sampling instants and down-conversion alike, as one oscillator behind both does. Instants stay [`Epoch`]s,
 //! so that nothing is lost to the size of a number of seconds. Limits: of the noise, what is quicker than a
@@ -18,7 +18,7 @@ use oscillator::Oscillator;
 /// A clock that is `bias_s` ahead of GPS time at the scene's start and gains `drift` seconds a second.
 #[derive(Clone, Debug)]
 pub struct ReceiverClock {
-    /// Reading minus true time at the start.
+    /// Clock minus true time at the start, in seconds.
     pub bias_s: f64,
     /// Gain at the start, in seconds a second.
     pub drift: f64,
@@ -36,31 +36,31 @@ impl ReceiverClock {
         Self { bias_s, drift, ageing_per_s: 0.0, shaking: None, oscillator: None }
     }
 
-    /// True GPS time when the clock reads `local`: the t that solves t + (reading − true time at t) = local.
+    /// True GPS time at the time `local` of the clock: the t that solves t + offset(t) = local.
     ///
     /// Error below 2e-16 s plus 1e-16 of the correction.
     pub fn true_time(&self, start: Epoch, local: Epoch) -> Epoch {
         local.plus_s(-self.offset_at_reading_s(start, local))
     }
 
-    /// True seconds since `start` when the clock reads `local`; resolves 1e-16 of its size.
+    /// True seconds since `start` at the time `local` of the clock; resolves 1e-16 of its size.
     pub fn true_elapsed_s(&self, start: Epoch, local: Epoch) -> f64 {
         local.since(start) - self.offset_at_reading_s(start, local)
     }
 
-    /// Seconds between the start and the reading, `true_s` true seconds after the start; the inverse of
+    /// Seconds of the clock since the start, `true_s` true seconds after the start; the inverse of
     /// [`Self::true_elapsed_s`] to a nanosecond.
     pub fn reading_elapsed_s(&self, start: Epoch, true_s: f64) -> f64 {
         let first = true_s + self.bias_s + self.drift * true_s;
-        // The offset changes by less than 1e-4 of what the reading does.
+        // The offset changes by less than 1e-4 of what the clock's time does.
         let second = true_s + self.offset_at_reading_s(start, start.plus_s(first));
         true_s + self.offset_at_reading_s(start, start.plus_s(second))
     }
 
-    /// Reading minus true time when the clock reads `local`, without fast noise. With x = local − start, the
-    /// elapsed true time is (x − bias)/(1 + drift) = x − (bias + drift·x)/(1 + drift): the correction is
-    /// small, so its rounding is too. Ageing and shaking are taken at that time: their own size times
-    /// themselves, below 1e-15 s, is left out.
+    /// Clock minus true time in seconds at the time `local` of the clock, without fast noise. With x = local
+    /// − start, the elapsed true time is (x − bias)/(1 + drift) = x − (bias + drift·x)/(1 + drift): the
+    /// correction is small, so its rounding is too. Ageing and shaking are taken at that time: their own size
+    /// times themselves, below 1e-15 s, is left out.
     pub fn offset_at_reading_s(&self, start: Epoch, local: Epoch) -> f64 {
         let elapsed_s = local.since(start);
         let drift = planted!("generator.clock.drift", self.drift, 1.05 * self.drift);
@@ -73,7 +73,7 @@ impl ReceiverClock {
         offset_s + self.oscillator.as_ref().map_or(0.0, |oscillator| oscillator.slow_s(elapsed_s))
     }
 
-    /// Gain of the reading, in seconds a second, when the clock reads `local`: over 20 ms around it, if it is
+    /// Drift in s/s at the time `local` of the clock: over 20 ms around it, if it is
     /// not steady.
     pub fn drift_at_reading(&self, start: Epoch, local: Epoch) -> f64 {
         if self.ageing_per_s == 0.0 && self.shaking.is_none() && self.oscillator.is_none() {

@@ -1,4 +1,4 @@
-//! Nodes of what changes quickly, in the reading of the receiver's clock.
+//! Nodes of what changes quickly, in time of the receiver's clock.
 //!
 //! A scene with one front end has them at its samples. Front ends that share a clock share nodes of a rate of
 //! their own, so that what changes there is the same for each of them, whichever others there are. Limits:
@@ -35,8 +35,8 @@ impl Nodes {
         self.rate
     }
 
-    /// The place of a sample of a clock among them: number of the node before it, and the share of the way to
-    /// the next.
+    /// The position of a sample of a clock among them: number of the node before it, and the share of the way
+    /// to the next.
     pub fn at(self, rate: Rate, sample: u64) -> (u64, f64) {
         if rate == self.rate {
             return (sample / self.ticks, (sample % self.ticks) as f64 / self.ticks as f64);
@@ -70,12 +70,12 @@ impl Nodes {
         Some(rate.first_sample_at((node + 1) * self.ticks * seconds, count))
     }
 
-    /// Seconds from the start to a node, by the clock's reading.
+    /// Seconds from the start to a node, by the clock.
     pub fn elapsed_s(self, node: u64) -> f64 {
         self.rate.elapsed_s(node * self.ticks)
     }
 
-    /// A clock that reads `start` at sample 0, and ticks where nodes are.
+    /// A clock whose time is `start` at sample 0, and which ticks where nodes are.
     pub fn clock(self, clock: SampleClock) -> SampleClock {
         SampleClock { rate: self.rate, ..clock }
     }
@@ -97,7 +97,7 @@ mod tests {
             let rate = Rate::from_hz(rate_hz).unwrap();
             for first in [0_u64, 1 << 20, 86_400 * rate_hz as u64] {
                 let (node, share) = common.at(rate, first);
-                // The place in one number has the resolution of the number of samples, 2^-53 of it.
+                // The position in one number has the resolution of the number of samples, 2^-53 of it.
                 let place = common.place(rate, first as f64);
                 assert!((place - (node as f64 + share)).abs() <= 4.0 * f64::EPSILON * place, "{rate_hz} {first}");
                 let next = common.until(rate, first).unwrap();

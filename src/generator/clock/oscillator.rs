@@ -2,7 +2,7 @@
 //!
 //! Definitions and levels: NIST SP 1065, section 3; presets: Winkel 2003, table 2.1 (h2 and h1 are not given
 //! there and are zero). The noise is drawn at nodes less than a millisecond apart on a grid of samples and is
-//! linear between them, so its upper cut-off is half the rate of nodes. Any stretch is a pure function of the
+//! linear between them, so its upper cut-off is half the rate of nodes. Any segment is a pure function of the
 //! seed: coarse nodes are stepped from the beginning, fine ones drawn between them. Limits: flicker reaches
 //! down to 1.6e-7 Hz.
 
@@ -153,7 +153,7 @@ impl Oscillator {
         self.cell(cell).get(index).copied().unwrap_or(0.0)
     }
 
-    /// [`Self::quick_s`] at a place between nodes.
+    /// [`Self::quick_s`] at a position between nodes.
     pub fn quick_at_s(&self, place: f64) -> f64 {
         let node = place.floor();
         let (from_s, to_s) = (self.quick_s(node as u64), self.quick_s(node as u64 + 1));

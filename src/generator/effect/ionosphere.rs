@@ -5,7 +5,7 @@
 //! cosine series ends, which nature does not: here the bulge fades to zero over the last
 //! [`FADE_RAD`] of its phase, and where local time wraps at midnight inside a bulge longer than 40 h, one
 //! day passes into the next over [`MIDNIGHT_S`]. Elsewhere the delay is the printed one to the last bit.
-//! Limits: where the bulge ends the fade departs from the printed delay by up to 0.16 m. The printed model's
+//! Limits: where the bulge ends the fade differs from the printed delay by up to 0.16 m. The printed model's
 //! shell is a sphere on which the user's geodetic latitude replaces the geocentric one, which moves the
 //! delay by up to 0.13 m. The model is meant for users below the ionosphere; it is applied in full below 350
 //! km, fades to zero at 1000 km and is absent above.
@@ -16,7 +16,7 @@ use gnss::klobuchar::{Bulge, DAY_S, Klobuchar, L1_HZ, NIGHT_S, SERIES_END_RAD, c
 use gnss::signal::Signal;
 use gnss::time::Epoch;
 
-/// Phase over which the bulge fades: 0.03 rad is 6 min at the shortest period. The delay then departs from
+/// Phase over which the bulge fades: 0.03 rad is 6 min at the shortest period. The delay then differs from
 /// the printed one by less than 3 % of the bulge's amplitude, little more than the step itself.
 pub const FADE_RAD: f64 = 0.03;
 /// Time over which one day's bulge passes into the next at local midnight.

@@ -23,7 +23,7 @@ const REFERENCE_NOISE_DBWHZ: f64 = -204.0;
 /// radius.
 const ZENITH_RANGE_M: f64 = 1.965e7;
 
-/// Part of a radius by which an orbit may depart from its system's: 0.1, that of the most eccentric satellite
+/// Part of a radius by which an orbit may differ from its system's: 0.1, that of the most eccentric satellite
 /// of QZSS.
 const FARTHEST: f64 = 0.1;
 

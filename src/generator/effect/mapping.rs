@@ -1,14 +1,14 @@
 //! Mapping functions of the neutral atmosphere: slant over zenith delay, hydrostatic and wet.
 //!
 //! Sources: Niell 1996 (NMF); Böhm, Werl & Schuh 2006 (VMF1: b and c in closed form); Landskron & Böhm 2018
-//! (VMF3: b and c by place and season). VMF1 and VMF3 take a from a Vienna grid or GPT3, at zero height, and
-//! add Niell's height correction to the hydrostatic factor. All were fitted from 3° of elevation without
+//! (VMF3: b and c by position and season). VMF1 and VMF3 take a from a Vienna grid or GPT3, at zero height,
+//! and add Niell's height correction to the hydrostatic factor. All were fitted from 3° of elevation without
 //! refraction up. Below, their continued fractions would be 10 % too high at the horizon: a sine that is
 //! raised there brings Niell's hydrostatic factor to that of rays traced through the standard atmosphere,
 //! within 0.4 % at sea level, and the wet one to within 7 % of vapour whose density falls in 2 km to 2.5 km
 //! by 1/e. One over the sine, in the height correction and in the cosecant, is bounded there. Limits: no
 //! factor is defined below the horizon; a grid's coefficients are held for the whole scene. Those of VMF3's
-//! grids and of GPT3 under VMF1's closed form depart from VMF3, by 2 cm of delay at 5° and 2 mm at 10°.
+//! grids and of GPT3 under VMF1's closed form differ from VMF3, by 2 cm of delay at 5° and 2 mm at 10°.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -93,7 +93,7 @@ impl Mapping {
     }
 }
 
-/// Niell's hydrostatic and wet mapping factors at an elevation, by place and day of year (from 1.0).
+/// Niell's hydrostatic and wet mapping factors at an elevation, by position and day of year (from 1.0).
 ///
 /// Niell 1996, equations 4 to 6 and tables 3 and 4; the factors hold still below the horizon.
 pub fn niell(user: Geodetic, elevation_rad: f64, day_of_year: f64) -> (f64, f64) {
@@ -150,8 +150,8 @@ pub fn vmf1(a: MappingA, user: Geodetic, elevation_rad: f64, day_of_year: f64) -
     (dry, mapped(sin, [a.wet, 0.00146, 0.04391]))
 }
 
-/// VMF3's hydrostatic and wet mapping factors with coefficients `a` at zero height, and `bc` of the place and
-/// day.
+/// VMF3's hydrostatic and wet mapping factors with coefficients `a` at zero height, and `bc` of the position
+/// and day.
 ///
 /// Landskron & Böhm 2018; the factors hold still below the horizon.
 pub fn vmf3(a: MappingA, bc: MappingBc, user: Geodetic, elevation_rad: f64) -> (f64, f64) {

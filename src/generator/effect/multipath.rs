@@ -82,7 +82,7 @@ impl Multipath {
         (excess_m >= 0.0).then_some(excess_m)
     }
 
-    /// The horizontal direction at the start's place, in ECEF.
+    /// The horizontal direction at the start's position, in ECEF.
     fn towards(&self, azimuth_rad: f64) -> Vector3<f64> {
         let (sin, cos) = libm::sincos(azimuth_rad);
         Geodetic::from_ecef(&self.origin_m).ecef_to_enu().transpose() * Vector3::new(sin, cos, 0.0)
@@ -183,7 +183,7 @@ mod tests {
             ];
             for (detour, enu_m) in cases {
                 let expected = image(enu_m, azimuth, elevation);
-                // The ellipsoid's normal bends by 1e-15 over the place's rounding; sines of degrees within
+                // The ellipsoid's normal bends by 1e-15 over the position's rounding; sines of degrees within
                 // 1e-15.
                 match multipath(detour, origin_m).excess_m(&detour, &from) {
                     Some(found) => assert!((found - expected).abs() < 1e-7, "{detour:?} {found} {expected}"),

@@ -53,7 +53,7 @@ pub struct Building {
     pub east_m: [f64; 2],
     /// South and north end in metres north of the scene's first position.
     pub north_m: [f64; 2],
-    /// Height of the roof above that place.
+    /// Height of the roof above that position.
     pub top_m: f64,
     /// Power that goes through it, 0 to 1.
     pub share: f64,
@@ -64,13 +64,13 @@ pub struct Building {
 pub struct Obstruction {
     /// The obstructions.
     pub obstacles: Vec<Obstacle>,
-    /// ECEF place that buildings are measured from, and the matrix to its east, north and up.
+    /// ECEF position that buildings are measured from, and the matrix to its east, north and up.
     origin_m: Vector3<f64>,
     ecef_to_enu: Matrix3<f64>,
 }
 
 impl Obstruction {
-    /// Obstacles around a place; `origin_m` is ECEF.
+    /// Obstacles around a position; `origin_m` is ECEF.
     pub fn new(obstacles: Vec<Obstacle>, origin_m: Vector3<f64>) -> Self {
         let ecef_to_enu = Geodetic::from_ecef(&origin_m).ecef_to_enu();
         Self { obstacles, origin_m, ecef_to_enu }

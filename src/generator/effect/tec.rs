@@ -2,7 +2,7 @@
 //!
 //! A column of TEC electrons/m² delays the code by 40.3·TEC/f² metres and advances the carrier by as much
 //! (IS-GPS-200N, 20.3.3.3.3.3 rests on the same 1/f²). The vertical column is taken where the straight line
-//! meets the shell, and stretched by 1/cos z' there (Schaer 1999, single-layer mapping) or as CODE does it
+//! meets the shell, and multiplied by 1/cos z' there (Schaer 1999, single-layer mapping) or as CODE does it
 //! (modified single layer). Limits: the geometry is that of a user on the ground; above 350 km the delay
 //! fades as in [`super::ionosphere`]. What satellites broadcast is not this module's.
 
@@ -101,7 +101,7 @@ pub enum Content {
 /// An ionosphere of given electron content.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShellIonosphere {
-    /// Vertical content by place and time.
+    /// Vertical content by position and time.
     pub content: Content,
     /// Shell in which the electrons are assumed.
     pub shell: Shell,

@@ -3,14 +3,14 @@
 //!
 //! Sources: Davis et al. 1985 (hydrostatic, with Saastamoinen's gravity term), Saastamoinen 1972 (wet), the
 //! Magnus formula with 237.3 °C; mapping functions are in [`super::mapping`]. Weather is the scene's, which
-//! follows the standard atmosphere from a reference height, or GPT3's by place and season with the wet delay
-//! of Askne & Nordius 1987. A ray that comes from below the horizon passes a lowest point: its delay is twice
-//! that along the horizon there less that of the ray which leaves upwards at the same angle, which is exact
-//! for air in spherical layers and a straight ray. Against traced rays, which bend, the delay is 3 % high at
-//! −1°, 7 % at −2° and 12 % at −3° for users at 5 km and 10 km, and within 1 % at and above the horizon.
-//! Where the Earth stands in the way the lowest point stays near the ground, for the scene's mask decides
-//! what is received. Limits: above 44.3 km the pressure of the standard atmosphere, and so the zenith delay,
-//! is zero; GPT3's fades there.
+//! follows the standard atmosphere from a reference height, or GPT3's by position and season with the wet
+//! delay of Askne & Nordius 1987. A ray that comes from below the horizon passes a lowest point: its delay is
+//! twice that along the horizon there less that of the ray which leaves upwards at the same angle, which is
+//! exact for air in spherical layers and a straight ray. Against traced rays, which bend, the delay is 3 %
+//! high at −1°, 7 % at −2° and 12 % at −3° for users at 5 km and 10 km, and within 1 % at and above the
+//! horizon. Where the Earth stands in the way the lowest point stays near the ground, for the scene's mask
+//! decides what is received. Limits: above 44.3 km the pressure of the standard atmosphere, and so the zenith
+//! delay, is zero; GPT3's fades there.
 
 use crate::effect::ionosphere::smooth;
 use crate::effect::mapping::{Mapping, season_day};
@@ -89,7 +89,7 @@ pub fn zenith_wet_m(temperature_k: f64, vapour_hpa: f64) -> f64 {
 pub enum Air {
     /// One weather, and the standard atmosphere's change with height.
     Weather(Weather),
-    /// A climatology by place and season.
+    /// A climatology by position and season.
     Gpt3(Box<Gpt3>),
 }
 
@@ -226,7 +226,7 @@ mod tests {
     /// Height, elevation, and by how many metres a ray through the dry standard atmosphere is longer than the
     /// straight line. Another program traced them: Snell's law in spherical layers (n r cos e is constant), n
     /// − 1 = 77.604e-6 p/T, 6371 km, 20 000 steps to 100 km, the elevation at the user iterated until the ray
-    /// leaves in the straight line's direction. The last column is by what part the model may depart, as its
+    /// leaves in the straight line's direction. The last column is by what part the model may differ, as its
     /// module says.
     const TRACED: [(f64, f64, f64, f64); 25] = [
         (0.0, 10.0, 12.7820, 0.005),

@@ -47,7 +47,7 @@ impl FastPhase {
 pub struct Sources<'a> {
     /// Nodes at which the phases are computed.
     pub nodes: Nodes,
-    /// Sample numbers as readings of the receiver's clock.
+    /// Sample numbers as times of the receiver's clock.
     pub clock: SampleClock,
     /// The receiver's clock, whose oscillator may be noisy.
     pub receiver_clock: &'a ReceiverClock,
@@ -101,7 +101,7 @@ impl Sources<'_> {
         [older(from, from_s), older(to, to_s)]
     }
 
-    /// The fast phase of a signal on `carrier_hz`, which fades with satellite `fading`, at a place between
+    /// The fast phase of a signal on `carrier_hz`, which fades with satellite `fading`, at a position between
     /// samples; before the first sample that of the first.
     pub fn at(&self, fading: Option<Sv>, carrier_hz: f64, sample: f64) -> FastPhase {
         if !self.any(fading) {
@@ -115,14 +115,14 @@ impl Sources<'_> {
     }
 }
 
-/// The fast phase of one signal over a stretch of samples.
+/// The fast phase of one signal over a segment of samples.
 #[derive(Clone, Debug, Default)]
 pub struct FastPhases {
     /// The grid of nodes, and the rate of the samples.
     grid: Option<(Nodes, Rate)>,
     /// Number of the first node.
     first: u64,
-    /// Beginning and end of the stretch behind each node.
+    /// Beginning and end of the segment behind each node.
     cells: Vec<[FastPhase; 2]>,
 }
 

@@ -1,6 +1,6 @@
-//! Satellites' clocks as they depart from what they broadcast: steps, ramps and the oscillator's noise.
+//! Errors of satellite clocks relative to what they broadcast: steps, ramps and the oscillator's noise.
 //!
-//! A departure reaches the antenna as a change of code and carrier alike. Steps and ramps begin and end at
+//! An error reaches the antenna as a change of code and carrier alike. Steps and ramps begin and end at
 //! nodes, up to a millisecond after the time that the scene gives, which is that of arrival; a step takes no
 //! time. Limits: the noise is drawn over the received samples, whose time runs a millionth faster or slower
 //! than the satellite's.
@@ -49,14 +49,14 @@ pub struct SatelliteClock {
 /// Clocks of the satellites that differ from the broadcast.
 #[derive(Debug, Default)]
 pub struct SatelliteClocks {
-    /// The departing clocks by satellite.
+    /// Clocks with errors, by satellite.
     pub clocks: BTreeMap<Sv, SatelliteClock>,
     /// Descriptions of the clock errors for the plan.
     pub descriptions: Vec<String>,
 }
 
 impl SatelliteClocks {
-    /// The clock of a satellite, if it departs.
+    /// Clock of a satellite, if it has an error.
     pub fn of(&self, sv: Sv) -> Option<&SatelliteClock> {
         self.clocks.get(&sv)
     }

@@ -55,7 +55,7 @@ const BANDS_HZ: [f64; 11] = [
     1_602.0e6,
     2_492.028e6,
 ];
-/// Place of the reference among them.
+/// Position of the reference among them.
 const REFERENCE: usize = 8;
 
 /// Strength of a scintillation on L1.
@@ -166,7 +166,7 @@ struct Fade {
     share: f64,
     /// Standard deviation of the added phase noise, in radians.
     added_rad: f64,
-    /// Place of the carrier's ξ among the bands'.
+    /// Position of the carrier's ξ among the bands'.
     band: usize,
     /// Phase at the beginning of each block, whole turns and all.
     starts_rad: Vec<f64>,

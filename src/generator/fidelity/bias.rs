@@ -84,7 +84,7 @@ mod tests {
             (Area, &L1_CA, 6.5e6, 0.013_25),
             (Area, &L1_CA, 25e6, 1.526e-3),
             (BandLimited, &L1_CA, 2.6e6, 0.010_80),
-            // Every chip meets the same four places.
+            // Every chip meets the same four positions.
             (Area, &L1_CA, 4.092e6, 1.712),
             (Area, &L5, 12.5e6, 0.015_22),
             (BandLimited, &L5, 12.5e6, 2.579e-3),

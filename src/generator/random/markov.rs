@@ -3,7 +3,7 @@
 //! White and random-walk frequency noise are such processes exactly; flicker is a sum of first-order ones
 //! whose time constants are a factor of four apart, which leaves a ripple of 2 sech(π²/ln 4) = 0.3 % on
 //! 1/f. Each is stepped without error over any interval, and a path between two known ends is drawn by
-//! correcting a free path by what it misses at its end (Doucet 2010), so that any stretch can be made without
+//! correcting a free path by what it misses at its end (Doucet 2010), so that any segment can be made without
 //! the ones before it.
 
 use crate::random::Stream;

@@ -1,7 +1,7 @@
 //! `[front_end]` as written: one table, or a list of them that listen to one sky by one clock.
 //!
 //! In a list each has its `name`, and its own centre, rate, format, gain and stages. What is random about it
-//! is keyed by its name alone, never by its place in the list.
+//! is keyed by its name alone, never by its position in the list.
 
 use super::read::{Refusals, Table};
 use super::stages::{self, Stages};

@@ -14,7 +14,7 @@ use gnss::time::Rate;
 /// The receiver's clock as written.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ClockSpec {
-    /// Reading minus GPS time at the scene's start.
+    /// Clock minus GPS time at the scene's start, in seconds.
     pub bias_s: f64,
     /// Gain at the start, in seconds a second.
     pub drift: f64,

@@ -26,11 +26,11 @@ pub enum Strength {
         /// Power in dBW.
         dbw: f64,
     },
-    /// Radiated towards the antenna, from the source's place, or from a distance that stays.
+    /// Radiated towards the antenna, from the source's position, or from a distance that stays.
     Radiated {
         /// Power in dBW.
         dbw: f64,
-        /// Distance from the antenna; absent where the source has a place.
+        /// Distance from the antenna; absent where the source has a position.
         distance_m: Option<f64>,
     },
 }
@@ -158,7 +158,7 @@ pub struct SpooferSpec {
     pub on_s: f64,
     /// Time of switching off, in seconds; absent means never.
     pub off_s: Option<f64>,
-    /// Satellites that it imitates; absent means all in view of the claimed place.
+    /// Satellites that it imitates; absent means all in view of the claimed position.
     pub satellites: Option<Vec<Sv>>,
     /// Clock minus GPS time at the scene's start, in seconds.
     pub clock_bias_s: f64,

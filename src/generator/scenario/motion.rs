@@ -12,7 +12,7 @@ use gnss::earth::Geodetic;
 /// Format of a trajectory file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileKind {
-    /// Rows of time and place.
+    /// Rows of time and position.
     Csv,
     /// NMEA sentences of kind GGA.
     Nmea,
@@ -25,7 +25,7 @@ pub enum MotionSpec {
     Static(Geodetic),
     /// Route through waypoints with smooth turns.
     Waypoints {
-        /// The places, with the speeds between them.
+        /// The positions, with the speeds between them.
         points: Vec<Waypoint>,
         /// Limits of the route's acceleration.
         limits: Limits,

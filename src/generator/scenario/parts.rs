@@ -95,8 +95,8 @@ pub(super) fn navigation(
     Ok(navigation)
 }
 
-/// The middle one of the reference times of a file's sets, for a day's file begins and ends with a few of its
-/// neighbours'.
+/// The middle one of the reference times of a file's ephemerides, for a day's file begins and ends with a few
+/// of its neighbours'.
 fn middle(file: &Navigation) -> Option<Epoch> {
     let mut times: Vec<i64> = file.ephemerides.iter().map(|set| set.toe.seconds()).collect();
     times.sort_unstable();

@@ -29,9 +29,9 @@ pub struct Ionosphere {
     pub truth: Electrons,
     /// Coefficients that the satellites send; absent means those of `truth`, or else the navigation file's.
     pub broadcast: Option<Klobuchar>,
-    /// Coefficients of NeQuick-G that are sent in place of the true ones or the file's.
+    /// Coefficients of NeQuick-G that are sent instead of the true ones or the file's.
     pub broadcast_ai: Option<[f64; 3]>,
-    /// Coefficients of BDGIM that are sent in place of the true ones or the file's; nine zeros for none.
+    /// Coefficients of BDGIM that are sent instead of the true ones or the file's; nine zeros for none.
     pub broadcast_bdgim_tecu: Option<[f64; 9]>,
 }
 

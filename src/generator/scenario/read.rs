@@ -1,9 +1,9 @@
-//! Typed access to TOML tables: one place where a key's name, type, range and unit are checked.
+//! Typed access to TOML tables: one point where a key's name, type, range and unit are checked.
 //!
 //! Values are read by the declarations of [`super::schema`]: a reader names a key, and its type, range and
 //! default are there. [`Table::check`] holds a whole document against them and collects every refusal. Each
 //! carries the file, the line and the column, because values are read off the spanned document; serde's
-//! derived structures lose the place of a value behind `kind = …`.
+//! derived structures lose the position of a value behind `kind = …`.
 
 mod refusals;
 
@@ -156,7 +156,7 @@ impl<'t> Table<'t> {
         if self.path.is_empty() { name.to_owned() } else { format!("{}.{name}", self.path) }
     }
 
-    /// The place of a key's value, or of the table if it is absent.
+    /// The position of a key's value, or of the table if it is absent.
     pub fn place(&self, name: &str) -> Place {
         self.source.place(self.get(name).map_or(self.at, |value| value.span().start))
     }
@@ -371,7 +371,7 @@ impl Table<'_> {
         values.filter(|values| !values.is_empty()).map(Some).ok_or_else(|| self.bad(name, expected))
     }
 
-    /// The table without its places.
+    /// The table without its positions.
     pub fn whole(&self) -> Result<toml::Table, ScenarioError> {
         let mut whole = toml::Table::new();
         for name in self.names() {
@@ -401,7 +401,7 @@ fn as_number(value: &DeValue<'_>) -> Option<f64> {
     }
 }
 
-/// A value without its place; `None` for a table or a number that is none.
+/// A value without its position; `None` for a table or a number that is none.
 pub fn plain(value: &DeValue<'_>) -> Option<toml::Value> {
     Some(match value {
         DeValue::Integer(i) => toml::Value::Integer(i64::from_str_radix(i.as_str(), i.radix()).ok()?),

@@ -128,7 +128,7 @@ pub enum MessageKind {
         /// Value that is added, in the parameter's unit.
         add: f64,
     },
-    /// Alert pages in place of all others.
+    /// Alert pages instead of all others.
     Alert,
 }
 
@@ -295,7 +295,7 @@ pub(super) fn departures(scenario: &Scenario) -> Vec<Displacement> {
     scenario.satellite_faults.iter().filter_map(departure).collect()
 }
 
-/// The clocks that faults make depart; those of no size are left out. `catalogue` knows who there is.
+/// Clock errors that faults cause; those of zero size are left out. `catalogue` knows who there is.
 pub(super) fn clocks(
     scenario: &Scenario,
     catalogue: &Catalogue,

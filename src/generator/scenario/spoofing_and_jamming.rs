@@ -341,7 +341,7 @@ pub(super) fn spoofers(
     Ok(found)
 }
 
-/// The drag in ECEF, its direction that at the place where it begins.
+/// The drag in ECEF, its direction that at the position where it begins.
 fn drag(spec: &SpooferSpec, from: &Constellation, scene: &Scene) -> Option<Drag> {
     let drag = spec.drag?;
     let here = Geodetic::from_ecef(&from.motion(&scene.trajectory, drag.start_s).position_m);

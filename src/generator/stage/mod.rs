@@ -16,7 +16,7 @@ pub mod playback;
 use crate::synth::isa::Level;
 use gnss::facts::StageSpec;
 
-/// A stretch of planar samples on its way from the antenna to the file, in LSB of the sample format.
+/// A segment of planar samples on its way from the antenna to the file, in LSB of the sample format.
 pub struct Block<'a> {
     /// Number of the first sample, a multiple of 4096.
     pub start: u64,

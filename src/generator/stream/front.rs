@@ -69,7 +69,7 @@ impl<'a> Front<'a> {
         let filter = limited.then(|| Filter::new(scene.cutoff_cps()));
         let mut transmitters = transmitters(scene, edge(scene, filter.as_ref()))?;
         if scene.trajectory.grown().is_some() {
-            // What spoofers send is made for places of their own.
+            // What spoofers send is made for positions of their own.
             let places = Arc::new(Places::default());
             let authentic = transmitters.iter_mut().filter(|t| t.from.number == 0);
             authentic.for_each(|t| t.places = Some(Arc::clone(&places)));

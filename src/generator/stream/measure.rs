@@ -1,4 +1,4 @@
-//! Stretches of samples that are made to be measured.
+//! Segments of samples that are made to be measured.
 
 use std::ops::Range;
 use std::time::Instant;

@@ -38,7 +38,7 @@ pub struct Filter {
 }
 
 /// The response to a change from −1 to 1, less the change itself, at the sixteen samples that it reaches, for
-/// changes between two places in a sample: cubic polynomials from the constant up (error below 1e-9).
+/// changes between two positions in a sample: cubic polynomials from the constant up (error below 1e-9).
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 pub(super) struct Cell([[f64; WIDTH]; 4]);
@@ -47,8 +47,8 @@ pub(super) struct Cell([[f64; WIDTH]; 4]);
 /// from the linear term up. The error is below 1.6 units, 3e-9.
 ///
 /// The number in the middle and the sum that becomes a whole number are rounded, by half a unit each. What is
-/// more stays below 2^22 units, so that roundings of the place within the cell, of the linear coefficient, of
-/// its sum with the higher terms and of the product are an eighth of a unit each at most. The cubic
+/// more stays below 2^22 units, so that roundings of the position within the cell, of the linear coefficient,
+/// of its sum with the higher terms and of the product are an eighth of a unit each at most. The cubic
 /// polynomial is within 0.02 units.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
@@ -109,7 +109,7 @@ impl Filter {
             let more = (x - from) / 6.0 * (at(from) + 4.0 * at(0.5 * (from + x)) + at(x));
             filter.fine.get(point as usize).map_or(1.0, |before| before + more / sum)
         };
-        // Between two places of the change behind the sample before it.
+        // Between two positions of the change behind the sample before it.
         let polynomials = |number: usize, cells: usize| -> [[f64; 4]; WIDTH] {
             let from = |k: usize, within: f64| x(k, 1.0 - (number as f64 + within) / cells as f64);
             std::array::from_fn(|k| cubic(|within| 2.0 * (exactly(from(k, within)) - jump(k))))

@@ -1,4 +1,4 @@
-//! The runs of all rays in one stretch of samples, gathered before any is made.
+//! The runs of all rays in one segment of samples, gathered before any is made.
 //!
 //! Kernels are faster with all satellites at hand: sums stay in registers and memory is written once. Runs
 //! that share their first and last sample go together; sums of `f32` are in the order of those spans, then in
@@ -22,12 +22,12 @@ pub struct Bank {
 }
 
 struct Entry {
-    /// First sample and end of the run; the stretch may end before.
+    /// First sample and end of the run; the segment may end before.
     span: (u64, u64),
-    /// Samples of the stretch that it makes.
+    /// Samples of the segment that it makes.
     samples: Range<usize>,
     strip: Range<usize>,
-    /// Place among the runs of its ray.
+    /// Position among the runs of its ray.
     part: usize,
     /// All but its bits and its pulse.
     run: Run<'static>,
@@ -35,8 +35,8 @@ struct Entry {
 }
 
 impl Bank {
-    /// Adds a run for `samples` of the stretch, part of `span`: `make` appends its signs to the strip that it
-    /// is handed and returns everything else but the pulse. `part` is its place among the runs of its ray,
+    /// Adds a run for `samples` of the segment, part of `span`: `make` appends its signs to the strip that it
+    /// is handed and returns everything else but the pulse. `part` is its position among the runs of its ray,
     /// from 0.
     pub fn push(
         &mut self,
@@ -51,7 +51,7 @@ impl Bank {
         self.entries.push(Entry { span, samples, strip: begin..self.bits.len(), part, run, pulse: pulse.cloned() });
     }
 
-    /// Adds the samples of all runs to the planar stretch and forgets the runs.
+    /// Adds the samples of all runs to the planar segment and forgets the runs.
     pub fn render(&mut self, kernel: Kernel<'_>, i: &mut [f32], q: &mut [f32]) {
         self.entries.sort_by_key(|entry| entry.span);
         for entries in self.entries.chunk_by(|a, b| a.span == b.span) {

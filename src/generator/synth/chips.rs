@@ -96,7 +96,7 @@ impl Pace {
         self.step_rate_mhz as f64 / 1000.0
     }
 
-    /// The place of the code when the satellite's clock reads `received − delay_s`.
+    /// Position of the code at the time `received − delay_s` of the satellite's clock.
     ///
     /// Whole seconds are turned into steps as integers; the fraction of a second resolves 1e-16 of its steps.
     pub fn at(&self, received: Epoch, delay_s: f64) -> CodeTime {

@@ -3,7 +3,7 @@
 //! Data and pilot of CBOC are four sequences on one carrier, half a turn apart at most; those of QMBOC and of
 //! data and pilot at right angles are a quarter apart. Waves in phase are added first, so are those in
 //! quadrature, and both are turned by one carrier. Sequences that step together (*a layer*) share their
-//! places and, for area edges, the shares of a sample that its steps have. Each half of a group begins its
+//! positions and, for area edges, the shares of a sample that its steps have. Each half of a group begins its
 //! window anew, so that a sample may span two steps: BOC(6,1) from 6.4 Msps on. Longer ones are read sample
 //! by sample ([`super::dense`]), and waves behind a filter come ready ([`super::waves`]). Accuracy and order
 //! of operations are those of [`super::lanes`]: the same bits on every instruction set.
@@ -30,7 +30,7 @@ pub(super) struct Chord {
 
 /// Sequences that step together.
 struct Layer {
-    /// Places of the lanes from the first sample of half a group on, and the same backwards.
+    /// Positions of the lanes from the first sample of half a group on, and the same backwards.
     ahead: Side<u32>,
     behind: Side<u32>,
     /// Code position of the first half group, early by the steps that an area looks back, and the advance
@@ -38,7 +38,7 @@ struct Layer {
     position: u64,
     stride: u64,
     density: Density,
-    /// A sample's span, or half of it where it is not dense, in units of a lane's place.
+    /// A sample's span, or half of it where it is not dense, in units of a lane's position.
     span: f32,
     /// Number of each sequence's run, and its amplitude.
     voices: Vec<(usize, f32)>,
@@ -269,7 +269,7 @@ impl Layer {
     }
 }
 
-/// Adds what a sequence is at every lane's place.
+/// Adds what a sequence is at every lane's position.
 #[inline(always)]
 fn each(fraction: u32, places: &Side<u32>, wave: &mut Side, value: impl Fn(u32) -> f32) {
     for k in 0..HALF {

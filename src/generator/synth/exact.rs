@@ -2,8 +2,8 @@
 //! [`reference`](mod@super::reference), at speed.
 //!
 //! A sample's carrier is the product of phasors of its tile, of the middle of its group of 32 and of its
-//! place about that middle, each from its own 64-bit turns by Taylor series within 2e-16 over an eighth of a
-//! turn; code positions are read with all their 48 fractional bits. Band-limited edges are off by less than
+//! position about that middle, each from its own 64-bit turns by Taylor series within 2e-16 over an eighth of
+//! a turn; code positions are read with all their 48 fractional bits. Band-limited edges are off by less than
 //! the rounding of the sum, as `responses` says. No value depends on the sample before. Sums over satellites
 //! are `f64` and become `f32` when all are in.
 
@@ -115,7 +115,7 @@ impl Carrier {
             for k in 0..LANES {
                 (before[k], after[k]) = (wave[LANES - 1 - k], wave[LANES + k]);
             }
-            // A copy, which nothing else can be the same place as.
+            // A copy, which shares its memory with nothing else.
             let mut sum = *sums;
             for k in 0..LANES {
                 let (a, b, c, d) = (re * cos[k], im * sin[k], re * sin[k], im * cos[k]);

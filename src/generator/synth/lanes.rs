@@ -1,4 +1,4 @@
-//! The fast kernel: all rays of a stretch at once, 32 samples side by side in plain arrays that the compiler
+//! The fast kernel: all rays of a segment at once, 32 samples side by side in plain arrays that the compiler
 //! turns into vectors.
 //!
 //! No fused multiply-add and no intrinsics: each operation is one IEEE rounding, so every instruction set
@@ -43,11 +43,11 @@ pub struct Buffers {
     waves: Box<Waves>,
 }
 
-/// A run made ready: its carrier, and the place of its code in each group.
+/// A run made ready: its carrier, and the position of its code in each group.
 #[derive(Clone)]
 struct Voice {
     carrier: Carrier,
-    /// Places of the lanes, earlier and later half, from the group's first sample on.
+    /// Positions of the lanes, earlier and later half, from the group's first sample on.
     before: [u32; HALF],
     after: [u32; HALF],
     /// Fraction of a step at each group's first sample.
@@ -55,7 +55,7 @@ struct Voice {
     /// Code position of the first group, a step early, and the advance from group to group, Q16.48.
     position: u64,
     stride: u64,
-    /// Half a sample's share of a step, as bits of the `f32`, in units of a lane's place.
+    /// Half a sample's share of a step, as bits of the `f32`, in units of a lane's position.
     reach: u32,
 }
 
@@ -165,7 +165,7 @@ impl Voice {
     }
 }
 
-/// A Q16.48 position as a lane's place.
+/// A Q16.48 position as a lane's position.
 #[inline(always)]
 pub(super) fn lane(position: u64) -> u32 {
     (position >> (CODE_BITS - LANE_BITS)) as u32
@@ -275,8 +275,8 @@ fn add<const AREA: bool>(bits: &[u64], voice: &Voice, group: usize, sums: &mut S
     }
 }
 
-/// The code at a lane's place: for area edges the mean over the sample in units of 1/`reach`, else the sign
-/// alone.
+/// The code at a lane's position: for area edges the mean over the sample in units of 1/`reach`, else the
+/// sign alone.
 #[inline(always)]
 fn chip<const AREA: bool>(place: u32, now: u32, changes: u32, reach: u32) -> f32 {
     let index = place >> LANE_BITS;

@@ -3,7 +3,7 @@
 //! A [`Run`] is up to 4096 samples of one sequence of a ray with constant carrier and code steps, both phases
 //! as fixed-point integers anchored at its first sample, so nothing accumulates from run to run.
 //! [`mod@reference`] evaluates each sample in `f64`, [`exact`] the same at speed; [`lanes`] is the fast
-//! kernel. Both take all rays of a stretch at once, as [`bank`] gathers them, and what the layers and zeros
+//! kernel. Both take all rays of a segment at once, as [`bank`] gathers them, and what the layers and zeros
 //! of a ray's components come to as several sequences of ±1 ([`waveform`]), a run each. They are plain
 //! lane-array code that [`isa`] compiles for each instruction set with the same bits on all. Limits: 15 code
 //! steps a sample.
@@ -40,11 +40,12 @@ pub const CODE_BITS: u32 = 48;
 /// One code step as a Q16.48 phase.
 pub const CODE_ONE: u64 = 1 << CODE_BITS;
 
-/// A stretch of one ray on which carrier and code advance by constant steps.
+/// A segment of one ray on which carrier and code advance by constant steps.
 #[derive(Clone, Copy, Debug)]
 pub struct Run<'a> {
-    /// Signs of the code steps in order, secondary code and data applied, most significant bit first; a set
-    /// bit is −1. At least [`chips::MARGIN_STEPS`] steps are before `position` and after the last sample.
+    /// Signs of the code steps in order, secondary code and data applied, most significant bit first. A bit
+    /// of one is −1. At least [`chips::MARGIN_STEPS`] steps are before `position` and after the last
+    /// sample.
     pub bits: &'a [u64],
     /// Code position of sample 0 in `bits`, Q16.48 steps.
     pub position: u64,

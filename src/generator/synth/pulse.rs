@@ -1,11 +1,12 @@
-//! Chips behind a band-limiting filter: the response to one whole pulse in place of those to its edges.
+//! Chips behind a band-limiting filter: the response to one whole pulse instead of those to its edges.
 //!
-//! A chip of BOC(6,1) has twelve edges, and one response takes the place of theirs. It is tabulated about the
-//! chip's middle for places in cells of a 64th of a sample, as cubic polynomials, and for its stretch: a
-//! Doppler makes a chip longer or shorter than at the nominal rate. Errors: 1e-9 for each edge in reach, as
-//! for single edges; the square of the stretch times that of half a chip's samples, 1e-8 at 3e-5, a satellite
-//! in low orbit; and at a sample that an edge's response just reaches, where that has a corner, 6e-7 of the
-//! edge. Chips take turns in two sums, so that one need not wait for what the one before has written.
+//! A chip of BOC(6,1) has twelve edges, and one response replaces theirs. It is tabulated about the
+//! chip's middle for positions in cells of a 64th of a sample, as cubic polynomials, and for its lengthening:
+//! a Doppler makes a chip longer or shorter than at the nominal rate. Errors: 1e-9 for each edge in reach, as
+//! for single edges; the square of the lengthening times that of half a chip's samples, 1e-8 at 3e-5, a
+//! satellite in low orbit; and at a sample that an edge's response just reaches, where that has a corner,
+//! 6e-7 of the edge. Chips take turns in two sums, so that one need not wait for what the one before has
+//! written.
 
 use super::band::{CELLS, Filter, HALF_WIDTH, cubic};
 use super::chips::window;
@@ -15,7 +16,7 @@ use super::{CODE_BITS, CODE_ONE, Run};
 /// Values of a block of a response, and most blocks of one.
 const BLOCK: usize = 8;
 const MOST: usize = 10;
-/// Coefficients of a place: four of the cubic polynomial, two of what a stretch adds.
+/// Coefficients of a position: four of the cubic polynomial, two of what a lengthening adds.
 const TERMS: usize = 6;
 /// Values before a tile, and behind it: as many as the response to a chip that does not reach the tile, half
 /// a chip away, may have there.
@@ -104,7 +105,7 @@ impl Pulse {
         })
     }
 
-    /// The sum over the edges of a chip of what each does by its place from the middle, in chips, and its
+    /// The sum over the edges of a chip of what each does by its position from the middle, in chips, and its
     /// height.
     fn edges(&self, of: impl Fn(f64, f64) -> f64) -> f64 {
         let steps = self.levels.len() as f64;
@@ -139,7 +140,7 @@ impl Pulse {
 }
 
 impl Pulses {
-    /// Adds the pulses of runs that have their chips at the same places over a tile, of which the first of
+    /// Adds the pulses of runs that have their chips at the same positions over a tile, of which the first of
     /// `run` is the first sample: of each its bits and amplitude.
     #[inline(always)]
     pub fn add<'r>(
@@ -197,7 +198,7 @@ impl Pulses {
     }
 }
 
-/// A sum with a response at a place within a cell and with a stretch, times its weight.
+/// A sum with a response at a position within a cell and with a lengthening, times its weight.
 #[inline(always)]
 fn with_response(
     mut sum: [f64; BLOCK],

@@ -1,9 +1,9 @@
 //! The band-limited waveform of a run for the `f64` kernel, a tile of samples at a time.
 //!
 //! It is the square wave, which changes its sign at the first sample behind each change of the code's, plus
-//! at each change the filter's response less the change itself. Places of changes are counted in 2^-48 sample
-//! from the tile on (error below 2^-35). Changes take turns in three sums, so that one need not wait for what
-//! the one before has written where they reach the same samples.
+//! at each change the filter's response less the change itself. Positions of changes are counted in 2^-48
+//! sample from the tile on (error below 2^-35). Changes take turns in three sums, so that one need not wait
+//! for what the one before has written where they reach the same samples.
 //!
 //! Where at most nine changes reach a sample the sums are whole numbers of 2^-29, exact in any order. A
 //! response is within 3e-9 there, and nine of them within 2.7e-8: less than the rounding of a sum of `f32`
@@ -16,18 +16,18 @@ use super::{CODE_BITS, CODE_ONE, Run};
 
 /// Samples that are made at a time.
 pub const TILE: usize = 512;
-/// Places before a tile, as many as a word of signs has.
+/// Positions before a tile, as many as a word of signs has.
 const BORDER: usize = 64;
-/// Places that are counted before they begin again: a tile, its borders, and room for what is not used.
+/// Positions that are counted before they begin again: a tile, its borders, and room for what is not used.
 const PLACES: usize = 1024;
-/// Words of signs of all places.
+/// Words of signs of all positions.
 const WORDS: usize = PLACES / 64;
 /// Position of changes that reach no sample.
 const NOWHERE: u64 = ((TILE + 2 * BORDER) as u64) << CODE_BITS;
 /// Sums in which changes take turns.
 const SUMS: usize = 3;
-/// Values of a sum. Those of equal places in two sums are no multiple of 4096 bytes apart, which a processor
-/// would take for the same place for a while.
+/// Values of a sum. Those of equal positions in two sums are no multiple of 4096 bytes apart, which a
+/// processor would take for the same position for a while.
 const LENGTH: usize = PLACES + 128;
 /// Index of the tile in a sum: each value is delayed by half a response.
 const BODY: usize = BORDER + HALF_WIDTH;
@@ -46,7 +46,7 @@ trait Number: Copy {
 
     fn cells(filter: &Filter) -> &[Self::Cell];
     fn within(place: u64) -> Self::Within;
-    /// The cell of a place; their number is a power of two.
+    /// The cell of a position; their number is a power of two.
     fn cell(place: u64) -> usize;
     fn response(cell: &Self::Cell, within: Self::Within) -> [Self; WIDTH];
     fn plus(self, other: Self) -> Self;
@@ -239,7 +239,7 @@ impl<T: Number> Sums<T> {
         self.take::<N>(&turns, changes.before, wave);
     }
 
-    /// Adds the responses, and returns in which places the sign changes.
+    /// Adds the responses, and returns in which positions the sign changes.
     #[inline(always)]
     fn add<const N: usize, const TOGETHER: usize>(&mut self, cells: &[T::Cell], places: &[u64]) -> [u64; WORDS] {
         let mut turns = [0; WORDS];
@@ -305,7 +305,7 @@ fn turned(mut bits: u64) -> u64 {
     bits
 }
 
-/// A word's highest bit in all its places.
+/// A word's highest bit in all its positions.
 #[inline(always)]
 fn highest_of(bits: u64) -> u64 {
     (bits as i64 >> 63) as u64
@@ -354,7 +354,7 @@ impl Changes {
     }
 }
 
-/// Puts a place into the next slot.
+/// Puts a position into the next slot.
 #[inline(always)]
 fn put(slots: &mut IterMut<'_, u64>, place: u64) {
     if let Some(slot) = slots.next() {

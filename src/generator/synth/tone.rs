@@ -1,7 +1,7 @@
 //! The kernel of frequency-modulated carriers: 32 samples side by side.
 //!
-//! Carrier and place in the repetition are 64-bit integers of each sample; the modulation's phase is a
-//! polynomial of the place in `f64`, taken modulo one by adding 1.5·2^52, which rounds alike on every
+//! Carrier and position in the repetition are 64-bit integers of each sample; the modulation's phase is a
+//! polynomial of the position in `f64`, taken modulo one by adding 1.5·2^52, which rounds alike on every
 //! instruction set. Errors: sines 3e-7, the modulation 1e-16 of its cycles (sine FM: 3e-7 of its index).
 //! Where the momentary frequency lies outside the samples' band there is silence, as behind a front end's
 //! filter; sidebands of a fast sweep beyond the band still fold.
@@ -38,13 +38,13 @@ pub struct Tone {
     pub turns: u64,
     /// Advance of the carrier a sample, in 2^-64 turn.
     pub turns_step: u64,
-    /// Place in the repetition, in 2^-64 period.
+    /// Position in the repetition, in 2^-64 period.
     pub place: u64,
-    /// Advance of the place in the repetition a sample, in 2^-64 of it.
+    /// Advance of the position in the repetition a sample, in 2^-64 of it.
     pub place_step: u64,
     /// The frequency over one repetition.
     pub modulation: Modulation,
-    /// Band of the samples less the carrier's place, in cycles a sample.
+    /// Band of the samples less the carrier's position, in cycles a sample.
     pub band_cps: (f64, f64),
     /// Peak amplitude, in LSB.
     pub amplitude: f32,
@@ -53,7 +53,7 @@ pub struct Tone {
 /// Adds the tone to planar samples of one length.
 #[inline(always)]
 pub fn add(tone: &Tone, i: &mut [f32], q: &mut [f32]) {
-    // Advance of the place a sample: frequency is the phase's slope times this.
+    // Advance of the position a sample: frequency is the phase's slope times this.
     let rate = tone.place_step as f64 / 18_446_744_073_709_551_616.0;
     match tone.modulation {
         Modulation::None => lanes(tone, i, q, |_, _| ([0; LANES], [tone.amplitude; LANES])),

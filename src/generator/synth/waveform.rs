@@ -69,7 +69,7 @@ fn least_common_multiple(a: usize, b: usize) -> usize {
 #[derive(Clone, Debug)]
 pub struct Waveform {
     link: Link,
-    /// Place of the component in its signal.
+    /// Position of the component in its signal.
     index: usize,
     component: &'static Component,
     chips: Vec<i8>,

@@ -62,7 +62,7 @@ impl Waves {
             let amplitude = |run: &Run<'_>| run.amplitude * if run.quarters_ahead(first) < 2 { 1.0 } else { -1.0 };
             let of_tile = Run { position: from(run), ..*run };
             if let (Edge::BandLimited(_), Some(pulse)) = (edge, run.pulse) {
-                // The first of those whose pulses are alike and at the same places brings all of them.
+                // The first of those whose pulses are alike and at the same positions brings all of them.
                 let alike =
                     |other: &&Run<'_>| other.quarters_ahead(first) % 2 == quarters % 2 && other.pulses_with(run);
                 if !runs.iter().take(number).any(|other| alike(&other)) {

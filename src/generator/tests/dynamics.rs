@@ -45,7 +45,7 @@ fn the_satellites_share_is_the_second_difference_of_the_true_range() {
         };
         let h_s = 10.0;
         let second = (range_m(middle_s + h_s) - 2.0 * range_m(middle_s) + range_m(middle_s - h_s)) / (h_s * h_s);
-        // Light time stretches the range by 1e-5, gravity is that of a point (1e-3 m/s²), and over a
+        // Light time lengthens the range by 1e-5, gravity is that of a point (1e-3 m/s²), and over a
         // minute the acceleration itself moves by 2e-5 m/s³ · 30 s.
         assert!((line.acceleration_mps2 - second.abs()).abs() < 2e-3, "{line:?} {second}");
     }

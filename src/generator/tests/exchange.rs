@@ -10,7 +10,7 @@ use ::rinex::prelude::{Rinex, TimeScale};
 use gnss::exchange::Version;
 use gnss::record::{Observation, TrajectoryRow};
 
-/// Three systems, five signals on three carriers, ten readings.
+/// Three systems, five signals on three carriers, ten epochs.
 const SCENE: &str = "name = \"x\"\nstart = 2020-11-29T12:50:30\nduration_s = 0.5\nseed = 7\n\
     signals = [\"GPS L1 C/A\", \"Galileo E1\", \"Galileo E5a\", \"BeiDou B1I\"]\n\
     [motion]\nkind = \"static\"\nlatitude_deg = 37.605\nlongitude_deg = -0.986\nheight_m = 60\n\
@@ -33,7 +33,7 @@ fn rinex_of_the_truth_is_its_table_to_the_last_digit_and_flags_its_slips() {
     let mut fronts = Fronts::new(&scenes, &mut records, &Options::default()).unwrap();
     while fronts.next(&mut records, &mut packed, &mut sink).unwrap() {}
     fronts.finish(&mut records).unwrap();
-    // One satellite is gone for two readings and begins anew; another's lock begins anew between two.
+    // One satellite is gone for two epochs and begins anew; another's lock begins anew between two.
     let samples: BTreeSet<u64> = records
         .iter()
         .filter_map(|record| if let Record::Trajectory(row) = record { Some(row.sample) } else { None })
@@ -83,7 +83,7 @@ fn rinex_of_the_truth_is_its_table_to_the_last_digit_and_flags_its_slips() {
             let labelled_ns = key.epoch.to_time_scale(TimeScale::GPST).duration.total_nanoseconds();
             let reading_s = (place.gps_s - labelled_ns as i64 / 1_000_000_000) as f64 + place.gps_fraction_s + offset_s
                 - (labelled_ns % 1_000_000_000) as f64 * 1e-9;
-            // A label is to 0.1 µs, and its clock's offset says by how much it is astray.
+            // A label is to 0.1 µs, and its clock's offset says how large its error is.
             assert!(reading_s.abs() <= 0.51e-7, "{reading_s}");
             let off_s = found.clock.as_ref().map(|clock| clock.offset_s).unwrap();
             assert!((off_s - (offset_s - reading_s)).abs() < 2e-9, "{off_s} {offset_s} {reading_s}");
@@ -100,7 +100,7 @@ fn rinex_of_the_truth_is_its_table_to_the_last_digit_and_flags_its_slips() {
                 let [code, phase, doppler] = ["C", "L", "D"].map(|kind| value(kind).value);
                 let own = [row.pseudorange_m, row.carrier_cycles, row.doppler_hz].map(printed);
                 assert_eq!([code, phase, doppler], own, "{} {}", row.sv, row.signal.name);
-                // Broken where the lock is younger than the reading before.
+                // Broken where the lock is younger than the epoch before.
                 let reading_s = row.sample as f64 / scenes[0].clock.rate.hz();
                 let before_s = seen.insert(row.link(), reading_s);
                 let broken = before_s.is_some_and(|before_s| row.locked_s < reading_s - before_s - 1e-6);

@@ -143,7 +143,7 @@ fn the_bytes_of_a_front_end_are_those_that_it_has_alone_however_the_work_is_cut(
                 assert_eq!(done[number], *own, "{rate_hz} {threads} {block_runs}: {number}");
             }
         }
-        // Nor does the place in the list matter.
+        // Nor does the position in the list matter.
         let (bytes, ..) = made(&scenes(&[&lower, UPPER]), &Options::default());
         assert!(bytes[0] == expected[1].0 && bytes[1] == expected[0].0, "{rate_hz}");
     }
@@ -209,8 +209,8 @@ fn one_oscillator_moves_every_carrier_in_proportion_to_its_frequency() {
             (scene.fast_phases().at(None, carrier_hz, t_s * scene.clock.rate.hz()), carrier_hz)
         });
         let moved_s = |(fast, carrier_hz): (FastPhase, f64)| fast.carrier_cycles / carrier_hz;
-        // Places among nodes are rounded to 2^-53 of them, on slopes of less than a picosecond from node to
-        // node.
+        // Positions among nodes are rounded to 2^-53 of them, on slopes of less than a picosecond from node
+        // to node.
         assert!((upper.0.delay_s - lower.0.delay_s).abs() < 1e-24, "{k}");
         assert!((moved_s(upper) - upper.0.delay_s).abs() < 1e-24 && (moved_s(lower) - lower.0.delay_s).abs() < 1e-24);
         largest_s = largest_s.max(upper.0.delay_s.abs());

@@ -10,7 +10,7 @@ use gnss::record::{PassEnd, PassRow};
 use gnss::time::Epoch;
 use std::ops::Range;
 
-/// The embedded day's last sets end at midnight, but for those of two uploads.
+/// The embedded day's last ephemerides end at midnight, but for those of two uploads.
 fn midnight(duration_s: f64) -> (Scene, Vec<String>) {
     let start_s = 86_400.0 - duration_s / 2.0;
     let (hour, rest) = ((start_s / 3600.0).floor(), start_s % 3600.0);

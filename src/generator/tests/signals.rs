@@ -119,7 +119,7 @@ impl Definition {
         layers.sum::<Complex64>() * f64::from(sign) * self.scale
     }
 
-    /// Whole steps and a fraction when a satellite's clock reads `at` in GPS time.
+    /// Whole steps and a fraction at the time `at` of a satellite's clock, in GPS time.
     fn place(&self, at: Epoch) -> (i128, f64) {
         let thousandths = (self.component.chip_rate_hz * 1000.0).round() as i128 * self.per_chip;
         let whole = i128::from(at.seconds() - self.behind_s) * thousandths;
@@ -212,8 +212,8 @@ fn every_component_is_its_definition_with_every_edge() {
                         let scale = definition.scale;
                         for (n, found) in found.into_iter().enumerate() {
                             let (expected, next) = definition.sample(edge, at(n as f64), rate_hz);
-                            // A place is rounded to 1e-16 s or 3e-9 steps on both sides; on an edge either is
-                            // right.
+                            // A position is rounded to 1e-16 s or 3e-9 steps on both sides; on an edge either
+                            // is right.
                             let allowed = match edge {
                                 Edge::Nearest if next < 1e-7 => continue,
                                 Edge::Nearest => 1e-12,
@@ -350,7 +350,7 @@ fn the_spectrum_of_samples_is_that_of_the_component() {
                         found += sum.norm_sqr() / WINDOW as f64 / windows;
                     }
                 }
-                // Independent values of a line: one a stretch, as far as the code does not repeat; lines
+                // Independent values of a line: one a segment, as far as the code does not repeat; lines
                 // nearer to each other than one over the window's length are one. Each scatters as much as it
                 // has: 5 sigma.
                 let window_s = WINDOW as f64 / RATE_HZ;
@@ -541,7 +541,7 @@ fn a_scene_is_the_sum_of_its_satellites_definitions() {
                         sum += value * Complex64::from_polar(gain * amplitude, phase);
                     }
                 }
-                // On an edge of a satellite either value is right; the place is known to 1e-6 step.
+                // On an edge of a satellite either value is right; the position is known to 1e-6 step.
                 if matches!(edge, Edge::Nearest) && nearest < 1e-5 {
                     continue;
                 }

@@ -1,7 +1,7 @@
 //! One satellite's signal as the stream needs it: when it is in view, its polynomials, its data.
 //!
-//! [`Transmitter::prepare`] gathers all of that for a stretch of samples; [`Transmitter::arrange`] then lists
-//! the runs of any block of the stretch and changes nothing, so blocks are made side by side. Everything is
+//! [`Transmitter::prepare`] gathers all of that for a segment of samples; [`Transmitter::arrange`] then lists
+//! the runs of any block of the segment and changes nothing, so blocks are made side by side. Everything is
 //! decided on absolute grids: view by whole seconds, parts and runs by sample numbers.
 
 mod rising;
@@ -47,7 +47,7 @@ struct Sent {
     gain: f64,
     /// Carrier phase relative to the signal's, in samples: the other way round in an inverted spectrum.
     turns: u64,
-    /// Place among those that are added in one pass, from 0.
+    /// Position among those that are added in one pass, from 0.
     part: usize,
 }
 
@@ -354,7 +354,7 @@ impl Transmitter {
         self.since.map_or(0.0, |since| scene.clock.rate.elapsed_s(sample.saturating_sub(since)))
     }
 
-    /// Phases that a run beginning at sample `n` of the prepared stretch has there: the carrier of the first
+    /// Phases that a run beginning at sample `n` of the prepared segment has there: the carrier of the first
     /// ray and sequence in 2^-64 turn, and its code. `None` where the satellite does not arrive.
     pub fn phases(&self, scene: &Scene, n: u64) -> Option<(u64, CodeTime)> {
         let part = self.parts.iter().find(|part| (part.start..part.end).contains(&n))?;

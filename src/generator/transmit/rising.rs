@@ -41,7 +41,7 @@ impl Leap {
         if nearest_m <= 0.0 || margin_rad <= 0.0 {
             return 0;
         }
-        // The line of sight turns by what moves across it, and the vertical with the place below.
+        // The line of sight turns by what moves across it, and the vertical with the position below.
         let rate_radps = (SATELLITE_MPS + user_mps) / nearest_m + user_mps / (0.99 * SEMI_MAJOR_AXIS_M);
         (margin_rad / rate_radps).min(LEAP_S) as u64
     }
@@ -67,7 +67,7 @@ pub(super) fn rising<E>(
     let mut next = second.checked_sub(1);
     while let Some(second) = next {
         let Presence::InView(emission) = presence(second)? else { break };
-        // Its clock may have stretched a leap by less than a second.
+        // Its clock may have lengthened a leap by less than a second.
         let earliest = second.saturating_sub(leap.seconds(&emission.sight).saturating_sub(1));
         let sent = earliest < second && scene.catalogue.sent_throughout(sv, time(earliest), time(second));
         let reached = if sent { earliest } else { second };

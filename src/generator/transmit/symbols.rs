@@ -51,8 +51,8 @@ impl Symbols {
         Some(Data { form, periods_per_symbol: i64::from(component.periods_per_symbol()?) })
     }
 
-    /// Gathers what `sv` sends from `first` to `last`, and forgets what lies before. A unit for which no set
-    /// was uploaded carries the one of `received`.
+    /// Gathers what `sv` sends from `first` to `last`, and forgets what lies before. A unit for which no
+    /// ephemeris was uploaded carries the one of `received`.
     ///
     /// # Errors
     /// Those of messages.

@@ -50,7 +50,7 @@ pub enum Record {
     Ray(RayRow),
     /// A source of interference at a tick.
     Interference(InterferenceRow),
-    /// Place and clock that a spoofer claims.
+    /// Position and clock that a spoofer claims.
     Claim {
         /// Number of the spoofer, from 1.
         spoofer: usize,

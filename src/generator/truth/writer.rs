@@ -93,10 +93,10 @@ pub struct Writer {
     driven: Option<(Arc<Switches>, Rate, SceneFacts)>,
 }
 
-/// Steps of a range below this are none: what a straying satellite has reached is computed anew.
+/// Steps of a range below this are none: the range error of a satellite is computed again.
 const STEP_M: f64 = 1e-6;
 
-/// The satellites that strayed, as faults and in words.
+/// Satellites with range errors, as faults and in words.
 fn strays(switches: &Switches, rate: Rate, first: u64) -> (Vec<Fault>, Vec<String>) {
     let (mut faults, mut words) = (Vec::new(), Vec::new());
     for Stray { sv, first: from, m, mps, step_m } in switches.strays(rate) {

@@ -78,7 +78,7 @@ impl Grown {
         self.read().rows.back().map(|row| row.knot)
     }
 
-    /// Places the first knot anew, before the first tick.
+    /// Sets the first knot again, before the first tick.
     pub(super) fn begin(&self, first: Knot, heading_cycles: f64, turn: Option<Turn>) {
         let mut rows = self.rows.write().unwrap_or_else(PoisonError::into_inner);
         if rows.ticks == 0 {

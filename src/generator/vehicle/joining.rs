@@ -30,7 +30,7 @@ const MOST_JERK_MPS3: f64 = 1e9;
 const MOST_TURNING_RADPS: f64 = 1e3;
 /// Mean speed of a snap at most; its peak is 1.875 times that.
 const SNAP_SPEED_MPS: f64 = 0.05 * SPEED_OF_LIGHT_MPS;
-/// Places in a join at which its jerk is taken.
+/// Positions in a join at which its jerk is taken.
 const PLACES: u32 = 8;
 
 /// A state of the vehicle as it is pushed, ECEF.
@@ -38,7 +38,7 @@ const PLACES: u32 = 8;
 pub struct Push {
     /// True time since the scene's start that it describes.
     pub t_s: f64,
-    /// Place.
+    /// Position.
     pub position_m: Vector3<f64>,
     /// Velocity in ECEF, if known, in m/s.
     pub velocity_mps: Option<Vector3<f64>>,
@@ -51,7 +51,7 @@ pub struct Push {
 }
 
 impl Push {
-    /// A place alone.
+    /// A position alone.
     pub fn at(t_s: f64, position_m: Vector3<f64>) -> Self {
         Self { t_s, position_m, velocity_mps: None, acceleration_mps2: None, jerk_mps3: None, turn: None }
     }
@@ -72,7 +72,7 @@ pub enum Refusal {
     /// A number that is none.
     #[error("a number that is not finite")]
     NotFinite,
-    /// A place that no vehicle has.
+    /// A position that no vehicle has.
     #[error("{0:e} m from the Earth's centre: expected {LEAST_RADIUS_M:e} to {MOST_RADIUS_M:e} m, ECEF")]
     Place(f64),
     /// A derivative of an implausible size.
@@ -328,7 +328,7 @@ impl State {
     }
 }
 
-/// The largest jerk of the quintic between two knots, of nine places in it.
+/// The largest jerk of the quintic between two knots, of nine positions in it.
 fn largest_jerk_mps3(left: &Knot, right: &Knot) -> f64 {
     let [third, fourth, fifth] = third_fourth_fifth(left, right);
     let h = right.t_s - left.t_s;
@@ -350,7 +350,7 @@ mod tests {
         Joining { tick_samples: 26_000, join_s: 0.1, hold_s: 0.5, max_jerk_mps3: 2e4 }
     }
 
-    /// A circle of 100 m at 20 m/s, 500 m above a place.
+    /// A circle of 100 m at 20 m/s, 500 m above a position.
     fn circle(t_s: f64) -> Motion {
         let (radius_m, turns) = (100.0, 0.2);
         let (sin, cos) = libm::sincos(turns * t_s);

@@ -31,7 +31,7 @@ use gnss::earth::Geodetic;
 /// Position, velocity and acceleration of the antenna in ECEF.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
-    /// Place, ECEF.
+    /// Position, ECEF.
     pub position_m: Vector3<f64>,
     /// Velocity in ECEF, in m/s.
     pub velocity_mps: Vector3<f64>,
@@ -276,7 +276,7 @@ impl Trajectory {
     }
 }
 
-/// Heading of the nose of a body with these axes at a place in ECEF, in turns within one.
+/// Heading of the nose of a body with these axes at a position in ECEF, in turns within one.
 fn heading_cycles(axes: &Orientation, place_m: &Vector3<f64>) -> f64 {
     let nose = Geodetic::from_ecef(place_m).ecef_to_enu() * (axes.still * Vector3::x());
     libm::atan2(nose.x, nose.y) / std::f64::consts::TAU
@@ -296,8 +296,8 @@ pub struct Extremes {
 fn third_fourth_fifth(left: &Knot, right: &Knot) -> [Vector3<f64>; 3] {
     let h = right.t_s - left.t_s;
     let (a, b) = (&left.motion, &right.motion);
-    // Departures of the right knot from the left one's parabola, each scaled to metres; differences first, so
-    // that the size of ECEF coordinates costs one rounding only.
+    // Differences of the right knot from the left one's parabola, each scaled to metres; differences first,
+    // so that the size of ECEF coordinates costs one rounding only.
     let gap = (b.position_m - a.position_m) - (a.velocity_mps + a.acceleration_mps2 * (0.5 * h)) * h;
     let slope = (b.velocity_mps - a.velocity_mps - a.acceleration_mps2 * h) * h;
     let bend = (b.acceleration_mps2 - a.acceleration_mps2) * (h * h);
@@ -330,7 +330,7 @@ fn between(left: &Knot, right: &Knot, t_s: f64) -> Motion {
 mod tests {
     use super::*;
 
-    /// A polynomial of degree five in each axis, about a place on the Earth.
+    /// A polynomial of degree five in each axis, about a position on the Earth.
     fn quintic(t: f64) -> Motion {
         let c = [0.0, 30.0, -4.0, 0.7, -0.05, 0.001];
         let axis = |s: f64| {

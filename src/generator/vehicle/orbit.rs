@@ -163,7 +163,7 @@ mod tests {
                 let t_s = 1.2 * f64::from(k) + 0.137;
                 let (found, want) = (flight.at(t_s), orbit.at(t_s).unwrap());
                 // The quintic's 9 nm; and half a dozen roundings in both, to 2^-53 of the distance or of an
-                // anomaly near one radian, which moves the place by a·√((1 + e cos E)/(1 − e cos E)), less
+                // anomaly near one radian, which moves the position by a·√((1 + e cos E)/(1 − e cos E)), less
                 // than 2a here.
                 let bound_m = 1e-8 + 8.0 * (want.position_m.norm() + 2.0 * a) * (0.5_f64).powi(53);
                 let apart_m = (found.position_m - want.position_m).norm();

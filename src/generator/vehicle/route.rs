@@ -13,7 +13,7 @@ use super::ramp::Ramp;
 use super::{Knot, Motion, Trajectory};
 use gnss::earth::Geodetic;
 
-/// A place on the route and how it is passed.
+/// A position on the route and how it is passed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Waypoint {
     /// Position of the waypoint.

@@ -1,8 +1,8 @@
 //! Content of augmentation messages about satellites and the ionosphere, independent of its encoding. The
 //! module has the content of each block, its meaning, and the knowledge of a network of ground stations.
 //!
-//! Source: RTCA DO-229D, A.4.4.1 to A.4.4.10. Satellites go by their place in the mask of type 1, points of
-//! the grid by theirs in the mask of type 18. Limits: types 10, 17, 27 and 28 are not among them.
+//! Source: RTCA DO-229D, A.4.4.1 to A.4.4.10. Satellites go by their position in the mask of type 1, points
+//! of the grid by theirs in the mask of type 18. Limits: types 10, 17, 27 and 28 are not among them.
 
 use std::fmt;
 
@@ -74,7 +74,7 @@ pub struct Degradation {
 /// Long-term corrections of one satellite.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LongTerm {
-    /// Place in the mask from 1; 0 for none.
+    /// Position in the mask from 1; 0 for none.
     pub place: u8,
     /// Issue of the elements that they correct.
     pub iode: u8,
@@ -93,14 +93,14 @@ pub struct LongTerm {
 /// Half of a block of long-term corrections.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Half {
-    /// Velocity code 0: places and clocks of two satellites.
+    /// Velocity code 0: positions and clocks of two satellites.
     Steady {
         /// Issue of the mask.
         iodp: u8,
         /// The satellites'.
         both: [LongTerm; 2],
     },
-    /// Velocity code 1: place and clock of one satellite, with their rates.
+    /// Velocity code 1: position and clock of one satellite, with their rates.
     Moving {
         /// Issue of the mask.
         iodp: u8,
@@ -203,7 +203,7 @@ pub struct Known {
     pub udrei: u8,
     /// Indicator of how fast the correction ages.
     pub degradation: u8,
-    /// Long-term correction; its place in the mask is 0.
+    /// Long-term correction; its position in the mask is 0.
     pub long_term: LongTerm,
     /// True if the long-term correction includes rates.
     pub is_moving: bool,

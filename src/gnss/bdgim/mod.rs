@@ -1,8 +1,8 @@
 //! BDGIM: the global ionosphere of which BeiDou's third generation broadcasts nine coefficients.
 //!
 //! Source: BDS-SIS-ICD-B1C 1.0, section 7.8 (7.8 of BDS-SIS-ICD-B2a 1.0 and 7.7 of BDS-SIS-ICD-B2b 1.0 have
-//! the same). The vertical content is a sum of normalised spherical harmonics of the geomagnetic place, its
-//! longitude counted from the mean Sun's: nine of degree 0 to 2 with the broadcast coefficients, and a
+//! the same). The vertical content is a sum of normalised spherical harmonics of the geomagnetic position,
+//! its longitude counted from the mean Sun's: nine of degree 0 to 2 with the broadcast coefficients, and a
 //! forecast of seventeen of degree 3 to 5, whose coefficients are sums of twelve periods ([`forecast_tecu`])
 //! and change every two hours. The slant content is that of a thin shell 400 km above a sphere.
 //!
@@ -57,7 +57,7 @@ pub struct Pierce {
 }
 
 impl Pierce {
-    /// The place that `user` sees towards `look`.
+    /// The position that `user` sees towards `look`.
     pub fn new(user: Geodetic, look: Look) -> Self {
         let elevation_rad = look.elevation_rad.max(0.0);
         // Sine of the zenith angle at the shell.
@@ -92,7 +92,7 @@ impl Pierce {
     }
 }
 
-/// A place in geomagnetic coordinates, as the Sun sees it.
+/// A position in geomagnetic coordinates, as the Sun sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnderSun {
     /// Sine of the geomagnetic latitude.
@@ -168,7 +168,7 @@ impl Bdgim {
         alpha_tecu.iter().any(|alpha| *alpha != 0.0).then_some(Self { alpha_tecu })
     }
 
-    /// The sum of the broadcast harmonics and those of a forecast at a place, in TECU: as the document has
+    /// The sum of the broadcast harmonics and those of a forecast at a position, in TECU: as the document has
     /// it, and in places below zero.
     pub fn series_tecu(&self, place: &UnderSun, forecast_tecu: &[f64; 17]) -> f64 {
         let harmonics = place.harmonics();
@@ -196,7 +196,7 @@ impl Bdgim {
         mean / planted!("gnss.bdgim.least", part, 2.0 * part)
     }
 
-    /// Vertical content at a place by a forecast, in TECU.
+    /// Vertical content at a position by a forecast, in TECU.
     pub fn vertical_tecu(&self, place: &UnderSun, forecast_tecu: &[f64; 17]) -> f64 {
         self.series_tecu(place, forecast_tecu).max(self.least_tecu())
     }

@@ -4,7 +4,7 @@ use super::*;
 
 const DAY: Bdgim = Bdgim { alpha_tecu: [30.875, 0.25, 11.625, 10.375, -12.5, 0.75, 0.0, 3.125, 1.875] };
 
-/// Every harmonic at a place by degree, order and whether it is a sine's.
+/// Every harmonic at a position by degree, order and whether it is a sine's.
 fn all(place: &UnderSun) -> Vec<f64> {
     let found = place.harmonics();
     (0..=DEGREE).flat_map(|n| (0..=ORDER.min(n)).flat_map(move |m| (0..2).map(move |k| found[n][m][k]))).collect()
@@ -12,7 +12,7 @@ fn all(place: &UnderSun) -> Vec<f64> {
 
 #[test]
 fn harmonics_are_orthogonal_over_the_sphere_and_have_a_mean_square_of_one() {
-    // Products have degree 10 and order 6 at most: the rule of Gauss and Legendre of six places in the sine
+    // Products have degree 10 and order 6 at most: the Gauss-Legendre rule of six nodes in the sine
     // of the latitude (Abramowitz and Stegun, table 25.4) and twelve longitudes integrate them without an
     // error.
     let half = [

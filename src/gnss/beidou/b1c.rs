@@ -110,7 +110,7 @@ pub(super) fn piece(legendre: &Legendre, [later, first]: [u16; 2], chips: u32) -
     weil.take(chips as usize).map(|one| if one { -1 } else { 1 }).collect()
 }
 
-/// Weil index and place of truncation of the data's code, of the pilot's and of its secondary code, for
+/// Weil index and position of truncation of the data's code, of the pilot's and of its secondary code, for
 /// numbers 1 to
 /// 63.
 #[rustfmt::skip]

@@ -3,7 +3,7 @@
 //!
 //! Source: BDS-SIS-ICD-B2b 1.0, 4.2 and 5.2 (codes of two registers of thirteen stages, table 5-1:
 //! numbers 6 to 58). A symbol is what one code period carries. The satellites are those of B1C and B2a.
-//! Limits: geostationary satellites (numbers 59 to 61) send PPP-B2b, corrections, in the same place,
+//! Limits: geostationary satellites (numbers 59 to 61) send PPP-B2b, corrections, in the same position,
 //! which is left out; so is the component in quadrature, of which no document is public. Power is that of
 //! medium orbits, 2 dB less of inclined ones. Below some 38 dB-Hz the phase detector of single periods
 //! declares slips that are none.

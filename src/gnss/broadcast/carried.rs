@@ -1,7 +1,7 @@
-//! A set of elements at another reference time: the same orbit and clock; and the same of another day.
+//! An ephemeris at another reference time: the same orbit and clock; and the same of another day.
 //!
-//! Limits: a rate of the mean motion's correction and of the axis is left as it is, which sets without them
-//! have as zero.
+//! Limits: a rate of the mean motion's correction and of the axis is left as it is, which ephemerides without
+//! them have as zero.
 
 use super::kepler::wrap;
 use super::{Constants, Ephemeris};
@@ -12,9 +12,9 @@ use crate::time::{Epoch, UTC};
 const DAY_S: i64 = 86_400;
 
 impl Ephemeris {
-    /// The set of a satellite that goes whole days later over the same ground, with the same clock. The node
-    /// counts from the beginning of a week, whose reference time is another now; issues stay. Sets of GLONASS
-    /// keep their hour of UTC.
+    /// The ephemeris of a satellite that goes whole days later over the same ground, with the same clock. The
+    /// node counts from the beginning of a week, whose reference time is another now; issues stay.
+    /// Ephemerides of GLONASS keep their hour of UTC.
     pub fn moved(&self, days: i64) -> Self {
         let later = |at: Epoch| Epoch::new(at.seconds() + days * DAY_S, at.fraction());
         let moved = match self.sv.system {
@@ -27,7 +27,7 @@ impl Ephemeris {
         Self { omega0_rad, ..moved }
     }
 
-    /// The set with `at`, of the same week, as the reference time of orbit and clock; issues stay.
+    /// The ephemeris with `at`, of the same week, as the reference time of orbit and clock; issues stay.
     pub(crate) fn carried_to(&self, at: Epoch) -> Self {
         let (since_toe_s, since_toc_s) = (at.since(self.toe), at.since(self.toc));
         Self {

@@ -1,7 +1,7 @@
-//! Meaning of an ephemeris' clock, delays and health in each message.
+//! Meaning of an ephemeris's clock, delays and health in each message.
 //!
-//! Sources: those of the messages. A set of no message in particular has one group delay of two carriers
-//! (IS-GPS-200N, 20.3.3.3.3.2), BeiDou's two against B3I.
+//! Sources: those of the messages. An ephemeris of no message in particular has one group delay of two
+//! carriers (IS-GPS-200N, 20.3.3.3.3.2), BeiDou's two against B3I.
 
 use std::fmt;
 
@@ -28,7 +28,7 @@ pub struct SetForm {
     pub rinex_sources: Option<f64>,
 }
 
-/// A set of no message in particular: one group delay, which goes with 1/f², and health of all signals
+/// An ephemeris of no message in particular: one group delay, which goes with 1/f², and health of all signals
 /// together.
 pub static PLAIN: SetForm = SetForm {
     name: "",
@@ -40,7 +40,7 @@ pub static PLAIN: SetForm = SetForm {
     rinex_sources: None,
 };
 
-/// The one delay of a set on the carrier of a signal; BeiDou's clock is that of B3I.
+/// The one delay of an ephemeris on the carrier of a signal; BeiDou's clock is that of B3I.
 fn plain_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
     match (set.sv.system, signal.carrier_hz(set.sv)) {
         (System::BeiDou, B2I_HZ) => planted!("gnss.delay.second", set.tgd2_s, -set.tgd2_s),
@@ -78,8 +78,8 @@ impl PartialEq for SetForm {
 /// (RINEX 3.05, table A10).
 pub const STRING_3_UNHEALTHY: u16 = 2;
 
-/// Galileo's data validity and health in the order of a set, of RINEX's: E1-B in bits 0 to 2, E5a in 3 to 5,
-/// E5b in 6 to 8; and the other way, for it exchanges the last two.
+/// Galileo's data validity and health in the order of an ephemeris, of RINEX's: E1-B in bits 0 to 2, E5a in 3
+/// to 5, E5b in 6 to 8; and the other way, for it exchanges the last two.
 pub fn status_of_record(health: u16) -> u16 {
     health & 0b111 | (health >> 6 & 0b111) << 3 | (health >> 3 & 0b111) << 6
 }

@@ -28,7 +28,7 @@ const DISTANCES_M: std::ops::RangeInclusive<f64> = 6.4e6..=1e8;
 /// State at the reference time, earth-fixed, and what Moon and Sun add to its acceleration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StateVector {
-    /// Place.
+    /// Position.
     pub position_m: Vector3<f64>,
     /// Velocity in the rotating axes.
     pub velocity_mps: Vector3<f64>,

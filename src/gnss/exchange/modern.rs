@@ -1,4 +1,4 @@
-//! Lines of the records of messages whose sets have rates of the axis and of the mean motion.
+//! Lines of the records of messages whose ephemerides have rates of the axis and of the mean motion.
 //!
 //! Source: RINEX 4.02, sections 5.4.2 (CNAV), 5.4.3 (CNAV-2) and 5.4.8 to 5.4.10 (B-CNAV1 to 3). The
 //! reference time of the clock, with which a record begins, is that of the orbit too where the record has no
@@ -22,7 +22,7 @@ pub fn orbit(set: &Ephemeris, time_s: Option<f64>) -> Vec<RecordLine> {
 /// A delay of which its field's least value says that it is not available (IS-GPS-705J, 20.3.3.3.1.1).
 const NOT_AVAILABLE_S: f64 = -4096.0 / (1_u64 << 35) as f64;
 
-/// Seconds of the week of the reference time at which a set was sent, before it too.
+/// Seconds of the week of the reference time at which an ephemeris was sent, before it too.
 pub fn transmitted_s(set: &Ephemeris) -> f64 {
     set.transmitted.since(set.toe) + set.toe.tow_s()
 }
@@ -34,7 +34,7 @@ pub fn of_gps(set: &Ephemeris, raw: Raw<'_>, health: u16, delays: &[usize]) -> V
     // Five bits, of which the highest is the sign.
     let sign = planted!("gnss.exchange.accuracy", 16, 32);
     let accuracy = raw("ura_ed_index").map(|raw| if raw >= sign { raw - 32 } else { raw } as f64);
-    // Weeks by their lowest eight bits, that nearest to the set.
+    // Weeks by their lowest eight bits, that nearest to the ephemeris.
     let week = raw("op_week").map(|low| {
         let near = set.toe.week();
         (near + (low - near + 128).rem_euclid(256) - 128) as f64

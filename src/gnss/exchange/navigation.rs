@@ -1,4 +1,4 @@
-//! Navigation files of sets by the raw parameters of their messages, as they were sent or decoded.
+//! Navigation files of ephemerides by the raw parameters of their messages, as they were sent or decoded.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
@@ -13,10 +13,10 @@ use crate::satellite::{Sv, System};
 use crate::signal::Signal;
 use crate::time::{BDT, BDT_WEEK, Epoch, TimeScale, UTC};
 
-/// The parameters of a set, or of what is common to all, by name.
+/// The parameters of an ephemeris, or of what is common to all, by name.
 type Raws = BTreeMap<String, i64>;
 
-/// Collects parameters as they come; a set is some kilobytes, however often it is read again.
+/// Collects parameters as they come; an ephemeris is some kilobytes, however often it is read again.
 #[derive(Debug, Default)]
 pub struct NavigationSets {
     /// Parameters by message, satellite and issue. Parameters that belong to no issue are in `common`, the
@@ -29,7 +29,7 @@ impl NavigationSets {
     /// Takes a parameter.
     pub fn take(&mut self, row: &NavigationRow) {
         let raws = if row.issue == 0 {
-            // Those of an issue 0 are of a set too.
+            // Those of an issue 0 are of an ephemeris too.
             self.common.entry(row.message.clone()).or_default().insert(row.parameter.clone(), row.raw);
             self.sets.entry((row.message.clone(), row.sv, 0)).or_default()
         } else {
@@ -38,9 +38,9 @@ impl NavigationSets {
         raws.insert(row.parameter.clone(), row.raw);
     }
 
-    /// Writes all whole sets, each once, near a time by which their weeks are resolved; `signals` are those
-    /// whose messages were read. Coefficients of the ionosphere, which all satellites of a system send alike,
-    /// have in RINEX 4 the first of them that sent a message.
+    /// Writes all complete ephemerides, each once, near a time by which their weeks are resolved; `signals`
+    /// are those whose messages were read. Coefficients of the ionosphere, which all satellites of a system
+    /// send alike, have in RINEX 4 the first of them that sent a message.
     ///
     /// # Errors
     /// What the writer reports.
@@ -67,7 +67,7 @@ impl NavigationSets {
             let form = if version == Version::Four { records.common } else { "" };
             let mut once = |what| described.insert((sv.system, form, what));
             let common = self.common.get(*name);
-            // BeiDou's, and those of NavIC on L1, come with the sets.
+            // BeiDou's, and those of NavIC on L1, come with the ephemerides.
             let mut raws = common.into_iter().chain(own.map(|(_, raws)| raws));
             let sent = raws.find_map(|raws| {
                 let raw = |name: &str| raws.get(name).copied();
@@ -96,7 +96,7 @@ impl NavigationSets {
         for ((name, sv, issue), raws) in &self.sets {
             let Some((message, time)) = messages.get(name.as_str()) else { continue };
             let Some(records) = message.rinex else { continue };
-            // What a set needs and bears no issue: delays and health of I/NAV's word 5.
+            // What an ephemeris needs and bears no issue: delays and health of I/NAV's word 5.
             let rest = self.sets.get(&(name.clone(), *sv, 0));
             let raw = |name: &str| raws.get(name).or_else(|| rest?.get(name)).copied();
             let set = (message.elements)(*sv, &raw, time.label(near));
@@ -138,7 +138,8 @@ fn ionosphere(sent: Coefficients, system: System) -> String {
     }
 }
 
-/// The line before a set: its kind, satellite and message (RINEX 4.02, section 5.4); version 3 has none.
+/// The line before an ephemeris: its kind, satellite and message (RINEX 4.02, section 5.4); version 3 has
+/// none.
 fn heading(version: Version, records: Records, sv: Sv) -> String {
     match version {
         Version::Three => String::new(),
@@ -202,8 +203,8 @@ pub(super) fn exponent(value: f64, digits: usize) -> String {
     format!("{mantissa}E{}{:02}", if exponent < 0 { '-' } else { '+' }, exponent.abs())
 }
 
-/// A set that is a state vector: a line with the clock, one of each axis and one with the rest (RINEX 3.05,
-/// table A10); times are UTC's.
+/// An ephemeris that is a state vector: a line with the clock, one of each axis and one with the rest (RINEX
+/// 3.05, table A10); times are UTC's.
 fn vector_record(set: &Ephemeris, vector: &StateVector, channel: Option<i8>) -> String {
     if set.sv.system == System::Sbas {
         return geostationary_record(set, vector);
@@ -226,7 +227,7 @@ fn vector_record(set: &Ephemeris, vector: &StateVector, channel: Option<i8>) -> 
     text
 }
 
-/// Place, velocity and acceleration along an axis in kilometres, and what ends their line.
+/// Position, velocity and acceleration along an axis in kilometres, and what ends their line.
 fn axis_km(vector: &StateVector, of: usize, last: f64) -> [f64; 4] {
     let axes = [vector.position_m, vector.velocity_mps, vector.acceleration_mps2];
     let [place, speed, pull] = axes.map(|axis| axis.get(of).map_or(0.0, |metres| 1e-3 * metres));
@@ -253,7 +254,7 @@ fn values(values: &[f64]) -> String {
     values.iter().map(|value| format!("{:>19}", exponent(*value, 12))).collect()
 }
 
-/// A set in a record that version 4 alone has: a line with the clock, and those of its message.
+/// An ephemeris in a record that version 4 alone has: a line with the clock, and those of its message.
 fn modern_record(set: &Ephemeris, lines: impl Fn(&Ephemeris) -> Vec<RecordLine>) -> String {
     // BeiDou's records are in its own time.
     let set = &if set.sv.system == System::BeiDou { set.clone().timed(|at| BDT.label(at)) } else { set.clone() };
@@ -269,7 +270,7 @@ fn clock_line(set: &Ephemeris) -> String {
     format!("{} {year:04} {month:02} {day:02} {hour:02} {minute:02} {second:02}{clock}\n", set.sv)
 }
 
-/// A set: a line with the clock, seven with the rest (RINEX 3.05, tables A6, A8, A14 and A18).
+/// An ephemeris: a line with the clock, seven with the rest (RINEX 3.05, tables A6, A8, A14 and A18).
 fn record(set: &Ephemeris, channel: Option<i8>) -> String {
     if let Some(vector) = &set.vector {
         return vector_record(set, vector, channel);
@@ -701,7 +702,7 @@ mod tests {
             let [model] = models.as_slice() else { panic!("{} models\n{four}", models.len()) };
             let [a, b, c, d, e, f, g, h, i] = alpha_tecu;
             assert_eq!(model.alpha, (a, b, c, d, e, f, g, h, i), "{four}");
-            // Ours wants sets of messages that it reads.
+            // Ours wants ephemerides of messages that it reads.
             let is_all = sent.len() == all.len();
             if is_all {
                 let read = rinex::read(four.as_bytes(), "own").unwrap();

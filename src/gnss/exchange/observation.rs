@@ -19,12 +19,12 @@ const TYPES_ON_A_LINE: usize = 13;
 const LARGEST: f64 = 999_999_999.999;
 /// Time tags are written to 0.1 µs.
 const TICKS_A_SECOND: f64 = 1e7;
-/// Two readings of a time are as far apart at most.
+/// Largest difference between two values of one time, in seconds.
 const SAME_TIME_S: f64 = 1e-6;
 
 /// A file in the making: the rows of one epoch are kept, nothing else.
 ///
-/// An epoch is labelled with the reading of the receiver's clock. A carrier that was not locked all the time
+/// An epoch is labelled with the time of the receiver's clock. A carrier that was not locked all the time
 /// since the epoch before has its loss-of-lock flag set.
 pub struct ObservationFile<W> {
     writer: W,
@@ -65,7 +65,7 @@ impl<W: Write> ObservationFile<W> {
         Ok(())
     }
 
-    /// States the reading of the receiver's clock less GPS time at the sample of the newest observations.
+    /// States the offset of the receiver's clock from GPS time at the sample of the newest observations.
     pub fn set_clock(&mut self, bias_s: f64) {
         self.clock_bias_s = Some(bias_s);
     }

@@ -77,7 +77,7 @@ impl Offset {
     }
 
     /// The record of a file of version 4 of a satellite that sent it (RINEX 4.02, table of `STO` records).
-    /// When it was sent is not known, which its zero says as in records of sets.
+    /// When it was sent is not known, which its zero says as in records of ephemerides.
     pub fn record(&self, records: &Records, sv: Sv) -> String {
         let [year, month, day, hour, minute, second] = calendar(self.reference);
         let epoch = format!("{year:04} {month:02} {day:02} {hour:02} {minute:02} {second:02}");

@@ -118,7 +118,7 @@ impl SceneFacts {
         self.time_offsets.iter().find(|offset| offset.time_scale == scale).map_or(0.0, |offset| offset.ahead_s)
     }
 
-    /// The stages and the sample rate in Hz of a front end by its place among several.
+    /// The stages and the sample rate in Hz of a front end by its position among several.
     pub fn stages(&self, front_end: usize) -> (&[StageSpec], f64) {
         match self.front_ends.get(front_end) {
             Some(own) => (&own.front_end, own.sample_rate_hz),

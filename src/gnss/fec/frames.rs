@@ -25,7 +25,7 @@ impl Frames {
     }
 
     /// Takes the next symbol; gives the frame that ends with it. Until one is known `may_begin` says of every
-    /// place whether `decode` is worth its time.
+    /// position whether `decode` is worth its time.
     pub fn take<F>(
         &mut self,
         soft: f32,
@@ -86,7 +86,7 @@ mod tests {
             symbols.iter().enumerate().filter_map(|(at, soft)| takes(*soft).map(|_| at)).collect()
         };
         assert_eq!(ends(&mut take, &[5.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 1.0, 0.0, 0.0]), [3, 6, 9]);
-        // Four of the places where one is due fail; then 1, 2, 0 is found a place later.
+        // Four of the positions where one is due fail; then 1, 2, 0 is found a position later.
         let moved = [2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 3.0, 1.0, 2.0, 0.0];
         assert_eq!(ends(&mut take, &moved), [15]);
         frames.skip();

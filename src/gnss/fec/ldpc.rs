@@ -16,7 +16,7 @@ const NORMALISATION: f32 = 0.78;
 /// A code.
 #[derive(Clone, Debug)]
 pub struct Ldpc {
-    /// Places of the bits whose sum is even, check after check.
+    /// Positions of the bits whose sum is even, check after check.
     checks: Vec<Vec<usize>>,
     /// Information bits, and as many parity bits.
     half: usize,
@@ -41,7 +41,7 @@ impl Ldpc {
         Self { generator: generator(&checks, half), checks, half }
     }
 
-    /// Places of the bits whose sum is even, check after check.
+    /// Positions of the bits whose sum is even, check after check.
     pub fn checks(&self) -> &[Vec<usize>] {
         &self.checks
     }
@@ -84,7 +84,7 @@ impl Ldpc {
     }
 }
 
-/// One check: what it said before is taken off its bits, and what it says now put in its place.
+/// One check: what it said before is taken off its bits, and what it says now added instead.
 fn update(row: &[usize], said: &mut [f32], sure: &mut [f32]) {
     let (mut least, mut next, mut at, mut odd) = (f32::INFINITY, f32::INFINITY, 0, false);
     for (edge, (&place, said)) in row.iter().zip(said.iter()).enumerate() {

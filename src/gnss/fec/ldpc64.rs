@@ -27,7 +27,7 @@ type Belief = [f32; ORDER];
 /// A code.
 #[derive(Clone, Debug)]
 pub struct Ldpc64 {
-    /// Place and factor of the elements whose sum is zero, check after check.
+    /// Position and factor of the elements whose sum is zero, check after check.
     checks: Vec<Vec<(usize, u8)>>,
     /// Checks of each element, each with the element's position in it.
     edges: Vec<Vec<(usize, usize)>>,
@@ -65,7 +65,7 @@ fn inverse(element: u8) -> u8 {
 
 impl Ldpc64 {
     /// The code of `half` information elements, each of whose checks has four elements: packed as an octet of
-    /// the place and one of the factor for each.
+    /// the position and one of the factor for each.
     pub fn packed(half: usize, packed: &[u8]) -> Self {
         let pairs: Vec<(usize, u8)> =
             packed.chunks_exact(2).filter_map(|pair| Some((usize::from(*pair.first()?), *pair.last()?))).collect();
@@ -79,7 +79,7 @@ impl Ldpc64 {
         Self { generator: generator(&checks, half), checks, edges, half }
     }
 
-    /// Place and factor of the elements whose sum is zero, check after check.
+    /// Position and factor of the elements whose sum is zero, check after check.
     pub fn checks(&self) -> &[Vec<(usize, u8)>] {
         &self.checks
     }

@@ -1,7 +1,7 @@
 //! Finds messages of one length in soft symbols of the convolutional code, which runs on from one to the
-//! next, whichever way up they come.
+//! next, normal or inverted.
 //!
-//! Both polynomials have an odd number of taps, so that symbols upside down are bits upside down. A message
+//! Both polynomials have an odd number of taps, so that inverted symbols are inverted bits. A message
 //! is decoded once the code's memory after it is there too.
 
 use std::collections::VecDeque;
@@ -79,7 +79,7 @@ impl Running {
             }
             return None;
         }
-        // Every place comes by within the margins.
+        // Every position comes by within the margins.
         if !self.next.is_multiple_of(MARGIN as u64) {
             return None;
         }
@@ -122,7 +122,7 @@ impl Running {
     }
 }
 
-/// Bits as they were sent and whether they came upside down, if they are a message.
+/// Bits as they were sent and whether they are inverted, if they are a message.
 fn either_way_up(bits: &[bool], is_message: fn(&[bool]) -> bool) -> Option<(Vec<bool>, bool)> {
     if is_message(bits) {
         return Some((bits.to_vec(), false));

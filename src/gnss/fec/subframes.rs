@@ -2,8 +2,8 @@
 //! one half and interleaved together.
 //!
 //! Source: IS-GPS-800J, 3.2.3 (CNAV-2 of L1C); NavIC SPS ICD for L1 1.0, which has the same frame with
-//! matrices of its own and a time of nine bits in one code word. What tells frames upside down differs: words
-//! of CNAV-2 upside down are words of another time, and the checks of the blocks decide; those of NavIC are
+//! matrices of its own and a time of nine bits in one code word. The sign of inverted frames: inverted words
+//! of CNAV-2 are words of another time, and the checks of the blocks decide; those of NavIC are
 //! none.
 
 use std::ops::RangeInclusive;
@@ -72,7 +72,7 @@ impl Subframes {
         first.iter().copied().chain(self.interleaver.interleave(rest)).collect()
     }
 
-    /// The most likely times in soft symbols with whether they are upside down then, and how much of what the
+    /// The most likely times in soft symbols with whether they are inverted then, and how much of what the
     /// symbols say is for them.
     pub fn likely_times(&self, soft: &[f32]) -> (Vec<(u32, bool)>, f32) {
         let own = soft.get(..self.time_symbols()).unwrap_or(soft);
@@ -94,7 +94,7 @@ impl Subframes {
         (known, sum.abs() / all.max(f32::MIN_POSITIVE))
     }
 
-    /// The frame in soft symbols, positive for a logical 0, whichever way up; `None` where its checks fail.
+    /// The frame in soft symbols, positive for a logical 0, normal or inverted; `None` where its checks fail.
     pub fn decode(&self, soft: &[f32]) -> Option<Blocks> {
         let (first, rest) = soft.split_at_checked(self.time_symbols())?;
         let (times, _) = self.likely_times(first);

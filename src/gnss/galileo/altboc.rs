@@ -3,7 +3,7 @@
 //! Source: Galileo OS SIS ICD 2.1, 2.3.1 (eq. 3 to 7, tables 6 and 7). Each side is data and pilot at right
 //! angles, times S(t) ∓ jS(t − Ts/4) with a sub-carrier of 15.345 MHz in four levels, constant over eighths
 //! of its period Ts: the phase turns by an eighth of a cycle a step, down on E5a, up on E5b. A chip has
-//! twelve eighths, one and a half periods, so that the sub-carrier is upside down on every second chip: that
+//! twelve eighths, one and a half periods, so that the sub-carrier is inverted on every second chip: that
 //! sign is in the codes here ([`code`]). S is a sum of two sequences of signs, which are layers. Secondary
 //! codes and messages are those of E5a and E5b ([`super::e5`]), and no group delay of both together is
 //! broadcast (`status`). Limits: the products of three codes, which make the envelope constant and have (2 −

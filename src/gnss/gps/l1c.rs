@@ -111,7 +111,7 @@ pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
         Code::Data => data,
         Code::Pilot => pilot,
     };
-    // Places count from 1.
+    // Positions count from 1.
     let before = usize::from(inserted_at) - planted!("gnss.l1c.insertion", 1, 0);
     let rest = CODE_CHIPS as usize - INSERTED.len() - before;
     let weil = || LEGENDRE.weil(later, 0);

@@ -2,9 +2,9 @@
 //!
 //! Source: IS-GPS-200N, 3.2.1.4 and 3.2.1.5 (CM of 10 230 chips in 20 ms with CNAV, CL of 767 250 in 1.5 s),
 //! 3.3.2.4 (one register of 27 stages for both), tables 3-IIa and 6-I (its first states). Each code has
-//! 511 500 chips a second; here a chip is one of the 1.023 million places a second, and codes are zero where
-//! the other has its turn. Limits: the power is that of Blocks IIR-M and IIF; the phase is that of CM, with
-//! no P code beside it.
+//! 511 500 chips a second; here a chip is one of the 1.023 million positions a second, and codes are zero
+//! where the other has its turn. Limits: the power is that of Blocks IIR-M and IIF; the phase is that of CM,
+//! with no P code beside it.
 
 use crate::gps::cnav::CNAV_L2C;
 use crate::gps::modernised;
@@ -65,7 +65,7 @@ pub(crate) fn placed(which: Code, number: u8) -> Option<Vec<i8>> {
     Some(in_turn(&code(which, number)?, first))
 }
 
-/// Chips at every other place, from the first or the second on.
+/// Chips at every other position, from the first or the second on.
 fn in_turn(chips: &[i8], first: usize) -> Vec<i8> {
     let mut all = vec![0; 2 * chips.len()];
     let first = planted!("gnss.l2c.turn", first, 1 - first);

@@ -1,16 +1,16 @@
 //! The tables of NeQuick-G: the grid of the modified dip and the ITU's monthly maps of the F2 layer.
 //!
 //! Source: the document's annexes; the maps are those of ITU-R P.1239. `maps.bin` holds, little-endian, for
-//! every month the F2 layer's critical frequency (quiet and active Sun, 76 functions of the place, 13 of the
-//! time) and the transmission factor M(3000)F2 (49 and 9) as `f64`, and then the dip as `i16` in hundredths
-//! of a degree: 39 rows of 39, a row every 5° of latitude and a column every 10° of longitude, both beginning
-//! one before −90° and −180°.
+//! every month the F2 layer's critical frequency (quiet and active Sun, 76 functions of the position, 13 of
+//! the time) and the transmission factor M(3000)F2 (49 and 9) as `f64`, and then the dip as `i16` in
+//! hundredths of a degree: 39 rows of 39, a row every 5° of latitude and a column every 10° of longitude,
+//! both beginning one before −90° and −180°.
 
 use std::f64::consts::PI;
 
 static TABLES: &[u8] = include_bytes!("maps.bin");
 
-/// Functions of the place and of the time in a map.
+/// Functions of the position and of the time in a map.
 struct Map {
     places: usize,
     times: usize,
@@ -43,7 +43,7 @@ fn dip_deg(row: usize, column: usize) -> f64 {
     bytes.map_or(0.0, |bytes| 0.01 * f64::from(i16::from_le_bytes(bytes)))
 }
 
-/// The maps of a month at a time and for a Sun: coefficients of the functions of the place.
+/// The maps of a month at a time and for a Sun: coefficients of the functions of the position.
 #[derive(Clone, Debug)]
 pub struct Maps {
     frequency: Vec<f64>,
@@ -77,8 +77,8 @@ impl Maps {
         Self { frequency: of(FREQUENCY), factor: of(FACTOR) }
     }
 
-    /// Critical frequency of the F2 layer in megahertz and its transmission factor at a place, of which the
-    /// dip is `modip_deg`.
+    /// Critical frequency of the F2 layer in megahertz and its transmission factor at a position, of which
+    /// the dip is `modip_deg`.
     pub fn at(&self, modip_deg: f64, latitude_cos: f64, longitude_rad: f64) -> (f64, f64) {
         let mut powers = [1.0; 12];
         let sine = libm::sin(modip_deg.to_radians());
@@ -106,13 +106,13 @@ impl Maps {
     }
 }
 
-/// The modified dip at a place, in degrees (2.5.4.3).
+/// The modified dip at a position, in degrees (2.5.4.3).
 pub fn modip_deg(latitude_rad: f64, longitude_rad: f64) -> f64 {
     let (latitude_deg, longitude_deg) = (latitude_rad * 180.0 / PI, longitude_rad * 180.0 / PI);
     if latitude_deg.abs() >= 90.0 {
         return latitude_deg.signum() * 90.0;
     }
-    // The row and the column before the place, and how far it is beyond them.
+    // The row and the column before the position, and how far it is beyond them.
     let (row, down) = cell((latitude_deg + 90.0) / 5.0, 35);
     let (column, right) = cell((longitude_deg + 180.0).rem_euclid(360.0) / 10.0, 35);
     let along = |column: usize| cubic([0, 1, 2, 3].map(|k| dip_deg(row + k, column)), down);

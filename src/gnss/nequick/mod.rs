@@ -1,7 +1,7 @@
 //! NeQuick-G: the ionosphere of which Galileo broadcasts three coefficients.
 //!
 //! Source: European GNSS (Galileo) Open Service, Ionospheric Correction Algorithm for Galileo Single
-//! Frequency Users, issue 1.2 (2016). The electrons at a place are three Epstein layers below a peak whose
+//! Frequency Users, issue 1.2 (2016). The electrons at a position are three Epstein layers below a peak whose
 //! density and height the ITU's monthly maps give (`maps`, `profile`), and one above it. The delay is
 //! their integral along the straight line to the satellite. Limits: the document takes latitudes and heights
 //! above the ellipsoid for those on a sphere of 6371.2 km, and so does this; GPS time is taken for UT, which
@@ -29,7 +29,7 @@ const DEFAULT_AZ_SFU: f64 = 63.7;
 const LARGEST_AZ_SFU: f64 = 400.0;
 /// Heights at which the integral is divided, in kilometres: the electrons crowd between 100 and 600 km.
 const DIVISIONS_KM: [f64; 9] = [100.0, 150.0, 200.0, 270.0, 350.0, 450.0, 650.0, 1000.0, 2000.0];
-/// Places and weights of Gauss and Legendre's rule of eight places on −1 to 1 (Abramowitz and Stegun, table
+/// Nodes and weights of the Gauss-Legendre rule of eight nodes on −1 to 1 (Abramowitz and Stegun, table
 /// 25.4): the half above zero.
 const RULE: [(f64, f64); 4] = [
     (0.183_434_642_495_649_8, 0.362_683_783_378_362),
@@ -78,9 +78,9 @@ pub fn delay_s(tecu: f64, carrier_hz: f64) -> f64 {
     DELAY_M3PS2 * TECU * tecu / (carrier_hz * carrier_hz) / crate::earth::SPEED_OF_LIGHT_MPS
 }
 
-/// A straight line past the Earth's centre, by the distance from the place that is nearest to it.
+/// A straight line past the Earth's centre, by the distance from the position that is nearest to it.
 struct Line {
-    /// The nearest place, in kilometres.
+    /// The nearest position, in kilometres.
     perigee_km: Vector3<f64>,
     /// Unit vector towards the satellite.
     along: Vector3<f64>,
@@ -123,7 +123,7 @@ impl Line {
     }
 }
 
-/// A place on the document's sphere, in kilometres from its centre.
+/// A position on the document's sphere, in kilometres from its centre.
 fn on_sphere_km(place: Geodetic) -> Vector3<f64> {
     let (sin_lat, cos_lat) = libm::sincos(place.latitude_rad);
     let (sin_lon, cos_lon) = libm::sincos(place.longitude_rad);

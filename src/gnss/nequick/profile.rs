@@ -1,4 +1,4 @@
-//! Electrons at a place: three Epstein layers up to the peak, one semi-Epstein layer above.
+//! Electrons at a position: three Epstein layers up to the peak, one semi-Epstein layer above.
 
 use nalgebra::Vector3;
 
@@ -46,7 +46,7 @@ impl Sun {
         }
     }
 
-    /// Electrons in a cubic metre at a place on the document's sphere, in kilometres from its centre.
+    /// Electrons in a cubic metre at a position on the document's sphere, in kilometres from its centre.
     pub fn electrons_per_m3(&self, place_km: &Vector3<f64>) -> f64 {
         let radius_km = place_km.norm();
         let sin_latitude = (place_km.z / radius_km).clamp(-1.0, 1.0);
@@ -55,7 +55,7 @@ impl Sun {
         DENSITY * layers.density(radius_km - EARTH_KM)
     }
 
-    /// The layers at a place.
+    /// The layers at a position.
     fn layers(&self, sin_latitude: f64, longitude_rad: f64) -> Layers {
         let cos_latitude = (1.0 - sin_latitude * sin_latitude).sqrt();
         let latitude_rad = libm::atan2(sin_latitude, cos_latitude);
@@ -166,7 +166,7 @@ impl Layer {
         4.0 * self.amplitude * e / ((1.0 + e) * (1.0 + e))
     }
 
-    /// Density and its relative slope a kilometre where the argument is stretched by `sharpness`.
+    /// Density and its relative slope per kilometre. The argument is multiplied by `sharpness`.
     fn density(&self, height_km: f64, above_km: f64, sharpness: f64) -> (f64, f64) {
         let thickness_km = self.thickness_km(above_km);
         let x = sharpness * (height_km - self.peak_km) / thickness_km;
@@ -178,7 +178,7 @@ impl Layer {
     }
 }
 
-/// The layers at a place.
+/// The layers at a position.
 #[derive(Clone, Copy, Debug)]
 struct Layers {
     e: Layer,

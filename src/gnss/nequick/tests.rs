@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Kronrod's fifteen places above and at zero with their weights, and Gauss' weights of seven (QUADPACK).
+/// Kronrod's fifteen nodes above and at zero with their weights, and Gauss' weights of seven (QUADPACK).
 const KRONROD: [(f64, f64, f64); 8] = [
     (0.0, 0.209_482_141_084_727_82, 0.417_959_183_673_469_4),
     (0.207_784_955_007_898_48, 0.204_432_940_075_298_89, 0.0),
@@ -93,7 +93,7 @@ fn the_integral_is_that_of_ever_finer_divisions() {
         let fine = kronrod(&at, [line.from_km, line.to_km], 1e-9) / 1e13;
         worst = worst.max((model.stec_tecu(user, satellite, month, ut_h) / fine - 1.0).abs());
     }
-    // The F1 layer begins and ends in steps, which fall between the places of any rule: 0.3 mm of a delay of
+    // The F1 layer begins and ends in steps, which fall between the nodes of any rule: 0.3 mm of a delay of
     // 1 m, where the model itself errs by 0.3 m.
     assert!(worst < 3e-4, "{worst}");
     println!("integral within {worst:.1e}");

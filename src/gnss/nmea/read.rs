@@ -104,8 +104,8 @@ pub struct Gga<'t> {
 }
 
 impl Gga<'_> {
-    /// The place in ECEF, metres: altitude and separation make the height above the ellipsoid. EGM96 gives a
-    /// separation that is missing, since the altitude is one above the sea.
+    /// The position in ECEF, metres: altitude and separation make the height above the ellipsoid. EGM96 gives
+    /// a separation that is missing, since the altitude is one above the sea.
     pub fn position_m(&self) -> Vector3<f64> {
         let [latitude_rad, longitude_rad] = [self.latitude_deg, self.longitude_deg].map(f64::to_radians);
         let separation_m = self.separation_m.unwrap_or_else(|| separation_m(latitude_rad, longitude_rad));

@@ -26,7 +26,7 @@ pub static CNAV: Message = Message {
     ..cnav::CNAV
 };
 
-/// CNAV as L2C of QZSS names it. Its sets are those of CNAV on L5.
+/// CNAV as L2C of QZSS names it. Its ephemerides are those of CNAV on L5.
 pub static CNAV_L2C: Message = Message {
     name: "CNAV of QZSS on L2C",
     sender: |common| Ok(cnav::sender(common, &CNAV_L2C)),
@@ -77,7 +77,7 @@ pub static CNAV2_SETS: SetForm = SetForm {
     ..cnav2::CNAV2_SETS
 };
 
-/// A set as one of these messages has it, of what GPS makes of one of LNAV.
+/// An ephemeris as one of these messages has it, of what GPS makes of one of LNAV.
 fn form(set: &Ephemeris, gps: &Message, message: &Message) -> Ephemeris {
     if set.form == message.sets {
         return set.clone();
@@ -90,7 +90,7 @@ fn form(set: &Ephemeris, gps: &Message, message: &Message) -> Ephemeris {
     Ephemeris { health, ..named(made, message) }
 }
 
-/// Adds to a parameter of a set of one of these messages; whether there is one.
+/// Adds to a parameter of an ephemeris of one of these messages; whether there is one.
 fn adjust(set: &mut Ephemeris, parameter: &str, by: f64, gps: &Message, message: &Message) -> bool {
     let mut own = as_gps(&(message.form)(set));
     let found = (gps.adjust)(&mut own, parameter, by);

@@ -1,6 +1,6 @@
 //! QZSS L1 C/A: the signal of GPS with codes of PRN 193 to 202.
 //!
-//! Source: IS-QZSS-PNT-005, 3.1 and 3.2.2. Limits: L1C/B, which some satellites send in its place, is not
+//! Source: IS-QZSS-PNT-005, 3.1 and 3.2.2. Limits: L1C/B, which some satellites send instead, is not
 //! there; the power is that of the document's Block I.
 
 use crate::gps::l1ca::{self, code};

@@ -1,8 +1,8 @@
-//! LNAV as QZSS sends it: the subframes of GPS, each bit in its place, with sets of an hour.
+//! LNAV as QZSS sends it: the subframes of GPS, each bit at its position, with ephemerides of an hour.
 //!
-//! Source: IS-QZSS-PNT-005, 4.1. A set is sent in the hour before its reference time and fits until an
+//! Source: IS-QZSS-PNT-005, 4.1. An ephemeris is sent in the hour before its reference time and fits until an
 //! hour after it. Health has a bit for the message and one for each signal, so that a satellite with
-//! L1C/B in place of L1 C/A is healthy for others. Limits: of subframes 4 and 5 only the page of
+//! L1C/B instead of L1 C/A is healthy for others. Limits: of subframes 4 and 5 only the page of
 //! ionosphere and UTC is sent, where GPS has it, with the coefficients of GPS; real satellites have their
 //! own of two regions, and almanacs.
 

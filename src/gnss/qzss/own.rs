@@ -17,7 +17,7 @@ static SIGNALS: [(&Signal, &Signal); 4] = [
     (&l5::L5, &gps::l5::L5),
 ];
 
-/// Forms of sets likewise.
+/// Forms of ephemerides likewise.
 static FORMS: [(&SetForm, &SetForm); 3] = [
     (&lnav::LNAV_SETS, &gps::lnav::LNAV_SETS),
     (&civil::CNAV_SETS, &gps::cnav::CNAV_SETS),
@@ -29,18 +29,18 @@ pub(super) fn like(signal: &Signal) -> &Signal {
     SIGNALS.iter().find(|(own, _)| *own == signal).map_or(signal, |(_, gps)| gps)
 }
 
-/// A set as GPS names its form.
+/// An ephemeris as GPS names its form.
 pub(super) fn as_gps(set: &Ephemeris) -> Ephemeris {
     let form = FORMS.iter().find(|(own, _)| *own == set.form).map_or(set.form, |(_, gps)| gps);
     Ephemeris { form, ..set.clone() }
 }
 
-/// A set as a message of QZSS names its form.
+/// An ephemeris as a message of QZSS names its form.
 pub(super) fn named(set: Ephemeris, message: &Message) -> Ephemeris {
     Ephemeris { form: message.sets, ..set }
 }
 
-/// The reader of a message of GPS, whose sets are of one of QZSS.
+/// The reader of a message of GPS, whose ephemerides are of one of QZSS.
 #[derive(Debug)]
 pub(super) struct OwnReader {
     reader: Box<dyn Reader>,

@@ -1,7 +1,7 @@
 //! Numbers of QZSS's satellites, and which of them send which signals since when.
 //!
 //! Source: IS-QZSS-PNT-005, 3.2.2 (PRN 193 to 202). L5 and L1C are sent by all. That J08 sends no L2C,
-//! and that it and J04 have L1C/B in place of L1 C/A, is what satellites broadcast: health in files of
+//! and that it and J04 have L1C/B instead of L1 C/A, is what satellites broadcast: health in files of
 //! six days from 2020 to 2026, messages of two days on L2C (`tests/witness`). J04 had L1 C/A until some
 //! day between 2025-02-15 and 2025-08-21; here until the latter. Limits: of J05, J06, J09 and J10 nothing
 //! is known, they count as J08 does.
@@ -17,7 +17,7 @@ pub fn prn(number: u8) -> Option<u8> {
     (1..=SATELLITES).contains(&number).then(|| Sv { system: System::Qzss, number }.prn())
 }
 
-/// The satellites before J08, the third at its place over the equator J07.
+/// The satellites before J08, the third at its position over the equator J07.
 fn is_of_the_first_five(number: u8) -> bool {
     matches!(number, 1..=4 | 7)
 }

@@ -324,7 +324,8 @@ impl Form {
             }
             let record = self.record(group)?;
             let is_fnav = letter == 'E' && record.says_fnav()?;
-            // Some converters join both messages: a clock that is not that of E1 and E5a is no set of F/NAV.
+            // Some converters join both messages: a clock that is not that of E1 and E5a is no ephemeris of
+            // F/NAV.
             if is_fnav && record.get("sources").unwrap_or(0.0) as u32 & CLOCK_FNAV == 0 {
                 return Ok(Group::Other);
             }

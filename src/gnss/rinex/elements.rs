@@ -34,7 +34,7 @@ fn whole(record: &Record, key: &'static str, most: u32) -> Result<u32, String> {
     if value == value.floor() { Ok(value as u32) } else { Err(format!("{key} = {value}: expected a whole number")) }
 }
 
-/// The set in a record.
+/// The ephemeris in a record.
 ///
 /// # Errors
 /// The element that is missing or out of its range.
@@ -96,8 +96,8 @@ pub(super) fn ephemeris(record: &Record) -> Result<Ephemeris, String> {
 /// an ephemeris is used. Among 2218 records of two days, three differ by an hour.
 const REFERENCES_S: f64 = 4.0 * 3600.0;
 
-/// The rest of a set of BeiDou, by its own time (BDS-SIS-ICD-B1I 3.0, tables 5-6 and 5-8; RINEX 3.05, table
-/// A14).
+/// The rest of an ephemeris of BeiDou, by its own time (BDS-SIS-ICD-B1I 3.0, tables 5-6 and 5-8; RINEX 3.05,
+/// table A14).
 fn beidou(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
     let both = |name, most: f64| field(record, name, -most, most);
     if common.toe.since(common.toc).abs() > REFERENCES_S {
@@ -122,8 +122,8 @@ fn beidou(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
     })
 }
 
-/// A set of GLONASS: a state vector (GLONASS ICD L1, L2 5.1, table 4.5; RINEX 3.05, table A10). Its epoch is
-/// the reference time, in UTC.
+/// An ephemeris of GLONASS: a state vector (GLONASS ICD L1, L2 5.1, table 4.5; RINEX 3.05, table A10). Its
+/// epoch is the reference time, in UTC.
 fn glonass(record: &Record) -> Result<Ephemeris, String> {
     const DAY_S: f64 = 86_400.0;
     let both = |name, most: f64| field(record, name, -most, most);
@@ -168,7 +168,7 @@ fn glonass(record: &Record) -> Result<Ephemeris, String> {
     })
 }
 
-/// A set of an augmentation system (RTCA DO-229D, A.4.4.11; RINEX 3.05, table A16), whose epoch is the
+/// An ephemeris of an augmentation system (RTCA DO-229D, A.4.4.11; RINEX 3.05, table A16), whose epoch is the
 /// reference time. Flags of health, which type 9 does not have, are left alone.
 fn sbas(record: &Record) -> Result<Ephemeris, String> {
     let both = |name, most: f64| field(record, name, -most, most);
@@ -199,7 +199,8 @@ fn sbas(record: &Record) -> Result<Ephemeris, String> {
     })
 }
 
-/// The rest of a NavIC set (IRNSS SIS ICD for SPS 1.1, subframes 1 and 2). Health is a bit each of S and L5.
+/// The rest of a NavIC ephemeris (IRNSS SIS ICD for SPS 1.1, subframes 1 and 2). Health is a bit each of S
+/// and L5.
 fn navic(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
     let both = |name, most: f64| field(record, name, -most, most);
     let issue = whole(record, "iode", 255)? as u16;
@@ -222,7 +223,7 @@ fn navic(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
     })
 }
 
-/// The rest of an LNAV set (IS-GPS-200N, tables 20-I and 20-III), of QZSS too.
+/// The rest of an LNAV ephemeris (IS-GPS-200N, tables 20-I and 20-III), of QZSS too.
 fn gps(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
     let both = |name, most: f64| field(record, name, -most, most);
     let optional = |name, most| if record.get(name).is_some() { whole(record, name, most).map(Some) } else { Ok(None) };
@@ -231,7 +232,7 @@ fn gps(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
     let sqrt_a_sqrtm = if is_qzss { 6450.0..=6540.0 } else { 5000.0..=5300.0 };
     Ok(Ephemeris {
         form: &LNAV_SETS,
-        // Sets go on the air two hours before their reference time, those of QZSS one.
+        // Ephemerides go on the air two hours before their reference time, those of QZSS one.
         transmitted: transmitted(record, common.toe, common.toe.plus_s(if is_qzss { -3600.0 } else { -7200.0 })),
         iode: iode as u16,
         iodc: optional("iodc", 1023)?.unwrap_or(iode) as u16,
@@ -251,7 +252,7 @@ fn gps(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
     })
 }
 
-/// The rest of an I/NAV or F/NAV set (Galileo OS SIS ICD 2.1, tables 57, 62, 64 and 90).
+/// The rest of an I/NAV or F/NAV ephemeris (Galileo OS SIS ICD 2.1, tables 57, 62, 64 and 90).
 fn galileo(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
     let both = |name, most: f64| field(record, name, -most, most);
     let issue = whole(record, "iode", 1023)? as u16;

@@ -285,7 +285,7 @@ fn random(length: usize, seed: u64) -> Vec<i8> {
     (0..length).map(next).collect()
 }
 
-/// `length` random chips at every other place from `first` on, zeros between.
+/// `length` random chips at every other position from `first` on, zeros between.
 fn in_turn(length: usize, first: usize, seed: u64) -> Vec<i8> {
     let mut chips = vec![0; 2 * length];
     chips.iter_mut().skip(first).step_by(2).zip(random(length, seed)).for_each(|(chip, value)| *chip = value);

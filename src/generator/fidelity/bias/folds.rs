@@ -10,7 +10,7 @@
 //!
 //! Two chips n and n + q of random signs add `g(q) + e^{−2πjq·m·fs/Rc} g(−q)` in either order, so that a code
 //! of duration T has the variance `Rc/T · ½ Σ_{q≠0} |g(q) + e^{−2πjq·m·fs/Rc} g(−q)|²`. A chip with itself is
-//! no random sign: `g(0)` has no mean as long as chips meet all places between samples. Where `m·fs` is a
+//! no random sign: `g(0)` has no mean as long as chips meet all positions between samples. Where `m·fs` is a
 //! whole number of chip rates they do not, and `g(0)` is an error that stands. Both are over the slope `∫
 //! w·2πf·H·|G|² df`. Chips of several kinds count by how often they are q apart.
 //!
@@ -60,7 +60,7 @@ impl Folds {
     pub(super) fn new(edge: CodeEdge, component: &Component, rate_hz: f64) -> Self {
         let chip_hz = component.chip_rate_hz;
         let (kinds, layered) = chip_kinds(component.layers);
-        // Codes that take turns have zeros at every second place.
+        // Codes that take turns have zeros at every second position.
         let code = (1..=u8::MAX).find_map(component.code).unwrap_or_default();
         let sent = |chip: usize| code.get(chip).is_none_or(|sign| *sign != 0);
         let kind = |chip: usize| layered.get(chip % layered.len()).copied().filter(|_| sent(chip));

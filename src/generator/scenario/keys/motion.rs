@@ -15,9 +15,9 @@ const fn height() -> Key {
     number("height_m", -12_000.0, 4e7, "m", "height above the ellipsoid")
 }
 
-/// A place that must be given.
+/// A position that must be given.
 pub(crate) const PLACE: [Key; 3] = [latitude().required(), longitude().required(), height().required()];
-/// A place that may be absent as a whole.
+/// A position that may be absent as a whole.
 pub(crate) const PLACE_IF_ANY: [Key; 3] = [latitude(), longitude(), height()];
 
 const GROUND: &[&str] = &["static", "rocket", "pushed"];

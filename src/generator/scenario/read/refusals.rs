@@ -16,7 +16,7 @@ pub struct Source<'t> {
     pub text: &'t str,
 }
 
-/// A place in it, counted from 1.
+/// A position in it, counted from 1.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
     /// The text's name.
@@ -66,7 +66,7 @@ impl Refusals {
         match error {
             ScenarioError::Several(errors) => errors.into_iter().for_each(|error| self.add(error)),
             error => {
-                // One refusal of a key is enough; of an absent one the place is its table's.
+                // One refusal of a key is enough; of an absent one the position is its table's.
                 let same = |known: &ScenarioError| match (known.key_at(), error.key_at()) {
                     (Some(one), Some(other)) => one == other,
                     _ => known.to_string() == error.to_string(),

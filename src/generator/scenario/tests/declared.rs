@@ -1,4 +1,4 @@
-//! The declarations of keys hold for every reader, and every refusal names its key and place.
+//! The declarations of keys hold for every reader, and every refusal names its key and position.
 
 use super::*;
 

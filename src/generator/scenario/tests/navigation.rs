@@ -117,7 +117,7 @@ fn refusals_name_spans_that_do_not_hold_what_is_refused() {
     let at = |start: &str| replaced(&format!("{MINIMAL}{STATIC}"), "", "start", start);
     let files = [("one.10n", file(Some(15), 0)), ("three.10n", file(Some(15), 2))];
     let refused = |text: &str| sent(text, &files).0.unwrap_err();
-    // Between two days, of which each is sent from two hours before it to two after its last set.
+    // Between two days, of which each is sent from two hours before it to two after its last ephemeris.
     let gap = refused(&at("2010-07-02T12:00:00"));
     assert!(gap.contains("at 2010-07-02T12:00:00.000000, the start of the scene"), "{gap}");
     assert!(gap.contains("within 2010-06-30T22:00:00.000000 to 2010-07-02T0"), "{gap}");

@@ -117,7 +117,7 @@ fn fraction_turns(cycles: f64) -> u64 {
     ((cycles - cycles.floor()) * 18_446_744_073_709_551_616.0) as u64
 }
 
-/// An emitter at a place, and the antenna that receives it.
+/// An emitter at a position, and the antenna that receives it.
 #[derive(Clone, Debug)]
 pub struct Path {
     /// ECEF.

@@ -1,6 +1,6 @@
 //! Interference: waveforms that reach the antenna beside the satellites.
 //!
-//! An [`Interferer`] is a waveform on a carrier with a power, a time and perhaps a place. It lives in true
+//! An [`Interferer`] is a waveform on a carrier with a power, a time and perhaps a position. It lives in true
 //! time and arrives at RF, so the receiver's oscillator shifts it as it shifts satellites. Phases are
 //! anchored at every run of 4096 samples and linear within it (a Doppler rate of 1000 Hz/s leaves 3e-4 cycle
 //! at 2.6 Msps); where the antenna's motion is pushed, at its ticks too. Power is that at the antenna's port
@@ -133,7 +133,7 @@ pub struct Interferer {
     pub carrier_hz: f64,
     /// Power over noise density at the antenna when the scene starts; of a pulse while it is on.
     pub jn0_hz: f64,
-    /// Its way to the antenna; `None` for a source without a place.
+    /// Its way to the antenna; `None` for a source without a position.
     pub path: Option<Path>,
     /// Samples in which it is on, at the antenna.
     pub on: Range<u64>,
@@ -256,7 +256,7 @@ impl Interferer {
         }
     }
 
-    /// Place in a repetition at the start of the run, whole and in 2^-64, and its advance a sample.
+    /// Position in a repetition at the start of the run, whole and in 2^-64, and its advance a sample.
     fn place(&self, anchor: &Anchor, repetition: Repetition, late_s: f64) -> (i64, u64, i128) {
         let at = |end: usize| {
             let n = anchor.n + anchor.length * end as u64;

@@ -60,7 +60,8 @@ fn difference(a: (&[f32], &[f32]), b: (&[f32], &[f32])) -> f64 {
 }
 
 /// Largest difference between two orders of summation. Some sums are rounded to the other side, by a last
-/// place of `f32` below one. Responses overshoot one, where the last place is larger, and may differ by 1e-9.
+/// place of `f32` below one. Responses overshoot one, where the last place is larger, and may differ by
+/// 1e-9.
 fn exact_bar(edge: Edge<'_>) -> f64 {
     if matches!(edge, Edge::BandLimited(_)) { 1.2e-7 } else { 6.1e-8 }
 }

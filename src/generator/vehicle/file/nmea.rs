@@ -1,4 +1,4 @@
-//! NMEA 0183 sentences as a source of motion: GGA has place and height, RMC place, speed and course.
+//! NMEA 0183 sentences as a source of motion: GGA has position and height, RMC position, speed and course.
 //!
 //! Times are UTC of a day that nobody names: the day is the one nearest to a time that is known, and the date
 //! of RMC is passed over, so that a rig of today drives a scene of any year. Altitudes are above mean sea
@@ -37,7 +37,7 @@ pub struct Gga {
     pub separation_assumed: bool,
 }
 
-/// Reads one GGA sentence: UTC time of day, place and height above the ellipsoid. `None` of one without a
+/// Reads one GGA sentence: UTC time of day, position and height above the ellipsoid. `None` of one without a
 /// fix, and of another kind. The day is the one nearest to `before_s`, or to the scene's start.
 ///
 /// # Errors

@@ -139,7 +139,7 @@ impl Rows {
     }
 }
 
-/// Least distance of the straight way between two places from the Earth's centre.
+/// Least distance of the straight way between two positions from the Earth's centre.
 fn nearest_m(from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
     let way = to - from;
     let square = way.norm_squared();

@@ -1,6 +1,6 @@
-//! Blocks of fields that the three messages have alike, each at a place of its own in each of them: places
-//! count from 0, the first bit of a message or subframe (BDS-SIS-ICD-B1C 1.0, BDS-SIS-ICD-B2a 1.0 and
-//! BDS-SIS-ICD-B2b 1.0, section 7; clauses are those of B1C's).
+//! Blocks of fields that the three messages have alike, each at a position of its own in each of them:
+//! positions count from 0, the first bit of a message or subframe (BDS-SIS-ICD-B1C 1.0, BDS-SIS-ICD-B2a 1.0
+//! and BDS-SIS-ICD-B2b 1.0, section 7; clauses are those of B1C's).
 
 use crate::beidou::bcnav1::almanac::{Entry, PLACES};
 use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
@@ -149,7 +149,7 @@ pub(in crate::beidou) const fn clock<const AT: u16>() -> [Of; 4] {
     ]
 }
 
-/// Place of the coefficient whose field has no sign and means a number below zero (7.8).
+/// Position of the coefficient whose field has no sign and means a number below zero (7.8).
 const BELOW_ZERO: usize = 4;
 
 /// A coefficient of BDGIM by the number of its field, and that by the coefficient.

@@ -1,9 +1,9 @@
 //! Parts that the messages of B1C, B2a and B2b share: blocks of fields, and ephemerides that are derived from
 //! D1. B2a and B2b also share messages of one length with a type each.
 //!
-//! Sources: BDS-SIS-ICD-B1C 1.0, BDS-SIS-ICD-B2a 1.0 and BDS-SIS-ICD-B2b 1.0, section 7. A set of D1 is
-//! carried to the nearest reference time that the messages can express, and to their steps. Group delays, all
-//! against B3I, are those that a file has of the signal's own message; without them those of the three
+//! Sources: BDS-SIS-ICD-B1C 1.0, BDS-SIS-ICD-B2a 1.0 and BDS-SIS-ICD-B2b 1.0, section 7. An ephemeris of D1
+//! is carried to the nearest reference time that the messages can express, and to their steps. Group delays,
+//! all against B3I, are those that a file has of the signal's own message; without them those of the three
 //! signals follow from D1's as delays that are as 1/f². A signal is sent with the delay of its pilot; the
 //! correction of its data is the satellite's, and who follows the data alone meets what real satellites have
 //! between the two.
@@ -29,7 +29,7 @@ use crate::signal::Signal;
 use crate::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
 use blocks::{Content, Of, STEP_S, electrons, kind, signed};
 
-/// Fields of BDGIM's coefficients, their places counted from the first of them.
+/// Fields of BDGIM's coefficients, their positions counted from the first of them.
 static ELECTRONS: [Of; 9] = electrons::<0>();
 
 /// Ionosphere content of the messages. `unit` is true for the units that carry it.
@@ -53,7 +53,7 @@ pub(super) fn electrons_in(all: &Parameters) -> Option<(Coefficients, Parameters
     Some((coefficients(&raw)?, own.copied().collect()))
 }
 
-/// Names of the predicted accuracies, which are of no set.
+/// Names of the predicted accuracies, which are of no ephemeris.
 const ACCURACIES: [&str; 5] = ["top_5min", "sisai_oe", "sisai_ocb", "sisai_oc1", "sisai_oc2"];
 
 /// The predicted accuracies among the parameters of a unit.
@@ -88,7 +88,7 @@ pub(super) fn check(common: &Common) -> Result<(), FieldError> {
     all.try_for_each(|(place, (element, alpha))| element.field.raw(signed(place, alpha)).map(|_| ()))
 }
 
-/// Tables with the parameters of a set.
+/// Tables with the parameters of an ephemeris.
 pub(super) type Tables = [&'static [Of]];
 
 /// Every field by the table that has it.
@@ -153,9 +153,9 @@ pub(super) fn blank(set: Ephemeris) -> Content {
     }
 }
 
-/// A set in one of the messages: carried to the nearest multiple of 300 s of BDT, with the delays of the
-/// signals that have the first and the second place in that message; `data` are the codes of the message's
-/// own signal, data and pilot, whose difference it has too.
+/// An ephemeris in one of the messages: carried to the nearest multiple of 300 s of BDT, with the delays of
+/// the signals that have the first and the second position in that message; `data` are the codes of the
+/// message's own signal, data and pilot, whose difference it has too.
 pub(super) fn carried(
     set: &Ephemeris,
     form: &'static SetForm,
@@ -187,17 +187,17 @@ pub(super) fn carried(
     Ephemeris { iode: issue, iodc: issue, aodo: 0, ..own.carried_to(toe) }
 }
 
-/// The set, its times GPS time, that a receiver decodes when that one is sent.
+/// The ephemeris, its times GPS time, that a receiver decodes when that one is sent.
 pub(super) fn quantised(tables: &Tables, carried: Ephemeris) -> Result<Ephemeris, FieldError> {
     let mut content = blank(carried.timed(|at| BDT.label(at)));
     tables.iter().try_for_each(|table| quantise_all(table, &mut content))?;
     Ok(content.set.timed(|label| BDT.instant(label)))
 }
 
-/// Parameters that are of a message and not of the set.
+/// Parameters that are of a message and not of the ephemeris.
 const PASSING: [&str; 3] = ["week", "how_1h", "page"];
 
-/// Names of the parameters of a set, each once.
+/// Names of the parameters of an ephemeris, each once.
 pub(super) fn set_parameters(tables: &Tables) -> Vec<&'static str> {
     let mut names: Vec<&'static str> = Vec::new();
     for name in tables.iter().flat_map(|table| table.iter()).map(|element| element.field.name) {
@@ -236,7 +236,7 @@ pub(super) fn of_integers(
 /// Upper bound of the bits in a subframe or message.
 const LONGEST_BITS: usize = 600;
 
-/// Parameters by which sets are distinguished, or that are no set's.
+/// Parameters by which ephemerides are distinguished, or that are no ephemeris's.
 const FIXED_PARAMETERS: [&str; 9] = [
     "iodc",
     "iode",
@@ -249,7 +249,7 @@ const FIXED_PARAMETERS: [&str; 9] = [
     "integrity_flags_b1c",
 ];
 
-/// Names of the parameters of a set that may be wrong with a right check.
+/// Names of the parameters of an ephemeris that may be wrong with a right check.
 pub(super) fn adjustable(tables: &Tables) -> Vec<&'static str> {
     let mut names = set_parameters(tables);
     names.retain(|name| !FIXED_PARAMETERS.contains(name) && !name.starts_with("utc_") && !name.starts_with("leap_"));

@@ -48,14 +48,14 @@ pub(in crate::beidou) struct Layout {
     pub order: &'static [u8],
     /// The tables of each type.
     pub tables: &'static [(u8, &'static Tables)],
-    /// Types that make up a set, beginning with the one that is sent first when a set is new.
+    /// Types that make up an ephemeris, beginning with the one that is sent first when an ephemeris is new.
     pub set: &'static [u8],
-    /// Fields that distinguish sets, by their names, and the bits of them that do.
+    /// Fields that distinguish ephemerides, by their names, and the bits of them that do.
     pub issues: &'static [&'static str],
     pub issue_bits: i64,
-    /// The number that a set has by those.
+    /// The number that an ephemeris has by those.
     pub number_of: fn(i64) -> u16,
-    /// The set if its parts belong together.
+    /// The ephemeris if its parts belong together.
     pub complete: fn(Ephemeris) -> Option<Ephemeris>,
 }
 
@@ -100,7 +100,7 @@ impl Layout {
         first.chain(self.code.encode(bits)).collect()
     }
 
-    /// The bits of a message in its soft symbols, and whether they are upside down; `None` where its check
+    /// The bits of a message in its soft symbols, and whether they are inverted; `None` where its check
     /// fails.
     pub fn decode(&self, soft: &[f32]) -> Option<(Vec<bool>, bool)> {
         let (_, word) = soft.split_at_checked(self.preamble.1 + self.plain)?;
@@ -192,7 +192,7 @@ impl Sender for Messages {
     }
 }
 
-/// A message of a set.
+/// A message of an ephemeris.
 #[derive(Clone)]
 struct Part {
     kind: u8,
@@ -208,7 +208,7 @@ pub(in crate::beidou) struct TypedReader {
     layout: &'static Layout,
     sv: Sv,
     frames: Frames,
-    /// The latest messages of a set, the newest last.
+    /// The latest messages of an ephemeris, the newest last.
     parts: Vec<Part>,
     /// Parameters of the ephemeris that was reported last.
     complete: Option<Parameters>,
@@ -238,7 +238,7 @@ impl TypedReader {
             news.push(Read::Ionosphere(coefficients));
             news.extend(issue.map(|issue| rows(issue, raws)));
         }
-        // Those in messages of a set are reported with it.
+        // Those in messages of an ephemeris are reported with it.
         let beside = !layout.set.contains(&layout.type_of(&bits));
         if let Some(issue) = issue.filter(|_| beside) {
             let accuracies = self.accuracies.take(issue.into(), &accuracies_in(&all));
@@ -249,8 +249,8 @@ impl TypedReader {
         news
     }
 
-    /// Keeps a message of a set. One that does not say of which is of the same as the one right before it, or
-    /// as the one right after it, if no set begins with that.
+    /// Keeps a message of an ephemeris. One that does not say of which is of the same as the one right before
+    /// it, or as the one right after it, if no ephemeris begins with that.
     fn keep(&mut self, bits: Vec<bool>, begun_s: i64) {
         let layout = self.layout;
         let kind = layout.type_of(&bits);
@@ -280,7 +280,7 @@ impl TypedReader {
         }
     }
 
-    /// The set in the latest messages, with its parameters.
+    /// The ephemeris in the latest messages, with its parameters.
     fn found(&self, near: Epoch) -> Option<(Ephemeris, Parameters)> {
         let layout = self.layout;
         let of = |kind: &u8| self.parts.iter().find(|part| part.kind == *kind);

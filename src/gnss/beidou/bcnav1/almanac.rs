@@ -22,7 +22,7 @@ pub(in crate::beidou) const PLACES: usize = 4;
 /// Inclination from which those of medium and of inclined orbits count, in semicircles.
 const INCLINATION_SEMICIRCLES: f64 = 0.30;
 
-/// One satellite in both kinds of almanac; number 0 for a place without one.
+/// One satellite in both kinds of almanac; number 0 for an entry without one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in crate::beidou) struct Entry {
     pub number: f64,

@@ -1,4 +1,4 @@
-//! The field tables of B-CNAV1: places count from 0, the first bit of a subframe (BDS-SIS-ICD-B1C 1.0,
+//! The field tables of B-CNAV1: positions count from 0, the first bit of a subframe (BDS-SIS-ICD-B1C 1.0,
 //! figures 6-5 to 6-9, tables 7-2 to 7-7).
 
 use super::almanac::{OF_MEDIUM, OF_REDUCED};

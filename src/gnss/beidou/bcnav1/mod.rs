@@ -76,7 +76,7 @@ pub static B_CNAV1: Message = Message {
     }),
 };
 
-/// Sets of B-CNAV1: T_GD of B1C's pilot in the place of the first group delay, of B2a's in that of the
+/// Ephemerides of B-CNAV1: T_GD of B1C's pilot in the field of the first group delay, of B2a's in that of the
 /// second; health of the satellite. They serve both signals, as do those of B-CNAV2.
 pub static B_CNAV1_SETS: SetForm = SetForm {
     name: "B-CNAV1",
@@ -88,7 +88,7 @@ pub static B_CNAV1_SETS: SetForm = SetForm {
     rinex_sources: None,
 };
 
-/// The signals whose delays the sets have.
+/// The signals whose delays the ephemerides have.
 fn serves(signal: &Signal) -> bool {
     signal.carries(&B_CNAV1) || signal.carries(&B_CNAV2)
 }
@@ -102,7 +102,7 @@ fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
     }
 }
 
-/// A set as B-CNAV1 has it.
+/// An ephemeris as B-CNAV1 has it.
 fn form(set: &Ephemeris) -> Ephemeris {
     bcnav::carried(set, &B_CNAV1_SETS, &[&B1C, &B2A], Some(["1D", "1P"]))
 }
@@ -201,7 +201,7 @@ fn likely_number(soft: &[f32], inverted: bool) -> u32 {
     (0..64).max_by(|a, b| sum(a).total_cmp(&sum(b))).unwrap_or(0)
 }
 
-/// The frame of a satellite in 1800 soft symbols, positive for a logical 0, whichever way up; `None` where
+/// The frame of a satellite in 1800 soft symbols, positive for a logical 0, normal or inverted; `None` where
 /// it is another's or its checks fail.
 pub fn decode(number: u8, soft: &[f32]) -> Option<Frame> {
     let (first, rest) = soft.split_at_checked(SYMBOLS_1)?;
@@ -240,7 +240,7 @@ impl Sender for Frames {
 }
 
 impl Frames {
-    /// The bits of subframes 2 and 3 of a set without their checks.
+    /// The bits of subframes 2 and 3 of an ephemeris without their checks.
     fn subframes(&self, set: &Ephemeris, start: Epoch) -> Result<[Vec<bool>; 2], FieldError> {
         let common = &self.common;
         let (page, entries) = self.almanacs.page_at(common.bdgim.is_some(), start);
@@ -287,14 +287,14 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     bcnav::quantised(SET, form(ephemeris))
 }
 
-/// The raw integers of the set in subframes 2 and 3.
+/// The raw integers of the ephemeris in subframes 2 and 3.
 fn of_set_in(two: &Vec<bool>, three: &Vec<bool>) -> Parameters {
     let mut found = integers_in(TWO, two);
     found.extend(integers_in(THREE, three));
     found
 }
 
-/// The raw integers of a page that are of no set, but almanacs.
+/// The raw integers of a page that are of no ephemeris, but almanacs.
 fn beside_in(three: &Vec<bool>) -> Parameters {
     match number(three.get(..6).unwrap_or_default()) as u8 {
         WITH_ELECTRONS => integers_in(BESIDE, three),
@@ -303,7 +303,7 @@ fn beside_in(three: &Vec<bool>) -> Parameters {
     }
 }
 
-/// The set in subframes 2 and 3, sent at `sent`.
+/// The ephemeris in subframes 2 and 3, sent at `sent`.
 fn elements(sv: Sv, two: &Vec<bool>, three: &Vec<bool>, sent: Epoch) -> Ephemeris {
     let mut content = blank(Ephemeris { form: &B_CNAV1_SETS, ..Ephemeris::blank(sv, sent) });
     TWO.iter().for_each(|table| read_all(table, two, &mut content));

@@ -1,4 +1,4 @@
-//! Finds frames in soft symbols, whichever way up they come, and gathers what they say.
+//! Finds frames in soft symbols, normal or inverted, and gathers what they say.
 //!
 //! Where a frame begins shows in the code words of number and time, which is right by chance at times: the
 //! check of subframe 2 decides.
@@ -42,7 +42,7 @@ impl BCnav1Reader {
         let Some(beside) = &frame.three else { return news };
         let all = of_set_in(&frame.two, beside);
         let set = elements(self.sv, &frame.two, beside, sent);
-        // A frame is of one set, and what it says besides bears its issue.
+        // A frame is of one ephemeris, and what it says besides bears its issue.
         let issue = u32::from(set.iode);
         let beside = beside_in(beside);
         let accuracies = self.accuracies.take(issue, &accuracies_in(&beside));

@@ -3,8 +3,8 @@
 //! Source: BDS-SIS-ICD-B2a 1.0, 6.2 (structure, code) and 7. A message is 600 symbols: 24 of a preamble, then
 //! 288 bits with their check, coded over GF(64) by the matrix of 6.2.2, packed in `ldpc.bin`. Sent are
 //! messages 10 and 11 (orbit), 30 (clock, group delays, ionosphere) and 34 (clock, UTC) in turn; the document
-//! leaves the order open. A set begins with message 10. Message 11 has no mark of its set: it is of that of
-//! the message 10 right before it, or of another message right after it.
+//! leaves the order open. An ephemeris begins with message 10. Message 11 has no mark of its ephemeris: it is
+//! of that of the message 10 right before it, or of another message right after it.
 //!
 //! Limits: those of [`super::bcnav`]; message 30 has zeros for what B2a's data are apart from its pilot.
 //! Messages 31, 32, 33 and 40 (almanacs, the Earth's orientation, other systems' times) are neither sent nor
@@ -57,7 +57,7 @@ pub static B_CNAV2: Message = Message {
     }),
 };
 
-/// Sets of B-CNAV2: as those of B-CNAV1.
+/// Ephemerides of B-CNAV2: as those of B-CNAV1.
 pub static B_CNAV2_SETS: SetForm = SetForm { name: "B-CNAV2", ..B_CNAV1_SETS };
 
 /// Seconds of a message, in which time is counted too.
@@ -124,7 +124,7 @@ static THIRTY_FOUR: &Tables = &[&HEADER, &ACCURACIES_34, &CLOCK_34, &ISSUE_34, &
 /// Fields of the messages that carry parameters of an ephemeris.
 static SET: &Tables = &[&BEGIN, &FIRST_HALF, &HEADER, &SECOND_HALF, &CLOCK, &DELAY];
 
-/// A set as B-CNAV2 has it.
+/// An ephemeris as B-CNAV2 has it.
 fn form(set: &Ephemeris) -> Ephemeris {
     bcnav::carried(set, &B_CNAV2_SETS, &[&B1C, &B2A], Some(["5D", "5P"]))
 }
@@ -142,7 +142,7 @@ pub fn encode(bits: &[bool]) -> Vec<bool> {
     LAYOUT.encode(0, bits)
 }
 
-/// The bits of a message in its 600 soft symbols, positive for a logical 0, and whether they are upside down;
+/// The bits of a message in its 600 soft symbols, positive for a logical 0, and whether they are inverted;
 /// `None` where its check fails.
 pub fn decode(soft: &[f32]) -> Option<(Vec<bool>, bool)> {
     LAYOUT.decode(soft)

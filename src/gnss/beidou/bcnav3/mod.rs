@@ -3,8 +3,8 @@
 //! Source: BDS-SIS-ICD-B2b 1.0, 6.2 (structure, code) and 7. A message is 1000 symbols: 16 of a preamble, six
 //! of the satellite's number and six reserved ones, then 486 bits with their check, coded over GF(64) by the
 //! matrix of 6.2.2, packed in `ldpc.bin`. Sent are messages 10 (orbit) and 30 (clock, group delay,
-//! ionosphere, UTC) in turn; the document leaves the order open. Sets have no issue but their reference
-//! times, which are those of orbit and clock alike.
+//! ionosphere, UTC) in turn; the document leaves the order open. Ephemerides have no issue but their
+//! reference times, which are those of orbit and clock alike.
 //!
 //! Limits: those of [`super::bcnav`]; message 30 has zeros for the Earth's orientation and predicted
 //! accuracies. Message 40 (almanacs, other systems' times) is neither sent nor read, nor are those of
@@ -51,7 +51,7 @@ pub static B_CNAV3: Message = Message {
     rinex: Some(Records { set: |_| "CNV3", common: "CNVX", fields: tables, lines: Some(record_lines_of_b2b) }),
 };
 
-/// Sets of B-CNAV3: T_GD of B2b in the place of the first group delay; health of the satellite.
+/// Ephemerides of B-CNAV3: T_GD of B2b in the field of the first group delay; health of the satellite.
 pub static B_CNAV3_SETS: SetForm = SetForm {
     name: "B-CNAV3",
     group_delay_s: |set, signal| set.group_delay_on_s(CARRIER_HZ, signal.carrier_hz(set.sv)),
@@ -109,13 +109,13 @@ static THIRTY: &Tables = &[&TIME, &CLOCK, &DELAY, &ELECTRONS, &UTC, &ACCURACIES,
 /// Fields of the messages that carry parameters of an ephemeris.
 static SET: &Tables = &[&FIRST_HALF, &SECOND_HALF, &STATUS, &TIME, &CLOCK, &DELAY, &HEALTH];
 
-/// The set with the number of its reference time, if that is the clock's too.
+/// The ephemeris with the number of its reference time, if that is the clock's too.
 fn numbered(set: Ephemeris) -> Option<Ephemeris> {
     let issue = issue(set.toe.tow_s());
     (set.toe == set.toc).then_some(Ephemeris { iode: issue, iodc: issue, ..set })
 }
 
-/// A set as B-CNAV3 has it.
+/// An ephemeris as B-CNAV3 has it.
 fn form(set: &Ephemeris) -> Ephemeris {
     bcnav::carried(set, &B_CNAV3_SETS, &[&B2B], None)
 }
@@ -133,8 +133,8 @@ pub fn encode(number: u8, bits: &[bool]) -> Vec<bool> {
     LAYOUT.encode(number, bits)
 }
 
-/// The bits of a message in its 1000 soft symbols, positive for a logical 0, and whether they are upside
-/// down; `None` where its check fails.
+/// The bits of a message in its 1000 soft symbols, positive for a logical 0, and whether they are
+/// inverted; `None` where its check fails.
 pub fn decode(soft: &[f32]) -> Option<(Vec<bool>, bool)> {
     LAYOUT.decode(soft)
 }

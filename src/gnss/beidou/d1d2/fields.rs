@@ -1,6 +1,6 @@
-//! The field tables of D1 and D2: places count from 0, the first bit of a subframe without its interleaving,
-//! parities counted, and go on through the subframes of D1, or the pages of D2's subframe 1, that make up a
-//! set (BDS-SIS-ICD-B1I 3.0, 5.2.4 and 5.3.3).
+//! The field tables of D1 and D2: positions count from 0, the first bit of a subframe without its
+//! interleaving, parities counted, and go on through the subframes of D1, or the pages of D2's subframe 1,
+//! that make up a ephemeris (BDS-SIS-ICD-B1I 3.0, 5.2.4 and 5.3.3).
 
 use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
 use crate::bits::{Bits, Element, Field, element, plain};
@@ -10,7 +10,7 @@ use crate::time::{BDT_WEEK, Epoch};
 
 /// Bits of a subframe.
 pub const SUBFRAME_BITS: usize = 300;
-/// Subframes of D1, and pages of D2, with a set.
+/// Subframes of D1, and pages of D2, with an ephemeris.
 pub const D1_PARTS: usize = 3;
 pub const D2_PARTS: usize = 10;
 
@@ -39,7 +39,7 @@ fn bdt_week(at: Epoch) -> f64 {
 /// A group delay in tenths of nanoseconds.
 const STEP_S: f64 = 1e-10;
 
-/// A set in D1. The week is that of sending; what sets it is the caller.
+/// An ephemeris in D1. The week is that of sending; what sets it is the caller.
 #[rustfmt::skip]
 const OF_D1: [Of; 35] = [
     element(Field::new("health", &[(42, 1)], Whole, 0, CLOCK),
@@ -124,7 +124,7 @@ const fn in_d2(of_d1: &[Of; 35]) -> [Of; 35] {
     all
 }
 
-/// Every field of a set, by D1 and by D2.
+/// Every field of an ephemeris, by D1 and by D2.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
     let of = |table: &'static [Of]| table.iter().map(|element| &element.field).collect();
     vec![("D1", of(&D1_SET)), ("D2", of(&D2_SET))]

@@ -2,13 +2,13 @@
 //!
 //! Source: BDS-SIS-ICD-B1I 3.0, section 5. A subframe is ten words of thirty bits: code words of
 //! BCH(15,11,1), two of them interleaved bit by bit, but for the first fifteen bits. In D1 (satellites in
-//! medium and inclined orbits) five subframes of 6 s are a frame; subframes 1 to 3 carry a set of elements.
-//! In D2 (geostationary ones) subframes last 0.6 s, and pages 1 to 10 of subframe 1 carry the set, one a
-//! frame of 3 s.
+//! medium and inclined orbits) five subframes of 6 s are a frame; subframes 1 to 3 carry an ephemeris.
+//! In D2 (geostationary ones) subframes last 0.6 s, and pages 1 to 10 of subframe 1 carry the ephemeris, one
+//! a frame of 3 s.
 //!
-//! A unit here is what repeats the set: 30 s of either, one frame of D1 or ten of D2. A symbol is what a code
-//! period of a millisecond carries: in D1 a bit times a chip of the Neuman-Hofman code, in D2 half a bit. A
-//! set is numbered by its reference time, as its ages of data repeat ([`issue`]).
+//! A unit here is what repeats the ephemeris: 30 s of either, one frame of D1 or ten of D2. A symbol is what
+//! a code period of a millisecond carries: in D1 a bit times a chip of the Neuman-Hofman code, in D2 half a
+//! bit. A ephemeris is numbered by its reference time, as its ages of data repeat ([`issue`]).
 //!
 //! Limits: subframes 4 and 5 of D1 and 2 to 5 of D2 have their headers and page numbers alone: no almanac, no
 //! UTC, no integrity or grid. Parities detect errors and correct none. Coefficients of the ionosphere that
@@ -82,10 +82,10 @@ pub static D1_D2: Message = Message {
     }),
 };
 
-/// Sets of D1 and D2: two group delays against B3I, of B1I and B2I (BDS-SIS-ICD-B1I 3.0, 5.2.4.8).
+/// Ephemerides of D1 and D2: two group delays against B3I, of B1I and B2I (BDS-SIS-ICD-B1I 3.0, 5.2.4.8).
 pub static D1_SETS: SetForm = SetForm { name: "D1/D2", serves: |signal| signal.carries(&D1_D2), ..PLAIN };
 
-/// A set as D1 and D2 have it.
+/// An ephemeris as D1 and D2 have it.
 fn form(set: &Ephemeris) -> Ephemeris {
     Ephemeris { form: &D1_SETS, signal_delays_s: Vec::new(), ..set.clone() }
 }
@@ -102,7 +102,7 @@ const D2_SUBFRAMES: usize = 50;
 /// First bits of every subframe, and bits of a word.
 const PREAMBLE: u32 = 0b111_0001_0010;
 const WORD_BITS: usize = 30;
-/// Places of the subframe's number, of the second of the week in two pieces, and of the page's number in
+/// Positions of the subframe's number, of the second of the week in two pieces, and of the page's number in
 /// subframes of D1 and in D2's subframe 1.
 const FRAME_ID: (u16, u8) = (15, 3);
 const SECOND: [(u16, u8); 2] = [(18, 8), (30, 12)];
@@ -132,8 +132,8 @@ fn chip(index: usize) -> bool {
     planted!("gnss.beidou.neuman_hofman", NEUMAN_HOFMAN, NEUMAN_HOFMAN ^ 1) >> (19 - index) & 1 == 1
 }
 
-/// Number of a set by its reference time, in 12 min (RTKLIB's, for the message has none that differs from set
-/// to set).
+/// Number of an ephemeris by its reference time, in 12 min (RTKLIB's, for the message has none that differs
+/// from ephemeris to ephemeris).
 pub fn issue(toe_of_week_s: f64) -> u16 {
     ((toe_of_week_s / 720.0) as u16) % 240
 }
@@ -143,7 +143,7 @@ impl Orbit {
         Self { ephemeris: form(&Ephemeris::blank(sv, near)), klobuchar: Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] } }
     }
 
-    /// The set, numbered.
+    /// The ephemeris, numbered.
     fn set(mut self) -> Ephemeris {
         self.ephemeris.iode = issue(self.ephemeris.toe.tow_s());
         self.ephemeris
@@ -292,7 +292,7 @@ pub fn second(subframe: &Subframe) -> u32 {
     subframe.piece(SECOND[0]) << 12 | subframe.piece(SECOND[1])
 }
 
-/// Subframes of D1 or pages of D2 that make up a set: the parts, first to last.
+/// Subframes of D1 or pages of D2 that make up an ephemeris: the parts, first to last.
 fn orbit_of(sv: Sv, parts: &[Subframe], sent: Epoch) -> (Orbit, Vec<(&'static str, i64)>) {
     let mut orbit = Orbit::blank(sv, sent);
     if sv.is_geostationary() {
@@ -313,7 +313,7 @@ fn sent_at(first: &Subframe, is_d2: bool, near: Epoch) -> Epoch {
     Epoch::new(week * WEEK_S + i64::from(second(first)), 0.0)
 }
 
-/// The parameters in the symbols of a unit; `None` where one of the parts with a set fails its check.
+/// The parameters in the symbols of a unit; `None` where one of the parts with an ephemeris fails its check.
 fn parameters(symbols: &[bool]) -> Option<Vec<(&'static str, i64)>> {
     let bits = |per_bit: usize| -> Vec<bool> {
         let first = symbols.iter().step_by(per_bit);
@@ -339,8 +339,8 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     Ok(orbit.ephemeris)
 }
 
-/// Parameters by which sets are distinguished, what all satellites say alike, and the health, which has a
-/// fault of its own.
+/// Parameters by which ephemerides are distinguished, what all satellites say alike, and the health, which
+/// has a fault of its own.
 const FIXED_PARAMETERS: [&str; 14] = [
     "week", "toc_s", "toe_s", "health", "aodc", "aode", "alpha_0", "alpha_1", "alpha_2", "alpha_3", "beta_0", "beta_1",
     "beta_2", "beta_3",
@@ -351,7 +351,7 @@ fn adjustable() -> Vec<&'static str> {
     names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
 }
 
-/// Adds `by` to a parameter of a set in the unit of the tables; whether there is one.
+/// Adds `by` to a parameter of an ephemeris in the unit of the tables; whether there is one.
 pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     let mut orbit = Orbit { ephemeris: ephemeris.clone(), ..Orbit::blank(ephemeris.sv, ephemeris.toe) };
     let found = add_to(&D1_SET, parameter, &mut orbit, by);

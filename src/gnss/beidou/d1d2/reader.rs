@@ -1,4 +1,5 @@
-//! Finds bits and subframes in the soft values of code periods, whichever way up they come, and gathers sets.
+//! Finds bits and subframes in the soft values of code periods, normal or inverted, and gathers
+//! ephemerides.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -12,11 +13,11 @@ use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::{Epoch, WEEK_S};
 
-/// Bits over which the place of their edges is sought: half a second of D1, 0.2 s of D2.
+/// Bits over which the position of their edges is sought: half a second of D1, 0.2 s of D2.
 const D1_SOUGHT: u64 = 25;
 const D2_SOUGHT: u64 = 100;
-/// Share of the best place's energy that any other has at most: of the wrong places of D1's code the best has
-/// a ninth without noise, of D2's half.
+/// Share of the best position's energy that any other has at most: of the wrong positions of D1's code the
+/// best has a ninth without noise, of D2's half.
 const NEXT_SHARE: f64 = 0.7;
 /// Subframes in a row that fail where they are expected before bits are sought anew.
 const FAILURES: u32 = 3;
@@ -40,7 +41,7 @@ pub struct D1D2Reader {
     /// Number of the symbol after some subframe, and those that failed since the last one that did not.
     frame: Option<u64>,
     failures: u32,
-    /// The latest parts of a set: subframes of D1, pages of D2.
+    /// The latest parts of an ephemeris: subframes of D1, pages of D2.
     parts: BTreeMap<u8, Subframe>,
     complete: Option<Vec<(&'static str, i64)>>,
 }
@@ -69,7 +70,7 @@ impl D1D2Reader {
         self.per_bit == D2_SYMBOLS
     }
 
-    /// Parts of a set.
+    /// Parts of an ephemeris.
     fn wanted(&self) -> u8 {
         (if self.is_d2() { D2_PARTS } else { D1_PARTS }) as u8
     }
@@ -80,7 +81,7 @@ impl D1D2Reader {
         chips.map(|(place, soft)| if !self.is_d2() && chip(place) { -soft } else { *soft }).sum()
     }
 
-    /// Looks for the place of bits.
+    /// Looks for the position of bits.
     fn seek(&mut self) {
         let energy = f64::from(self.bit()).powi(2);
         let residue = (self.next - 1) % self.per_bit as u64;
@@ -157,13 +158,13 @@ impl D1D2Reader {
         let klobuchar = orbit.klobuchar;
         let set = orbit.set();
         // Equal reference times show that clock and orbit belong together, and else that one frame has both,
-        // for sets change between frames.
+        // for ephemerides change between frames.
         let frame_of = |part: &Subframe| i64::from(second(part)) / UNIT_S;
         if set.toe != set.toc && parts.iter().any(|part| frame_of(part) != frame_of(first)) {
             news.extend(self.complete.is_none().then(|| Read::make_no_set("the latest subframes")));
             return;
         }
-        // A set is sent from its reference time on: an older part is of the one before.
+        // An ephemeris is sent from its reference time on: an older part is of the one before.
         let toe_s = set.toe.tow_whole_s();
         let is_later = |part: &Subframe| {
             let since_s = (i64::from(second(part)) - toe_s + WEEK_S / 2).rem_euclid(WEEK_S) - WEEK_S / 2;
@@ -229,8 +230,8 @@ mod tests {
     use crate::rinex;
     use crate::time::{BDT, Epoch};
 
-    /// Records of C06 of 2026-03-09 as a merged broadcast file has them (BRD400DLR of that day; facts): a set
-    /// with an orbit an hour after its clock, and the set of that later hour.
+    /// Records of C06 of 2026-03-09 as a merged broadcast file has them (BRD400DLR of that day; facts): an
+    /// ephemeris with an orbit an hour after its clock, and the ephemeris of that later hour.
     const RECORDS: &str = "     4.02           NAVIGATION DATA     M                   RINEX VERSION / TYPE
                                                             END OF HEADER
 > EPH C06 D1
@@ -288,11 +289,11 @@ C06 2026 03 09 11 00 00-5.751254502684e-05-2.089706185870e-11-1.355252715607e-18
         let [back] = sets.as_slice() else { panic!("{sets:?}") };
         assert_eq!((back.toc, back.toe), (set.toc, set.toe));
         assert!((back.af0_s - set.af0_s).abs() < 1e-15 && (back.m0_rad - set.m0_rad).abs() < 1e-11);
-        // Two sets that follow one another are not joined: the first frame has the orbit, the next one the
-        // clock.
+        // Two ephemerides that follow one another are not joined: the first frame has the orbit, the next one
+        // the clock.
         let whole = Ephemeris { toc: set.toe, ..set.clone() };
         assert!(read(&[(0, &whole), (30, set)]).iter().all(|back| back.toc == set.toc));
-        // Beside the set of that hour the record is one that a converter joined.
+        // Beside the ephemeris of that hour the record is one that a converter joined.
         let file = rinex::read(format!("{RECORDS}{LATER}").as_bytes(), "C06").unwrap();
         assert_eq!(file.ephemerides.iter().map(|set| label(set.toc)).collect::<Vec<_>>(), [126_000.0]);
         assert!(file.skipped[0].contains("with an older clock"), "{:?}", file.skipped);

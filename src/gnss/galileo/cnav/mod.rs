@@ -4,7 +4,7 @@
 //! high accuracy service), by other programs that agree and by real pages (`tests/witness`). A page is a
 //! pattern of sixteen symbols and 492 bits, coded ([`Convolutional`]) and interleaved ([`Interleaver`]): 14
 //! reserved bits, a page of the service of 448, a check and a tail of zeros. It says neither its time nor
-//! where the satellite is. Its second is known by another signal of the satellite, and sets of elements are
+//! where the satellite is. Its second is known by another signal of the satellite, and ephemerides are
 //! those of I/NAV.
 //!
 //! Limits: pages of the service are carried, not applied. Those sent are dummies at multiples of ten seconds
@@ -94,7 +94,7 @@ const RESERVED: u32 = 0x3FFF;
 /// Bit pattern that fills a message up to whole pages.
 const FILLING: u32 = 0x5555_5555;
 
-/// Places of the reserved bits, and of the page of the service.
+/// Positions of the reserved bits, and of the page of the service.
 const RESERVED_PLACE: (u16, u8) = (0, 14);
 const HEADER_PLACE: (u16, u8) = (14, 24);
 
@@ -182,7 +182,7 @@ pub fn encode_page(page: &[bool]) -> Vec<bool> {
     bits_of(planted!("gnss.galileo_cnav.pattern", PATTERN, !PATTERN), PATTERN_SYMBOLS).chain(coded).collect()
 }
 
-/// The 462 bits in the 1000 soft symbols of a page, and whether they came upside down; `None` where the check
+/// The 462 bits in the 1000 soft symbols of a page, and whether they are inverted; `None` where the check
 /// is wrong.
 pub fn decode_soft(symbols: &[f32]) -> Option<(Vec<bool>, bool)> {
     let (head, coded) = symbols.split_at_checked(PATTERN_SYMBOLS).filter(|_| symbols.len() == PAGE_SYMBOLS)?;

@@ -1,4 +1,4 @@
-//! Finds pages in soft symbols, whichever way up they come, and hands on what they carry.
+//! Finds pages in soft symbols, normal or inverted, and hands on what they carry.
 
 use super::{CNAV, PAGE_SYMBOLS, PATTERN, PATTERN_SYMBOLS, decode_soft, parameters};
 use crate::bits::bits_of;
@@ -8,7 +8,7 @@ use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::Epoch;
 
-/// Wrong symbols of the pattern of a place that is tried all the same: of a page at the least C/N0 that
+/// Wrong symbols of the pattern of a position that is tried all the same: of a page at the least C/N0 that
 /// codes hold one in twenty is wrong.
 const WRONG_SYMBOLS: usize = 3;
 

@@ -1,5 +1,5 @@
-//! The field tables of F/NAV: places count from 0, the first bit of a page after its pattern (Galileo OS SIS
-//! ICD 2.1, tables 29 to 35).
+//! The field tables of F/NAV: positions count from 0, the first bit of a page after its pattern (Galileo OS
+//! SIS ICD 2.1, tables 29 to 35).
 
 use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
 use crate::bits::{Element, Field, element, plain};
@@ -141,7 +141,7 @@ fn split(entry: &Entry) -> i64 {
     SPLIT.raw(entry.omega0_rad).unwrap_or(0).rem_euclid(1 << 16)
 }
 
-/// Puts some bits of the split node in the place of others.
+/// Puts some bits of the split node in the field of others.
 fn join(entry: &mut Entry, mask: i64, bits: i64) {
     let raw = split(entry) & !mask | bits & mask;
     entry.omega0_rad = SPLIT.value(if raw >= 1 << 15 { raw - (1 << 16) } else { raw });

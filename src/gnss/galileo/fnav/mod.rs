@@ -3,8 +3,8 @@
 //!
 //! Source: Galileo OS SIS ICD 2.1, 4.2 and 5.1. A page is a pattern of twelve symbols and 244 bits, coded
 //! ([`Convolutional`]) and interleaved ([`Interleaver`]). Its clock is that of E1 and E5a. Limits: of
-//! almanacs nothing is read. Flags of ionospheric storms are zero. Satellites begin their almanacs at places
-//! of their own; here all begin at the same one.
+//! almanacs nothing is read. Flags of ionospheric storms are zero. Satellites begin their almanacs at
+//! positions of their own; here all begin at the same one.
 //!
 //! [`Convolutional`]: crate::fec::convolutional::Convolutional
 
@@ -66,7 +66,7 @@ pub static FNAV: Message = Message {
     rinex: Some(Records { set: |_| "FNAV", common: "IFNV", fields: tables, lines: None }),
 };
 
-/// Sets of F/NAV: its clock and its delay are those of E1 and E5a (5.1.5, table 66).
+/// Ephemerides of F/NAV: its clock and its delay are those of E1 and E5a (5.1.5, table 66).
 pub static FNAV_SETS: SetForm = SetForm {
     name: "F/NAV",
     group_delay_s: status::against_fnav_s,
@@ -79,7 +79,7 @@ pub static FNAV_SETS: SetForm = SetForm {
     rinex_sources: Some(258.0),
 };
 
-/// Seconds of a page, and of the two sub-frames in which all pages have their places (4.2.3).
+/// Seconds of a page, and of the two sub-frames in which all pages have their positions (4.2.3).
 const PAGE_S: i64 = 10;
 const SUBFRAME_S: i64 = 50;
 const PAIR_S: i64 = 2 * SUBFRAME_S;
@@ -90,13 +90,13 @@ const PAGE_SYMBOLS: usize = 500;
 const DATA_BITS: usize = 214;
 const CHECK_BITS: usize = 24;
 const PAGE_BITS: usize = 244;
-/// The pages of a set of elements, all of which say their time.
+/// The pages of an ephemeris, all of which say their time.
 const PAGES_OF_SET: [u8; 4] = [1, 2, 3, 4];
 
 const INTERLEAVER: Interleaver = Interleaver { columns: 61, rows: 8 };
 
 /// Bits that nobody reads, as satellites sent them in 2025: ones and zeros in turn, by page with the first
-/// place and the first bit.
+/// position and the first bit.
 const SPARE: [(u8, usize, bool); 4] = [(1, 188, true), (3, 206, false), (4, 209, false), (6, 211, false)];
 
 /// Type of the page that begins at a time (4.2.3, table 28): pages 5 and 6 alternate from sub-frame to
@@ -170,7 +170,7 @@ pub fn encode_page(page: &[bool]) -> Vec<bool> {
     PATTERN.into_iter().chain(coded).collect()
 }
 
-/// The 214 bits in the 500 soft symbols of a page, and whether they came upside down; `None` where the check
+/// The 214 bits in the 500 soft symbols of a page, and whether they are inverted; `None` where the check
 /// is wrong.
 pub fn decode_soft(symbols: &[f32]) -> Option<(Vec<bool>, bool)> {
     if symbols.len() != PAGE_SYMBOLS {
@@ -242,7 +242,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     Ok(sent.ephemeris)
 }
 
-/// Parameters by which sets and senders are distinguished, and what all satellites say alike.
+/// Parameters by which ephemerides and senders are distinguished, and what all satellites say alike.
 const FIXED_PARAMETERS: [&str; 7] = ["iodnav", "svid", "week", "tow_s", "ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"];
 
 /// Names of the adjustable parameters in pages 1 to 4.

@@ -1,4 +1,4 @@
-//! Finds pages in soft symbols, whichever way up they come, and gathers what they say.
+//! Finds pages in soft symbols, normal or inverted, and gathers what they say.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -13,7 +13,7 @@ use crate::time::Epoch;
 
 /// Pages in a row that fail where they are expected before they are sought elsewhere.
 const FAILURES: u32 = 3;
-/// Parameters that change from page to page of the same set.
+/// Parameters that change from page to page of the same ephemeris.
 const PASSING: [&str; 1] = ["week"];
 
 /// Reads F/NAV.

@@ -30,7 +30,7 @@ const ALMANAC: &str = "5.1.10, table 71";
 const STATUS: &str = "5.1.9.7";
 const OFFSET: &str = "5.1.8, table 69";
 
-/// One satellite in the almanac; number 0 for a place without one.
+/// One satellite in the almanac; number 0 for an entry without one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in crate::galileo) struct Entry {
     pub number: u8,

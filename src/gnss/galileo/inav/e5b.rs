@@ -1,7 +1,7 @@
 //! I/NAV as E5b-I sends it: the words of E1-B in another order, a second earlier.
 //!
 //! Source: Galileo OS SIS ICD 2.1, 4.3.2.2 (even parts begin at even seconds), 4.3.5, table 38 (order) and
-//! table 37: in place of authentication, return link and secondary pattern are reserved bits. Those here are
+//! table 37: instead of authentication, return link and secondary pattern are reserved bits. Those here are
 //! what satellites sent in 2025 (`tests/witness`).
 
 use super::reader::InavReader;
@@ -13,7 +13,7 @@ use crate::ionosphere::Model;
 use crate::message::{IonosphereForm, Message, Records};
 use crate::time::Epoch;
 
-/// I/NAV as E5b names it. Its sets are those of I/NAV on E1-B.
+/// I/NAV as E5b names it. Its ephemerides are those of I/NAV on E1-B.
 pub static INAV_E5B: Message = Message {
     name: "I/NAV on E5b",
     symbol_s: INAV.symbol_s,

@@ -1,5 +1,5 @@
-//! The field tables of I/NAV: places count from 0, the first bit of a word (Galileo OS SIS ICD 2.1, tables 42
-//! to 54).
+//! The field tables of I/NAV: positions count from 0, the first bit of a word (Galileo OS SIS ICD 2.1, tables
+//! 42 to 54).
 
 use super::almanac::{GPS_OFFSET, WORD_7, WORD_8, WORD_9, WORD_10};
 use super::reduced::WORD_16;

@@ -4,8 +4,8 @@
 //! Source: Galileo OS SIS ICD 2.1, 4.3 and 5.1. A page is an even and an odd part of a second each; a part is
 //! a pattern of ten symbols and 120 bits, coded ([`Convolutional`]) and interleaved ([`Interleaver`]). Both
 //! parts carry one word of 128 bits and a check. Limits: Of almanacs (words 7 to 10) only the offset of GPS
-//! time is read. Alert pages keep their place and say nothing. The bits reserved for authentication and the
-//! return link are zero, as satellites send them on E5b.
+//! time is read. Alert pages keep their position and say nothing. The bits reserved for authentication and
+//! the return link are zero, as satellites send them on E5b.
 
 pub(super) mod almanac;
 mod e5b;
@@ -67,13 +67,13 @@ pub static INAV: Message = Message {
     rinex: Some(Records { set: |_| "INAV", common: "IFNV", fields: tables, lines: None }),
 };
 
-/// The set as I/NAV has it, of either message.
+/// The ephemeris as I/NAV has it, of either message.
 fn form(set: &Ephemeris) -> Ephemeris {
     let ahead_s = if *set.form == FNAV_SETS { status::fnav_ahead_s(set) } else { 0.0 };
     Ephemeris { form: &INAV_SETS, af0_s: set.af0_s - ahead_s, ..set.clone() }
 }
 
-/// Sets of I/NAV, on either carrier: the clock of E1 and E5b.
+/// Ephemerides of I/NAV, on either carrier: the clock of E1 and E5b.
 pub static INAV_SETS: SetForm = SetForm {
     name: "I/NAV",
     group_delay_s: status::against_inav_s,
@@ -107,7 +107,7 @@ fn pattern(start: Epoch) -> u8 {
 
 /// Seconds of a page.
 const PAGE_S: i64 = 2;
-/// Seconds of a sub-frame, in which the words have their places.
+/// Seconds of a sub-frame, in which the words have their positions.
 const SUBFRAME_S: i64 = 30;
 /// Symbols of the pattern with which a page part begins (4.3.2.1), of a part, and of a page.
 const PATTERN: [bool; 10] = [false, true, false, true, true, false, false, false, false, false];
@@ -128,7 +128,7 @@ const RESERVED_BEGIN: usize = 18;
 const RESERVED_BITS: usize = 64;
 const LAST_BEGIN: usize = 106;
 const LAST_BITS: usize = 8;
-/// The word that has nothing to say (5.1.9.11), that of reduced elements, and those of a set of elements.
+/// The word that has nothing to say (5.1.9.11), that of reduced elements, and those of an ephemeris.
 const SPARE: u8 = 0;
 const REDUCED: u8 = 16;
 const WORDS_OF_SET: [u8; 4] = [1, 2, 3, 4];
@@ -144,7 +144,7 @@ const INTERLEAVER: Interleaver = Interleaver { columns: 30, rows: 8 };
 /// sent it later. The real words that it was compared with are of 2025.
 const REDUNDANT_SINCE_WEEK: i64 = 2243;
 
-/// The parameters in the symbols of a page, and whether they are a set's.
+/// The parameters in the symbols of a page, and whether they are an ephemeris's.
 fn opened(symbols: &[bool]) -> Option<(bool, Vec<(&'static str, i64)>)> {
     let (bits, _) = decode_page(symbols)?;
     let word = word_of(&bits);
@@ -323,7 +323,7 @@ fn decode_page(symbols: &[bool]) -> Option<([Vec<bool>; 2], bool)> {
     decode_soft(&soft)
 }
 
-/// The parts of 120 bits in the 500 soft symbols of a page, and whether they came upside down; `None` where
+/// The parts of 120 bits in the 500 soft symbols of a page, and whether they are inverted; `None` where
 /// they are no nominal page of a right check.
 pub fn decode_soft(symbols: &[f32]) -> Option<([Vec<bool>; 2], bool)> {
     decode_any(symbols).filter(|(parts, _)| !is_alert(parts))
@@ -334,7 +334,7 @@ fn is_alert(parts: &[Vec<bool>; 2]) -> bool {
     parts.iter().any(|part| part[1])
 }
 
-/// An alert page in place of a nominal one, its data ones and zeros in turn.
+/// An alert page instead of a nominal one, its data ones and zeros in turn.
 fn alerted(symbols: &[bool]) -> Option<Vec<bool>> {
     let ([mut even, mut odd], _) = decode_page(symbols)?;
     (even[1], odd[1]) = (true, true);
@@ -394,7 +394,7 @@ fn of_integers(sv: Sv, raw: &dyn Fn(&str) -> Option<i64>, near: Epoch) -> Option
     let mut orbit = Orbit { ephemeris: blank, nequick: [0.0; 3] };
     for table in of_set() {
         let mut word = 0_u128;
-        // The week and time of word 5 are those of its sending, which the set has already.
+        // The week and time of word 5 are those of its sending, which the ephemeris has already.
         for field in table.iter().map(|element| &element.field).filter(|field| field.name != "tow_s") {
             field.write(&mut word, raw(field.name)?);
         }
@@ -427,7 +427,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     Ok(sent.ephemeris)
 }
 
-/// Parameters by which sets and senders are distinguished, and what all satellites say alike.
+/// Parameters by which ephemerides and senders are distinguished, and what all satellites say alike.
 const FIXED_PARAMETERS: [&str; 7] = ["iodnav", "svid", "week", "tow_s", "ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"];
 
 /// Names of the adjustable parameters in words 1 to 5.

@@ -1,4 +1,4 @@
-//! Finds pages in soft symbols, whichever way up they come, and gathers what their words say.
+//! Finds pages in soft symbols, normal or inverted, and gathers what their words say.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -80,7 +80,7 @@ impl InavReader {
             self.timed = Some((begin, dated.unwrap_or_else(|| near.nearest_tow(tow_s))));
         }
         news.extend(dated.map(Read::Time));
-        // Redundancy of an issue before is that of another set.
+        // Redundancy of an issue before is that of another ephemeris.
         if WORDS_OF_SET.contains(&word_type(&word)) && self.issue.replace(issue(&word)) != Some(issue(&word)) {
             self.words.retain(|_, word| !is_redundant(word));
         }

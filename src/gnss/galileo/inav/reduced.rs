@@ -101,7 +101,7 @@ impl Reduced {
         }
     }
 
-    /// The set that users of a word sent at `start` compute with.
+    /// The ephemeris that users of a word sent at `start` compute with.
     pub(super) fn ephemeris(&self, sv: Sv, start: Epoch) -> Ephemeris {
         let reference = begin(start);
         let omega_rad = libm::atan2(self.ey, self.ex);

@@ -1,5 +1,5 @@
-//! The field tables of GLONASS's strings: places count from 0, the first bit sent, which the document numbers
-//! 85 (GLONASS ICD L1, L2 5.1, 4.3.2 and table 4.5). Kilometres are those of the document.
+//! The field tables of GLONASS's strings: positions count from 0, the first bit sent, which the document
+//! numbers 85 (GLONASS ICD L1, L2 5.1, 4.3.2 and table 4.5). Kilometres are those of the document.
 
 use crate::bits::Kind::{Magnitude, Whole};
 use crate::bits::{Bits, Element, Field, element, plain};
@@ -100,7 +100,8 @@ pub(super) static STRING_3: [Of; 5] = [
         |e| vector(e).position_m.z / KM, |e, v| change(e, |of| of.position_m.z = v * KM)),
 ];
 
-/// String 4. The day is that of the reference time, for sets refer to no midnight but where they are sent.
+/// String 4. The day is that of the reference time, for ephemerides refer to no midnight but where they are
+/// sent.
 #[rustfmt::skip]
 pub(super) static STRING_4: [Of; 6] = [
     // What is sent is by how much GLONASS time is ahead of the satellite's.

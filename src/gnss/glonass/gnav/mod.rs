@@ -4,16 +4,16 @@
 //! of 20 ms, the last eight a Hamming code's, and a time mark of 30 chips of 10 ms; fifteen strings are a
 //! frame, which begins at whole half minutes of GLONASS time. Bits are coded relative to the one before, and
 //! multiplied with a meander: each is a chip of 10 ms and its opposite. A symbol here is such a chip. Strings
-//! 1 to 4 carry a set: a state vector at a quarter of an hour, to whose middle half hour the set belongs, and
-//! the clock; string 5 has the date's four years. A set is numbered by that quarter.
+//! 1 to 4 carry an ephemeris: a state vector at a quarter of an hour, to whose middle half hour the ephemeris
+//! belongs, and the clock; string 5 has the date's four years. An ephemeris is numbered by that quarter.
 //!
 //! The document's time mark has one sign against the meander, and what is received the other way up is seen
 //! by it; bits do not depend on it.
 //!
 //! Limits: strings 6 to 15, almanacs, are empty but for their numbers. GLONASS time is sent as UTC(SU) and as
 //! GPS time, whole seconds apart. How a leap second is sent is not settled by a document at hand: one second
-//! is sent twice. A failed check is not corrected. Sets that refer to midnight are read within half a day of
-//! when they were sent.
+//! is sent twice. A failed check is not corrected. Ephemerides that refer to midnight are read within half a
+//! day of when they were sent.
 
 mod fields;
 mod reader;
@@ -101,9 +101,9 @@ const MARK_SYMBOLS: usize = 30;
 /// Bits before the checks, and checks.
 const DATA_BITS: usize = 77;
 const CHECKS: usize = 8;
-/// Places of what is in no table: number of the string, interval between sets, time of the frame's beginning
-/// (hours, minutes, half minutes), whether the reference time is odd, satellites of an almanac's frame, kind
-/// of satellite, day, slot.
+/// Positions of what is in no table: number of the string, interval between ephemerides, time of the frame's
+/// beginning (hours, minutes, half minutes), whether the reference time is odd, satellites of an almanac's
+/// frame, kind of satellite, day, slot.
 const ID: (u16, u8) = (1, 4);
 const INTERVAL: (u16, u8) = (7, 2);
 const TIME: [(u16, u8); 3] = [(9, 5), (14, 6), (20, 1)];
@@ -114,7 +114,7 @@ const DAY: (u16, u8) = (59, 11);
 const SLOT: (u16, u8) = (70, 5);
 /// The flag l of string 3 once more, in strings 5, 7, 9, 11, 13 and 15 (4.4, l_n).
 const UNHEALTHY_AGAIN: (u16, u8) = (76, 1);
-/// Thirty minutes between sets, a GLONASS-M satellite.
+/// Thirty minutes between ephemerides, a GLONASS-M satellite.
 const HALF_AN_HOUR: u32 = 1;
 const MODERNISED: u32 = 1;
 
@@ -220,7 +220,7 @@ pub fn encode(string: &GlonassString) -> Vec<bool> {
     symbols
 }
 
-/// The string in soft symbols, either way up, its mark among them; `None` where its checks fail.
+/// The string in soft symbols, normal or inverted, its mark among them; `None` where its checks fail.
 pub fn decode_soft(symbols: &[f32]) -> Option<GlonassString> {
     let mut string = GlonassString::default();
     let mut before = None;
@@ -261,7 +261,7 @@ fn of_integers(sv: Sv, raw: &dyn Fn(&str) -> Option<i64>, near: Epoch) -> Option
         }
         read_all(table, &string, &mut found);
     }
-    // Sent in a frame of the set's own half hour.
+    // Sent in a frame of the ephemeris's own half hour.
     let half_s = 0.5 * found.fit_interval_s();
     let late_s = near.since(found.toe).clamp(-half_s, half_s - FRAME_S as f64);
     let sent = found.toe.plus_s(late_s).seconds().div_euclid(FRAME_S) * FRAME_S;
@@ -341,7 +341,8 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     Ok(sent)
 }
 
-/// Parameters by which sets and senders are distinguished, and the health, which has a fault of its own.
+/// Parameters by which ephemerides and senders are distinguished, and the health, which has a fault of its
+/// own.
 const FIXED_PARAMETERS: [&str; 5] = ["health", "tb_quarters", "unhealthy", "day", "slot"];
 
 fn adjustable() -> Vec<&'static str> {
@@ -415,7 +416,7 @@ mod tests {
     fn strings_of_two_sets_make_none_where_one_follows_the_other() {
         let sender = (GNAV.sender)(&Common::default()).unwrap();
         let sv = Sv { system: System::Glonass, number: 5 };
-        // By the time of GLONASS less three hours: from 12:30 on the set of 12:45 is sent.
+        // By the time of GLONASS less three hours: from 12:30 on the ephemeris of 12:45 is sent.
         let change = Epoch::parse("2020-11-29T12:30:00").unwrap();
         let sets = [-900.0, 900.0].map(|from_s| {
             let toe = change.plus_s(from_s);

@@ -1,4 +1,5 @@
-//! Finds strings in soft symbols, whichever way up they come, learns time and sender, and gathers sets.
+//! Finds strings in soft symbols, normal or inverted, learns time and sender, and gathers
+//! ephemerides.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -15,7 +16,7 @@ use crate::time::Epoch;
 
 /// Strings in a row that fail where they are expected before they are sought elsewhere.
 const FAILURES: u32 = 3;
-/// Symbols of the time mark that may be wrong: of a million places one looks like it then, and the checks
+/// Symbols of the time mark that may be wrong: of a million positions one looks like it then, and the checks
 /// decide.
 const TOLERATED: usize = 2;
 /// Symbols of a second.
@@ -78,7 +79,7 @@ impl GnavReader {
         if number <= 5 {
             self.parts.insert(number, (begin, string));
         }
-        // Strings of an earlier frame are those of another day, or set.
+        // Strings of an earlier frame are those of another day, or ephemeris.
         let oldest = begin.saturating_sub(STRINGS * STRING_SYMBOLS as u64);
         self.parts.retain(|_, (placed, _)| *placed >= oldest);
         let start = match self.begun(begin) {
@@ -125,7 +126,8 @@ impl GnavReader {
         let (Some(one), Some(two), Some(three), Some(four)) = (one, two, three, four) else { return };
         let sent = |placed: &Placed| start.plus_s((placed.0 as f64 - begin as f64) / RATE_HZ);
         let set = elements(self.sv, [&one.1, &two.1, &three.1, &four.1], sent(one));
-        // Sets change where their half hours end, which belongs to the next: all four were sent before.
+        // Ephemerides change where their half hours end, which belongs to the next: all four were sent
+        // before.
         let half_s = 0.5 * set.fit_interval_s();
         let is_of_set = |placed: &Placed| (-half_s..half_s).contains(&sent(placed).since(set.toe));
         if ![one, two, three, four].into_iter().all(is_of_set) {

@@ -1,4 +1,4 @@
-//! The field tables of CNAV: places count from 0, the first bit of a message (IS-GPS-705J, figures 20-1 to
+//! The field tables of CNAV: positions count from 0, the first bit of a message (IS-GPS-705J, figures 20-1 to
 //! 20-7, tables 20-I to 20-IX).
 
 use super::Content;
@@ -45,7 +45,7 @@ fn set_bit(health: &mut u16, bit: u16, value: f64) {
     *health = *health & !bit | if value > 0.0 { bit } else { 0 };
 }
 
-/// The reference time of the orbit, whose steps are the issue of the set.
+/// The reference time of the orbit, whose steps are the issue of the ephemeris.
 const fn toe(pieces: &'static [(u16, u8)]) -> Of {
     element(
         Field::new("toe_5min", pieces, Whole, 0, ORBIT),

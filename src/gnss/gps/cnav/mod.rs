@@ -5,13 +5,13 @@
 //! message is 300 bits with their check, coded without a break from one to the next ([`Convolutional`]). Sent
 //! are messages 10 and 11 (orbit), 30 (clock, group delays, ionosphere) and 33 (clock, UTC) in turn. Limits:
 //! no almanacs, no offsets of other systems, no Earth orientation, no corrections; of UTC nothing is used. A
-//! set of LNAV is carried to the nearest reference time that CNAV can express, and to its steps, by which the
-//! orbit departs by 3 cm (`tests/witness`). T_GD and the corrections between signals are those that a file
-//! has of the satellite's own CNAV; without them the one delay of LNAV gives all, as delays that are as 1/f².
-//! L1 C/A is sent with the delay of LNAV, its own message, so that its correction here is what T_GD of both
-//! messages leave. A signal is sent with the delay of its pilot; the correction of I5 is the satellite's, and
-//! who follows I5 alone meets what real satellites have between the two. Health is that of all signals, where
-//! real satellites call L5 unhealthy until it is declared operational.
+//! ephemeris of LNAV is carried to the nearest reference time that CNAV can express, and to its steps, by
+//! which the orbit differs by 3 cm (`tests/witness`). T_GD and the corrections between signals are those that
+//! a file has of the satellite's own CNAV; without them the one delay of LNAV gives all, as delays that are
+//! as 1/f². L1 C/A is sent with the delay of LNAV, its own message, so that its correction here is what T_GD
+//! of both messages leave. A signal is sent with the delay of its pilot; the correction of I5 is the
+//! satellite's, and who follows I5 alone meets what real satellites have between the two. Health is that of
+//! all signals, where real satellites call L5 unhealthy until it is declared operational.
 
 mod fields;
 mod on_l2c;
@@ -67,7 +67,8 @@ pub static CNAV: Message = Message {
     rinex: Some(Records { set: |_| "CNAV", common: "CNVX", fields: tables, lines: Some(record_lines) }),
 };
 
-/// Sets of CNAV: a correction for each signal beside the group delay, and a bit of health for each carrier.
+/// Ephemerides of CNAV: a correction for each signal beside the group delay, and a bit of health for each
+/// carrier.
 pub static CNAV_SETS: SetForm = SetForm {
     name: "CNAV",
     group_delay_s,
@@ -125,7 +126,7 @@ struct Content {
     utc: UtcNumbers,
 }
 
-/// The parameters of a unit's symbols; every message has some of a set.
+/// The parameters of a unit's symbols; every message has some of an ephemeris.
 fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
     let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
     let bits = checked(CODE.decode_open(&soft))?;
@@ -143,8 +144,8 @@ pub fn type_at(message: &Message, start: Epoch) -> u8 {
     ORDER.get(turn.rem_euclid(4) as usize).copied().unwrap_or(10)
 }
 
-/// The set as CNAV has it: carried to the nearest multiple of 300 s, with the corrections between signals
-/// that the set has of it, or that agree with the one delay of LNAV, whose delays are as 1/f².
+/// The ephemeris as CNAV has it: carried to the nearest multiple of 300 s, with the corrections between
+/// signals that the ephemeris has of it, or that agree with the one delay of LNAV, whose delays are as 1/f².
 pub(super) fn form(set: &Ephemeris) -> Ephemeris {
     if *set.form == CNAV_SETS {
         return set.clone();
@@ -166,7 +167,7 @@ pub(super) fn form(set: &Ephemeris) -> Ephemeris {
     }
 }
 
-/// The delay of a code in a set of LNAV: its own, or T_GD as 1/f².
+/// The delay of a code in an ephemeris of LNAV: its own, or T_GD as 1/f².
 pub(super) fn delay_s(set: &Ephemeris, code: &str, hz: f64) -> f64 {
     let ratio = L1_HZ / hz;
     set.delay_of_code_s(code).unwrap_or(set.tgd_s * ratio * ratio)
@@ -275,7 +276,7 @@ pub fn message_type(bits: &[bool]) -> u8 {
     bits.get(14..20).map_or(0, |bits| number(bits) as u8)
 }
 
-/// Parameters that are of the message and not of the set.
+/// Parameters that are of the message and not of the ephemeris.
 const PASSING: [&str; 5] = ["preamble", "prn", "type", "tow_count", "alert"];
 
 /// The raw integers of a message but those of its header; `None` for types that are not read.
@@ -342,7 +343,8 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     Ok(content.set)
 }
 
-/// Parameters by which sets are distinguished, that are no set's, or that all satellites say alike.
+/// Parameters by which ephemerides are distinguished, that are no ephemeris's, or that all satellites say
+/// alike.
 const FIXED_PARAMETERS: [&str; 14] = [
     "week",
     "toe_5min",
@@ -374,8 +376,8 @@ fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     found
 }
 
-/// The set in messages 10, 11 and 30 of the same reference time, the first sent at `sent`; `None` where they
-/// do not belong together or name another satellite.
+/// The ephemeris in messages 10, 11 and 30 of the same reference time, the first sent at `sent`; `None` where
+/// they do not belong together or name another satellite.
 fn elements(sv: Sv, messages: [&Vec<bool>; 3], sent: Epoch) -> Option<Ephemeris> {
     let mut content = blank(Ephemeris::blank(sv, sent));
     let mut toes = Vec::new();

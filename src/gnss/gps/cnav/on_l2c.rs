@@ -7,7 +7,7 @@ use super::reader::CnavReader;
 use super::{CNAV, IONOSPHERE, MESSAGE_S, sender, type_at};
 use crate::message::{IonosphereForm, Message};
 
-/// CNAV as L2C names it. Its sets are those of CNAV on L5.
+/// CNAV as L2C names it. Its ephemerides are those of CNAV on L5.
 pub static CNAV_L2C: Message = Message {
     name: "CNAV on L2C",
     symbol_s: 2.0 * CNAV.symbol_s,

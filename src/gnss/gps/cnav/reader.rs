@@ -11,7 +11,7 @@ use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::{Epoch, WEEK_S};
 
-/// Types whose parameters make up a set.
+/// Types whose parameters make up an ephemeris.
 const OF_SET: [u8; 3] = [10, 11, 30];
 
 /// Reads CNAV.
@@ -47,7 +47,7 @@ impl CnavReader {
             let all = parameters(&bits).unwrap_or_default();
             let raw = |name: &str| all.iter().find(|(other, _)| *other == name).map(|(_, raw)| *raw);
             news.extend(ionosphere(&raw).map(Read::Ionosphere));
-            // Its reference time is that of its set, by which sets are numbered.
+            // Its reference time is that of its ephemeris, by which ephemerides are numbered.
             if let Some(issue) = raw("toc_5min") {
                 let own = all.iter().filter(|(name, _)| DELAY.iter().any(|element| element.field.name == *name));
                 let rows = NavigationRow::each(self.sv, self.message.name, issue as u32, own.copied().collect());

@@ -2,7 +2,7 @@
 //!
 //! Source: IS-GPS-800J, 3.5.4.3; for QZSS IS-QZSS-PNT-005, 4.2.2.4. Page 3 has six reduced almanacs, page 4
 //! one almanac of medium length; both are those of CNAV ([`super::cnav`]) with eight bits of number. The
-//! documents leave the order of the pages open. Two of three frames are page 1, so that a set is whole
+//! documents leave the order of the pages open. Two of three frames are page 1, so that an ephemeris is whole
 //! after two frames at most; the others go through the almanacs of all satellites of the system that are
 //! known. Who knows no satellite sends page 1 alone. In the reduced almanac a geostationary satellite has no
 //! node: its angle counts from that of longitude zero at the beginning of the week, as in real pages.
@@ -90,7 +90,7 @@ impl Entry {
     }
 }
 
-/// Bits of health of L1, L2 and L5, L1 the highest. Only sets of CNAV tell carriers apart.
+/// Bits of health of L1, L2 and L5, L1 the highest. Only ephemerides of CNAV tell carriers apart.
 fn unhealthy(set: &Ephemeris) -> u8 {
     let bit = |carrier: u16| u8::from(set.health & carrier > 0);
     let of_all = if set.is_healthy() { 0 } else { 7 };

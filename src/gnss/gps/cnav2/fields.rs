@@ -1,5 +1,5 @@
-//! The field tables of CNAV-2: places count from 0, the first bit of a subframe (IS-GPS-800J, figures 3.5-1
-//! to 3.5-2, tables 3.5-1 to 3.5-3).
+//! The field tables of CNAV-2: positions count from 0, the first bit of a subframe (IS-GPS-800J, figures
+//! 3.5-1 to 3.5-2, tables 3.5-1 to 3.5-3).
 
 use super::Content;
 use super::almanac::{OF_MEDIUM, OF_REDUCED};
@@ -24,7 +24,7 @@ fn steps(at: Epoch) -> f64 {
 }
 
 /// All of subframe 2: time, health, orbit, clock and the delays of L1C. The clock's reference time is that of
-/// the orbit, whose steps are the issue of the set.
+/// the orbit, whose steps are the issue of the ephemeris.
 #[rustfmt::skip]
 pub(super) static SET: [Of; 34] = [
     plain!("week", [(0, 13)], Whole, 0, TIME, week),

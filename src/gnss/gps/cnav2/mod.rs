@@ -6,12 +6,12 @@
 //! codes are those of 6.2, packed in `ldpc_2.bin` and `ldpc_3.bin`.
 //!
 //! Sent are page 1 (UTC, ionosphere, corrections between signals), 3 and 4 (almanacs) of subframe 3: two of
-//! three frames are page 1, the third goes through the almanacs. A set is whole once page 1 has come, and
-//! changes with a frame that has it. Limits: left out are page 2, which has the Earth's orientation, of which
-//! a scene knows nothing, beside other systems' times, 5 (corrections), 6 (text) and those that QZSS alone
-//! sends. Almanacs are not read. Of UTC nothing is used. Sets of LNAV become those of CNAV-2 as they become
-//! those of CNAV ([`super::cnav`]), with delays of both parts of L1C that are those of L1 where the file has
-//! none.
+//! three frames are page 1, the third goes through the almanacs. An ephemeris is whole once page 1 has come,
+//! and changes with a frame that has it. Limits: left out are page 2, which has the Earth's orientation, of
+//! which a scene knows nothing, beside other systems' times, 5 (corrections), 6 (text) and those that QZSS
+//! alone sends. Almanacs are not read. Of UTC nothing is used. Ephemerides of LNAV become those of CNAV-2 as
+//! they become those of CNAV ([`super::cnav`]), with delays of both parts of L1C that are those of L1 where
+//! the file has none.
 
 mod almanac;
 mod fields;
@@ -45,7 +45,7 @@ pub static CNAV2: Message = Message {
     symbol_s: 0.01,
     bit: |_| &[1],
     unit_s: FRAME_S,
-    // A new set begins with page 1, after the frame of almanacs.
+    // A new ephemeris begins with page 1, after the frame of almanacs.
     set_s: ROUND * FRAME_S,
     first_s: 2 * FRAME_S,
     sender: |common| Ok(Box::new(Frames { common: common.clone(), almanacs: Almanacs::of(common) })),
@@ -68,7 +68,7 @@ pub static CNAV2: Message = Message {
     rinex: Some(Records { set: |_| "CNV2", common: "CNVX", fields: tables, lines: Some(record_lines) }),
 };
 
-/// Sets of CNAV-2: those of CNAV with corrections for L1C, and health of L1C alone.
+/// Ephemerides of CNAV-2: those of CNAV with corrections for L1C, and health of L1C alone.
 pub static CNAV2_SETS: SetForm = SetForm {
     name: "CNAV-2",
     group_delay_s,
@@ -184,7 +184,8 @@ pub fn interleaved(coded: &[bool]) -> Vec<bool> {
     FRAME.interleaved(coded)
 }
 
-/// The frame in 1800 soft symbols, positive for a logical 0, whichever way up; `None` where its checks fail.
+/// The frame in 1800 soft symbols, positive for a logical 0, normal or inverted; `None` where its checks
+/// fail.
 pub fn decode(soft: &[f32]) -> Option<Frame> {
     let Blocks { time, inverted, two, three } = FRAME.decode(soft)?;
     Some(Frame { time, inverted, two, three })
@@ -245,7 +246,7 @@ fn checked(tables: &[&'static [Element<Content>]], content: &Content, count: usi
     Ok(bits)
 }
 
-/// The set as CNAV-2 has it.
+/// The ephemeris as CNAV-2 has it.
 fn form(set: &Ephemeris) -> Ephemeris {
     if *set.form == CNAV2_SETS {
         return set.clone();
@@ -266,12 +267,12 @@ fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
     }
 }
 
-/// Tables with parameters of a set.
+/// Tables with parameters of an ephemeris.
 fn of_set() -> [&'static [Element<Content>]; 2] {
     [&SET, &DELAY]
 }
 
-/// Parameters that are of the frame and not of the set.
+/// Parameters that are of the frame and not of the ephemeris.
 const PASSING: [&str; 2] = ["week", "itow_2h"];
 
 fn set_parameters() -> Vec<&'static str> {
@@ -279,7 +280,7 @@ fn set_parameters() -> Vec<&'static str> {
     names.filter(|name| !PASSING.contains(name)).collect()
 }
 
-/// The raw integers of the set in subframe 2.
+/// The raw integers of the ephemeris in subframe 2.
 fn of_two(two: &Vec<bool>) -> Parameters {
     let mut found = integers(&SET, two);
     found.retain(|(name, _)| !PASSING.contains(name));
@@ -367,7 +368,8 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     Ok(content.set)
 }
 
-/// Parameters by which sets are distinguished, that are no set's, or that all satellites say alike.
+/// Parameters by which ephemerides are distinguished, that are no ephemeris's, or that all satellites say
+/// alike.
 const FIXED_PARAMETERS: [&str; 15] = [
     "week",
     "itow_2h",
@@ -399,7 +401,7 @@ fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     found
 }
 
-/// The set in subframe 2 and in page 1, sent at `sent`.
+/// The ephemeris in subframe 2 and in page 1, sent at `sent`.
 fn elements(sv: Sv, two: &Vec<bool>, page_1: &Vec<bool>, sent: Epoch) -> Ephemeris {
     let mut content = blank(Ephemeris::blank(sv, sent));
     read_all(&SET, two, &mut content);

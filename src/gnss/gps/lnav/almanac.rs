@@ -63,7 +63,7 @@ pub struct Almanac {
 impl Almanac {
     /// The almanac at `toa` that an ephemeris implies, not yet rounded.
     ///
-    /// The mean-motion correction goes into the semi-major axis, for an almanac has no other place for it.
+    /// The mean-motion correction goes into the semi-major axis, for an almanac has no field for it.
     pub fn derive(ephemeris: &Ephemeris, toa: Epoch) -> Self {
         let mean = ephemeris.mean_at(toa);
         Self {

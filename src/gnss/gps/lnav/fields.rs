@@ -1,7 +1,7 @@
 //! The field table: where each parameter of the message is, and what its integer means.
 //!
-//! Source: IS-GPS-200N, figure 20-1 (places) and tables 20-I, 20-III, 20-VI, 20-IX and 20-X (lengths and
-//! scales). A field is read and written through the same entry. Places are the document's: bit 1 is
+//! Source: IS-GPS-200N, figure 20-1 (positions) and tables 20-I, 20-III, 20-VI, 20-IX and 20-X (lengths and
+//! scales). A field is read and written through the same entry. Positions are the document's: bit 1 is
 //! the first of a subframe's 300, parity included.
 
 use super::almanac::{Almanac, Utc};

@@ -80,7 +80,8 @@ pub static LNAV: Message = Message {
     rinex: Some(Records { set: |_| "LNAV", common: "LNAV", fields: tables, lines: None }),
 };
 
-/// Sets of LNAV: one group delay, and six bits of health that speak of all signals together (IS-GPS-200N,
+/// Ephemerides of LNAV: one group delay, and six bits of health that speak of all signals together
+/// (IS-GPS-200N,
 /// 20.3.3.3.3.2 and 20.3.3.3.1.4).
 pub static LNAV_SETS: SetForm = SetForm { name: "LNAV", serves: |signal| signal.carries(&LNAV), ..PLAIN };
 
@@ -240,7 +241,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     Ok(sent)
 }
 
-/// Parameters by which sets are distinguished, and the health, which has a fault of its own.
+/// Parameters by which ephemerides are distinguished, and the health, which has a fault of its own.
 const FIXED_PARAMETERS: [&str; 4] = ["week", "iodc", "iode", "health"];
 
 fn adjustable() -> Vec<&'static str> {
@@ -289,7 +290,7 @@ pub enum SubframeError {
     /// Words whose last bits the parity should have made zero.
     #[error("words 2 and 10 do not end like the word before the subframe")]
     Tail,
-    /// Subframes of different sets.
+    /// Subframes of different ephemerides.
     #[error("issues of data disagree: iodc {iodc}, iode {iode_2} in subframe 2 and {iode_3} in subframe 3")]
     Issue {
         /// Issue of the clock, subframe 1.
@@ -334,7 +335,7 @@ pub struct Subframe {
 
 impl Subframe {
     /// Checks and opens ten received words. `previous_last_word` counts by its two low bits, which are 00 by
-    /// the message's law, or 11 where the stream is received upside down (preamble 0x74).
+    /// the message's law, or 11 where the stream is inverted (preamble 0x74).
     pub fn decode(words: &[u32; 10], previous_last_word: u32) -> Result<Self, SubframeError> {
         let mut data = [0; 10];
         let mut previous = previous_last_word;

@@ -40,7 +40,7 @@ pub(super) fn solve_tail(data: u32, previous: u32) -> u32 {
 /// The 24 source bits of a received 30-bit word, or `None` when its parity is wrong.
 ///
 /// `previous` is the word before, of which only the two low bits (D29*, D30*) count. The check holds
-/// for a stream received upside down too, and the data come out upright.
+/// for an inverted stream too, and the data come out upright.
 pub fn check_parity(word: u32, previous: u32) -> Option<u32> {
     let received = (word >> 6) & DATA;
     let data = if previous & 1 == 1 { !received & DATA } else { received };

@@ -1,4 +1,4 @@
-//! Finds subframes in the symbols of a satellite, whichever way up they come, and gathers what they say.
+//! Finds subframes in the symbols of a satellite, normal or inverted, and gathers what they say.
 //!
 //! Two headers a whole number of subframes apart, or one whole subframe with its parity, show where subframes
 //! begin. Source: IS-GPS-200N, 20.3.2 to 20.3.5. Limits: a word with a wrong bit is lost.
@@ -86,7 +86,7 @@ impl LnavReader {
         }
         let data = check_parity(handover, telemetry)?;
         let (tow_count, id) = (data >> 7, (data >> 2) & 7);
-        // Word 10 of the subframe before ends in 00 (IS-GPS-200N, 20.3.3.2), or 11 upside down.
+        // Word 10 of the subframe before ends in 00 (IS-GPS-200N, 20.3.3.2), or 11 inverted.
         let upright = previous == if inverted { 3 } else { 0 };
         let plausible = upright && tow_count < TOW_COUNTS && (1..=5).contains(&id);
         plausible.then_some(Header { bit: self.next_bit() - HEADER_BITS as u64, tow_count, inverted })

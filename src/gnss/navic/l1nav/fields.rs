@@ -1,5 +1,5 @@
-//! The field tables of NavIC's message on L1: places count from 0, the first bit of a subframe (NavIC SPS ICD
-//! for L1 1.0, subframe 2 and message type 10 of subframe 3).
+//! The field tables of NavIC's message on L1: positions count from 0, the first bit of a subframe (NavIC SPS
+//! ICD for L1 1.0, subframe 2 and message type 10 of subframe 3).
 
 use super::Content;
 use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};

@@ -1,7 +1,7 @@
 //! NavIC's message on L1: frames of eighteen seconds, encoded and decoded.
 //!
-//! Source: NavIC SPS ICD for L1 1.0 (ISRO, August 2023), which was not at hand itself: places and lengths as
-//! the open decoder `cssrlib` 1.2.1 (MIT) reads them, frame, codes and times as `PocketSDR` (BSD 2-clause)
+//! Source: NavIC SPS ICD for L1 1.0 (ISRO, August 2023), which was not at hand itself: positions and lengths
+//! as the open decoder `cssrlib` 1.2.1 (MIT) reads them, frame, codes and times as `PocketSDR` (BSD 2-clause)
 //! does. A frame is that of CNAV-2 with matrices of its own ([`Subframes`], `ldpc_2.bin`, `ldpc_3.bin`):
 //! subframe 1, the count of frames in two hours, 1 to 400, at the end of this one; subframe 2, orbit and
 //! clock in 600 bits; subframe 3, one of several messages in 274. What a real record shows beside is in
@@ -10,9 +10,9 @@
 //! Sent and read is message type 10 (ionosphere) alone in subframe 3, type 0 where no coefficients are known,
 //! for the document leaves the order open. Limits: the Earth's orientation in type 10 is zeros; types 5
 //! (grid), 6 (almanac), 8 (NeQuick-N) and 17 (times of other systems, UTC) are not sent and not read.
-//! Coefficients are taken as those of L5, as in the other message ([`super::nav`]), and for all places, not
-//! only those of their region. A set of that message is carried to the nearest five minutes; its clock stays
-//! that of S and L5, and the correction of L1 makes of its one group delay what goes with 1/f².
+//! Coefficients are taken as those of L5, as in the other message ([`super::nav`]), and for all positions,
+//! not only those of their region. An ephemeris of that message is carried to the nearest five minutes; its
+//! clock stays that of S and L5, and the correction of L1 makes of its one group delay what goes with 1/f².
 
 mod fields;
 mod reader;
@@ -68,7 +68,7 @@ pub static L1_NAV: Message = Message {
     rinex: Some(Records { set: |_| "L1NV", common: "L1NV KLOB", fields: tables, lines: Some(record_lines) }),
 };
 
-/// Sets of this message: health of L1 alone, and a clock of two carriers that a flag names.
+/// Ephemerides of this message: health of L1 alone, and a clock of two carriers that a flag names.
 pub static L1_NAV_SETS: SetForm = SetForm {
     name: "L1 NAV",
     group_delay_s,
@@ -155,7 +155,8 @@ impl Frame {
     }
 }
 
-/// The frame in 1800 soft symbols, positive for a logical 0, whichever way up; `None` where its checks fail.
+/// The frame in 1800 soft symbols, positive for a logical 0, normal or inverted; `None` where its checks
+/// fail.
 pub fn decode(soft: &[f32]) -> Option<Frame> {
     FRAME.decode(soft).map(Frame)
 }
@@ -202,7 +203,7 @@ fn checked(tables: &[&'static [Element<Content>]], content: &Content, count: usi
     Ok(bits)
 }
 
-/// The set as this message has it.
+/// The ephemeris as this message has it.
 fn form(set: &Ephemeris) -> Ephemeris {
     if *set.form == L1_NAV_SETS {
         return set.clone();
@@ -237,14 +238,14 @@ fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
     if shares { set.tgd_s } else { set.tgd_s - correction_s }
 }
 
-/// Parameters that are of the frame and not of the set.
+/// Parameters that are of the frame and not of the ephemeris.
 const PASSING: [&str; 4] = ["week", "itow_2h", "alert", "prn"];
 
 fn set_parameters() -> Vec<&'static str> {
     SET.iter().map(|element| element.field.name).filter(|name| !PASSING.contains(name)).collect()
 }
 
-/// The raw integers of the set in subframe 2.
+/// The raw integers of the ephemeris in subframe 2.
 fn of_set_in(two: &Vec<bool>) -> Parameters {
     let mut found = integers(&SET, two);
     found.retain(|(name, _)| !PASSING.contains(name));
@@ -319,7 +320,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     Ok(content.set)
 }
 
-/// Parameters by which sets are distinguished, or that have a fault of their own.
+/// Parameters by which ephemerides are distinguished, or that have a fault of their own.
 const FIXED_PARAMETERS: [&str; 8] =
     ["week", "itow_2h", "alert", "prn", "toe_5min", "iodec", "l1_health", "reference_flag"];
 
@@ -335,7 +336,7 @@ fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     found
 }
 
-/// The set in subframe 2, sent at `sent`.
+/// The ephemeris in subframe 2, sent at `sent`.
 fn elements(sv: Sv, two: &Vec<bool>, sent: Epoch) -> Ephemeris {
     let mut content = blank(Ephemeris::blank(sv, sent));
     read_all(&SET, two, &mut content);

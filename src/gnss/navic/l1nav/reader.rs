@@ -1,4 +1,4 @@
-//! Finds frames in soft symbols, whichever way up they come, and gathers what they say.
+//! Finds frames in soft symbols, normal or inverted, and gathers what they say.
 //!
 //! Where a frame begins shows in the code word of its time, which is right by chance at times: the check of
 //! subframe 2 decides.
@@ -39,7 +39,7 @@ impl L1NavReader {
         let (symbols, inverted) = (SYMBOLS as u64, frame.0.inverted);
         let mut news = vec![Read::Unit { symbols, of_week_s: frame.of_week_s(), inverted }, Read::Time(sent)];
         let set = elements(self.sv, &frame.0.two, sent);
-        // A frame is of one set, and what it says besides bears its issue.
+        // A frame is of one ephemeris, and what it says besides bears its issue.
         let issue = u32::from(set.iode);
         if let Some(three) = frame.electrons() {
             news.push(Read::Ionosphere(coefficients_in(three)));

@@ -7,7 +7,7 @@ use crate::fec::reliability::is_as_codes_of_its_length;
 
 #[test]
 fn both_codes_have_the_printed_matrices_and_fail_between_shannon_s_limit_and_one_decibel_and_a_half_above_it() {
-    // SHA-256 of "rows columns" and a line for every row with the places of its ones, in their order, as
+    // SHA-256 of "rows columns" and a line for every row with the positions of its ones, in their order, as
     // another program has the matrices; those of tables 30 to 41 of the document are the same, as a third
     // says.
     for (code, half, digest) in [
@@ -42,6 +42,6 @@ fn words_of_the_time_are_twenty_symbols_apart_and_upside_down_none_is_another() 
         all.extend(words.iter().skip(index + 1).map(|other| apart(word, other)));
     }
     assert_eq!(all.iter().min(), Some(&20));
-    // Upside down a word of 52 differs from another in 52 less what they differ in upright.
+    // An inverted word of 52 bits differs from another in 52 less the bits in which they differ otherwise.
     assert_eq!(all.iter().max(), Some(&36));
 }

@@ -1,4 +1,4 @@
-//! The field tables of NavIC's message: places count from 0, the first bit of a subframe before coding
+//! The field tables of NavIC's message: positions count from 0, the first bit of a subframe before coding
 //! (IRNSS SIS ICD for SPS 1.1, tables of the subframes and of message types 7, 9, 11 and 26).
 
 use super::NAVIC_WEEK;

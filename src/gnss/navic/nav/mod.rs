@@ -2,12 +2,13 @@
 //!
 //! Source: IRNSS SIS ICD for SPS 1.1, data structure. A subframe is a pattern of 16 symbols and 292 bits, the
 //! last six of them zeros, coded ([`Convolutional`]) and interleaved ([`Interleaver`]); four of them are a
-//! frame. Subframes 1 and 2 carry a set of elements, subframes 3 and 4 a message each: here 11 (ionosphere)
+//! frame. Subframes 1 and 2 carry an ephemeris, subframes 3 and 4 a message each: here 11 (ionosphere)
 //! and 26 (UTC) in turn in subframe 3, and 7 (almanac) in subframe 4, for the document leaves their order
-//! open. A set has its issue in subframe 1 alone: what shows that both subframes are of one set is that their
-//! reference times agree, as they do in all real ones that were looked at. Limits: earth orientation is sent
-//! as zeros, and so is the second model of type 26, another system's time; types 5 (ionosphere by a grid), 9,
-//! 14 and 18 are not sent, and not read. Flags of alert and of autonomous navigation are zero.
+//! open. An ephemeris has its issue in subframe 1 alone: what shows that both subframes are of one ephemeris
+//! is that their reference times agree, as they do in all real ones that were looked at. Limits: earth
+//! orientation is sent as zeros, and so is the second model of type 26, another system's time; types 5
+//! (ionosphere by a grid), 9, 14 and 18 are not sent, and not read. Flags of alert and of autonomous
+//! navigation are zero.
 
 mod fields;
 mod reader;
@@ -34,7 +35,7 @@ pub static SPS_NAV: Message = Message {
     symbol_s: 0.02,
     bit: |_| &[1],
     unit_s: SUBFRAME_S,
-    // Subframes 1 and 2 have no issue in common: a set goes on the air with a frame.
+    // Subframes 1 and 2 have no issue in common: an ephemeris goes on the air with a frame.
     set_s: FRAME_S,
     first_s: 0,
     sender: |common| Ok(Box::new(Subframes { common: common.clone() })),
@@ -93,7 +94,7 @@ const ALMANAC: u32 = 7;
 const ELECTRONS: u32 = 11;
 const UTC: u32 = 26;
 
-/// Places of what all subframes, and all messages, have.
+/// Positions of what all subframes, and all messages, have.
 const COUNT: (u16, u8) = (8, 17);
 const ID: (u16, u8) = (27, 2);
 const MESSAGE: (u16, u8) = (30, 6);
@@ -203,7 +204,7 @@ pub fn encode(subframe: &Subframe) -> Vec<bool> {
     pattern.chain(INTERLEAVER.interleave(&CODE.encode(&bits))).collect()
 }
 
-/// The subframe in soft symbols the right way up, its pattern among them; `None` where its check fails.
+/// The subframe in soft symbols not inverted, its pattern among them; `None` where its check fails.
 pub fn decode_soft(symbols: &[f32]) -> Option<Subframe> {
     let coded = symbols.get(PATTERN_SYMBOLS..SUBFRAME_SYMBOLS)?;
     let bits = CODE.decode(&INTERLEAVER.deinterleave(coded));
@@ -254,7 +255,7 @@ fn of_integers(sv: Sv, raw: &dyn Fn(&str) -> Option<i64>, near: Epoch) -> Option
 }
 
 /// The elements in subframes 1 and 2 with the time at which subframe 1 was sent; `None` where they are not of
-/// one set.
+/// one ephemeris.
 pub fn elements(sv: Sv, one: &Subframe, two: &Subframe, near: Epoch) -> Option<Ephemeris> {
     let mut found = Ephemeris::blank(sv, sent_at(one, near)?);
     read_all(&SUBFRAME_1, one, &mut found);
@@ -290,7 +291,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     Ok(sent)
 }
 
-/// Parameters by which sets are distinguished, and the health, which has a fault of its own.
+/// Parameters by which ephemerides are distinguished, and the health, which has a fault of its own.
 const FIXED_PARAMETERS: [&str; 5] = ["week", "iodec", "toc_s", "toe_s", "health"];
 
 fn adjustable() -> Vec<&'static str> {

@@ -1,4 +1,4 @@
-//! Finds subframes in soft symbols, whichever way up they come, and gathers what they say.
+//! Finds subframes in soft symbols, normal or inverted, and gathers what they say.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -14,7 +14,7 @@ use crate::time::Epoch;
 
 /// Subframes in a row that fail where they are expected before they are sought elsewhere.
 const FAILURES: u32 = 3;
-/// Symbols of the pattern that may be wrong: one of 240 places looks like it then, and the check decides.
+/// Symbols of the pattern that may be wrong: one of 240 positions looks like it then, and the check decides.
 const TOLERATED: usize = 2;
 
 /// Reads NavIC's message.

@@ -23,7 +23,8 @@ pub(super) struct Layout {
     lines: usize,
     /// The delay from which corrections are taken, where there is one for all.
     common: Option<Place>,
-    /// Code, place, place of another delay that is added to it, and whether the message is the signal's own.
+    /// Code, position, position of another delay that is added to it, and whether the message is the signal's
+    /// own.
     delays: &'static [(&'static str, Place, Option<Place>, bool)],
 }
 

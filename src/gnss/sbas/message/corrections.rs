@@ -1,4 +1,4 @@
-//! The field tables of the blocks of corrections: places count from 0, the first bit of a block; of half a
+//! The field tables of the blocks of corrections: positions count from 0, the first bit of a block; of half a
 //! block of long-term corrections, the first bit of the half (RTCA DO-229D, A.4.4.2 to A.4.4.10). Fields that
 //! are there for each satellite of a mask, or each point of a grid, are numbered from 1.
 

@@ -1,5 +1,5 @@
-//! The field tables of SBAS's messages: places count from 0, the first bit of a message (RTCA DO-229D,
-//! A.4.4.11 and A.4.4.15). Steps of places, velocities and accelerations are no powers of two: fields
+//! The field tables of SBAS's messages: positions count from 0, the first bit of a message (RTCA DO-229D,
+//! A.4.4.11 and A.4.4.15). Steps of positions, velocities and accelerations are no powers of two: fields
 //! count them.
 
 use super::NetworkTime;
@@ -50,7 +50,7 @@ macro_rules! axis {
     };
 }
 
-/// Type 9: the satellite's place. A set is numbered by its reference time.
+/// Type 9: the satellite's position. An ephemeris is numbered by its reference time.
 #[rustfmt::skip]
 pub(super) static GEO: [Of; 14] = [
     element(Field::new("iodn", &[(14, 8)], Whole, 0, GEO_CLAUSE),

@@ -2,9 +2,9 @@
 //!
 //! Source: RTCA DO-229D, A.4.3 (blocks, three beginnings in turn, check) and A.4.4. A block is coded
 //! without a break from one to the next (`fec::running`). Types 12 (time) and 9 (where the satellite is) are
-//! sent in rounds of six seconds; real satellites send them every minute or five. A set is a place with its
-//! velocity and acceleration at a multiple of 16 s, good for six minutes to either side (A.4.5.1.3, table
-//! Only type 12 says which second of the week it is. Where a network knows something of other
+//! sent in rounds of six seconds; real satellites send them every minute or five. An ephemeris is a position
+//! with its velocity and acceleration at a multiple of 16 s, good for six minutes to either side (A.4.5.1.3,
+//! table A-25). Only type 12 says which second of the week it is. Where a network knows something of other
 //! satellites, the rest of a round has its corrections (`schedule`), else type 63 (nothing).
 //!
 //! Limits: types 10, 17, 27 and 28 are neither sent nor read: their blocks pass the check and count as time
@@ -108,7 +108,7 @@ fn is_healthy(set: &Ephemeris) -> bool {
 }
 
 /// Type of the block that begins at a time where nothing is said of other satellites; blocks with corrections
-/// take the places of type 63.
+/// replace type 63.
 pub fn type_at(start: Epoch) -> u8 {
     let turn = start.tow_whole_s().rem_euclid(ORDER.len() as i64) as usize;
     ORDER.get(turn).copied().unwrap_or(EMPTY)
@@ -184,14 +184,14 @@ fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
     (!parameters.is_empty()).then_some((false, parameters))
 }
 
-/// The set in a block of type 9 that was sent at `sent`.
+/// The ephemeris in a block of type 9 that was sent at `sent`.
 fn elements(sv: Sv, bits: &Vec<bool>, sent: Epoch) -> Ephemeris {
     let mut found = Ephemeris { form: &SBAS_SETS, ..Ephemeris::blank(sv, sent) };
     read_all(&GEO, bits, &mut found);
     found
 }
 
-/// The set that raw integers give, as if they had been sent at `near`.
+/// The ephemeris that raw integers give, as if they had been sent at `near`.
 fn of_integers(sv: Sv, raw: Raw<'_>, near: Epoch) -> Option<Ephemeris> {
     let mut bits = vec![false; DATA_BITS];
     for field in GEO.iter().map(|element| &element.field) {
@@ -201,7 +201,7 @@ fn of_integers(sv: Sv, raw: Raw<'_>, near: Epoch) -> Option<Ephemeris> {
     Some(elements(sv, &bits, Epoch::new(near.seconds(), 0.0)))
 }
 
-/// The set that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+/// The ephemeris that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
 ///
 /// # Errors
 /// A value that the message cannot carry.
@@ -211,7 +211,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     Ok(sent)
 }
 
-/// Parameters by which sets are distinguished, and the accuracy, which is the health.
+/// Parameters by which ephemerides are distinguished, and the accuracy, which is the health.
 const FIXED_PARAMETERS: [&str; 3] = ["iodn", "t0_16s", "ura_index"];
 
 fn adjustable() -> Vec<&'static str> {

@@ -1,5 +1,5 @@
 //! Gathers what the blocks found in soft symbols say ([`Running`]): the second of the week by type 12, and
-//! from it on by counting, the satellite's place by type 9, and what is said of others from then on.
+//! from it on by counting, the satellite's position by type 9, and what is said of others from then on.
 
 use super::{BITS, OF_PLACE, OF_TIME, RATE_HZ, SBAS, TIME, elements, is_block, type_of};
 use crate::augmentation::Content;
