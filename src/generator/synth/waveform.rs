@@ -23,13 +23,13 @@ use gnss::signal::{Component, Layer, Layers, Link, Signal};
 /// A sequence with its part in the component.
 #[derive(Clone, Debug)]
 pub struct Voice {
-    /// Its signs over a code period.
+    /// Signs of the sequence over a code period.
     pub spreading: Spreading,
     /// Factor of the component's amplitude.
     pub amplitude: f64,
     /// Carrier phase relative to the component's.
     pub phase_cycles: f64,
-    /// What the steps of the sequence are where they are no levels of ±1: chips behind a filter.
+    /// Pulse for the steps of a sequence that are not levels of ±1: chips behind a filter.
     pub pulse: Option<Arc<Pulse>>,
 }
 
@@ -76,7 +76,7 @@ pub struct Waveform {
     secondary_code: Arc<[bool]>,
 }
 
-/// Why a component cannot be rendered.
+/// Reason for which a component cannot be rendered.
 #[derive(Debug, Error, PartialEq)]
 pub enum WaveformError {
     /// A rate at which a sample would span more than 15 steps of a sequence.
@@ -107,11 +107,11 @@ pub enum WaveformError {
         component: usize,
         /// The satellite.
         sv: Sv,
-        /// Which of the tables.
+        /// Name of the table.
         what: &'static str,
-        /// What was found.
+        /// Value that was found.
         found: String,
-        /// What is expected.
+        /// Values that are expected.
         expected: String,
     },
 }
@@ -222,8 +222,8 @@ impl Waveform {
         layers.iter().map(|layer| of((self.steps(layer, layer.pulse.len()), rate(layer)), layer)).collect()
     }
 
-    /// The same behind a filter: layers of one phase are one sequence of chips with a pulse where the
-    /// response to a chip costs less than those to its edges.
+    /// Layers behind a filter. Layers of one phase are one sequence of chips with a pulse where the response
+    /// to a chip costs less than those to its edges.
     fn filtered(&self, layers: &[Layer], filter: &Filter, rate_hz: f64) -> Vec<Sequence> {
         if self.chips.contains(&0) || layers.iter().any(|layer| !layer.chips.is_empty()) {
             return self.sequences(layers);

@@ -1,4 +1,4 @@
-//! When and how an emitter's wave reaches the samples: clock, path, tuning and repetition.
+//! Arrival of an emitter's wave in the samples: clock, path, tuning and repetition.
 //!
 //! Sample n is taken when the receiver's clock reads n/rate after its start; what it holds was sent
 //! `behind_s` before that reading (the clock's error plus the time on the way). Phases are the exact phase of
@@ -14,28 +14,28 @@ use gnss::samples::IfMetadata;
 use gnss::signal::Signal;
 use gnss::time::{Rate, SampleClock, tone_turns};
 
-/// What the receiver does to any wave from its antenna to its samples.
+/// Receiver's effect on any wave between its antenna and its samples.
 #[derive(Clone, Debug)]
 pub struct Tuning {
     /// Sample numbers as readings of the receiver's clock.
     pub clock: SampleClock,
-    /// That clock against GPS time.
+    /// Receiver's clock, with its offset from GPS time.
     pub receiver_clock: ReceiverClock,
     /// Radio frequency at 0 Hz in the samples.
     pub center_hz: f64,
-    /// Whether the spectrum is mirrored.
+    /// True if the spectrum is mirrored.
     pub inverted: bool,
-    /// Whether only the I plane is sent on.
+    /// True if only the I plane is sent on.
     pub real: bool,
-    /// Where the band of real samples begins: 0, or beyond half the rate a multiple of it.
+    /// Lower end in Hz of the band of real samples: 0, or a multiple of half the rate for a higher zone.
     pub low_hz: f64,
     /// Standard deviation of the thermal noise per component, in LSB: the gain.
     pub noise_lsb: f64,
 }
 
 impl Tuning {
-    /// That of a receiver whose samples are as `metadata` say, at readings `clock` of `receiver_clock`; real
-    /// samples are those of the zone in which most of `signals` lie. `noise_lsb` is the gain.
+    /// Creates the tuning of a receiver with samples as in `metadata`, at times `clock` of `receiver_clock`.
+    /// Real samples are those of the zone in which most of `signals` lie. `noise_lsb` is the gain.
     pub fn new(
         metadata: &IfMetadata,
         (clock, receiver_clock): (SampleClock, &ReceiverClock),
@@ -94,7 +94,7 @@ impl Tuning {
         if self.inverted { turns.wrapping_neg() } else { turns }
     }
 
-    /// Its advance a sample while `behind_s` changes by `change_s` over `samples`.
+    /// Phase advance per sample in 2^-64 turn, while `behind_s` changes by `change_s` over `samples`.
     pub fn turns_step(&self, carrier_hz: f64, change_s: f64, samples: u64) -> u64 {
         let tone = tone_turns(carrier_hz - self.center_hz, self.clock.rate, 1);
         let step = tone.wrapping_sub(fraction_turns(carrier_hz * change_s / samples as f64));
@@ -132,7 +132,7 @@ impl Path {
         self.travel_to_s(&self.antenna.at(t_s).position_m)
     }
 
-    /// The same when the scene starts.
+    /// Travel time in seconds when the scene starts.
     pub fn first_travel_s(&self) -> f64 {
         self.travel_to_s(&self.antenna.composed_for().position_m)
     }
@@ -144,7 +144,7 @@ impl Path {
     }
 }
 
-/// How often something repeats: an exact fraction of integers.
+/// Rate of a repetition: an exact fraction of integers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Repetition {
     count: u64,

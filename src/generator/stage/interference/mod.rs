@@ -34,18 +34,18 @@ const RUN: u64 = BLOCK_SAMPLES as u64;
 /// it.
 const EDGE_SAMPLES: f64 = 1e-6;
 
-/// How the chips of a matched waveform meet the samples.
+/// Model of the chip edges of a matched waveform between samples.
 #[derive(Clone, Debug)]
 pub enum ChipEdge {
-    /// At the nearest sample.
+    /// Edge at the nearest sample.
     Nearest,
-    /// By the share of the sample on either side.
+    /// Share of the sample's area on either side of the edge.
     Area,
     /// Through a low-pass filter.
     BandLimited(Arc<Filter>),
 }
 
-/// What an interferer sends.
+/// Waveform of an interferer.
 #[derive(Clone, Debug)]
 pub enum Waveform {
     /// A continuous wave.
@@ -54,37 +54,37 @@ pub enum Waveform {
     Chirp {
         /// Width of the sweep.
         sweep_hz: f64,
-        /// How often it repeats.
+        /// Rate of the repetition.
         repetition: Repetition,
     },
     /// Linear up and down; a repetition is both.
     Fmcw {
         /// Width of the sweep.
         sweep_hz: f64,
-        /// How often it repeats.
+        /// Rate of the repetition.
         repetition: Repetition,
     },
     /// Frequency that follows a cosine.
     SineFm {
         /// Largest deviation from the carrier.
         deviation_hz: f64,
-        /// How often it repeats.
+        /// Rate of the repetition.
         repetition: Repetition,
     },
     /// A carrier that is on for `width_s`; each pulse comes late by up to `jitter` of a period, at random.
     Pulse {
         /// Length of a pulse.
         width_s: f64,
-        /// How often it repeats.
+        /// Rate of the repetition.
         repetition: Repetition,
         /// Largest delay of a pulse, as a share of the period.
         jitter: f64,
     },
     /// Random chips, so that the spectrum is that of a code.
     Matched {
-        /// How often chips come.
+        /// Rate of the chips.
         chips: Repetition,
-        /// How their edges fall between samples.
+        /// Model of the chip edges between samples.
         edge: ChipEdge,
     },
     /// Gaussian noise over the samples' whole band.
@@ -95,18 +95,18 @@ pub enum Waveform {
         width_hz: f64,
         /// Source samples a sample, in 2^-32.
         step: u64,
-        /// From the source's samples to the scene's.
+        /// Interpolator from the source's samples to the scene's.
         by: Interpolator,
     },
     /// Recorded samples of unit mean power.
     Recording {
         /// The samples of the file.
         samples: Arc<Recorded>,
-        /// How often they come.
+        /// Rate of the source's samples.
         rate: Repetition,
-        /// From the source's samples to the scene's.
+        /// Interpolator from the source's samples to the scene's.
         by: Interpolator,
-        /// Whether they begin anew at their end.
+        /// True if the samples restart at their end.
         repeat: bool,
     },
 }
@@ -114,7 +114,7 @@ pub enum Waveform {
 /// Planar samples of a file.
 #[derive(Clone, Debug)]
 pub struct Recorded {
-    /// In-phase components.
+    /// I components.
     pub i: Vec<f32>,
     /// Quadrature components.
     pub q: Vec<f32>,
@@ -123,31 +123,31 @@ pub struct Recorded {
 /// One source of interference in a scene.
 #[derive(Clone, Debug)]
 pub struct Interferer {
-    /// Its number in the scenario, from 1.
+    /// Number of the source in the scenario, from 1.
     pub source: u64,
-    /// Its kind as a scenario writes it.
+    /// Kind of the source as a scenario writes it.
     pub kind: &'static str,
-    /// What it sends.
+    /// Waveform of the source.
     pub waveform: Waveform,
     /// Carrier, or middle of the band, as sent.
     pub carrier_hz: f64,
     /// Power over noise density at the antenna when the scene starts; of a pulse while it is on.
     pub jn0_hz: f64,
-    /// Its way to the antenna; `None` for a source without a position.
+    /// Path to the antenna; `None` for a source without a position.
     pub path: Option<Path>,
     /// Samples in which it is on, at the antenna.
     pub on: Range<u64>,
     /// Seed of its random numbers.
     pub seed: u64,
-    /// What the receiver does to its wave.
+    /// Receiver's effect on the wave.
     pub tuning: Tuning,
-    /// What is switched while the scene is sent.
+    /// Switches that act while the scene is sent.
     pub switches: Option<Arc<Switches>>,
-    /// For the plan.
+    /// Description for the plan.
     pub description: String,
 }
 
-/// What holds over one run.
+/// Values that hold over one run.
 struct Anchor {
     n: u64,
     /// Samples to its other end.
@@ -180,7 +180,7 @@ impl Interferer {
         })
     }
 
-    /// Its waveform, as far as its spectrum needs it.
+    /// Describes the waveform, as far as its spectrum needs it.
     pub fn fact(&self) -> Interference {
         match &self.waveform {
             Waveform::Cw => Interference::Cw,
@@ -212,7 +212,8 @@ impl Interferer {
         }
     }
 
-    /// What is true of it at a sample; `None` while it is off. Its power is the mean over a repetition.
+    /// Returns the true values at a sample; `None` while the source is off. The power is the mean over a
+    /// repetition.
     pub fn row(&self, source: usize, sample: u64) -> Option<InterferenceRow> {
         if !self.on.contains(&sample) || self.jn0_at(sample) <= 0.0 {
             return None;
