@@ -1,6 +1,6 @@
 //! Fourier transforms of both precisions: the planner of `rustfft` behind functions that are not generic.
 //!
-//! A generic planner is compiled anew in each crate and test that calls it: rustfft's algorithms for every
+//! A generic planner is compiled again in each crate and test that calls it: rustfft's algorithms for every
 //! instruction set were two fifths of the code of the receiver and a third of the judge's. Here they are
 //! compiled once. Transforms are those of `rustfft`: unnormalised, in place, of any length.
 //!

@@ -1,9 +1,9 @@
-//! The ground network of an augmentation system: what it says of GPS satellites and of the ionosphere.
+//! The ground network of an augmentation system: its corrections for GPS satellites and the ionosphere.
 //!
 //! It knows the truth of the scene and what satellites send, faults of either among them, and sends the
 //! difference: of the orbit by long-term corrections, of the clock by fast ones, of the ionosphere at the
 //! points of its grid. What is left is the rounding of the fields, and what moves until the next block; the
-//! indicators of accuracy bound both. A satellite is out of use where it says so itself, where an operator
+//! indicators of accuracy bound both. A satellite is out of use where it reports so itself, where an operator
 //! does, or where a difference exceeds what the fields hold. Limits: the network is without noise and delay;
 //! noise that a fault adds to a clock is not corrected; one list of satellites and points, those near where
 //! the motion begins, serves the whole scene.

@@ -1,6 +1,6 @@
 //! Broadcast ephemeris of each satellite at each time, and the smooth orbit that the generator takes as true.
 //!
-//! An ephemeris of GPS goes on the air two hours before its reference time (IS-GPS-200N, 20.3.4.4), or when
+//! An ephemeris of GPS is first sent two hours before its reference time (IS-GPS-200N, 20.3.4.4), or when
 //! it was first received if its reference time is off the two-hour grid, which marks a fresh upload; it stays
 //! until the next one or the end of its curve fit interval. Neighbouring ephemerides disagree by
 //! a metre or two, so the truth passes from one to the next over [`BLEND_S`]: the received phase
@@ -381,7 +381,7 @@ fn leave_out_rogues(sets: &mut Vec<Ephemeris>, warnings: &mut Vec<String>) {
 /// send it after its reference time. A file states when a receiver had decoded it completely, some minutes
 /// later.
 ///
-/// BeiDou's ephemerides are those of an hour, and go on the air with it, those of QZSS with the hour before
+/// BeiDou's ephemerides are those of an hour, and are first sent with it, those of QZSS with the hour before
 /// theirs.
 fn first_sent(set: &Ephemeris) -> Epoch {
     if let Some(from) = set.sent_from() {

@@ -1,7 +1,7 @@
 //! Events that switch sources while a scene is sent, written as lines of text.
 //!
 //! `power G05 -10` · `spoofer 1 3` · `jammer 1 off` · `jammer 1 on` · `spoofer 1 off` · `astray G05 30 0.5`
-//! (metres, metres a second) · `astray G05 0`. A power is in decibels over that of the scene, `off` none at
+//! (metres, metres per second) · `astray G05 0`. A power is in decibels over that of the scene, `off` none at
 //! all. The record of a live run holds them in a table with the sample of each, which a replay reads.
 
 use std::fmt;
@@ -32,7 +32,7 @@ pub enum Event {
 /// Reason for which a line is not a valid event, or not one of the scene.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum EventError {
-    /// A line that says nothing known.
+    /// Line that is not a known event.
     #[error("'{0}': expected power SV DB|off, jammer N on|off|DB, spoofer N on|off|DB or astray SV M [M/S]")]
     Unknown(String),
     /// A number beyond its range.

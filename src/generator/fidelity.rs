@@ -1,9 +1,9 @@
 //! Choices that trade speed for accuracy, each with the error and the cost that were measured for it.
 //!
-//! A scene names a level or single knobs ([`Wishes`]); [`choices`] says what was picked and what it is worth:
-//! errors of codes by the signals' waveforms ([`code_bias_m`]), costs as multiples that the kernels' bench
-//! measures (`cargo bench --bench trade`). Limits: a knob's figure assumes that every other knob is at its
-//! best.
+//! A scene names a level or single knobs ([`Wishes`]); [`choices`] states what was picked and what it is
+//! worth: errors of codes by the signals' waveforms ([`code_bias_m`]), costs as multiples that the kernels'
+//! bench measures (`cargo bench --bench trade`). Limits: a knob's figure assumes that every other knob is at
+//! its best.
 
 mod bias;
 mod costs;

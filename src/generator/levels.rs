@@ -155,8 +155,8 @@ fn middle(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// The strongest satellite in view at the scene's start, and the C/N0 in dB-Hz of the direct ray of its
-/// strongest signal: the S of a jammer's J/S. `None` where nothing is in view, or nothing says how strong it
-/// is.
+/// strongest signal: the S of a jammer's J/S. `None` where nothing is in view, or nothing states how strong
+/// it is.
 ///
 /// # Errors
 /// Those of the orbit.

@@ -36,7 +36,7 @@
 //! 3. the kernels and the front end: [`synth`], [`knots`], [`switches`], [`mod@stage`];
 //! 4. [`scene`], which holds all of these, and what follows from it: [`event`], [`presence`], [`geometry`],
 //!    [`arrival`], [`truth`], [`error`], [`transmit`], [`mod@stream`];
-//! 5. what is said before a run: [`levels`], [`plan`], [`dynamics`]; and [`scenario`], the scene as written.
+//! 5. the reports before a run: [`levels`], [`plan`], [`dynamics`]; and [`scenario`], the scene as written.
 
 #[macro_use(planted)]
 extern crate gnss;

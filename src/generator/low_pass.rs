@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-/// Cut-off of band-limited edges, in cycles a sample.
+/// Cut-off of band-limited edges, in cycles per sample.
 pub(crate) const CUTOFF_CPS: f64 = 0.45;
 /// Half width of that filter in samples.
 pub const HALF_WIDTH: usize = 8;
@@ -13,12 +13,12 @@ const BETA: f64 = 5.65;
 /// Frequency response of the filter.
 #[derive(Debug)]
 pub struct Response {
-    /// The impulse response from its middle on, at [`Response::CELLS`] points a sample.
+    /// The impulse response from its middle on, at [`Response::CELLS`] points per sample.
     impulse: Vec<f64>,
 }
 
 impl Response {
-    /// Points a sample: images lie sixteen times the rate away, where the filter leaves nothing.
+    /// Points per sample: images lie sixteen times the rate away, where the filter leaves nothing.
     const CELLS: usize = 16;
 
     /// Computes the response of the filter with this cut-off, in cycles per sample.
@@ -27,7 +27,7 @@ impl Response {
         Self { impulse: points.map(|k| impulse(k as f64 / Self::CELLS as f64, cutoff_cps)).collect() }
     }
 
-    /// The amplitude left at that many cycles a sample, one at zero. The phase is not turned.
+    /// The amplitude left at that many cycles per sample, one at zero. The phase is not turned.
     pub fn at(&self, cps: f64) -> f64 {
         let Some((middle, rest)) = self.impulse.split_first() else { return 1.0 };
         // Chebyshev's recurrence of cosines of equal steps.

@@ -215,7 +215,7 @@ fn in_view(scene: &Scene, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
 }
 
 /// Power over noise density in dB-Hz of a satellite's first signal's direct ray, and of all signals and rays
-/// together; `None` when nothing in the scene says how strong they are.
+/// together; `None` when nothing in the scene states how strong they are.
 pub(crate) fn strength_dbhz(scene: &Scene, sight: &Sight) -> (Option<f64>, Option<f64>) {
     let (mut direct_hz, mut sum_hz) = (None, 0.0);
     for signal in scene.signals_of(sight.sv) {

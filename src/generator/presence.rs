@@ -16,7 +16,7 @@ use gnss::record::{PassEnd, PassRow};
 use gnss::satellite::Sv;
 use gnss::time::Epoch;
 
-/// Farthest from its reference time that an ephemeris places a satellite above or below the mask. Half a day
+/// Largest time in seconds from its reference time for which an ephemeris decides on the mask. Half a day
 /// on, real ephemerides of two days are some kilometres off: 1e-4 rad of elevation.
 const EXTRAPOLATED_S: f64 = 43_200.0;
 /// Spacing of the instants at which the sky without an ephemeris is looked at: satellites move 5° in it.

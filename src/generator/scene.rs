@@ -134,7 +134,7 @@ impl Scene {
         }
     }
 
-    /// Cut-off of band-limited edges, in cycles a sample. In a real format the band around the IF must fit
+    /// Cut-off of band-limited edges, in cycles per sample. In a real format the band around the IF must fit
     /// between zero and half the rate.
     pub fn cutoff_cps(&self) -> f64 {
         if self.metadata.format.is_complex() {

@@ -103,7 +103,7 @@ pub fn generate(
     generate_with(scene, samples, truth, progress, &Options::default())
 }
 
-/// [`generate`] with the work cut as `options` say.
+/// [`generate`] with the work cut as `options` state.
 ///
 /// # Errors
 /// As [`generate`].

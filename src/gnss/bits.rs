@@ -148,7 +148,7 @@ pub enum Kind {
     Signed,
     /// A sign and a magnitude; a negative zero is read as zero.
     Magnitude,
-    /// Two's complement of semicircles (or semicircles a second); the value is in radians.
+    /// Two's complement of semicircles (or semicircles per second); the value is in radians.
     Semicircles,
     /// Two's complement of semicircles for an angle modulo one turn. A value outside ±π radians is reduced
     /// first.

@@ -112,7 +112,7 @@ pub struct Ephemeris {
     /// Carriers of the clock, as the message states them: NavIC on L1 has 0 for L1 and L5, 1 for S and L5.
     /// Other messages have 0.
     pub reference_flag: u8,
-    /// Group delays that another message of the satellite says, by the code of RINEX to which they belong
+    /// Group delays that another message of the satellite states, by the code of RINEX to which they belong
     /// ("5Q"), that of GPS's clock, T_GD, by [`GPS_CLOCK_CODE`]; others follow from `tgd_s`.
     pub signal_delays_s: Vec<(&'static str, f64)>,
     /// State and forces at the reference time, of messages without elements, whose own here are zero.
@@ -483,7 +483,7 @@ impl Ephemeris {
     /// eight hours: an ephemeris is used for four hours after its reference time.
     ///
     /// Of QZSS two hours (IS-QZSS-PNT-005, 4.1.2.4), of SBAS twelve minutes (RTCA DO-229D, table A-25).
-    /// Of GPS four hours, or what the issue of data says when the fit flag is set
+    /// Of GPS four hours, or what the issue of data states when the fit flag is set
     /// (IS-GPS-200N, 20.3.4.4, table 20-XII; intervals of extended operations beyond 26 h are read as 6 h).
     pub fn fit_interval_s(&self) -> f64 {
         let hours = match (self.long_fit, self.iodc) {

@@ -1,7 +1,7 @@
 //! WGS 84: the ellipsoid, geodetic and local coordinates, the constants of the broadcast algorithms.
 //!
 //! Source: NGA.STND.0036 (WGS 84) and IS-GPS-200N, 20.3.3.4.3. Positions are earth-centred,
-//! earth-fixed (ECEF) metres unless a name says otherwise.
+//! earth-fixed (ECEF) metres unless a name states otherwise.
 
 use nalgebra::{Matrix3, Vector3};
 

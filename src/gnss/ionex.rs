@@ -381,7 +381,7 @@ impl<'t> Reader<'t> {
         Err(self.wrong(&format!("{label} before the file ends")))
     }
 
-    /// Goes to the next line, and says whether there is one.
+    /// Goes to the next line, and states whether there is one.
     fn next(&mut self) -> bool {
         match self.lines.next() {
             Some((index, text)) => {

@@ -2,7 +2,7 @@
 //!
 //! Source: IS-GPS-200N, 20.3.3.5.2.5 and figure 20-4. It removes about half of the true delay. As
 //! printed it steps by 2 % of the bulge where its cosine series ends (see [`SERIES_END_RAD`]), and where
-//! local time wraps at midnight if the period exceeds 40 hours. Below the horizon the document says
+//! local time wraps at midnight if the period exceeds 40 hours. Below the horizon the document has
 //! nothing: there the elevation counts as zero, which keeps clear of the pole of ψ at −19.8°. Its shell is a
 //! sphere that takes geodetic latitudes: up to 0.13 m of delay against an ellipsoid's. The generator smooths
 //! the step (up to 0.16 m).

@@ -1,8 +1,8 @@
 //! Navigation messages as encoders and decoders use them: one [`Message`] for each form.
 //!
 //! A transmitter asks a [`Sender`] for the symbols of a unit (a subframe, a page) that begins at a time; a
-//! receiver gives a [`Reader`] the symbols as they come and takes what they say. Each form is one [`Message`]
-//! in the file that encodes and decodes it. All times here are those of the system that sends
+//! receiver gives a [`Reader`] the symbols as they come and takes what they state. Each form is one
+//! [`Message`] in the file that encodes and decodes it. All times here are those of the system that sends
 //! ([`TimeScale::label`]); who calls brings them to GPS time.
 //!
 //! [`TimeScale::label`]: crate::time::TimeScale::label
@@ -33,7 +33,7 @@ pub struct Message {
     /// Duration of a unit, which is encoded in one piece, and when in the week the first one begins.
     pub unit_s: i64,
     /// Seconds, from one multiple of them to the next, in which all units are of one ephemeris: whole units.
-    /// Messages whose units each say of which ephemeris they are have those of one unit.
+    /// Messages whose units each state of which ephemeris they are have those of one unit.
     pub set_s: i64,
     /// Seconds after the beginning of the week at which its first unit begins.
     pub first_s: i64,
@@ -41,10 +41,10 @@ pub struct Message {
     pub sender: fn(&Common) -> Result<Box<dyn Sender>, FieldError>,
     /// Number by which faults name the unit that begins then: a subframe's, a word's type.
     pub number: fn(Epoch) -> u8,
-    /// Numbers of the units that say their time; none where another signal of the satellite has to give it.
+    /// Numbers of the units that state their time; none where another signal of the satellite has to give it.
     pub timed: &'static [u8],
-    /// Numbers of the units all of which have to be read before one of those says its whole time; none where
-    /// each says it by itself.
+    /// Numbers of the units all of which have to be read before one of those states its whole time; none
+    /// where each states it by itself.
     pub dated: &'static [u8],
     /// Numbers of the units that make up an ephemeris.
     pub set: &'static [u8],
@@ -135,7 +135,7 @@ pub struct Common {
     pub nequick: Option<[f64; 3]>,
     /// GPS time against UTC.
     pub utc: UtcData,
-    /// Galileo's time against GPS time; absent means that nothing is said of it.
+    /// Galileo's time against GPS time; absent means that it is not stated.
     pub galileo: Option<TimePolynomial>,
     /// One ephemeris a satellite, for almanacs, and the time near which they hold.
     pub almanac: Vec<Ephemeris>,
@@ -306,7 +306,7 @@ pub trait Reader: fmt::Debug + Send + Sync {
     fn know(&mut self, _near: Epoch) {}
     /// Symbols are missing before the next one.
     fn skip(&mut self);
-    /// The time of a unit contradicts those before: where units begin is sought anew.
+    /// The time of a unit contradicts those before: where units begin is searched again.
     fn doubt(&mut self);
     /// Parts of an ephemeris that have not been decoded: subframes, words.
     fn missing(&self) -> Vec<u8>;

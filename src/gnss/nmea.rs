@@ -3,7 +3,8 @@
 //! Source: NMEA 0183, version 4.11 (GGA, RMC, VTG, ZDA, GSA with the system's number, GSV with the signal's).
 //! Times are UTC to a millisecond, positions are written to 1e-7 of a minute (0.2 mm). Heights are above mean
 //! sea level by EGM96 ([`crate::geoid`]), with the separation beside them: their sum is the height above the
-//! ellipsoid, to 0.05 mm. [`read`] reads sentences. Limit: no sentence says how far the solution may be off.
+//! ellipsoid, to 0.05 mm. [`read`] reads sentences. Limit: no sentence states how far the solution may be
+//! off.
 
 pub mod read;
 
@@ -120,7 +121,7 @@ fn number(sv: Sv) -> u16 {
     }
 }
 
-/// Number of a signal in GSV, hexadecimal (NMEA 0183 4.11, GSV); 0 says that it has none.
+/// Number of a signal in GSV, hexadecimal (NMEA 0183 4.11, GSV); 0 if it has none.
 fn signal_number(signal: &Signal) -> u8 {
     match (signal.system, signal.rinex) {
         (System::Gps | System::Glonass | System::Qzss | System::Sbas, "1C") => 1,

@@ -1,6 +1,6 @@
 //! Recordings whose samples are no whole bytes, or lie among those of other channels.
 //!
-//! A [`Layout`] says which bits of a group of words are the samples of one channel; an [`Unpacker`] reads
+//! A [`Layout`] states which bits of a group of words are the samples of one channel; an [`Unpacker`] reads
 //! them as a [`Format`] of whole bytes. Values of 1 to 4 bits lie in the middle of their step, at odd
 //! numbers 1, 3, … to both sides of zero, as a quantiser without a zero has them: two's complement `x` is
 //! `2x + 1`, sign and magnitude `±(2m + 1)`, offset binary `2x + 1 − 2^bits`, a sign alone `±1`. Of 8 and
@@ -340,7 +340,7 @@ pub struct Unpacker<R> {
 }
 
 impl<R: Read> Unpacker<R> {
-    /// Reads what `layout` says from `reader`.
+    /// Reads what `layout` states from `reader`.
     pub fn new(layout: Layout, reader: R) -> Self {
         Self { layout, reader, packed: Vec::new(), samples: Vec::new(), taken: 0 }
     }

@@ -1,6 +1,6 @@
 //! The rows that generator and receiver write and the judge joins, one CSV file a kind.
 //!
-//! A row says *when* by sample number: the only clock that truth and estimate share without
+//! A row states *when* by sample number: the only clock that truth and estimate share without
 //! agreeing on anything. Columns end with their unit; angles are in degrees in files, in radians nowhere.
 
 use nalgebra::Vector3;
@@ -281,7 +281,7 @@ pub struct Fix {
     /// Ionosphere correction of the fix.
     pub ionosphere: IonosphereModel,
     /// Ranges in the solution, and clocks that it estimates: one a satellite, and one, where the file does
-    /// not say.
+    /// not state.
     #[serde(default)]
     pub ranges: Option<u32>,
     /// Clocks that it estimates.
@@ -470,7 +470,7 @@ pub struct NavigationRow {
     pub parameter: String,
     /// Raw integer as sent, with its sign extended.
     pub raw: i64,
-    /// The message's name: satellites may send several. Files of one message do not say it: LNAV.
+    /// The message's name: satellites may send several. Files of one message do not state it: LNAV.
     #[serde(default = "lnav")]
     pub message: String,
 }
@@ -522,7 +522,7 @@ pub enum Event {
     PhaseLocked,
     /// The edges of symbols are known.
     BitSynchronised,
-    /// The message says which satellite it is: what was recorded of the channel before, under the name of
+    /// The message states which satellite it is: what was recorded of the channel before, under the name of
     /// another on the same carrier with the same code, is of this one.
     Identified,
     /// The message's frame is known, and with it the time.
@@ -534,7 +534,7 @@ pub enum Event {
     /// The ionosphere's parameters came, for the first time or other than before: fixes are corrected by them
     /// from here on.
     IonosphereDecoded,
-    /// The satellite says that it is unhealthy: it is not used from here on.
+    /// The satellite states that it is unhealthy: it is not used from here on.
     Unhealthy,
     /// The satellite reports itself healthy again.
     Healthy,

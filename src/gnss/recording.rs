@@ -24,13 +24,13 @@ pub enum Samples {
 pub struct Description {
     /// Arrangement of samples in the file.
     pub samples: Option<Samples>,
-    /// Samples a second.
+    /// Samples per second.
     pub rate: Option<Rate>,
     /// The radio frequency at 0 Hz of the samples.
     pub center_hz: Option<f64>,
     /// True if the spectrum is mirrored.
     pub inverted: bool,
-    /// The signals in it; none where nothing says it.
+    /// Signals in the recording; empty if no key states them.
     pub signals: Vec<&'static Signal>,
     /// Time of the first sample by the recorder's clock.
     pub start: Option<Epoch>,

@@ -1,4 +1,5 @@
-//! IF samples as files hold them: formats, packing, and what a data sheet says of a recording.
+//! IF samples as files hold them: formats, packing, and the description of a recording as a data sheet gives
+//! it.
 //!
 //! Formats carry SigMF's names (SigMF 1.2, "Dataset format"). Inside, samples are planar `f32`
 //! in units of the format's least significant bit. Integers saturate symmetrically and round half to even.
@@ -202,7 +203,7 @@ impl FromStr for Format {
 pub struct IfMetadata {
     /// Encoding of the samples.
     pub format: Format,
-    /// Samples a second by the recorder's clock.
+    /// Samples per second by the recorder's clock.
     pub rate: Rate,
     /// The radio frequency that appears at 0 Hz in the samples.
     pub center_hz: f64,

@@ -1,4 +1,4 @@
-//! SigMF metadata: what a data sheet says of a recording, as JSON beside the samples.
+//! SigMF metadata: the description of a recording as a data sheet gives it, as JSON beside the samples.
 //!
 //! Source: SigMF 1.2.0 (core namespace). One capture is written; of other people's files, unknown keys
 //! are passed over, and what is absent is left to whoever reads them ([`describe`]). Headers, offsets,
@@ -249,8 +249,8 @@ fn utc_text(start: Epoch) -> String {
     format!("{whole}.{}Z", fraction.strip_prefix("0.").unwrap_or("0"))
 }
 
-/// Reads the JSON text of a `.sigmf-meta` file that says all that there is to know of samples in whole bytes;
-/// `name` is how errors call it.
+/// Reads the JSON text of a `.sigmf-meta` file that states all that there is to know of samples in whole
+/// bytes; `name` is how errors call it.
 ///
 /// # Errors
 /// [`SigmfError`] with the file, the key, its value and what was expected.
@@ -279,7 +279,7 @@ const DATATYPES: &str = "one of ci8, cu8, ci16_le, cf32_le, ri8, ri16_le";
 const RATES: &str = "samples a second, above 0 and below 1e12";
 const FREQUENCIES: &str = "the radio frequency at 0 Hz of the samples, in Hz";
 
-/// Reads what the JSON text of a `.sigmf-meta` file says; `name` is how errors call it.
+/// Reads what the JSON text of a `.sigmf-meta` file states; `name` is how errors call it.
 ///
 /// # Errors
 /// [`SigmfError`] with the file, the key, its value and what was expected: of what is there and cannot be
@@ -446,7 +446,7 @@ impl File<'_> {
         found.map(|(_, meaning)| *meaning).ok_or_else(|| self.bad(key, &value(), expected))
     }
 
-    /// The recording with what its captures say of it; numbers of samples count from `offset`.
+    /// The recording with what its captures state of it; numbers of samples count from `offset`.
     fn captures(&self, captures: Vec<Capture>, offset: u64, of: Description) -> Result<Description, SigmfError> {
         let mut captures = captures.into_iter();
         let Some(first) = captures.next() else { return Ok(of) };

@@ -230,7 +230,7 @@ fn decimal(line: &str, first: usize, last: usize) -> Result<f64, Fault> {
 }
 
 impl Precise {
-    /// Takes in what another file says; where both say something, that one counts.
+    /// Takes in what another file states; where both state something, that one counts.
     pub fn extend(&mut self, other: Self) {
         for (sv, samples) in other.satellites {
             self.satellites.entry(sv).or_default().extend(samples);

@@ -357,7 +357,7 @@ pub fn tone_turns(hz: f64, rate: Rate, n: u64) -> u64 {
 pub struct SampleClock {
     /// Time of sample 0 by the clock.
     pub start: Epoch,
-    /// Samples a second, as the sampler's own clock counts them.
+    /// Samples per second, as the sampler's own clock counts them.
     pub rate: Rate,
 }
 

@@ -15,12 +15,12 @@ use crate::vehicle::shaking::Shaking;
 use gnss::time::Epoch;
 use oscillator::Oscillator;
 
-/// A clock that is `bias_s` ahead of GPS time at the scene's start and gains `drift` seconds a second.
+/// A clock that is `bias_s` ahead of GPS time at the scene's start and gains `drift` seconds per second.
 #[derive(Clone, Debug)]
 pub struct ReceiverClock {
     /// Clock minus true time at the start, in seconds.
     pub bias_s: f64,
-    /// Gain at the start, in seconds a second.
+    /// Gain at the start, in seconds per second.
     pub drift: f64,
     /// Growth of the drift a second.
     pub ageing_per_s: f64,

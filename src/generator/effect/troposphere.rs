@@ -26,7 +26,7 @@ const PRESSURE_EXPONENT: f64 = 5.2568;
 const TEMPERATURE_LAPSE_KPM: f64 = 6.5e-3;
 const TROPOPAUSE_M: f64 = 11_000.0;
 const CELSIUS_K: f64 = 273.15;
-/// Heights between which what GPT3 says fades away: its own decay leaves 0.4 % of the delay there.
+/// Heights between which what GPT3 states fades away: its own decay leaves 0.4 % of the delay there.
 const FADE_M: f64 = 40e3;
 const TOP_M: f64 = 50e3;
 /// Mean radius of the Earth, and by how much air bends a ray that grazes the ground: half a degree.
@@ -227,7 +227,7 @@ mod tests {
     /// straight line. Another program traced them: Snell's law in spherical layers (n r cos e is constant), n
     /// − 1 = 77.604e-6 p/T, 6371 km, 20 000 steps to 100 km, the elevation at the user iterated until the ray
     /// leaves in the straight line's direction. The last column is by what part the model may differ, as its
-    /// module says.
+    /// module states.
     const TRACED: [(f64, f64, f64, f64); 25] = [
         (0.0, 10.0, 12.7820, 0.005),
         (0.0, 5.0, 23.3291, 0.005),

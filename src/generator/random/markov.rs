@@ -14,12 +14,12 @@ pub type State = [f64; 2];
 /// One Gauss–Markov process; its output is its phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Process {
-    /// Phase that walks; `level` is its variance a second, h0 / 2.
+    /// Phase that walks; `level` is its variance per second, h0 / 2.
     WhiteFrequency {
         /// Variance per second.
         level: f64,
     },
-    /// Frequency that walks; `level` is its variance a second, 2 π² h−2.
+    /// Frequency that walks; `level` is its variance per second, 2 π² h−2.
     FrequencyWalk {
         /// Variance per second.
         level: f64,

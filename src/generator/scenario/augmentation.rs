@@ -18,7 +18,7 @@ use gnss::satellite::{Sv, System};
 pub struct SbasSpec {
     /// True if the system reports test mode.
     pub test: bool,
-    /// Satellites that it says must not be used.
+    /// Satellites that it states must not be used.
     pub do_not_use: Vec<Sv>,
 }
 

@@ -15,7 +15,7 @@ pub(super) fn expect(table: &Table<'_>, duration_s: f64) -> Result<Expect, Scena
     Ok(Expect { whole: if says { Some(terms(table)?) } else { None }, intervals })
 }
 
-/// Keys of which one at least says what is expected.
+/// Keys of which one at least states what is expected.
 const SAYS: [&str; 4] = ["fix", "losses", "errors", "position_within_m"];
 const NOTHING: &str = "at least one of fix, losses, errors and position_within_m";
 

@@ -60,7 +60,7 @@ impl FrontEnd {
         self.signals.as_deref().unwrap_or(signals).first().copied()
     }
 
-    /// The key that says where it is tuned to.
+    /// The key that states where it is tuned to.
     pub(super) fn tuning_key(&self) -> &'static str {
         match self.tuned {
             Tuned::If { .. } => "front_end.if_hz",

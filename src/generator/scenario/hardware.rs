@@ -16,7 +16,7 @@ use gnss::time::Rate;
 pub struct ClockSpec {
     /// Clock minus GPS time at the scene's start, in seconds.
     pub bias_s: f64,
-    /// Gain at the start, in seconds a second.
+    /// Gain at the start, in seconds per second.
     pub drift: f64,
     /// Growth of the drift a second.
     pub ageing_per_s: f64,

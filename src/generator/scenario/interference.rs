@@ -162,7 +162,7 @@ pub struct SpooferSpec {
     pub satellites: Option<Vec<Sv>>,
     /// Clock minus GPS time at the scene's start, in seconds.
     pub clock_bias_s: f64,
-    /// Gain of its clock, in seconds a second.
+    /// Gain of its clock, in seconds per second.
     pub clock_drift: f64,
     /// The claimed motion; absent means that of the antenna.
     pub motion: Option<MotionSpec>,

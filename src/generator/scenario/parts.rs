@@ -108,7 +108,7 @@ fn far_s(file: &Navigation, at: Epoch) -> f64 {
     middle(file).map_or(f64::INFINITY, |middle| at.since(middle).abs())
 }
 
-/// Moves a file by whole days; what it says of leap seconds belongs to its own.
+/// Moves a file by whole days; what it states of leap seconds belongs to its own.
 fn move_days(file: &mut Navigation, days: i64) {
     for set in &mut file.ephemerides {
         *set = set.moved(days);

@@ -124,7 +124,7 @@ impl Ionosphere {
         matches!(self.truth, Electrons::Klobuchar(_))
     }
 
-    /// Coefficients of NeQuick-G that the satellites send, if the scenario says them.
+    /// Coefficients of NeQuick-G that the satellites send, if the scenario states them.
     pub(super) fn sent_nequick(&self) -> Option<[f64; 3]> {
         self.broadcast_ai.or(match self.truth {
             Electrons::NequickG(given) => given,
@@ -132,7 +132,7 @@ impl Ionosphere {
         })
     }
 
-    /// Coefficients of BDGIM that the satellites send, if the scenario says them; nine zeros for none.
+    /// Coefficients of BDGIM that the satellites send, if the scenario states them; nine zeros for none.
     pub(super) fn sent_bdgim_tecu(&self) -> Option<[f64; 9]> {
         self.broadcast_bdgim_tecu.or(match self.truth {
             Electrons::Bdgim(given) => given.map(|model| model.alpha_tecu),
@@ -140,7 +140,7 @@ impl Ionosphere {
         })
     }
 
-    /// The effect, with its file read; `navigation` says what the scenario does not, `end_s` is the scene's
+    /// The effect, with its file read; `navigation` states what the scenario does not, `end_s` is the scene's
     /// end.
     pub(super) fn effect(
         &self,

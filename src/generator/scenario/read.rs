@@ -27,7 +27,7 @@ pub struct Table<'t> {
     keys: &'static [Key],
     /// Description of each key in a table whose keys are satellites.
     each: Option<&'static Key>,
-    /// The word that says which kind of its tables it is.
+    /// The word that states which kind of its tables it is.
     kind: Option<&'t str>,
 }
 

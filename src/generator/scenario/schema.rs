@@ -135,7 +135,7 @@ pub const fn flag(name: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Flag, meaning)
 }
 
-/// A text; `expected` says what it must be.
+/// A text; `expected` states what it must be.
 pub const fn text(name: &'static str, expected: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Text(expected), meaning)
 }
@@ -150,12 +150,12 @@ pub const fn word(name: &'static str, words: fn() -> Vec<&'static str>, meaning:
     key(name, Value::Word(words), meaning)
 }
 
-/// An array of words; `expected` says of which.
+/// An array of words; `expected` states of which.
 pub const fn words(name: &'static str, expected: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Words(expected), meaning)
 }
 
-/// A text or an array of texts; `expected` says what they are.
+/// A text or an array of texts; `expected` states what they are.
 pub const fn texts(name: &'static str, expected: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Texts(expected), meaning)
 }
@@ -185,7 +185,7 @@ pub const fn one_or_more(name: &'static str, keys: &'static [Key], meaning: &'st
     key(name, Value::OneOrMore(keys), meaning)
 }
 
-/// A table whose keys another reference has; `found` says which.
+/// A table whose keys another reference has; `found` states which.
 pub const fn foreign(name: &'static str, found: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Foreign(found), meaning)
 }

@@ -20,7 +20,7 @@ const CUT: f64 = 1e-5;
 const REACH: usize = 64;
 const BETA: f64 = 5.65;
 
-/// The low-pass prototype, by its poles in radians a sample.
+/// The low-pass prototype, by its poles in radians per sample.
 pub(super) struct Analogue {
     poles: Vec<Complex64>,
     residues: Vec<Complex64>,
@@ -72,8 +72,8 @@ impl Analogue {
     }
 }
 
-/// The taps of the filter about `middle` cycles a sample, of a real one about both signs of it, and its delay
-/// in samples in the middle of its band.
+/// The taps of the filter about `middle` cycles per sample, of a real one about both signs of it, and its
+/// delay in samples in the middle of its band.
 pub(super) fn taps(filter: &Analogue, middle: f64, real: bool) -> (Vec<Complex64>, f64) {
     // The carrier in the middle of the band is delayed as its envelope is.
     let turn = phasor(-TAU * middle * filter.delay());

@@ -132,8 +132,8 @@ fn short_enough(taps: usize, bandwidth_hz: f64, rate_hz: f64) -> Result<usize, F
     if taps > MAX_TAPS { Err(FilterError::Narrow { bandwidth_hz, rate_hz, taps }) } else { Ok(taps) }
 }
 
-/// A sinc of `width` cycles a sample under a Kaiser window, of unit gain in the middle of its band, which is
-/// at `middle` cycles a sample.
+/// A sinc of `width` cycles per sample under a Kaiser window, of unit gain in the middle of its band, which
+/// is at `middle` cycles per sample.
 fn brick_wall(width: f64, middle: f64, length: usize, real: bool) -> Vec<Complex64> {
     let beta = 0.1102 * (KAISER_DB - 8.7);
     let half = 0.5 * (length - 1) as f64;

@@ -63,7 +63,7 @@ impl<'a> Generator<'a> {
         Self::with(scene, &Options::default())
     }
 
-    /// [`Generator::new`] with the work cut as `options` say.
+    /// [`Generator::new`] with the work cut as `options` state.
     ///
     /// # Errors
     /// As [`Generator::new`].

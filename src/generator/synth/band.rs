@@ -12,12 +12,12 @@ use crate::low_pass::impulse;
 
 /// Samples of the response.
 pub(super) const WIDTH: usize = 2 * HALF_WIDTH;
-/// Points a sample in the table that the reference reads.
+/// Points per sample in the table that the reference reads.
 const FINE: usize = 4096;
 /// Cells a sample in the table of responses in `f64`.
 pub(super) const CELLS: usize = 64;
 /// Cells a sample in that of responses in [`UNIT`]s, which from the middle of a cell to its ends may not
-/// change by 2^22 units: they do not where the cut-off is below 0.4995 cycles a sample.
+/// change by 2^22 units: they do not where the cut-off is below 0.4995 cycles per sample.
 pub(super) const UNIT_CELLS: usize = 128;
 /// Unit of responses in whole numbers. 2^31 of them are 4, and no filter makes more than 1.7 times the
 /// largest value of what it is given.
@@ -85,7 +85,7 @@ impl UnitCell {
 }
 
 impl Filter {
-    /// A filter of that cut-off (−6 dB), in cycles a sample.
+    /// A filter of that cut-off (−6 dB), in cycles per sample.
     pub fn new(cutoff_cps: f64) -> Self {
         let at = |x: f64| impulse(x, cutoff_cps);
         let cell = 1.0 / FINE as f64;
@@ -153,7 +153,7 @@ impl Filter {
         }
     }
 
-    /// The response to a pulse of one chip in equal steps of those levels, at `step` chips a sample; `None`
+    /// The response to a pulse of one chip in equal steps of those levels, at `step` chips per sample; `None`
     /// for a chip of more than 48 samples. It is made once.
     pub(super) fn pulse(&self, levels: &[f64], step: f64) -> Option<Arc<Pulse>> {
         let mut known = self.pulses.lock().unwrap_or_else(PoisonError::into_inner);

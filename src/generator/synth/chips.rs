@@ -23,7 +23,7 @@ pub const MAX_STEP: f64 = 15.0;
 pub struct Pace {
     /// Steps in one code period.
     pub steps: u32,
-    /// Steps a second in thousandths, by the satellite's clock.
+    /// Steps per second in thousandths, by the satellite's clock.
     step_rate_mhz: i64,
     /// The fewest whole seconds that are whole periods, and those periods.
     cycle_s: i64,
@@ -91,7 +91,7 @@ impl Pace {
         Some(Self { steps, step_rate_mhz, cycle_s, cycle_periods, time })
     }
 
-    /// Steps a second by the satellite's clock.
+    /// Steps per second by the satellite's clock.
     pub fn step_rate_hz(&self) -> f64 {
         self.step_rate_mhz as f64 / 1000.0
     }
@@ -156,7 +156,7 @@ impl Spreading {
     }
 
     /// Appends the signs around `samples` samples that start at `at` and advance by `step`, with the data of
-    /// each period (`negative` says whether it is sent inverted, asked in their order), and returns the
+    /// each period (`negative` states whether it is sent inverted, asked in their order), and returns the
     /// position of the first sample in them.
     pub fn strip(
         &self,

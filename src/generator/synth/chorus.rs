@@ -4,7 +4,7 @@
 //! data and pilot at right angles are a quarter apart. Waves in phase are added first, so are those in
 //! quadrature, and both are turned by one carrier. Sequences that step together (*a layer*) share their
 //! positions and, for area edges, the shares of a sample that its steps have. Each half of a group begins its
-//! window anew, so that a sample may span two steps: BOC(6,1) from 6.4 Msps on. Longer ones are read sample
+//! window again, so that a sample may span two steps: BOC(6,1) from 6.4 Msps on. Longer ones are read sample
 //! by sample ([`super::dense`]), and waves behind a filter come ready ([`super::waves`]). Accuracy and order
 //! of operations are those of [`super::lanes`]: the same bits on every instruction set.
 
@@ -13,7 +13,7 @@ use super::lanes::{Carrier, FRACTION, GROUP, HALF, LANE_BITS, SIGN, Side, Sums, 
 use super::waves::{TILE, Waves};
 use super::{CODE_BITS, CODE_ONE, Edge, Run, dense};
 
-/// Most steps a sample that are read from a window for each half of a group, which then spans 30 of its 32,
+/// Most steps per sample that are read from a window for each half of a group, which then spans 30 of its 32,
 /// two of which an area looks back.
 const DENSEST: u64 = 29 * CODE_ONE / 15;
 const DENSER: u64 = DENSEST + 1;

@@ -4,8 +4,8 @@
 //! A sample's carrier is the product of phasors of its tile, of the middle of its group of 32 and of its
 //! position about that middle, each from its own 64-bit turns by Taylor series within 2e-16 over an eighth of
 //! a turn; code positions are read with all their 48 fractional bits. Band-limited edges are off by less than
-//! the rounding of the sum, as `responses` says. No value depends on the sample before. Sums over satellites
-//! are `f64` and become `f32` when all are in.
+//! the rounding of the sum, as `responses` states. No value depends on the sample before. Sums over
+//! satellites are `f64` and become `f32` when all are in.
 
 use super::waves::{TILE, Waves};
 use super::{Edge, RUN_SAMPLES, Run};

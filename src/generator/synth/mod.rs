@@ -6,7 +6,7 @@
 //! kernel. Both take all rays of a segment at once, as [`bank`] gathers them, and what the layers and zeros
 //! of a ray's components come to as several sequences of ±1 ([`waveform`]), a run each. They are plain
 //! lane-array code that [`isa`] compiles for each instruction set with the same bits on all. Limits: 15 code
-//! steps a sample.
+//! steps per sample.
 
 pub(crate) mod angle;
 pub mod band;
@@ -49,9 +49,9 @@ pub struct Run<'a> {
     pub bits: &'a [u64],
     /// Code position of sample 0 in `bits`, Q16.48 steps.
     pub position: u64,
-    /// Code steps a sample, Q16.48.
+    /// Code steps per sample, Q16.48.
     pub step: u64,
-    /// Carrier phase of sample 0, in 2^-64 turn, and its advance a sample.
+    /// Carrier phase of sample 0, in 2^-64 turn, and its advance per sample.
     pub turns: u64,
     /// Advance of the carrier a sample, in 2^-64 turn.
     pub turns_step: u64,
@@ -118,7 +118,7 @@ impl Edge<'_> {
     }
 
     /// Mean power of a waveform of autocorrelation `correlation` (by whole steps, its power at lag 0) at
-    /// `step` code steps a sample.
+    /// `step` code steps per sample.
     pub fn power(&self, correlation: &[f64], step: f64) -> f64 {
         match self {
             Edge::Nearest => correlation.first().copied().unwrap_or(1.0),

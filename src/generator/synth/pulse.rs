@@ -29,7 +29,7 @@ const SUMS: usize = 2;
 pub struct Pulse {
     /// Levels of equal steps of the chip.
     levels: Vec<f64>,
-    /// Chips a sample without a Doppler.
+    /// Chips per sample without a Doppler.
     step: f64,
     /// Blocks of a response.
     blocks: usize,
@@ -51,8 +51,8 @@ impl Default for Pulses {
 }
 
 impl Pulse {
-    /// The response to a pulse of those levels, of `step` chips a sample; `None` where a chip is longer than
-    /// 48 samples.
+    /// The response to a pulse of those levels, of `step` chips per sample; `None` where a chip is longer
+    /// than 48 samples.
     pub(super) fn new(filter: &Filter, levels: &[f64], step: f64) -> Option<Self> {
         let blocks = Self::blocks(step)?;
         let mut pulse = Self { levels: levels.to_vec(), step, blocks, terms: Vec::new() };
@@ -75,7 +75,7 @@ impl Pulse {
         Some(pulse)
     }
 
-    /// Blocks of the response to a chip at so many chips a sample.
+    /// Blocks of the response to a chip at so many chips per sample.
     pub(super) fn blocks(step: f64) -> Option<usize> {
         let half = HALF_WIDTH as f64 + 0.5 / step;
         let taps = 2 * half.ceil() as usize;

@@ -24,7 +24,7 @@ pub struct Position {
     pub whole: i64,
     /// Fraction of a sample, in 2^-32.
     pub fraction: u32,
-    /// Source samples a sample, in 2^-32.
+    /// Source samples per sample, in 2^-32.
     pub step: u64,
 }
 
@@ -35,7 +35,7 @@ pub struct Interpolator {
 }
 
 impl Interpolator {
-    /// Cut-off (−6 dB) in cycles a sample of the source. `unit_noise` scales white noise of unit power to
+    /// Cut-off (−6 dB) in cycles per sample of the source. `unit_noise` scales white noise of unit power to
     /// unit power; otherwise slow signals keep their size.
     pub fn new(cutoff_cps: f64, unit_noise: bool) -> Self {
         let mut rows: Vec<[f64; TAPS]> = (0..=PHASES)

@@ -197,7 +197,7 @@ impl<T: Number> Default for Sums<T> {
     }
 }
 
-/// Vectors of eight doubles, or of as many bytes, in the response to an edge at so many steps a sample.
+/// Vectors of eight doubles, or of as many bytes, in the response to an edge at so many steps per sample.
 pub(super) fn edge_vectors(step: f64) -> f64 {
     if step * CODE_ONE as f64 <= LONGEST_IN_UNITS as f64 { 1.0 } else { 2.0 }
 }

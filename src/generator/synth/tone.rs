@@ -34,17 +34,17 @@ pub enum Modulation {
 /// A carrier over up to 4096 samples.
 #[derive(Clone, Copy, Debug)]
 pub struct Tone {
-    /// Phase of sample 0, in 2^-64 turn, and its advance a sample, Doppler in.
+    /// Phase of sample 0, in 2^-64 turn, and its advance per sample, Doppler in.
     pub turns: u64,
     /// Advance of the carrier a sample, in 2^-64 turn.
     pub turns_step: u64,
     /// Position in the repetition, in 2^-64 period.
     pub place: u64,
-    /// Advance of the position in the repetition a sample, in 2^-64 of it.
+    /// Advance of the position in the repetition per sample, in 2^-64 of it.
     pub place_step: u64,
     /// The frequency over one repetition.
     pub modulation: Modulation,
-    /// Band of the samples less the carrier's position, in cycles a sample.
+    /// Band of the samples less the carrier's position, in cycles per sample.
     pub band_cps: (f64, f64),
     /// Peak amplitude, in LSB.
     pub amplitude: f32,

@@ -91,7 +91,7 @@ pub enum WaveformError {
         component: usize,
         /// Number of the layer, from 0.
         layer: usize,
-        /// Steps a second.
+        /// Steps per second.
         steps_hz: f64,
         /// The sample rate.
         rate_hz: f64,
@@ -168,7 +168,7 @@ impl Waveform {
     /// that has a mean power of one behind `edge`.
     ///
     /// # Errors
-    /// [`WaveformError`] for more than 15 steps a sample, and for a code whose periods cannot be counted.
+    /// [`WaveformError`] for more than 15 steps per sample, and for a code whose periods cannot be counted.
     pub fn voices(&self, layers: Layers, edge: Edge<'_>, rate_hz: f64) -> Result<Vec<Voice>, WaveformError> {
         let layers = self.component.made_with(layers);
         let steps_hz = |layer: &Layer| self.component.chip_rate_hz * layer.pulse.len() as f64;

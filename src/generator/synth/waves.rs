@@ -2,7 +2,7 @@
 //! phase with the first and those at right angles to it, before a carrier turns them.
 //!
 //! Values of a sequence are those of [`super::reference`]: to the last bit with nearest and area edges, and
-//! as [`super::responses`] and [`super::pulse`] say behind a filter.
+//! as [`super::responses`] and [`super::pulse`] state behind a filter.
 
 use super::chips::window;
 use super::pulse::Pulses;

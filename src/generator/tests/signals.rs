@@ -128,7 +128,7 @@ impl Definition {
         (whole.div_euclid(1000) + rest.floor() as i128, rest - rest.floor())
     }
 
-    /// Steps a second.
+    /// Steps per second.
     fn rate_hz(&self) -> f64 {
         self.component.chip_rate_hz * self.per_chip as f64
     }

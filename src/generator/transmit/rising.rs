@@ -51,7 +51,7 @@ impl Leap {
 /// not in view in the last of them.
 ///
 /// # Errors
-/// Those of `presence`, which says where the satellite is at a second.
+/// Those of `presence`, which states where the satellite is at a second.
 pub(super) fn rising<E>(
     scene: &Scene,
     (from, sv): (&Constellation, Sv),

@@ -53,7 +53,7 @@ pub enum Nose {
 pub struct Attitude {
     /// Direction of the body.
     pub nose: Nose,
-    /// Turns a second about the nose, positive to the right.
+    /// Turns per second about the nose, positive to the right.
     pub spin_hz: f64,
     /// Lever arm in metres from the point that moves along the trajectory to the antenna, in body axes.
     pub lever_arm_m: Vector3<f64>,
@@ -87,8 +87,8 @@ impl Attitude {
         }
     }
 
-    /// The body's axes `t_s` seconds after the scene's start, when its trajectory says `motion`, and `pushed`
-    /// where the turn is pushed.
+    /// The body's axes `t_s` seconds after the scene's start, when its trajectory states `motion`, and
+    /// `pushed` where the turn is pushed.
     pub fn at(&self, t_s: f64, motion: &Motion, pushed: Option<&Turn>) -> Orientation {
         let local = local_axes(Geodetic::from_ecef(&motion.position_m));
         let still = match self.nose {
@@ -106,7 +106,7 @@ impl Attitude {
         Orientation { still, spin_cycles: self.spin_hz * t_s }
     }
 
-    /// The antenna's motion `t_s` seconds after the scene's start, when the trajectory says `motion`, and
+    /// The antenna's motion `t_s` seconds after the scene's start, when the trajectory states `motion`, and
     /// `pushed` where the turn is pushed. The slow turning of the nose moves the lever arm, but does not
     /// enter its velocity and acceleration; a pushed rate does, an angular acceleration does not.
     pub fn antenna(&self, t_s: f64, motion: &Motion, pushed: Option<&Turn>) -> Motion {

@@ -171,7 +171,7 @@ pub enum Fault {
         /// The acceleration.
         acceleration_mps2: f64,
     },
-    /// A tolerance for rows whose velocities say how the motion goes.
+    /// A tolerance for rows whose velocities state how the motion goes.
     #[error("velocities beside tolerance_m: expected positions alone, or no tolerance_m")]
     Velocities,
     /// Fewer rows than a motion needs.
@@ -442,7 +442,7 @@ pub fn read_csv(input: impl Read, file: &str, options: &Options) -> Result<CsvTr
 pub struct NmeaTrajectory {
     /// The motion.
     pub trajectory: Trajectory,
-    /// GGA sentences that say that there is no fix.
+    /// GGA sentences that state that there is no fix.
     pub without_fix: usize,
     /// GGA sentences without a geoid separation, for which EGM96's was added.
     pub separations_assumed: usize,

@@ -2,7 +2,7 @@
 //!
 //! A tick follows a quintic from the state that is transmitted now to the newest pushed state, extrapolated
 //! to the end of the joining time: position, velocity and acceleration are continuous whatever is pushed. The
-//! next tick aims anew. Without news the acceleration is kept for the holding time, fades over another one,
+//! next tick aims again. Without news the acceleration is kept for the holding time, fades over another one,
 //! and the velocity stays. Where a join needs more jerk than allowed, the tick moves all the way within
 //! itself, still without a step: a snap. Limits: a velocity that is not pushed is the slope from the push
 //! before, half an interval old, and the acceleration then zero.

@@ -198,7 +198,7 @@ impl Trajectory {
     }
 
     /// The motion of the body that carries the antenna. Before the first knot and after the last one the
-    /// acceleration there continues; [`Self::span_s`] says where that is.
+    /// acceleration there continues; [`Self::span_s`] states where that is.
     pub fn body(&self, t_s: f64) -> Motion {
         if let Some(grown) = &self.grown {
             return grown.body(t_s).unwrap_or(self.first.motion);

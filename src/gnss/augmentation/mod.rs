@@ -22,7 +22,7 @@ pub const FAST_SLOTS: usize = 13;
 pub const MIXED_SLOTS: usize = 6;
 /// Points of a block of delays.
 pub const DELAY_SLOTS: usize = 15;
-/// Issue of fast corrections that says that an alarm is on (A.4.4.4).
+/// Issue of fast corrections that states that an alarm is on (A.4.4.4).
 pub const ALARM: u8 = 3;
 
 /// Type 1: which satellites are corrected.

@@ -9,7 +9,7 @@
 //! The program of the model's authors (Li and Wang, 2021) differs from the document: it has the modified
 //! single-layer mapping (0.9782) for the document's, 40.3 for 40.28, a geocentric pierce point, and a least
 //! vertical content ([`Bdgim::least_tecu`]), without which the sum is below zero in places. That least
-//! content alone is taken over here. Limits: time is that of BDT, where the document says modified Julian
+//! content alone is taken over here. Limits: time is that of BDT, where the document has modified Julian
 //! date and no more (UTC is 4 s off, 5 mm of delay at most); geodetic latitudes are taken for those on the
 //! sphere, as in the document; below the horizon the elevation counts as zero.
 
@@ -163,7 +163,7 @@ pub fn forecast_tecu(interval: i64) -> [f64; 17] {
 }
 
 impl Bdgim {
-    /// The model of coefficients that are not all zero, as they are where a message says nothing.
+    /// The model of coefficients that are not all zero, as they are where a message states nothing.
     pub fn given(alpha_tecu: [f64; 9]) -> Option<Self> {
         alpha_tecu.iter().any(|alpha| *alpha != 0.0).then_some(Self { alpha_tecu })
     }

@@ -114,7 +114,7 @@ fn long(number: u8) -> Option<Vec<i8>> {
     Some(registers([1, 3, 4, 13], &[1, 5, 6, 7, 9, 10, 12, 13], start))
 }
 
-/// The code of two registers of thirteen stages, which feed back those stages: the first begins anew after
+/// The code of two registers of thirteen stages, which feed back those stages: the first begins again after
 /// 8190 chips, the second begins with `start`, from stage 1 on.
 pub(super) fn registers(first: [u32; 4], second: &[u32], start: u16) -> Vec<i8> {
     let (first, second) = (stages(&first), stages(second));

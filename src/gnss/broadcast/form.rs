@@ -50,7 +50,7 @@ fn plain_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
 }
 
 impl Ephemeris {
-    /// The group delay of a code of RINEX, where another message of the satellite says it.
+    /// The group delay of a code of RINEX, where another message of the satellite states it.
     pub fn delay_of_code_s(&self, code: &str) -> Option<f64> {
         self.signal_delays_s.iter().find(|(own, _)| *own == code).map(|(_, delay_s)| *delay_s)
     }
@@ -74,7 +74,7 @@ impl PartialEq for SetForm {
 }
 
 /// Bit of GLONASS's flag l of string 3, 1 where the satellite is unhealthy, among the health flags of a
-/// record. Bit 1 says whether the almanac's health is known, and bit 0 is that health, 1 where it is good
+/// record. Bit 1 states whether the almanac's health is known, and bit 0 is that health, 1 where it is good
 /// (RINEX 3.05, table A10).
 pub const STRING_3_UNHEALTHY: u16 = 2;
 

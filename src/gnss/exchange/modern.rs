@@ -19,7 +19,7 @@ pub fn orbit(set: &Ephemeris, time_s: Option<f64>) -> Vec<RecordLine> {
     ]
 }
 
-/// A delay of which its field's least value says that it is not available (IS-GPS-705J, 20.3.3.3.1.1).
+/// A delay of which its field's least value states that it is not available (IS-GPS-705J, 20.3.3.3.1.1).
 const NOT_AVAILABLE_S: f64 = -4096.0 / (1_u64 << 35) as f64;
 
 /// Seconds of the week of the reference time at which an ephemeris was sent, before it too.

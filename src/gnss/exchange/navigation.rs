@@ -326,7 +326,7 @@ fn ura_m(index: u8) -> f64 {
     }
 }
 
-/// Metres of a signal-in-space accuracy index; −1 says that there is no prediction (Galileo OS SIS ICD 2.1,
+/// Metres of a signal-in-space accuracy index; −1 states that there is no prediction (Galileo OS SIS ICD 2.1,
 /// table 90).
 fn sisa_m(index: u8) -> f64 {
     let index = f64::from(index);

@@ -8,7 +8,7 @@ use crate::message::{Raw, Records};
 use crate::satellite::{Sv, System};
 use crate::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
 
-/// One time scale against another, as a message says it.
+/// One time scale against another, as a message states it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Offset {
     /// RINEX name of the pair of time scales.
@@ -37,7 +37,7 @@ fn named(system: System) -> &'static [Named] {
     }
 }
 
-/// The offsets that the parameters of a message say, near a time by which weeks are resolved.
+/// The offsets that the parameters of a message state, near a time by which weeks are resolved.
 pub(super) fn offsets(records: &Records, system: System, raw: Raw<'_>, near: Epoch) -> Vec<Offset> {
     let tables = (records.fields)();
     let field = |prefix: &str, rest: &str| -> Option<&'static Field> {
@@ -77,7 +77,7 @@ impl Offset {
     }
 
     /// The record of a file of version 4 of a satellite that sent it (RINEX 4.02, table of `STO` records).
-    /// When it was sent is not known, which its zero says as in records of ephemerides.
+    /// When it was sent is not known, which its zero states as in records of ephemerides.
     pub fn record(&self, records: &Records, sv: Sv) -> String {
         let [year, month, day, hour, minute, second] = calendar(self.reference);
         let epoch = format!("{year:04} {month:02} {day:02} {hour:02} {minute:02} {second:02}");

@@ -18,7 +18,7 @@ pub enum Interference {
         /// Sweeps a second.
         repetition_hz: f64,
     },
-    /// A frequency that runs to and fro.
+    /// A frequency that runs back and forth.
     Fmcw {
         /// Width of the sweep from end to end, in Hz.
         width_hz: f64,
@@ -43,7 +43,7 @@ pub enum Interference {
     },
     /// Random chips.
     Matched {
-        /// Chips a second.
+        /// Chips per second.
         repetition_hz: f64,
     },
     /// Gaussian noise of a flat band.

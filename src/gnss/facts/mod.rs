@@ -126,7 +126,7 @@ impl Expect {
         self.whole.is_none() && self.intervals.is_empty()
     }
 
-    /// The terms that say something at a time, the last of the intervals first and the whole scene's last.
+    /// The terms that state something at a time, the last of the intervals first and the whole scene's last.
     pub fn at(&self, time_s: f64) -> impl Iterator<Item = &Terms> {
         let within = move |interval: &&Interval| (interval.from_s..interval.to_s).contains(&time_s);
         self.intervals.iter().rev().filter(within).map(|interval| &interval.terms).chain(&self.whole)
@@ -175,19 +175,19 @@ pub enum FaultKind {
     ClockStep,
     /// A satellite's clock runs away.
     ClockRamp,
-    /// A satellite's clock is noisier than its message says.
+    /// A satellite's clock is noisier than its message states.
     ClockNoise,
-    /// A satellite is not where its message says.
+    /// A satellite is not where its message states.
     Orbit,
     /// Bits of the message are wrong at random.
     BitErrors,
     /// One bit of the message is wrong.
     Bit,
-    /// The message says that the satellite is not healthy.
+    /// The message states that the satellite is not healthy.
     Health,
     /// A parameter of the message is wrong.
     Parameter,
-    /// The message says nothing but that something is wrong.
+    /// The message states nothing but that something is wrong.
     Alert,
 }
 

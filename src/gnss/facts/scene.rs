@@ -26,9 +26,9 @@ pub struct SceneFacts {
     /// Number of samples.
     #[serde(default)]
     pub samples: u64,
-    /// Samples a second, Hz.
+    /// Samples per second, Hz.
     pub sample_rate_hz: f64,
-    /// Frequency on the air that lies at 0 in the samples, Hz.
+    /// Radio frequency that lies at 0 in the samples, Hz.
     #[serde(default)]
     pub center_hz: Option<f64>,
     /// True if the samples' spectrum is mirrored about `center_hz`.
@@ -43,7 +43,7 @@ pub struct SceneFacts {
     /// Placement of chip edges between samples.
     #[serde(default)]
     pub code_edge: Edge,
-    /// Cut-off (−6 dB) of band-limited edges, cycles a sample.
+    /// Cut-off (−6 dB) of band-limited edges, cycles per sample.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edge_cutoff_cps: Option<f64>,
     /// Layers that are transmitted of waveforms with several layers.
@@ -158,9 +158,9 @@ pub struct FrontEndFacts {
     pub name: Option<String>,
     /// Number of samples.
     pub samples: u64,
-    /// Samples a second, Hz.
+    /// Samples per second, Hz.
     pub sample_rate_hz: f64,
-    /// Frequency on the air that lies at 0 in the samples, Hz.
+    /// Radio frequency that lies at 0 in the samples, Hz.
     pub center_hz: f64,
     /// True if the samples' spectrum is mirrored.
     pub inverted: bool,
@@ -168,7 +168,7 @@ pub struct FrontEndFacts {
     pub format: String,
     /// Placement of chip edges between samples.
     pub code_edge: Edge,
-    /// Cut-off (−6 dB) of band-limited edges, cycles a sample.
+    /// Cut-off (−6 dB) of band-limited edges, cycles per sample.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub edge_cutoff_cps: Option<f64>,
     /// Names of the signals.

@@ -24,8 +24,8 @@ impl Frames {
         Self { length, symbols: VecDeque::with_capacity(length), next: 0, frame: None, failures: 0 }
     }
 
-    /// Takes the next symbol; gives the frame that ends with it. Until one is known `may_begin` says of every
-    /// position whether `decode` is worth its time.
+    /// Takes the next symbol; gives the frame that ends with it. Until one is known `may_begin` states of
+    /// every position whether `decode` is worth its time.
     pub fn take<F>(
         &mut self,
         soft: f32,

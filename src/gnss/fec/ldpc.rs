@@ -84,7 +84,7 @@ impl Ldpc {
     }
 }
 
-/// One check: what it said before is taken off its bits, and what it says now added instead.
+/// One check: what it said before is taken off its bits, and what it states now added instead.
 fn update(row: &[usize], said: &mut [f32], sure: &mut [f32]) {
     let (mut least, mut next, mut at, mut odd) = (f32::INFINITY, f32::INFINITY, 0, false);
     for (edge, (&place, said)) in row.iter().zip(said.iter()).enumerate() {

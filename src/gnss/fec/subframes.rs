@@ -72,8 +72,7 @@ impl Subframes {
         first.iter().copied().chain(self.interleaver.interleave(rest)).collect()
     }
 
-    /// The most likely times in soft symbols with whether they are inverted then, and how much of what the
-    /// symbols say is for them.
+    /// Most likely times of soft symbols, each with true if they are inverted, and their agreement, 0 to 1.
     pub fn likely_times(&self, soft: &[f32]) -> (Vec<(u32, bool)>, f32) {
         let own = soft.get(..self.time_symbols()).unwrap_or(soft);
         let all: f32 = own.iter().map(|value| value.abs()).sum();

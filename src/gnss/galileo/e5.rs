@@ -130,7 +130,7 @@ fn register(feedback: u32, start: u32) -> impl Iterator<Item = bool> {
 }
 
 /// The chips of a satellite by its number, 1 to 50, as ±1; `None` beyond. The first register starts with
-/// ones, and neither starts anew before the code's end.
+/// ones, and neither starts again before the code's end.
 pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     let start = STARTS.get(usize::from(number).checked_sub(1)?)?.get(which.column())?;
     let [first, second] = which.feedback();

@@ -3,7 +3,7 @@
 //!
 //! Source: Galileo E6-B/C codes technical note (modulation, codes; secondary codes are those of E5a's pilot,
 //! CS100 of the satellite's number), by tables of other programs that agree. The codes have no generator, and
-//! `e6_codes.bin` holds the chips. Its message says neither time nor orbit ([`super::cnav`]), and no group
+//! `e6_codes.bin` holds the chips. Its message states neither time nor orbit ([`super::cnav`]), and no group
 //! delay of E6 is broadcast (`status`). Limits: the pilot's minus sign is the document's and has not been
 //! measured; E6-A is left out.
 

@@ -2,10 +2,10 @@
 //!
 //! Source: Galileo OS SIS ICD 2.1, 5.1.9.6 and 5.1.9.7 (status), 5.1.5 (broadcast group delays). I/NAV has
 //! the clock of the combination of E1 and E5b, F/NAV that of E1 and E5a; an ephemeris keeps BGD(E1,E5b) in
-//! `tgd_s` and BGD(E1,E5a) in `tgd2_s`, whichever clock it has. Of E6 neither says anything: it has the clock
-//! of I/NAV here, without a delay, as a user takes it who knows no more; real satellites delay E6 by what
-//! only the high accuracy service sends. Of both sides of E5 as one signal neither says anything either: here
-//! it is delayed by the mean of what delays its sides, which have equal power.
+//! `tgd_s` and BGD(E1,E5a) in `tgd2_s`, whichever clock it has. Of E6 neither states anything: it has the
+//! clock of I/NAV here, without a delay, as a user takes it who knows no more; real satellites delay E6 by
+//! what only the high accuracy service sends. Of both sides of E5 as one signal neither states anything
+//! either: here it is delayed by the mean of what delays its sides, which have equal power.
 
 use super::e5;
 use crate::broadcast::Ephemeris;

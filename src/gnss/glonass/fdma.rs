@@ -2,12 +2,12 @@
 //! carrier of its channel.
 //!
 //! Source: GLONASS ICD L1, L2 5.1, 3.3.1.1 (carriers), 3.3.2.1 (code), 3.3.2.2 (data). The number of a
-//! satellite is its slot. No document says which slot has which channel, and no satellite says its own but in
-//! almanacs: [`channel`] is the assignment that navigation files have had since 2010, the same in those of
-//! 2020, 2023, 2025 and 2026 that were looked at. Satellites that are opposite each other share a channel: a
-//! receiver on the ground meets one of both, and learns from the message which. Limits: slots 1 to 24; a
-//! satellite on another channel is left out where a file has it. The code at high accuracy, in quadrature, is
-//! not sent.
+//! satellite is its slot. No document states which slot has which channel, and no satellite states its own
+//! but in almanacs: [`channel`] is the assignment that navigation files have had since 2010, the same in
+//! those of 2020, 2023, 2025 and 2026 that were looked at. Satellites that are opposite each other share a
+//! channel: a receiver on the ground meets one of both, and learns from the message which. Limits: slots 1 to
+//! 24; a satellite on another channel is left out where a file has it. The code at high accuracy, in
+//! quadrature, is not sent.
 
 use crate::glonass::gnav::GNAV;
 use crate::satellite::System;

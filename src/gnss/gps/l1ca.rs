@@ -1,7 +1,7 @@
 //! GPS L1 C/A: Gold codes of 1023 chips at 1.023 Mchip/s on 1575.42 MHz.
 //!
 //! Source: IS-GPS-200N, 3.3.2.3 and table 3-Ia. The codes of PRN 1 to 37 are made from the two printed
-//! registers and the G2 delays; PRN 34 and 37 share a code, as the table says. Those of PRN 120 to 158 are
+//! registers and the G2 delays; PRN 34 and 37 share a code, as the table states. Those of PRN 120 to 158 are
 //! of augmentation systems and those of PRN 193 to 202 of QZSS (IS-GPS-200N, table 6-I).
 
 use crate::gps::lnav::LNAV;

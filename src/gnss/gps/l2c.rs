@@ -2,7 +2,7 @@
 //!
 //! Source: IS-GPS-200N, 3.2.1.4 and 3.2.1.5 (CM of 10 230 chips in 20 ms with CNAV, CL of 767 250 in 1.5 s),
 //! 3.3.2.4 (one register of 27 stages for both), tables 3-IIa and 6-I (its first states). Each code has
-//! 511 500 chips a second; here a chip is one of the 1.023 million positions a second, and codes are zero
+//! 511 500 chips per second; here a chip is one of the 1.023 million positions per second, and codes are zero
 //! where the other has its turn. Limits: the power is that of Blocks IIR-M and IIF; the phase is that of CM,
 //! with no P code beside it.
 

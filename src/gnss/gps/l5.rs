@@ -2,7 +2,7 @@
 //! 1176.45 MHz.
 //!
 //! Source: IS-GPS-705J, 3.2.1 (codes), 3.3.1 (modulation: Q5 lags), tables 3-Ia and 6-I (advances). XA starts
-//! anew after 8190 chips, XB after its natural 8191, both with the code. Limits: the power is that of Block
+//! again after 8190 chips, XB after its natural 8191, both with the code. Limits: the power is that of Block
 //! IIF.
 
 use std::sync::LazyLock;
@@ -68,7 +68,7 @@ pub enum Code {
     Pilot,
 }
 
-/// Chips of XA until it starts anew, and of XB.
+/// Chips of XA until it starts again, and of XB.
 const XA_CHIPS: usize = 8190;
 const XB_CHIPS: usize = 8191;
 

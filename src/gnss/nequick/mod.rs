@@ -98,7 +98,7 @@ impl Line {
         Self { perigee_km: user_km - along * from_km, along, from_km, to_km: from_km + way_km.norm() }
     }
 
-    /// Integral of `density` over the line, in its unit times a kilometre.
+    /// Integral of `density` over the line, in its unit times kilometres.
     fn integrate(&self, density: impl Fn(&Vector3<f64>) -> f64) -> f64 {
         let perigee_km = self.perigee_km.norm();
         let mut ends_km: Vec<f64> = vec![self.from_km, self.to_km, 0.0];

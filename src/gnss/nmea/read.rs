@@ -172,7 +172,7 @@ impl<'t> Sentence<'t> {
         if have < need { Err(short()) } else { Ok(()) }
     }
 
-    /// The fix of a GGA sentence; `None` where it says that there is none.
+    /// The fix of a GGA sentence; `None` where it states that there is none.
     ///
     /// # Errors
     /// [`SentenceError`]: too few fields, one that has not its form.

@@ -89,7 +89,7 @@ pub struct Packer<W> {
 }
 
 impl<W: Write> Packer<W> {
-    /// Writes to `writer` as `layout` says.
+    /// Writes to `writer` as `layout` states.
     pub fn new(layout: Layout, writer: W) -> Self {
         Self { layout, writer, samples: Vec::new(), packed: Vec::new() }
     }

@@ -104,7 +104,7 @@ type Line<'t> = (usize, &'t str);
 /// Reads an ASCII text.
 ///
 /// # Errors
-/// No header that says how to read the rest.
+/// No header that states how to read the rest.
 pub(super) fn read(text: &[u8]) -> Result<Contents, String> {
     let whole = String::from_utf8_lossy(text);
     let all: Vec<Line<'_>> = (1..).zip(whole.lines()).collect();

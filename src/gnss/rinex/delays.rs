@@ -7,7 +7,7 @@ use crate::broadcast::Ephemeris;
 use crate::satellite::Sv;
 
 /// Gives each ephemeris the group delays of its satellite's records: of each code those of the signal's own
-/// message before those that another message says of it, and of these the nearest in time.
+/// message before those that another message states of it, and of these the nearest in time.
 pub(super) fn give(sets: &mut [Ephemeris], records: &[Delays]) {
     let mut by_satellite: BTreeMap<Sv, Vec<&Delays>> = BTreeMap::new();
     for record in records {

@@ -277,7 +277,7 @@ fn galileo(record: &Record, common: Ephemeris) -> Result<Ephemeris, String> {
     })
 }
 
-/// Metres of accuracy, where they are given; a negative one says nothing.
+/// Metres of accuracy, where they are given; a negative one states nothing.
 fn optional_accuracy(record: &Record) -> Result<Option<f64>, String> {
     if record.get("accuracy").is_some() { field(record, "accuracy", 0.0, 1e6).map(Some) } else { Ok(None) }
 }

@@ -1,8 +1,9 @@
-//! SBAS L1: C/A codes of PRN 120 to 158, the satellites S20 to S58, with 500 symbols a second.
+//! SBAS L1: C/A codes of PRN 120 to 158, the satellites S20 to S58, with 500 symbols per second.
 //!
 //! Source: RTCA DO-229D, appendix A.2 (signal), A.3.2 (codes), IS-GPS-200N, table 6-I (their delays).
 //! Satellites are timed by the network, which keeps within 50 ns of GPS time: it is taken for GPS time.
-//! Limits: the power is the least that is promised; which numbers range says the message alone.
+//! Limits: the power is the least that is promised; only the message states which satellites may be used for
+//! ranging.
 
 use crate::gps::l1ca::{self, code};
 use crate::satellite::{Sv, System};

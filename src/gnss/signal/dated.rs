@@ -1,4 +1,4 @@
-//! Signals whose messages say when they are sent and from where, and those that take it from these.
+//! Signals whose messages state when they are sent and from where, and those that take it from these.
 
 use super::Signal;
 use crate::message::Message;

@@ -144,7 +144,7 @@ pub struct Component {
     pub power_share: f64,
     /// Carrier phase relative to the signal's reference phase.
     pub phase_cycles: f64,
-    /// Chips a second, by the satellite's clock.
+    /// Chips per second, by the satellite's clock.
     pub chip_rate_hz: f64,
     /// Chips in one period of the code.
     pub code_chips: u32,

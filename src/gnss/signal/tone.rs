@@ -14,7 +14,7 @@ use super::{Component, Layer, Shape, Signal, shape};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tone {
     /// Half cycles in a chip, negative below the carrier. Of an odd number the sign changes from chip to chip
-    /// where the pulses begin anew.
+    /// where the pulses begin again.
     pub half_cycles: i32,
     /// Amplitude and phase of the line at a chip's beginning, relative to the component's.
     pub gain: Complex64,

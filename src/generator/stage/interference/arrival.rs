@@ -1,7 +1,7 @@
 //! Arrival of an emitter's wave in the samples: clock, path, tuning and repetition.
 //!
 //! Sample n is taken when the receiver's clock reads n/rate after its start; what it holds was sent
-//! `behind_s` before that reading (the clock's error plus the time on the way). Phases are the exact phase of
+//! `behind_s` before that time (the clock's error plus the time on the way). Phases are the exact phase of
 //! sample n as integers, less frequency times `behind_s`, so neither a long scene nor a drifting clock loses
 //! a digit. Limits: emitters do not move.
 
@@ -17,7 +17,7 @@ use gnss::time::{Rate, SampleClock, tone_turns};
 /// Receiver's effect on any wave between its antenna and its samples.
 #[derive(Clone, Debug)]
 pub struct Tuning {
-    /// Sample numbers as readings of the receiver's clock.
+    /// Sample numbers as times of the receiver's clock.
     pub clock: SampleClock,
     /// Receiver's clock, with its offset from GPS time.
     pub receiver_clock: ReceiverClock,
@@ -102,7 +102,7 @@ impl Tuning {
     }
 }
 
-/// The stretch of `half_hz` in which most of the signals' carriers lie, counted from 0 Hz; of equals the
+/// The zone of width `half_hz` in which most of the signals' carriers lie, counted from 0 Hz; of equals the
 /// first signal's.
 fn zone_of(metadata: &IfMetadata, signals: &[&Signal], half_hz: f64) -> f64 {
     let carriers = signals.iter().flat_map(|signal| <[f64; 2]>::from(signal.carriers_hz()));
@@ -157,7 +157,7 @@ impl Repetition {
         Self { count: 1_000_000_000_000, seconds: (period_s * 1e12).round().max(1.0) as u64 }
     }
 
-    /// `hz` times a second, to the millihertz.
+    /// `hz` times per second, to the millihertz.
     pub fn of_hz(hz: f64) -> Self {
         Self { count: (hz * 1e3).round().max(1.0) as u64, seconds: 1000 }
     }

@@ -89,11 +89,11 @@ pub enum Waveform {
     },
     /// Gaussian noise over the samples' whole band.
     White,
-    /// Gaussian noise of a band; `step` source samples a sample, in 2^-32.
+    /// Gaussian noise of a band; `step` source samples per sample, in 2^-32.
     Noise {
         /// Width of the band.
         width_hz: f64,
-        /// Source samples a sample, in 2^-32.
+        /// Source samples per sample, in 2^-32.
         step: u64,
         /// Interpolator from the source's samples to the scene's.
         by: Interpolator,
@@ -152,7 +152,7 @@ struct Anchor {
     n: u64,
     /// Samples to its other end.
     length: u64,
-    /// Reading of the receiver's clock minus the time sent, at both ends.
+    /// Time of the receiver's clock minus the transmission time, at both ends, in seconds.
     behind_s: [f64; 2],
     turns: u64,
     turns_step: u64,
@@ -164,7 +164,7 @@ impl Interferer {
         self.path.as_ref().map_or(0.0, |path| path.travel_s(self.tuning.elapsed_s(n)))
     }
 
-    /// Reading of the receiver's clock at sample `n` minus the time at which what arrives was sent.
+    /// Time of the receiver's clock at sample `n` minus the transmission time of the wave, in seconds.
     fn behind_s(&self, n: u64) -> f64 {
         let (clock, local) = (&self.tuning.clock, self.tuning.clock.epoch(n));
         local.since(self.tuning.receiver_clock.true_time(clock.start, local)) + self.travel_s(n)
@@ -234,7 +234,7 @@ impl Interferer {
         self.switches.as_ref().map(|switches| switches.tick_samples())
     }
 
-    /// The stretch around sample `at` of the run from `run` on, in which phases are linear.
+    /// Segment around sample `at` of the run from `run` on, in which phases are linear.
     fn span(&self, run: u64, at: u64) -> Range<u64> {
         let whole = run..run + RUN;
         self.tick_samples().map_or(whole.clone(), |tick| {
@@ -257,7 +257,7 @@ impl Interferer {
         }
     }
 
-    /// Position in a repetition at the start of the run, whole and in 2^-64, and its advance a sample.
+    /// Position in a repetition at the start of the run, whole and in 2^-64, and its advance per sample.
     fn place(&self, anchor: &Anchor, repetition: Repetition, late_s: f64) -> (i64, u64, i128) {
         let at = |end: usize| {
             let n = anchor.n + anchor.length * end as u64;
@@ -269,7 +269,7 @@ impl Interferer {
         (whole, first, advance / i128::from(anchor.length))
     }
 
-    /// Adds samples `from` to `from + i.len()` of the anchor's stretch.
+    /// Adds samples `from` to `from + i.len()` of the anchor's segment.
     fn add(&self, level: Level, anchor: &Anchor, from: u64, i: &mut [f32], q: &mut [f32]) {
         match &self.waveform {
             Waveform::Cw => isa::add_tone(level, &self.tone(anchor, from, Modulation::None, None), i, q),

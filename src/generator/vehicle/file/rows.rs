@@ -80,7 +80,7 @@ impl Rows {
         if self.tolerance_m.is_some() { None } else { Digits::of(&self.rows, step_m) }
     }
 
-    /// The spline through the rows, or as near to them as the tolerance says, with a break at each of them.
+    /// The spline through the rows, or as near to them as the tolerance states, with a break at each of them.
     pub fn finish(mut self, file: &str) -> Result<Trajectory, FileError> {
         let error = |line, fault| FileError { file: file.to_owned(), line, fault };
         let last = self.lines.last().map_or(1, |line| u64::from(*line));

@@ -2,7 +2,7 @@
 //!
 //! A digit of d metres rounds by up to d/2, d/√12 rms. The natural cubic spline through rows h apart makes of
 //! independent errors accelerations six times as large over h² (rms over all frequencies of
-//! 6(2 − 2 cos ω)/(4 + 2 cos ω)), √3·d/h² a coordinate: of 18 cm ten times a second 32 m/s².
+//! 6(2 − 2 cos ω)/(4 + 2 cos ω)), √3·d/h² a coordinate: of 18 cm ten times per second 32 m/s².
 //!
 //! The smoothest motion is Reinsch's (1967, "Smoothing by spline functions"): of all with a given sum of
 //! squared distances from the rows the one with the least mean square acceleration, a natural cubic spline
@@ -142,7 +142,7 @@ mod tests {
     use super::*;
     use crate::vehicle::spline;
 
-    /// A circle of 300 m at 15 m/s, 0.75 m/s², ten times a second, its coordinates to `step_m`.
+    /// A circle of 300 m at 15 m/s, 0.75 m/s², ten times per second, its coordinates to `step_m`.
     fn ride(step_m: f64) -> Vec<Row> {
         let rounded = |x: f64| if step_m > 0.0 { (x / step_m).round() * step_m } else { x };
         (0..600)

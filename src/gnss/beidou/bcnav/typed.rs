@@ -2,8 +2,8 @@
 //! alike.
 //!
 //! Source: BDS-SIS-ICD-B2a 1.0 and BDS-SIS-ICD-B2b 1.0, 6.2. A message begins with a preamble and the
-//! satellite's number, whose symbols the code leaves as they are. Messages say their second of the week, one
-//! type says the week.
+//! satellite's number, whose symbols the code leaves as they are. Messages state their second of the week,
+//! one type states the week.
 
 use std::cell::Cell;
 use std::fmt;
@@ -134,7 +134,7 @@ impl Layout {
         of_integers((set, self.message.sets), sv, raw, near).and_then(self.complete)
     }
 
-    /// Type that a message says it has.
+    /// Type of a message, as it states it.
     fn type_of(&self, bits: &Vec<bool>) -> u8 {
         self.kind.read(bits) as u8
     }
@@ -249,8 +249,8 @@ impl TypedReader {
         news
     }
 
-    /// Keeps a message of an ephemeris. One that does not say of which is of the same as the one right before
-    /// it, or as the one right after it, if no ephemeris begins with that.
+    /// Keeps a message of an ephemeris. One that does not state of which is of the same as the one right
+    /// before it, or as the one right after it, if no ephemeris begins with that.
     fn keep(&mut self, bits: Vec<bool>, begun_s: i64) {
         let layout = self.layout;
         let kind = layout.type_of(&bits);

@@ -226,7 +226,7 @@ fn finished(mut subframe: Subframe, number: usize, begin_s: i64) -> Vec<bool> {
     encode(&subframe)
 }
 
-/// The bits of a subframe as they are sent: parities are made anew.
+/// The bits of a subframe as they are sent: parities are computed again.
 pub fn encode(subframe: &Subframe) -> Vec<bool> {
     let mut sent = Vec::with_capacity(SUBFRAME_BITS);
     for (index, word) in subframe.0.chunks_exact(WORD_BITS).enumerate() {
@@ -287,7 +287,7 @@ pub fn id(subframe: &Subframe) -> u8 {
     subframe.piece(FRAME_ID) as u8
 }
 
-/// Second of the week of BDT that a subframe says: in D1 when it began, in D2 when its frame did.
+/// Second of the week of BDT that a subframe states: in D1 when it began, in D2 when its frame did.
 pub fn second(subframe: &Subframe) -> u32 {
     subframe.piece(SECOND[0]) << 12 | subframe.piece(SECOND[1])
 }
@@ -339,7 +339,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     Ok(orbit.ephemeris)
 }
 
-/// Parameters by which ephemerides are distinguished, what all satellites say alike, and the health, which
+/// Parameters by which ephemerides are distinguished, what all satellites send alike, and the health, which
 /// has a fault of its own.
 const FIXED_PARAMETERS: [&str; 14] = [
     "week", "toc_s", "toe_s", "health", "aodc", "aode", "alpha_0", "alpha_1", "alpha_2", "alpha_3", "beta_0", "beta_1",

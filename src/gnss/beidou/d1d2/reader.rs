@@ -19,10 +19,10 @@ const D2_SOUGHT: u64 = 100;
 /// Share of the best position's energy that any other has at most: of the wrong positions of D1's code the
 /// best has a ninth without noise, of D2's half.
 const NEXT_SHARE: f64 = 0.7;
-/// Subframes in a row that fail where they are expected before bits are sought anew.
+/// Subframes in a row that fail where they are expected before bits are searched again.
 const FAILURES: u32 = 3;
 
-/// Reads D1 or D2, as the satellite's number says.
+/// Reads D1 or D2, as the satellite's number states.
 #[derive(Clone, Debug)]
 pub struct D1D2Reader {
     sv: Sv,

@@ -3,12 +3,12 @@
 //! Source: Galileo HAS SIS ICD 1.0 (C/NAV's page with code and interleaver, header and encoded page of the
 //! high accuracy service), by other programs that agree and by real pages (`tests/witness`). A page is a
 //! pattern of sixteen symbols and 492 bits, coded ([`Convolutional`]) and interleaved ([`Interleaver`]): 14
-//! reserved bits, a page of the service of 448, a check and a tail of zeros. It says neither its time nor
+//! reserved bits, a page of the service of 448, a check and a tail of zeros. It states neither its time nor
 //! where the satellite is. Its second is known by another signal of the satellite, and ephemerides are
 //! those of I/NAV.
 //!
 //! Limits: pages of the service are carried, not applied. Those sent are dummies at multiples of ten seconds
-//! and after them a message of type 1 of one page, which says its time of the hour and that no corrections
+//! and after them a message of type 1 of one page, which states its time of the hour and that no corrections
 //! follow, in test mode. Those read are reported by header and by pieces of what they encode; parts of longer
 //! messages are not put together, so the Reed-Solomon code over pages is left out.
 //!

@@ -90,7 +90,7 @@ const PAGE_SYMBOLS: usize = 500;
 const DATA_BITS: usize = 214;
 const CHECK_BITS: usize = 24;
 const PAGE_BITS: usize = 244;
-/// The pages of an ephemeris, all of which say their time.
+/// The pages of an ephemeris, all of which state their time.
 const PAGES_OF_SET: [u8; 4] = [1, 2, 3, 4];
 
 const INTERLEAVER: Interleaver = Interleaver { columns: 61, rows: 8 };
@@ -109,7 +109,7 @@ pub fn page_at(start: Epoch) -> u8 {
     }
 }
 
-/// The type that a page says it has.
+/// Type of a page, as it states it.
 pub fn page_type(page: &Vec<bool>) -> u8 {
     page.piece((0, 6)) as u8
 }
@@ -232,7 +232,7 @@ fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
 }
 
 /// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays, and so does what the
-/// message does not say.
+/// message does not state.
 ///
 /// # Errors
 /// A value that the message cannot carry.
@@ -242,7 +242,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     Ok(sent.ephemeris)
 }
 
-/// Parameters by which ephemerides and senders are distinguished, and what all satellites say alike.
+/// Parameters by which ephemerides and senders are distinguished, and what all satellites send alike.
 const FIXED_PARAMETERS: [&str; 7] = ["iodnav", "svid", "week", "tow_s", "ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"];
 
 /// Names of the adjustable parameters in pages 1 to 4.
@@ -286,7 +286,7 @@ fn sent_at(page: &Vec<bool>, near: Epoch) -> Option<Epoch> {
     Some(Epoch::new(week * WEEK_S + time_of_week(page)?, 0.0))
 }
 
-/// Seconds of the week at which a page began, of pages that say them.
+/// Seconds of the week at which a page began, of pages that state them.
 fn time_of_week(page: &Vec<bool>) -> Option<i64> {
     let first = match page_type(page) {
         1 => 167,

@@ -1,4 +1,4 @@
-//! Finds pages in soft symbols, normal or inverted, and gathers what they say.
+//! Finds pages in soft symbols, normal or inverted, and collects their content.
 
 use std::collections::{BTreeMap, VecDeque};
 

@@ -113,7 +113,7 @@ impl Triple {
 
 impl Offset {
     /// The offset's constant and rate with its reference time of week in hours and week; all ones in the
-    /// message, here −1 and 255 and 63, where nothing is said.
+    /// message, here −1 and 255 and 63, where nothing is stated.
     pub fn field(&self, field: usize) -> f64 {
         let Some(offset) = self.0 else { return NO_OFFSET[field] };
         let week = (offset.reference.week() - GST_WEEK).rem_euclid(64);

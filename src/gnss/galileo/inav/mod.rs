@@ -4,7 +4,7 @@
 //! Source: Galileo OS SIS ICD 2.1, 4.3 and 5.1. A page is an even and an odd part of a second each; a part is
 //! a pattern of ten symbols and 120 bits, coded ([`Convolutional`]) and interleaved ([`Interleaver`]). Both
 //! parts carry one word of 128 bits and a check. Limits: Of almanacs (words 7 to 10) only the offset of GPS
-//! time is read. Alert pages keep their position and say nothing. The bits reserved for authentication and
+//! time is read. Alert pages keep their position and state nothing. The bits reserved for authentication and
 //! the return link are zero, as satellites send them on E5b.
 
 pub(super) mod almanac;
@@ -128,7 +128,7 @@ const RESERVED_BEGIN: usize = 18;
 const RESERVED_BITS: usize = 64;
 const LAST_BEGIN: usize = 106;
 const LAST_BITS: usize = 8;
-/// The word that has nothing to say (5.1.9.11), that of reduced elements, and those of an ephemeris.
+/// Types of the spare word (5.1.9.11), the word with reduced elements, and the words of an ephemeris.
 const SPARE: u8 = 0;
 const REDUCED: u8 = 16;
 const WORDS_OF_SET: [u8; 4] = [1, 2, 3, 4];
@@ -179,7 +179,7 @@ pub fn word_at(start: Epoch) -> u8 {
     }
 }
 
-/// The type that a word says it has.
+/// Type of a word, as it states it.
 pub fn word_type(word: &u128) -> u8 {
     word.piece((0, 6)) as u8
 }
@@ -427,7 +427,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     Ok(sent.ephemeris)
 }
 
-/// Parameters by which ephemerides and senders are distinguished, and what all satellites say alike.
+/// Parameters by which ephemerides and senders are distinguished, and what all satellites send alike.
 const FIXED_PARAMETERS: [&str; 7] = ["iodnav", "svid", "week", "tow_s", "ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"];
 
 /// Names of the adjustable parameters in words 1 to 5.
@@ -486,7 +486,7 @@ fn sent_at(word: &u128, near: Epoch) -> Option<Epoch> {
     Some(Epoch::new(week * WEEK_S + tow_s, 0.0))
 }
 
-/// Seconds of the week at which the page began, of words that say them.
+/// Seconds of the week at which the page began, of words that state them.
 fn time_of_week(word: &u128) -> Option<u32> {
     let tow_s = match word_type(word) {
         0 if word.piece((6, 2)) == 2 => word.piece((108, 20)),

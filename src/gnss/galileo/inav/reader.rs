@@ -1,4 +1,4 @@
-//! Finds pages in soft symbols, normal or inverted, and gathers what their words say.
+//! Finds pages in soft symbols, normal or inverted, and collects the content of their words.
 
 use std::collections::{BTreeMap, VecDeque};
 

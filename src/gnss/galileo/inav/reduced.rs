@@ -1,7 +1,7 @@
 //! The sender's elements in short: word 16, whole in two seconds.
 //!
 //! Source: Galileo OS SIS ICD 2.1, 5.1.11. Eight coarse numbers give orbit and clock from the sub-frame's
-//! beginning on for ten minutes; rates, harmonics, health and group delays are zero or not said. Satellites
+//! beginning on for ten minutes; rates, harmonics, health and group delays are zero or not stated. Satellites
 //! send what fits best over that time, with the clock making up for the orbit's error along the line to the
 //! Earth: the real words of an hour of 2025 are so (`tests/witness`), within 1.9 m in a range (rms), and what
 //! is sent here is like them. Limits: satellites whose orbit the fields cannot hold have none.

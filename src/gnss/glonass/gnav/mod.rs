@@ -7,8 +7,8 @@
 //! 1 to 4 carry an ephemeris: a state vector at a quarter of an hour, to whose middle half hour the ephemeris
 //! belongs, and the clock; string 5 has the date's four years. An ephemeris is numbered by that quarter.
 //!
-//! The document's time mark has one sign against the meander, and what is received the other way up is seen
-//! by it; bits do not depend on it.
+//! The document's time mark has one sign against the meander, which shows whether symbols are inverted.
+//! Bits do not depend on it.
 //!
 //! Limits: strings 6 to 15, almanacs, are empty but for their numbers. GLONASS time is sent as UTC(SU) and as
 //! GPS time, whole seconds apart. How a leap second is sent is not settled by a document at hand: one second
@@ -127,7 +127,7 @@ fn string_at(start: Epoch) -> u8 {
     (start.seconds().rem_euclid(FRAME_S) / STRING_S + 1) as u8
 }
 
-/// Number of a string by what it says.
+/// Number of a string, as it states it.
 pub fn id(string: &GlonassString) -> u8 {
     string.piece(ID) as u8
 }

@@ -271,7 +271,7 @@ fn is_message(bits: &[bool]) -> bool {
     begins && bits.len() == BITS && crc24q(bits.iter().copied()) == 0
 }
 
-/// The type that a message says it has.
+/// Type of a message, as it states it.
 pub fn message_type(bits: &[bool]) -> u8 {
     bits.get(14..20).map_or(0, |bits| number(bits) as u8)
 }
@@ -343,7 +343,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     Ok(content.set)
 }
 
-/// Parameters by which ephemerides are distinguished, that are no ephemeris's, or that all satellites say
+/// Parameters by which ephemerides are distinguished, that are no ephemeris's, or that all satellites state
 /// alike.
 const FIXED_PARAMETERS: [&str; 14] = [
     "week",

@@ -1,6 +1,6 @@
 //! CNAV as L2 CM sends it: the messages of L5 at half the rate, twelve seconds each.
 //!
-//! Source: IS-GPS-200N, 3.2.2 and 30.3.3 (25 bit/s, coded to 50 symbols a second, in step with twelve
+//! Source: IS-GPS-200N, 3.2.2 and 30.3.3 (25 bit/s, coded to 50 symbols per second, in step with twelve
 //! seconds of the week). The order of messages is that of satellites in 2025 (`tests/witness`).
 
 use super::reader::CnavReader;

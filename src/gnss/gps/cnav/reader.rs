@@ -1,4 +1,4 @@
-//! Gathers what the messages found in soft symbols say ([`Running`]).
+//! Collects the content of messages found in soft symbols ([`Running`]).
 
 use std::collections::BTreeMap;
 

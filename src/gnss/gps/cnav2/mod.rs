@@ -164,7 +164,7 @@ impl Frame {
         self.three.as_ref().filter(|bits| page(bits) == PAGE)
     }
 
-    /// The number of the satellite's codes that subframe 3 says.
+    /// The number of the satellite's codes that subframe 3 states.
     fn prn(&self) -> Option<u128> {
         self.three.as_ref().and_then(|bits| bits.get(..8)).map(number)
     }
@@ -368,7 +368,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     Ok(content.set)
 }
 
-/// Parameters by which ephemerides are distinguished, that are no ephemeris's, or that all satellites say
+/// Parameters by which ephemerides are distinguished, that are no ephemeris's, or that all satellites state
 /// alike.
 const FIXED_PARAMETERS: [&str; 15] = [
     "week",

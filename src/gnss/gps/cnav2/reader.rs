@@ -1,4 +1,4 @@
-//! Finds frames in soft symbols, normal or inverted, and gathers what they say.
+//! Finds frames in soft symbols, normal or inverted, and collects their content.
 //!
 //! Where a frame begins shows in the code word of its time, which is right by chance at times: the check of
 //! subframe 2 decides.

@@ -235,7 +235,7 @@ fn special_message() -> [u32; 10] {
     data
 }
 
-/// Page 18; a dummy page when there is no ionosphere to report, since the page cannot say "none".
+/// Page 18; a dummy page when there is no ionosphere to report, since the page cannot state "none".
 fn ionosphere_and_utc(
     klobuchar: Option<&Klobuchar>,
     utc: &UtcData,

@@ -161,7 +161,7 @@ impl Broadcast {
         Ok(Self { pages: almanac::pages(klobuchar.as_ref(), utc, almanac, reference)? })
     }
 
-    /// The pages of what a scene says of its satellites.
+    /// The pages of what a scene states of its satellites.
     ///
     /// # Errors
     /// As [`Self::with_utc`].
@@ -325,7 +325,7 @@ pub struct Subframe {
     pub id: u8,
     /// Time of week of the next subframe's start, in 6 s.
     pub tow_count: u32,
-    /// The signal's accuracy may be worse than the URA says (IS-GPS-200N, 20.3.3.2).
+    /// The signal's accuracy may be worse than the URA states (IS-GPS-200N, 20.3.3.2).
     pub alert: bool,
     /// True if P is encrypted to Y (IS-GPS-200N, 20.3.3.2).
     pub antispoof: bool,

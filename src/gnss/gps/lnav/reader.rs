@@ -1,4 +1,4 @@
-//! Finds subframes in the symbols of a satellite, normal or inverted, and gathers what they say.
+//! Finds subframes in the symbols of a satellite, normal or inverted, and collects their content.
 //!
 //! Two headers a whole number of subframes apart, or one whole subframe with its parity, show where subframes
 //! begin. Source: IS-GPS-200N, 20.3.2 to 20.3.5. Limits: a word with a wrong bit is lost.

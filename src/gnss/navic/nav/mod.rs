@@ -122,7 +122,7 @@ fn message_at(start: Epoch) -> u32 {
     }
 }
 
-/// Number of a subframe by what it says.
+/// Number of a subframe, as it states it.
 pub fn id(subframe: &Subframe) -> u8 {
     subframe.piece(ID) as u8 + 1
 }
@@ -169,7 +169,8 @@ impl Sender for Subframes {
 }
 
 impl Subframes {
-    /// Puts the message of the time into subframe 3 or 4; type 0, which says nothing, where nothing is known.
+    /// Puts the message of the time into subframe 3 or 4; type 0, which states nothing, where nothing is
+    /// known.
     fn message(&self, subframe: &mut Subframe, sender: Sv, start: Epoch) -> Result<(), FieldError> {
         let own: Vec<&Ephemeris> = self.common.almanac.iter().filter(|set| set.sv.system == System::Navic).collect();
         let frame = (start.tow_whole_s() / FRAME_S) as usize;

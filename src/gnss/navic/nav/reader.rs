@@ -1,4 +1,4 @@
-//! Finds subframes in soft symbols, normal or inverted, and gathers what they say.
+//! Finds subframes in soft symbols, normal or inverted, and collects their content.
 
 use std::collections::{BTreeMap, VecDeque};
 

@@ -47,7 +47,7 @@ impl Form {
         }
     }
 
-    /// BDGIM's coefficients in a record of version 4; where all are zero the record says nothing.
+    /// BDGIM's coefficients in a record of version 4; where all are zero the record states nothing.
     pub(super) fn bdgim(&self, group: &[Line<'_>], satellite: &str) -> Result<Group, String> {
         let (first, title) = group.first().copied().unwrap_or_default();
         let refuse = |line: usize, what: String| Err(format!("line {line} ({}): {what}", title.trim_end()));

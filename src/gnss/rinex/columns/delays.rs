@@ -87,7 +87,7 @@ const LARGEST_S: f64 = 1.192_093e-7;
 const NOT_AVAILABLE_S: f64 = -1.192_092e-7;
 
 impl Form {
-    /// The delays of a record; a blank field, or one that says so, is not available.
+    /// The delays of a record; a blank field, or one that states so, is not available.
     pub(super) fn delays(&self, record: &[Line<'_>], layout: &Layout) -> Result<Delays, String> {
         let (first, title) = record.first().copied().unwrap_or_default();
         let label: String = title.chars().take(23).collect();

@@ -87,7 +87,7 @@ impl Half {
 }
 
 impl Content {
-    /// The type of block that says it.
+    /// The type of block that states it.
     pub fn kind(&self) -> u8 {
         match self {
             Self::Test => TEST,

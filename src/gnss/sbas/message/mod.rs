@@ -1,15 +1,15 @@
-//! SBAS's message on L1: 250 bits a second, encoded and decoded.
+//! SBAS's message on L1: 250 bits per second, encoded and decoded.
 //!
 //! Source: RTCA DO-229D, A.4.3 (blocks, three beginnings in turn, check) and A.4.4. A block is coded
 //! without a break from one to the next (`fec::running`). Types 12 (time) and 9 (where the satellite is) are
 //! sent in rounds of six seconds; real satellites send them every minute or five. An ephemeris is a position
 //! with its velocity and acceleration at a multiple of 16 s, good for six minutes to either side (A.4.5.1.3,
-//! table A-25). Only type 12 says which second of the week it is. Where a network knows something of other
+//! table A-25). Only type 12 states which second of the week it is. Where a network knows something of other
 //! satellites, the rest of a round has its corrections (`schedule`), else type 63 (nothing).
 //!
 //! Limits: types 10, 17, 27 and 28 are neither sent nor read: their blocks pass the check and count as time
-//! alone. Health is the accuracy, of which 15 says that the satellite is not to be ranged to. Of UTC nothing
-//! is said.
+//! alone. Health is the accuracy, of which 15 states that the satellite is not to be ranged to. Of UTC
+//! nothing is said.
 
 mod content;
 mod corrections;
@@ -88,9 +88,9 @@ const BITS: usize = DATA_BITS + CHECK_BITS;
 const RATE_HZ: f64 = 500.0;
 /// Bits of the block before that the code remembers.
 const MEMORY_BITS: usize = 6;
-/// An accuracy that says that there is none (A.4.4.11).
+/// Accuracy index for "no accuracy" (A.4.4.11).
 const NOT_TO_BE_USED: u8 = 15;
-/// A standard that says that there is none (A.4.4.15).
+/// UTC standard identifier for "no UTC" (A.4.4.15).
 const NO_UTC: f64 = 7.0;
 
 const CODE: Convolutional = Convolutional { second_inverted: false };
@@ -107,8 +107,8 @@ fn is_healthy(set: &Ephemeris) -> bool {
     set.ura_index < planted!("gnss.sbas.accuracy", NOT_TO_BE_USED, 0)
 }
 
-/// Type of the block that begins at a time where nothing is said of other satellites; blocks with corrections
-/// replace type 63.
+/// Type of the block that begins at a time where nothing is stated of other satellites; blocks with
+/// corrections replace type 63.
 pub fn type_at(start: Epoch) -> u8 {
     let turn = start.tow_whole_s().rem_euclid(ORDER.len() as i64) as usize;
     ORDER.get(turn).copied().unwrap_or(EMPTY)
@@ -167,7 +167,7 @@ fn is_block(bits: &[bool]) -> bool {
     begins && bits.len() == BITS && crc24q(bits.iter().copied()) == 0
 }
 
-/// The type that a block says it has.
+/// Type of a block, as it states it.
 fn type_of(bits: &[bool]) -> u8 {
     bits.get(8..14).map_or(0, |bits| number(bits) as u8)
 }

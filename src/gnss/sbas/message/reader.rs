@@ -1,5 +1,5 @@
-//! Gathers what the blocks found in soft symbols say ([`Running`]): the second of the week by type 12, and
-//! from it on by counting, the satellite's position by type 9, and what is said of others from then on.
+//! Collects the content of blocks found in soft symbols ([`Running`]): the second of the week by type 12, and
+//! from it on by counting, the satellite's position by type 9, and the content about others from then on.
 
 use super::{BITS, OF_PLACE, OF_TIME, RATE_HZ, SBAS, TIME, elements, is_block, type_of};
 use crate::augmentation::Content;
@@ -35,7 +35,7 @@ impl SbasReader {
         Some(at.plus_s((begin as f64 - timed as f64) / RATE_HZ))
     }
 
-    /// The time that a block of type 12 says it began at, its week near `near`.
+    /// The time that a block of type 12 states it began at, its week near `near`.
     fn said(bits: &Vec<bool>, near: Epoch) -> Option<Epoch> {
         let all = integers(&TIME, bits);
         let value = |name: &str| all.iter().find(|(other, _)| *other == name).map(|(_, raw)| *raw);

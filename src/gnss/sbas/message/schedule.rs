@@ -4,7 +4,7 @@
 //! satellites of the mask, as each six seconds at least there is an indicator of their accuracy; of a last
 //! part of six satellites or fewer, type 24 has them. The rest of the round takes turns: the masks, the
 //! long-term corrections, how corrections age, the grid, integrity. While a satellite's alarm is new, the
-//! last second of each round says the integrity of all (type 6).
+//! last second of each round states the integrity of all (type 6).
 //!
 //! The tests hold the longest intervals of RTCA DO-229D, table A-25: 6 s for accuracies, 120 s for the mask
 //! and long-term corrections, 300 s for the grid. Limits: where most of more than 26 satellites have rates, a
@@ -28,7 +28,7 @@ const NEW_ROUNDS: i64 = 4;
 const ISSUES: i64 = 3;
 /// Issue of the masks: they stay as they are for a whole scene.
 const ISSUE: u8 = 0;
-/// The largest delay of a point of the grid; one step more says that it is not to be used (A.4.4.10).
+/// The largest delay of a point of the grid; one step more states that it is not to be used (A.4.4.10).
 const LARGEST_DELAY_M: f64 = 63.75;
 
 /// Block that is sent when its turn comes.

@@ -1,0 +1,126 @@
+//! Doc comments as a reader of docs.rs meets them: how each begins, and the words that it uses.
+//!
+//! A doc comment stands alone. It begins with its noun or, for a function, with a verb in the third person or
+//! the noun of the result. A word that points to another comment, a preposition and a question word are no
+//! noun. Limits: the first paragraph's first word is read, not its grammar; code spans are left out.
+
+/// A rule that doc comments keep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rule {
+    /// No opening of [`OPENINGS`].
+    Noun,
+    /// No opening of [`FRAGMENTS`].
+    Sentence,
+    /// No word of [`WORDS`].
+    Word,
+}
+
+/// Openings that stand for a noun of another comment, or for a question.
+const OPENINGS: &[&str] = &[
+    "…", "As", "By", "How", "It", "Its", "Of", "So many", "That", "The same", "Their", "These", "They", "Those",
+    "What", "Whatever", "When", "Where", "Whether", "Which", "Who", "Whose", "Why",
+];
+
+/// Openings of a phrase that goes on from the item's name or from the comment before.
+const FRAGMENTS: &[&str] = &[
+    "After", "Against", "Along", "At", "Before", "Behind", "Below", "Between", "Beyond", "For", "From", "In", "Off",
+    "On", "Since", "Taken", "To", "Until", "With", "Within", "Without",
+];
+
+/// Words that are not ours, each with the field's term. An asterisk stands for any ending.
+const WORDS: &[(&str, &str)] = &[
+    ("anew", "again"),
+    ("astray", "range error"),
+    ("depart*", "differ, error"),
+    ("honest*", "consistency, NEES"),
+    ("in plan", "horizontal"),
+    ("on the air", "sent, radio frequency"),
+    ("overlay*", "secondary code"),
+    ("parting", "code-carrier divergence"),
+    ("place", "position, field, node"),
+    ("places", "positions, fields, nodes"),
+    ("reading of the clock", "clock offset, time of the clock"),
+    ("reading of the receiver's clock", "clock offset, time of the receiver's clock"),
+    ("readings of the receiver's clock", "times of the receiver's clock"),
+    ("set of elements", "ephemeris"),
+    ("sets of elements", "ephemerides"),
+    ("stray*", "range error"),
+    ("stretch", "segment"),
+    ("stretches", "segments"),
+    ("to and fro", "back and forth"),
+    ("upside down", "inverted"),
+    ("way up", "normal or inverted"),
+    ("whither", "direction"),
+];
+
+/// Phrases in which such a word is the usual one.
+const USUAL: &[&str] = &["decimal places", "in one place", "in place", "in places", "last place"];
+/// A word that a standard uses, and the end of the paths of its signal: L1C's secondary code is an overlay.
+const STANDARD: (&str, &str) = ("overlay*", "/l1c.rs");
+
+/// A doc comment of one item or module.
+#[derive(Debug)]
+pub struct Doc {
+    /// Number of its first line.
+    pub line: usize,
+    /// Its lines without their marks.
+    pub text: String,
+}
+
+/// Doc comments of a source.
+pub fn docs(text: &str) -> Vec<Doc> {
+    let mut found: Vec<Doc> = Vec::new();
+    let mut open = "";
+    for (number, line) in (1..).zip(text.lines()) {
+        let line = line.trim_start();
+        let mark = ["///", "//!"].into_iter().find(|mark| line.starts_with(mark) && !line.starts_with("////"));
+        let Some(mark) = mark else {
+            open = "";
+            continue;
+        };
+        let rest = line[mark.len()..].trim_start();
+        match found.last_mut().filter(|_| open == mark) {
+            Some(doc) => doc.text.extend(["\n", rest]),
+            None => found.push(Doc { line: number, text: rest.to_owned() }),
+        }
+        open = mark;
+    }
+    found
+}
+
+/// Faults of a doc comment in the file `path` against a rule, in words.
+pub fn faults(path: &str, doc: &Doc, rule: Rule) -> Vec<String> {
+    let opens =
+        |list: &[&str]| list.iter().filter(|word| begins(&doc.text, word)).map(|word| format!("'{word}'")).collect();
+    match rule {
+        Rule::Noun => opens(OPENINGS),
+        Rule::Sentence => opens(FRAGMENTS),
+        Rule::Word => words(path, &doc.text),
+    }
+}
+
+/// True if a text begins with a word and not with a longer one.
+fn begins(text: &str, word: &str) -> bool {
+    text.strip_prefix(word).is_some_and(|rest| !rest.starts_with(|c: char| c.is_alphanumeric()) || word == "…")
+}
+
+/// Words of [`WORDS`] in a text, each with the field's term.
+fn words(path: &str, text: &str) -> Vec<String> {
+    let plain = USUAL.iter().fold(without_code(text).to_lowercase(), |plain, usual| plain.replace(usual, " "));
+    let is = |(word, _): &&(&str, &str)| {
+        let stem = word.trim_end_matches('*');
+        plain.match_indices(stem).any(|(at, _)| {
+            let starts = !plain[..at].ends_with(|c: char| c.is_alphanumeric());
+            starts && (stem != *word || !plain[at + stem.len()..].starts_with(|c: char| c.is_alphanumeric()))
+        })
+    };
+    let ours = |(word, _): &&(&str, &str)| *word != STANDARD.0 || !path.ends_with(STANDARD.1);
+    WORDS.iter().filter(ours).filter(is).map(|(word, term)| format!("'{word}': {term}")).collect()
+}
+
+/// A text in one line, without code spans and fenced code.
+fn without_code(text: &str) -> String {
+    let prose = text.split("```").step_by(2).collect::<Vec<_>>().join(" ");
+    let spans = prose.split('`').step_by(2).collect::<Vec<_>>().join(" ");
+    spans.split_whitespace().collect::<Vec<_>>().join(" ")
+}
