@@ -122,9 +122,9 @@ impl Kind {
 pub struct InterferenceSpec {
     /// Waveform of the source.
     pub kind: Kind,
-    /// Radio frequency of its centre.
+    /// Radio frequency of the centre, in Hz.
     pub center_hz: f64,
-    /// How strong it is.
+    /// Strength of the source.
     pub strength: Strength,
     /// Position of the source; absent for a source without one.
     pub place: Option<Geodetic>,
@@ -206,7 +206,7 @@ fn center_hz(table: &Table<'_>) -> Result<f64, ScenarioError> {
     }
 }
 
-/// The one of three keys that says how strong the source is.
+/// The one of three keys that states how strong the source is.
 fn strength(table: &Table<'_>, placed: bool) -> Result<Strength, ScenarioError> {
     const ONE: &str = "exactly one of js_db, power_dbw and eirp_dbw";
     let distance_m = table.number("distance_m")?;
