@@ -29,7 +29,7 @@ use gnss::time::Epoch;
 
 /// Steps of fast corrections and of positions (A.4.4.3, A.4.4.7).
 const STEP_M: f64 = 0.125;
-/// Limits of the fields: a fast correction, a position without and with rates, a rate.
+/// Limits of the fields, in metres: a fast correction, a position without and with rates, a rate.
 const LARGEST_FAST_M: f64 = 255.875;
 const LARGEST_STEADY_M: f64 = 31.875;
 const LARGEST_MOVING_M: f64 = 127.875;
@@ -40,8 +40,8 @@ const LONG_S: f64 = 120.0;
 /// A clock that is faster against its correction takes the ageing that has receivers extrapolate.
 const QUICK_MPS: f64 = 0.01;
 const EXTRAPOLATED: u8 = 15;
-/// Great circle from where the motion begins to the points of the grid: 14° to where a line of sight at 5°
-/// meets the shell, and a cell.
+/// Great circle from where the motion begins to the points of the grid, in degrees: 14° to where a line of
+/// sight at 5° meets the shell, and a cell.
 const GRID_DEG: f64 = 20.0;
 /// Share of a delay by which shells at other heights than the grid's differ along a line of sight at 5°: at
 /// 450 km 10 %.

@@ -30,9 +30,9 @@ const PLACES: u32 = 10;
 pub struct LineOfSight {
     /// The satellite.
     pub sv: Sv,
-    /// Largest magnitude of the range's second and third derivative.
+    /// Largest magnitude of the range's second and third derivative, in m/s².
     pub acceleration_mps2: f64,
-    /// Largest jerk along it.
+    /// Largest jerk along the line of sight, in m/s³.
     pub jerk_mps3: f64,
     /// Difference of the largest and the least second derivative, in m/s²: an upper bound for any step of it.
     pub swing_mps2: f64,

@@ -62,9 +62,9 @@ pub struct Fidelity {
     pub carrier: Arithmetic,
     /// Arithmetic of the thermal noise's radius and angle; the random words are the same for all.
     pub noise: Arithmetic,
-    /// Largest error of the carrier between knots.
+    /// Largest error of the carrier between knots, in cycles.
     pub knot_tolerance_cycles: f64,
-    /// Error of the code below which `balanced` chooses.
+    /// Error of the code below which `balanced` chooses, in metres.
     pub allowed_m: f64,
 }
 
@@ -199,7 +199,7 @@ pub struct Wishes {
     pub noise: Option<Arithmetic>,
     /// Knot tolerance in cycles that replaces the level's.
     pub knot_tolerance_cycles: Option<f64>,
-    /// Error of the code below which `balanced` chooses.
+    /// Error of the code below which `balanced` chooses, in metres.
     pub allowed_m: f64,
 }
 

@@ -28,7 +28,7 @@ pub struct Arrival {
     pub delay_s: f64,
     /// Pseudorange of the carrier in cycles at RF, absolute: `rho_phi / lambda`.
     pub carrier_cycles: f64,
-    /// Carrier power over noise density.
+    /// Carrier power over noise density, in Hz.
     pub cn0_hz: f64,
 }
 
@@ -81,7 +81,7 @@ pub struct Part {
     pub end: u64,
     /// A polynomial for each ray.
     pub paths: Vec<Path>,
-    /// Largest error met at the points of comparison.
+    /// Largest error met at the points of comparison, in cycles.
     pub error_cycles: f64,
     /// Largest amplitude error met at the points of comparison, relative to the ray's largest amplitude.
     pub amplitude_error: f64,

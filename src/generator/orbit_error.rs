@@ -17,7 +17,7 @@ use gnss::time::Epoch;
 pub struct Displacement {
     /// The satellites concerned.
     pub satellites: Vec<Sv>,
-    /// Outwards, along the inertial motion, and along the angular momentum.
+    /// Radial displacement in metres, positive outwards.
     pub radial_m: f64,
     /// Displacement along the inertial motion, in metres.
     pub along_m: f64,

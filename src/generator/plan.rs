@@ -36,7 +36,7 @@ pub struct InView {
     pub sv: Sv,
     /// Azimuth in degrees at the first instant above the mask.
     pub azimuth_deg: f64,
-    /// Elevation then.
+    /// Elevation in degrees at the first instant above the mask.
     pub elevation_deg: f64,
     /// C/N0 in dB-Hz of the satellite's first signal; `None` if the scene defines no signal power.
     pub cn0_dbhz: Option<f64>,
@@ -71,7 +71,7 @@ pub struct Plan {
     pub front_end: Option<String>,
     /// Time of sample 0 by the receiver's clock.
     pub start: String,
-    /// Length of the scene.
+    /// Length of the scene, in seconds.
     pub duration_s: f64,
     /// Names of the signals.
     pub signals: Vec<&'static str>,
@@ -79,9 +79,9 @@ pub struct Plan {
     pub mask_deg: f64,
     /// True if the scene begins so high that the Earth's limb replaces the elevation mask.
     pub in_space: bool,
-    /// Largest speed and acceleration of the antenna during the scene.
+    /// Largest speed and acceleration of the antenna during the scene, in m/s.
     pub speed_mps: f64,
-    /// Largest acceleration of the antenna.
+    /// Largest acceleration of the antenna, in m/s².
     pub acceleration_mps2: f64,
     /// Satellites that are in view at any time, highest first.
     pub satellites: Vec<InView>,

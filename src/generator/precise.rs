@@ -34,7 +34,7 @@ const MOST_EPOCHS: i64 = 50_000;
 /// Satellite parameters that the orbit table does not contain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hardware {
-    /// L1 C/A against the combination that clocks belong to.
+    /// Group delay of L1 C/A against the combination that clocks belong to, in seconds.
     pub tgd_s: f64,
     /// Antenna's phase centre below the centre of mass, towards the Earth.
     pub antenna_m: f64,

@@ -23,11 +23,11 @@ pub struct Sight {
     pub user_mps: Vector3<f64>,
     /// Satellite when it sent what is received now, in the ECEF axes of `received`.
     pub satellite: State,
-    /// Geometric range between the two.
+    /// Geometric range between the two, in metres.
     pub range_m: f64,
     /// Azimuth and elevation of the satellite at the antenna.
     pub look: Look,
-    /// Angle at the satellite between the Earth's centre and the antenna.
+    /// Angle at the satellite between the Earth's centre and the antenna, in radians.
     pub off_nadir_rad: f64,
 }
 

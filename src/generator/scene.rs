@@ -91,7 +91,7 @@ pub struct Scene {
     pub noise_lsb: f32,
     /// Fidelity with which samples are made.
     pub fidelity: Fidelity,
-    /// Spacing of truth records.
+    /// Spacing of truth records, in seconds.
     pub truth_interval_s: f64,
     /// Expectations about a receiver, for the judge.
     pub expect: Expect,

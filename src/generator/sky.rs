@@ -31,7 +31,7 @@ const LEAST_RANGE_M: f64 = 1.0;
 pub struct Emission {
     /// The line of sight at reception.
     pub sight: Sight,
-    /// Geometric light time.
+    /// Geometric light time, in seconds.
     pub travel_s: f64,
     /// Satellite's L1 C/A clock minus GPS time at emission (relativity and T_GD in).
     pub satellite_clock_s: f64,

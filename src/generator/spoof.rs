@@ -35,7 +35,7 @@ pub struct Drag {
     pub start_s: f64,
     /// Unit vector, ECEF.
     pub direction: Vector3<f64>,
-    /// Final speed.
+    /// Final speed, in m/s.
     pub speed_mps: f64,
     /// Acceleration in m/s² until the final speed is reached.
     pub acceleration_mps2: f64,

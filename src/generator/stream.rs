@@ -64,7 +64,7 @@ pub struct Generated {
     pub clipped: u64,
     /// Polynomials made.
     pub knots: u64,
-    /// Largest error of the carrier met between their knots.
+    /// Largest error of the carrier met between their knots, in cycles.
     pub worst_knot_cycles: f64,
     /// Knot tolerance that the scene allows, in cycles.
     pub knot_tolerance_cycles: f64,

@@ -62,23 +62,23 @@ pub struct Ephemeris {
     pub aodo: u8,
     /// Square root of the semi-major axis at the reference time, √m.
     pub sqrt_a_sqrtm: f64,
-    /// Rate of the semi-major axis; zero for messages without it.
+    /// Rate of the semi-major axis, in m/s; zero for messages without it.
     pub axis_rate_mps: f64,
     /// Eccentricity of the orbit.
     pub eccentricity: f64,
-    /// Mean anomaly at the reference time.
+    /// Mean anomaly at the reference time, in radians.
     pub m0_rad: f64,
     /// Mean motion beyond that of the semi-major axis, rad/s.
     pub delta_n_radps: f64,
     /// Rate of that correction, rad/s²; zero for messages without it.
     pub delta_n_rate_radps2: f64,
-    /// Longitude of the ascending node at the beginning of the week.
+    /// Longitude of the ascending node at the beginning of the week, in radians.
     pub omega0_rad: f64,
     /// Rate of right ascension of the node, rad/s.
     pub omega_dot_radps: f64,
-    /// Argument of perigee.
+    /// Argument of perigee, in radians.
     pub omega_rad: f64,
-    /// Inclination at the reference time.
+    /// Inclination at the reference time, in radians.
     pub i0_rad: f64,
     /// Rate of the inclination, rad/s.
     pub idot_radps: f64,
@@ -106,8 +106,9 @@ pub struct Ephemeris {
     /// The second group delay of messages that have two: BGD(E1,E5a) of Galileo beside BGD(E1,E5b) in
     /// `tgd_s`, T_GD2 of BeiDou.
     pub tgd2_s: f64,
-    /// Corrections between signals beside the group delay in `tgd_s`: of L1 C/A, L2C, I5 and Q5 in CNAV, and
-    /// of the pilot and the data of L1C in CNAV-2; of NavIC on L1 the two of its message at the last places.
+    /// Corrections between signals beside the group delay in `tgd_s`, in seconds: of L1 C/A, L2C, I5 and Q5
+    /// in CNAV, and of the pilot and the data of L1C in CNAV-2; of NavIC on L1 the two of its message at the
+    /// last places.
     pub isc_s: [f64; 6],
     /// Carriers of the clock, as the message states them: NavIC on L1 has 0 for L1 and L5, 1 for S and L5.
     /// Other messages have 0.
@@ -122,9 +123,9 @@ pub struct Ephemeris {
 /// Position and velocity in ECEF at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
-    /// Position, ECEF.
+    /// ECEF position, in metres.
     pub position_m: Vector3<f64>,
-    /// Velocity, ECEF.
+    /// ECEF velocity, in m/s.
     pub velocity_mps: Vector3<f64>,
 }
 
@@ -142,11 +143,11 @@ pub struct ClockState {
 pub struct Mean {
     /// Square root of the semi-major axis, √m.
     pub sqrt_a_sqrtm: f64,
-    /// Inclination.
+    /// Inclination, in radians.
     pub inclination_rad: f64,
-    /// Node at the beginning of the reference time's week.
+    /// Node at the beginning of the reference time's week, in radians.
     pub omega0_rad: f64,
-    /// Mean anomaly at the reference time.
+    /// Mean anomaly at the reference time, in radians.
     pub m0_rad: f64,
     /// Clock's offset at the reference time.
     pub af0_s: f64,
@@ -156,11 +157,11 @@ pub struct Mean {
 pub(crate) struct Constants {
     /// Gravitational constant of the Earth.
     pub mu_m3ps2: f64,
-    /// Rotation of the Earth.
+    /// Rotation of the Earth, in rad/s.
     pub rotation_radps: f64,
     /// Relativistic clock constant F = −2√μ/c².
     relativity_spsqrtm: f64,
-    /// The week from whose beginning the node counts begins so much after that of GPS.
+    /// Time in seconds by which the week of the node begins after the GPS week.
     behind_gpst_s: f64,
     /// Carrier to which the message's group delay belongs as it is.
     delay_carrier_hz: f64,
@@ -203,14 +204,14 @@ const B3I_HZ: f64 = 1_268.52e6;
 
 /// Motion in the orbital plane: what orbit and clock have in common.
 struct Anomaly {
-    /// Time from the reference time of the orbit.
+    /// Time from the reference time of the orbit, in seconds.
     since_toe_s: f64,
     semi_major_m: f64,
     sin: f64,
     cos: f64,
     /// 1 − e cos E.
     shrink: f64,
-    /// Rate of the eccentric anomaly.
+    /// Rate of the eccentric anomaly, in rad/s.
     rate_radps: f64,
 }
 
@@ -402,7 +403,7 @@ impl Ephemeris {
         ClockState { offset_s: clock.offset_s - self.given_delay_s(), ..clock }
     }
 
-    /// The group delay on the carrier of which the message gives it.
+    /// The group delay on the carrier of which the message gives it, in seconds.
     pub fn given_delay_s(&self) -> f64 {
         let given_s = (self.form.given_delay_s)(self);
         planted!("gnss.clock.group_delay", given_s, -given_s)
@@ -560,7 +561,7 @@ impl Ephemeris {
         Ok(Anomaly { since_toe_s, semi_major_m, sin, cos, shrink, rate_radps: mean_radps / shrink })
     }
 
-    /// Mean motion at the reference time.
+    /// Mean motion at the reference time, in rad/s.
     pub fn mean_motion_radps(&self) -> f64 {
         let semi_major_m = self.sqrt_a_sqrtm * self.sqrt_a_sqrtm;
         (Constants::of(self.sv.system).mu_m3ps2 / (semi_major_m * semi_major_m * semi_major_m)).sqrt()

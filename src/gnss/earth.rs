@@ -5,16 +5,16 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Speed of light in vacuum (IS-GPS-200N, 20.3.4.3).
+/// Speed of light in vacuum, in m/s (IS-GPS-200N, 20.3.4.3).
 pub const SPEED_OF_LIGHT_MPS: f64 = 299_792_458.0;
-/// Earth's rotation rate (IS-GPS-200N, table 20-IV).
+/// Earth's rotation rate, in rad/s (IS-GPS-200N, table 20-IV).
 pub const EARTH_ROTATION_RADPS: f64 = 7.292_115_146_7e-5;
 /// Earth's gravitational parameter for GPS users (IS-GPS-200N, table 20-IV).
 pub const GPS_MU_M3PS2: f64 = 3.986_005e14;
 /// π as the broadcast algorithm prints it (IS-GPS-200N, table 20-IV).
 #[expect(clippy::approx_constant, reason = "the document prints this many digits and both ends must use them")]
 pub const GPS_PI: f64 = 3.141_592_653_589_8;
-/// Semi-major axis of the WGS 84 ellipsoid.
+/// Semi-major axis of the WGS 84 ellipsoid, in metres.
 pub const SEMI_MAJOR_AXIS_M: f64 = 6_378_137.0;
 /// Flattening of the WGS 84 ellipsoid.
 pub const FLATTENING: f64 = 1.0 / 298.257_223_563;
@@ -24,11 +24,11 @@ pub const ECCENTRICITY_SQUARED: f64 = FLATTENING * (2.0 - FLATTENING);
 /// A position given by latitude, longitude and height above the ellipsoid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geodetic {
-    /// Geodetic latitude, north positive.
+    /// Geodetic latitude, north positive, in radians.
     pub latitude_rad: f64,
-    /// Longitude, east positive.
+    /// Longitude, east positive, in radians.
     pub longitude_rad: f64,
-    /// Height above the ellipsoid.
+    /// Height above the ellipsoid, in metres.
     pub height_m: f64,
 }
 

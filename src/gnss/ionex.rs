@@ -43,7 +43,7 @@ pub struct Maps {
     longitudes: Axis,
     /// Radius of the Earth and height of the shell above it, as the header gives them.
     pub radius_m: f64,
-    /// Height of the shell above that radius.
+    /// Height of the shell above that radius, in metres.
     pub height_m: f64,
     /// TEC units (1e16 electrons/m²): by map, latitude, longitude.
     values_tecu: Vec<f64>,

@@ -14,7 +14,7 @@ use crate::time::{BDT, Epoch};
 
 /// Carrier on which the coefficients are defined (IS-GPS-200N, 3.3.1.1).
 pub const L1_HZ: f64 = 1_575.42e6;
-/// Delay at night (IS-GPS-200N, figure 20-4).
+/// Delay at night, in seconds (IS-GPS-200N, figure 20-4).
 pub const NIGHT_S: f64 = 5e-9;
 /// Local time of the bulge's maximum (IS-GPS-200N, figure 20-4).
 pub const MAXIMUM_S: f64 = 50_400.0;
@@ -54,7 +54,7 @@ pub struct Bulge {
 }
 
 impl Bulge {
-    /// Phase of the bulge x at its local time.
+    /// Phase of the bulge x at its local time, in radians.
     pub fn phase_rad(&self) -> f64 {
         TAU * (self.local_s - planted!("gnss.klobuchar.noon", MAXIMUM_S, 43_200.0)) / self.period_s
     }

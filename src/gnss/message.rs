@@ -25,7 +25,7 @@ use crate::time::{Epoch, TimePolynomial, TimeScale, WEEK_S};
 pub struct Message {
     /// Name as its document has it.
     pub name: &'static str,
-    /// Duration of a symbol: whole periods of the code that it modulates.
+    /// Duration of a symbol, in seconds: whole periods of the code that it modulates.
     pub symbol_s: f64,
     /// Signs of the symbols that make a bit of a satellite, one after another; one sign where symbols are not
     /// of a known code.

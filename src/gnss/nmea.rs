@@ -29,9 +29,9 @@ const GSV_SATELLITES: usize = 4;
 pub struct Place {
     /// GPS time of the position.
     pub time: Epoch,
-    /// ECEF position.
+    /// ECEF position, in metres.
     pub position_m: Vector3<f64>,
-    /// ECEF velocity.
+    /// ECEF velocity, in m/s.
     pub velocity_mps: Vector3<f64>,
     /// Satellites in the solution.
     pub satellites: u32,

@@ -43,13 +43,15 @@ pub struct Observation {
     /// Pseudorange in metres: speed of light times (time of reception by the receiver's clock − transmission
     /// time).
     pub pseudorange_m: f64,
-    /// Accumulated carrier, growing with range (RINEX sense); the receiver's has an unknown whole number.
+    /// Accumulated carrier phase in cycles, growing with range (RINEX sense); the receiver's has an unknown
+    /// whole number.
     pub carrier_cycles: f64,
-    /// Positive when approaching (RINEX sense).
+    /// Doppler in Hz, positive when approaching (RINEX sense).
     pub doppler_hz: f64,
     /// Carrier power over noise density of the whole signal, dB-Hz.
     pub cn0_dbhz: f64,
-    /// Time since the carrier was locked without interruption; in the truth, since the satellite appeared.
+    /// Time since the carrier was locked without interruption, in seconds; in the truth, since the satellite
+    /// appeared.
     pub locked_s: f64,
 }
 
@@ -74,13 +76,13 @@ pub struct SkyRow {
     pub azimuth_deg: f64,
     /// Elevation above the horizon, in degrees.
     pub elevation_deg: f64,
-    /// Geometric range with light time and Earth rotation.
+    /// Geometric range with light time and Earth rotation, in metres.
     pub range_m: f64,
     /// Satellite clock as that signal carries it (relativity and group delay included), in metres.
     pub satellite_clock_m: f64,
-    /// Group delay of the ionosphere on that signal.
+    /// Group delay of the ionosphere on that signal, in metres.
     pub ionosphere_m: f64,
-    /// Delay of the troposphere.
+    /// Delay of the troposphere, in metres.
     pub troposphere_m: f64,
 }
 
@@ -126,7 +128,7 @@ pub struct RayRow {
     pub signal: &'static Signal,
     /// Counted from 1; the direct ray is 0.
     pub ray: u32,
-    /// Delay of its code against the direct ray's.
+    /// Delay of its code against the direct ray's, in metres.
     pub excess_m: f64,
     /// Amplitude relative to the direct ray; 0 while there is no direct ray.
     pub amplitude_ratio: f64,
@@ -167,12 +169,12 @@ impl TrajectoryRow {
         Epoch::new(self.gps_s, self.gps_fraction_s)
     }
 
-    /// ECEF position.
+    /// ECEF position, in metres.
     pub fn position_m(&self) -> Vector3<f64> {
         Vector3::new(self.x_m, self.y_m, self.z_m)
     }
 
-    /// ECEF velocity.
+    /// ECEF velocity, in m/s.
     pub fn velocity_mps(&self) -> Vector3<f64> {
         Vector3::new(self.vx_mps, self.vy_mps, self.vz_mps)
     }
@@ -182,11 +184,11 @@ impl TrajectoryRow {
 /// and of a [`Fix`] in their files, and is not read again.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Geographic {
-    /// Geodetic latitude, north positive.
+    /// Geodetic latitude, north positive, in degrees.
     pub latitude_deg: f64,
-    /// Longitude, east positive.
+    /// Longitude, east positive, in degrees.
     pub longitude_deg: f64,
-    /// Height above the ellipsoid of WGS 84.
+    /// Height above the ellipsoid of WGS 84, in metres.
     pub height_m: f64,
     /// UTC, ISO 8601.
     pub utc: String,
@@ -246,13 +248,13 @@ pub struct Fix {
     pub clock_bias_s: f64,
     /// Rate of that bias, s/s.
     pub clock_drift: f64,
-    /// Formal standard deviations in the local frame, and of the clock.
+    /// Formal standard deviation of the east coordinate, in metres.
     pub sigma_east_m: f64,
-    /// North.
+    /// Formal standard deviation of the north coordinate, in metres.
     pub sigma_north_m: f64,
-    /// Standard deviation of the height, in metres.
+    /// Formal standard deviation of the height, in metres.
     pub sigma_up_m: f64,
-    /// Clock, times the speed of light.
+    /// Formal standard deviation of the clock offset times the speed of light, in metres.
     pub sigma_clock_m: f64,
     /// Formal correlations of east and north, east and up, north and up.
     pub correlation_en: f64,
@@ -323,7 +325,7 @@ pub struct IonosphereRow {
     /// Group delay on 1575.42 MHz, smoothed by the carriers. What the receiver's bands are apart, seen on
     /// that carrier, is in it, alike for all satellites of the same signals.
     pub delay_m: f64,
-    /// Standard deviation by thermal noise.
+    /// Standard deviation by thermal noise, in metres.
     pub sigma_m: f64,
 }
 
@@ -337,7 +339,7 @@ pub struct ClockRow {
     /// Offset of the receiver's clock from that time scale, in seconds, without the whole seconds to GPS
     /// time.
     pub clock_bias_s: f64,
-    /// Formal standard deviation.
+    /// Formal standard deviation, in metres.
     pub sigma_clock_m: f64,
 }
 
@@ -373,12 +375,12 @@ impl Fix {
         Epoch::new(self.gps_s, self.gps_fraction_s)
     }
 
-    /// ECEF position.
+    /// ECEF position, in metres.
     pub fn position_m(&self) -> Vector3<f64> {
         Vector3::new(self.x_m, self.y_m, self.z_m)
     }
 
-    /// ECEF velocity.
+    /// ECEF velocity, in m/s.
     pub fn velocity_mps(&self) -> Vector3<f64> {
         Vector3::new(self.vx_mps, self.vy_mps, self.vz_mps)
     }
@@ -400,7 +402,7 @@ pub struct AcquisitionRow {
     pub statistic: f64,
     /// Threshold of the statistic.
     pub threshold: f64,
-    /// Doppler of the largest statistic.
+    /// Doppler of the largest statistic, in Hz.
     pub doppler_hz: f64,
     /// Code phase at `sample`.
     pub code_phase_chips: f64,
@@ -455,7 +457,7 @@ pub struct TrackingRow {
     pub cn0_dbhz: f64,
     /// cos of twice the phase error, averaged: 1 is perfect lock.
     pub phase_lock: f64,
-    /// Time between updates of the loops.
+    /// Time between updates of the loops, in seconds.
     pub integration_s: f64,
 }
 

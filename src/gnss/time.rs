@@ -315,7 +315,7 @@ impl Rate {
         (whole as i64, rest as f64 / self.samples as f64)
     }
 
-    /// Time from sample 0 to sample `n` in one number; resolves 1e-16 of its size.
+    /// Time from sample 0 to sample `n` in one number, in seconds; resolves 1e-16 of its size.
     pub fn elapsed_s(self, n: u64) -> f64 {
         let (whole, fraction) = self.elapsed(n);
         whole as f64 + fraction

@@ -226,7 +226,7 @@ struct Climate {
     humidity: Season,
     lapse_kpm: Season,
     undulation_m: f64,
-    /// Height of the node's ground above the geoid.
+    /// Height of the node's ground above the geoid, in metres.
     ground_m: f64,
     a_hydrostatic: Season,
     a_wet: Season,
@@ -237,11 +237,11 @@ struct Climate {
 /// Weather that GPT3 gives for a position on a day of the year.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gpt3Weather {
-    /// Pressure of the air.
+    /// Pressure of the air, in hPa.
     pub pressure_hpa: f64,
     /// Temperature of the air.
     pub temperature_k: f64,
-    /// Pressure of the water vapour.
+    /// Pressure of the water vapour, in hPa.
     pub vapour_hpa: f64,
     /// Mean temperature of the water vapour above.
     pub mean_temperature_k: f64,
@@ -249,7 +249,7 @@ pub struct Gpt3Weather {
     pub vapour_decrease: f64,
     /// Coefficients of the mapping functions.
     pub a: MappingA,
-    /// Height of the geoid above the ellipsoid.
+    /// Height of the geoid above the ellipsoid, in metres.
     pub undulation_m: f64,
 }
 

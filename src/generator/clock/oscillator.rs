@@ -93,7 +93,7 @@ pub struct Oscillator {
     pub law: PowerLaw,
     cell_s: f64,
     tracks: Vec<Track>,
-    /// White phase noise of a node: standard deviation and random numbers.
+    /// White phase noise of a node, in seconds: standard deviation and random numbers.
     white_s: f64,
     white: Stream,
     /// Phase and frequency at the beginning, which are taken off.

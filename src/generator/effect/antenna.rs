@@ -184,7 +184,7 @@ pub enum PatternError {
     Wrap {
         /// The file.
         name: String,
-        /// The spacing found.
+        /// Largest change of the phase between neighbours, in degrees.
         step_deg: f64,
     },
 }

@@ -21,7 +21,7 @@ use gnss::time::Epoch;
 pub const FADE_RAD: f64 = 0.03;
 /// Time over which one day's bulge passes into the next at local midnight.
 pub const MIDNIGHT_S: f64 = 1200.0;
-/// Heights between which the delay fades.
+/// Heights between which the delay fades, in metres.
 const SHELL_M: f64 = 350e3;
 const TOP_M: f64 = 1000e3;
 
@@ -30,7 +30,7 @@ const TOP_M: f64 = 1000e3;
 pub struct KlobucharIonosphere {
     /// The model's eight coefficients.
     pub model: Klobuchar,
-    /// The carrier on which these give the delay: L1, or L5 of NavIC.
+    /// Carrier frequency in Hz on which the coefficients give the delay: L1, or L5 of NavIC.
     pub defined_hz: f64,
 }
 

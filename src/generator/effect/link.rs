@@ -19,8 +19,8 @@ use gnss::signal::Signal;
 /// k·T0 in dBW/Hz as the budget rounds it: a matched source at 290 K gives −203.98.
 const REFERENCE_NOISE_DBWHZ: f64 = -204.0;
 
-/// Height of a GPS orbit's lowest point: 26 560 km less 2 % (plausible eccentricities) less the Earth's
-/// radius.
+/// Height of a GPS orbit's lowest point, in metres: 26 560 km less 2 % (plausible eccentricities) less the
+/// Earth's radius.
 const ZENITH_RANGE_M: f64 = 1.965e7;
 
 /// Part of a radius by which an orbit may differ from its system's: 0.1, that of the most eccentric satellite
@@ -37,13 +37,13 @@ pub struct LinkBudget {
     pub block: Block,
     /// Satellites with a block of their own.
     pub blocks: Vec<(Sv, Block)>,
-    /// Atmospheric and polarisation losses.
+    /// Atmospheric and polarisation losses, in dB.
     pub path_loss_db: f64,
     /// The receiving antenna.
     pub antenna: Antenna,
     /// Noise figure of the receiver, against 290 K.
     pub noise_figure_db: f64,
-    /// Losses in the receiver.
+    /// Losses in the receiver, in dB.
     pub implementation_loss_db: f64,
     /// Additional losses of the scene, in dB.
     pub extra_loss_db: f64,
@@ -86,7 +86,7 @@ impl LinkBudget {
         (self.over_noise_dbhz(received_dbw + receive_db), phase_cycles)
     }
 
-    /// Power into an isotropic antenna at a range.
+    /// Power into an isotropic antenna at a range, in dBW.
     fn incident_dbw(&self, transmit_db: f64, range_m: f64, carrier_hz: f64) -> f64 {
         let spreading = 4.0 * std::f64::consts::PI * range_m * carrier_hz / SPEED_OF_LIGHT_MPS;
         self.transmit_dbw + transmit_db

@@ -20,21 +20,21 @@ use gnss::time::Epoch;
 pub enum Detour {
     /// The excess at the scene's start and its rate.
     Given {
-        /// Path beyond the direct one at the scene's start.
+        /// Path beyond the direct one at the scene's start, in metres.
         excess_m: f64,
         /// Growth of that excess a second.
         rate_mps: f64,
     },
     /// Level ground, which keeps its distance to the antenna.
     Ground {
-        /// Height of the antenna above the ground.
+        /// Height of the antenna above the ground, in metres.
         height_m: f64,
     },
     /// A vertical plane in a direction (from north over east) that stays where it is while the antenna moves.
     Wall {
-        /// Azimuth of the wall as seen from the antenna.
+        /// Azimuth of the wall as seen from the antenna, in radians.
         azimuth_rad: f64,
-        /// Distance of the wall.
+        /// Distance of the wall, in metres.
         distance_m: f64,
     },
 }
@@ -64,7 +64,7 @@ pub struct Multipath {
 }
 
 impl Multipath {
-    /// Distance of the antenna at `user_m` from a wall; negative behind it.
+    /// Distance of the antenna at `user_m` from a wall, in metres; negative behind it.
     pub fn clearance_m(&self, azimuth_rad: f64, distance_m: f64, user_m: &Vector3<f64>) -> f64 {
         distance_m - self.towards(azimuth_rad).dot(&(user_m - self.origin_m))
     }

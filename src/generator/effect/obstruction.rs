@@ -24,20 +24,20 @@ pub enum Obstacle {
     Horizon {
         /// Azimuths in [0, 2π), ascending, and elevations.
         points_rad: Vec<(f64, f64)>,
-        /// Elevation over which the loss goes from nothing to all.
+        /// Elevation over which the loss goes from nothing to all, in radians.
         edge_rad: f64,
         /// Share of the power that is left behind it.
         share: f64,
     },
     /// Everything below `roof_rad` from azimuth `from_rad` clockwise to `to_rad`.
     Sector {
-        /// Azimuth at which it begins.
+        /// Azimuth at which the sector begins, in radians.
         from_rad: f64,
-        /// Azimuth at which it ends, clockwise.
+        /// Azimuth at which the sector ends, clockwise, in radians.
         to_rad: f64,
-        /// Elevation of its upper edge.
+        /// Elevation of the upper edge, in radians.
         roof_rad: f64,
-        /// Elevation over which the loss goes from nothing to all.
+        /// Elevation over which the loss goes from nothing to all, in radians.
         edge_rad: f64,
         /// Share of the power that is left behind it.
         share: f64,
@@ -53,7 +53,7 @@ pub struct Building {
     pub east_m: [f64; 2],
     /// South and north end in metres north of the scene's first position.
     pub north_m: [f64; 2],
-    /// Height of the roof above that position.
+    /// Height of the roof above the scene's first position, in metres.
     pub top_m: f64,
     /// Power that goes through it, 0 to 1.
     pub share: f64,

@@ -19,7 +19,7 @@ const METRES_PER_TECU_HZ2: f64 = 40.3e16;
 /// CODE's modified single-layer mapping: share of the zenith angle, and height of the shell that it assumes.
 const MODIFIED_SHARE: f64 = 0.9782;
 const MODIFIED_HEIGHT_M: f64 = 506.7e3;
-/// Mean radius of the Earth where no map gives one.
+/// Mean radius of the Earth where no map gives one, in metres.
 pub const EARTH_RADIUS_M: f64 = 6371e3;
 
 /// Conversion of a vertical electron content to a slant one.
@@ -37,7 +37,7 @@ pub enum Mapping {
 pub struct Shell {
     /// Radius of the Earth, and height of the shell above it.
     pub radius_m: f64,
-    /// Height above the sphere of the maps.
+    /// Height above the sphere of the maps, in metres.
     pub height_m: f64,
     /// Conversion from vertical to slant content.
     pub mapping: Mapping,
@@ -46,9 +46,9 @@ pub struct Shell {
 /// Point at which a line of sight crosses the shell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pierce {
-    /// Geocentric latitude.
+    /// Geocentric latitude, in radians.
     pub latitude_rad: f64,
-    /// Longitude, east positive.
+    /// Longitude, east positive, in radians.
     pub longitude_rad: f64,
     /// Slant over vertical column.
     pub slant: f64,

@@ -26,7 +26,8 @@ const PRESSURE_EXPONENT: f64 = 5.2568;
 const TEMPERATURE_LAPSE_KPM: f64 = 6.5e-3;
 const TROPOPAUSE_M: f64 = 11_000.0;
 const CELSIUS_K: f64 = 273.15;
-/// Heights between which what GPT3 states fades away: its own decay leaves 0.4 % of the delay there.
+/// Heights between which what GPT3 states fades away, in metres: its own decay leaves 0.4 % of the delay
+/// there.
 const FADE_M: f64 = 40e3;
 const TOP_M: f64 = 50e3;
 /// Mean radius of the Earth, and by how much air bends a ray that grazes the ground: half a degree.
@@ -67,7 +68,7 @@ impl Weather {
     }
 }
 
-/// Saturation pressure of water vapour (Magnus; Tetens 1930).
+/// Saturation pressure of water vapour, in hPa (Magnus; Tetens 1930).
 pub fn saturation_hpa(temperature_k: f64) -> f64 {
     let celsius = temperature_k - CELSIUS_K;
     6.1078 * libm::pow(10.0, 7.5 * celsius / (celsius + 237.3))

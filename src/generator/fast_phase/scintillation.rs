@@ -63,7 +63,7 @@ const REFERENCE: usize = 8;
 pub struct Strength {
     /// Standard deviation of the intensity over its mean.
     pub s4: f64,
-    /// Standard deviation of the phase; absent means what comes with `s4` of a carrier.
+    /// Standard deviation of the phase, in radians; absent means what comes with `s4` of a carrier.
     pub sigma_phi_rad: Option<f64>,
     /// Time after which the autocorrelation of ξ is 1/e.
     pub decorrelation_s: f64,

@@ -13,9 +13,10 @@ use folds::Folds;
 
 /// Largest error of a code at rest that `balanced` leaves, whatever the noise.
 pub(super) const LARGEST_BIAS_M: f64 = 0.2;
-/// Noise bandwidth of the code loop behind which the plan states a moving code's error.
+/// Noise bandwidth of the code loop behind which the plan states a moving code's error, in Hz.
 pub const LOOP_HZ: f64 = 0.5;
-/// Rate and spacing of the correlator whose noise hides an error.
+/// Chip rate in Hz of the code loop whose noise is compared with an error; the correlator's spacing is one
+/// chip.
 const CHIP_HZ: f64 = 1.023e6;
 
 /// Error of a signal's code whose phase is at rest on the sampling grid, root mean square over codes and

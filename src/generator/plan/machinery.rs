@@ -18,7 +18,7 @@ const PLANNED_ROOTS: u64 = 16;
 pub struct Machinery {
     /// Shortest and longest time between knots of the signal's delay, and why it is that.
     pub knot_spacing_s: f64,
-    /// Longest time between knots.
+    /// Longest time between knots, in seconds.
     pub longest_knot_spacing_s: f64,
     /// Reason for the knot spacing.
     pub knot_reason: String,

@@ -21,7 +21,7 @@ const RATE_HZ: f64 = 2.6e6;
 pub enum Tuned {
     /// The carrier of its first signal appears there in the samples.
     If {
-        /// The carrier's frequency in the samples.
+        /// The carrier's frequency in the samples, in Hz.
         if_hz: f64,
     },
     /// Radio frequency that appears at 0 Hz.

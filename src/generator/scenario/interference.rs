@@ -53,28 +53,28 @@ pub enum Kind {
     Cw,
     /// A frequency that rises linearly and jumps back.
     Chirp {
-        /// Width of the sweep.
+        /// Width of the sweep, in Hz.
         sweep_hz: f64,
-        /// Period of the sweep.
+        /// Period of the sweep, in seconds.
         sweep_s: f64,
     },
     /// A frequency that rises and falls linearly.
     Fmcw {
-        /// Width of the sweep.
+        /// Width of the sweep, in Hz.
         sweep_hz: f64,
-        /// Period of the sweep.
+        /// Period of the sweep, in seconds.
         sweep_s: f64,
     },
     /// A frequency that follows a cosine.
     SineFm {
-        /// Largest deviation from the carrier.
+        /// Largest deviation from the carrier, in Hz.
         deviation_hz: f64,
         /// Periods a second.
         rate_hz: f64,
     },
     /// A carrier that is on for short times.
     Pulse {
-        /// Length of a pulse.
+        /// Length of a pulse, in seconds.
         width_s: f64,
         /// Pulses a second.
         rate_hz: f64,
@@ -85,7 +85,7 @@ pub enum Kind {
     Matched,
     /// Gaussian noise of a band.
     Noise {
-        /// Width of the band.
+        /// Width of the band, in Hz.
         bandwidth_hz: f64,
     },
     /// Samples of a file.
@@ -143,9 +143,9 @@ pub struct DragSpec {
     pub azimuth_rad: f64,
     /// Direction of the drag, upwards.
     pub elevation_rad: f64,
-    /// Final speed.
+    /// Final speed, in m/s.
     pub speed_mps: f64,
-    /// Acceleration until that speed.
+    /// Acceleration until that speed, in m/s².
     pub acceleration_mps2: f64,
 }
 
@@ -195,7 +195,7 @@ pub(super) fn interference(table: &Table<'_>) -> Result<InterferenceSpec, Scenar
     })
 }
 
-/// Radio frequency of a source's centre: as written, or by its offset from GPS L1.
+/// Radio frequency of a source's centre, in Hz: as written, or by its offset from GPS L1.
 fn center_hz(table: &Table<'_>) -> Result<f64, ScenarioError> {
     match table.number("center_hz")? {
         Some(_) if table.has("offset_hz") => {

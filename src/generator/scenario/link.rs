@@ -34,9 +34,9 @@ pub enum Power {
         blocks: Vec<(Sv, Block)>,
         /// The antenna.
         antenna: AntennaSpec,
-        /// Noise figure of the receiver.
+        /// Noise figure of the receiver, in dB.
         noise_figure_db: f64,
-        /// Losses between antenna and receiver.
+        /// Losses between antenna and receiver, in dB.
         loss_db: f64,
     },
 }

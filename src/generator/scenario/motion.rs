@@ -36,7 +36,7 @@ pub enum MotionSpec {
         path: PathBuf,
         /// Format of the file.
         kind: FileKind,
-        /// Longest time between two rows.
+        /// Longest time between two rows, in seconds.
         max_gap_s: f64,
         /// Largest distance in metres between the motion and its rows.
         tolerance_m: Option<f64>,
@@ -49,13 +49,13 @@ pub enum MotionSpec {
     Pushed {
         /// Position before the first push.
         place: Geodetic,
-        /// Length of a tick.
+        /// Length of a tick, in seconds.
         tick_s: f64,
         /// Time in which what is sent joins what was pushed.
         join_s: f64,
         /// Age of a push up to which its acceleration is kept.
         hold_s: f64,
-        /// Largest jerk of a join.
+        /// Largest jerk of a join, in m/s³.
         max_jerk_mps3: f64,
     },
     /// The ticks of a live run again.
@@ -64,7 +64,7 @@ pub enum MotionSpec {
         path: PathBuf,
         /// Table of what was switched meanwhile.
         events: Option<PathBuf>,
-        /// Length of a tick.
+        /// Length of a tick, in seconds.
         tick_s: f64,
     },
 }

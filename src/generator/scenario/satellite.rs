@@ -33,7 +33,7 @@ const MARGIN_S: f64 = 2.0;
 pub struct OrbitsSpec {
     /// SP3 files, in the order of time.
     pub files: Vec<PathBuf>,
-    /// Antenna below the centre of mass: of all satellites, and of some by name.
+    /// Antenna below the centre of mass, in metres: of all satellites, and of some by name.
     pub antenna_m: f64,
     /// Offset of the antenna from the centre of mass towards the Earth, by satellite.
     pub antennas_m: Vec<(Sv, f64)>,
@@ -77,7 +77,7 @@ pub enum SatelliteFault {
     Orbit {
         /// The satellites concerned.
         satellites: Vec<Sv>,
-        /// Outwards.
+        /// Radial displacement in metres, positive outwards.
         radial_m: f64,
         /// Displacement along the inertial motion, in metres.
         along_m: f64,

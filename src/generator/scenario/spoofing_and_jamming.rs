@@ -151,7 +151,7 @@ impl Source<'_> {
         }
     }
 
-    /// Lowest and highest frequency of a band of `width_hz` about the carrier that samples hold.
+    /// Lowest and highest frequency of a band of `width_hz` about the carrier that samples hold, in Hz.
     fn overlap_hz(&self, width_hz: f64) -> Option<(f64, f64)> {
         let (low_hz, high_hz) = self.tuning.band_hz();
         let place_hz = self.tuning.place_hz(self.spec.center_hz);

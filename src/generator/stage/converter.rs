@@ -124,7 +124,7 @@ mod tests {
     use super::*;
     use crate::synth::noise::add_block;
 
-    /// Correlation loss of a weak signal: 10 lg of (E[x Q(x)])² / E[Q(x)²], for Gaussian x.
+    /// Correlation loss of a weak signal, in dB: 10 lg of (E[x Q(x)])² / E[Q(x)²], for Gaussian x.
     fn loss_db(converter: &Converter, sigma: f32) -> f64 {
         let (mut product, mut square, mut power) = (0.0, 0.0, 0.0);
         for number in 0..200 {

@@ -39,11 +39,11 @@ const MAX_TAPS: usize = 8192;
 pub struct Filter {
     /// Shape of the response.
     pub shape: Shape,
-    /// Width between the points of half power (both sides of the IF together).
+    /// Width between the points of half power, in Hz (both sides of the IF together).
     pub bandwidth_hz: f64,
-    /// Delay of the envelope in the middle of the band.
+    /// Delay of the envelope in the middle of the band, in seconds.
     pub group_delay_s: f64,
-    /// Frequency in the samples of its middle.
+    /// Frequency in the samples of its middle, in Hz.
     pub middle_hz: f64,
     /// The response by ascending lag; imaginary parts are zero for a filter around zero.
     re: Vec<f32>,
@@ -58,19 +58,19 @@ pub enum FilterError {
     /// A band that the sample rate cannot hold.
     #[error("{bandwidth_hz} Hz at {rate_hz} samples a second: expected less than {limit_hz} Hz, or no filter")]
     Wide {
-        /// The band asked for.
+        /// The band asked for, in Hz.
         bandwidth_hz: f64,
-        /// The sample rate.
+        /// The sample rate, in Hz.
         rate_hz: f64,
-        /// The widest band at that rate.
+        /// The widest band at that rate, in Hz.
         limit_hz: f64,
     },
     /// A band that would take too long a filter.
     #[error("{bandwidth_hz} Hz at {rate_hz} samples a second takes {taps} taps: expected at most 8192")]
     Narrow {
-        /// The band asked for.
+        /// The band asked for, in Hz.
         bandwidth_hz: f64,
-        /// The sample rate.
+        /// The sample rate, in Hz.
         rate_hz: f64,
         /// Taps that it would take.
         taps: usize,

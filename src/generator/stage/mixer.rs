@@ -31,7 +31,7 @@ pub struct Oscillator {
 /// Phase noise of a synthesiser.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhaseNoise {
-    /// Standard deviation of the phase.
+    /// Standard deviation of the phase, in radians.
     pub rms_rad: f64,
     /// Half-power bandwidth of the noise, that of the synthesiser's loop.
     pub bandwidth_hz: f64,

@@ -27,7 +27,7 @@ pub struct Voice {
     pub spreading: Spreading,
     /// Factor of the component's amplitude.
     pub amplitude: f64,
-    /// Carrier phase relative to the component's.
+    /// Carrier phase relative to the component's, in cycles.
     pub phase_cycles: f64,
     /// Pulse for the steps of a sequence that are not levels of ±1: chips behind a filter.
     pub pulse: Option<Arc<Pulse>>,
@@ -93,9 +93,9 @@ pub enum WaveformError {
         layer: usize,
         /// Steps per second.
         steps_hz: f64,
-        /// The sample rate.
+        /// The sample rate, in Hz.
         rate_hz: f64,
-        /// The least rate that would do.
+        /// The least rate that would do, in Hz.
         least_hz: f64,
     },
     /// A table that is no code.

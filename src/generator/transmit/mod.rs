@@ -96,7 +96,7 @@ pub struct Transmitter {
     pub seen: bool,
     /// Polynomials made.
     pub knots: u64,
-    /// Largest error of the carrier met between their knots.
+    /// Largest error of the carrier met between their knots, in cycles.
     pub worst_knot_cycles: f64,
 }
 

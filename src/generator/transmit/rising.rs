@@ -15,7 +15,8 @@ use gnss::satellite::Sv;
 const SATELLITE_MPS: f64 = 5000.0;
 /// No leap is longer, so that ranges stay about what they are.
 const LEAP_S: f64 = 600.0;
-/// Largest change of an elevation by lever arms and orbit errors of a satellite: 200 m at 20 000 km.
+/// Largest change of an elevation by lever arms and orbit errors of a satellite, in radians: 200 m at 20 000
+/// km.
 const SLACK_RAD: f64 = 1e-5;
 
 /// Time before a sight for which a satellite was certainly in view.

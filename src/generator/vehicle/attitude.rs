@@ -15,7 +15,7 @@ use super::Motion;
 use super::turn::Turn;
 use gnss::earth::Geodetic;
 
-/// Weight of the direction at rest against the velocity.
+/// Weight of the direction at rest against the velocity, in m/s.
 const REST_MPS: f64 = 1.0;
 
 /// Direction of the nose.

@@ -32,10 +32,10 @@ pub const MAX_ROWS: usize = 1_000_000;
 pub const MAX_BYTES: u64 = 256 << 20;
 /// Bytes of a row at most, so that a text without ends of lines takes no memory.
 const MAX_ROW_BYTES: usize = 1 << 16;
-/// Nearest to the Earth's centre: 50 km below the poles.
+/// Nearest to the Earth's centre, in metres: 50 km below the poles.
 const LEAST_RADIUS_M: f64 = 6.3e6;
 
-/// A degree along a meridian.
+/// A degree along a meridian, in metres.
 const DEGREE_M: f64 = 111_195.0;
 
 /// Time scale of a file's rows and limits of their spacing.
@@ -43,7 +43,7 @@ const DEGREE_M: f64 = 111_195.0;
 pub struct Options {
     /// Start of the scene.
     pub start: Epoch,
-    /// Longest time between two rows.
+    /// Longest time between two rows, in seconds.
     pub max_gap_s: f64,
     /// Largest distance in metres of the motion from rows with positions alone; `None` for a motion through
     /// all of them.
@@ -141,34 +141,34 @@ pub enum Fault {
     Unsorted {
         /// Time of the earlier row, in seconds since the scene's start.
         t_s: f64,
-        /// Time of the row before.
+        /// Time of the row before, in seconds.
         before_s: f64,
     },
     /// Rows too far apart.
     #[error("{gap_s:.3} s since the row before: expected at most max_gap_s = {max_gap_s} s")]
     Gap {
-        /// Time between them.
+        /// Time between them, in seconds.
         gap_s: f64,
-        /// Longest time between two rows.
+        /// Longest time between two rows, in seconds.
         max_gap_s: f64,
     },
     /// A motion that is too fast.
     #[error("{speed_mps:.6e} m/s since the row before: expected at most 0.1 c = 2.998e7 m/s")]
     Speed {
-        /// The speed.
+        /// The speed, in m/s.
         speed_mps: f64,
     },
     /// A way that passes through the Earth.
     #[error("the way from the row before passes {:.0} km from the Earth's centre: expected at least 6300 \
              km", radius_m / 1e3)]
     Depth {
-        /// Least distance from the Earth's centre.
+        /// Least distance from the Earth's centre, in metres.
         radius_m: f64,
     },
     /// A motion that accelerates too much.
     #[error("acceleration of {acceleration_mps2:.3e} m/s2: expected at most 1e6 m/s2")]
     Acceleration {
-        /// The acceleration.
+        /// The acceleration, in m/s².
         acceleration_mps2: f64,
     },
     /// A tolerance for rows whose velocities state how the motion goes.

@@ -26,7 +26,7 @@ const MOST_RADIUS_M: f64 = 1e9;
 const MOST_SPEED_MPS: f64 = 0.01 * SPEED_OF_LIGHT_MPS;
 const MOST_ACCELERATION_MPS2: f64 = 1e6;
 const MOST_JERK_MPS3: f64 = 1e9;
-/// Largest angular rate.
+/// Largest angular rate, in rad/s.
 const MOST_TURNING_RADPS: f64 = 1e3;
 /// Mean speed of a snap at most; its peak is 1.875 times that.
 const SNAP_SPEED_MPS: f64 = 0.05 * SPEED_OF_LIGHT_MPS;
@@ -38,7 +38,7 @@ const PLACES: u32 = 8;
 pub struct Push {
     /// True time since the scene's start that it describes.
     pub t_s: f64,
-    /// Position.
+    /// Position, in metres.
     pub position_m: Vector3<f64>,
     /// Velocity in ECEF, if known, in m/s.
     pub velocity_mps: Option<Vector3<f64>>,
@@ -145,7 +145,7 @@ pub struct Tick {
     pub gap_m: f64,
     /// Age in seconds of the push at the tick's end; negative while the push lies ahead.
     pub age_s: f64,
-    /// The largest jerk of the tick.
+    /// The largest jerk of the tick, in m/s³.
     pub jerk_mps3: f64,
 }
 
@@ -165,7 +165,7 @@ struct State {
 #[derive(Clone, Debug)]
 pub struct Joiner {
     joining: Joining,
-    /// Length of a tick.
+    /// Length of a tick, in seconds.
     tick_s: f64,
     /// Motion that is transmitted now.
     now: Motion,

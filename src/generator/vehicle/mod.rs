@@ -31,7 +31,7 @@ use gnss::earth::Geodetic;
 /// Position, velocity and acceleration of the antenna in ECEF.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
-    /// Position, ECEF.
+    /// ECEF position, in metres.
     pub position_m: Vector3<f64>,
     /// Velocity in ECEF, in m/s.
     pub velocity_mps: Vector3<f64>,
@@ -235,7 +235,8 @@ impl Trajectory {
             && self.knots.iter().all(|knot| knot.motion == Motion::at_rest(self.first.motion.position_m))
     }
 
-    /// First and last instant that the knots cover; for all times where nothing moves at that end.
+    /// First and last instant that the knots cover, in seconds; for all times where nothing moves at that
+    /// end.
     pub fn span_s(&self) -> (f64, f64) {
         if self.grown.is_some() {
             return (f64::NEG_INFINITY, f64::INFINITY);
@@ -285,9 +286,9 @@ fn heading_cycles(axes: &Orientation, place_m: &Vector3<f64>) -> f64 {
 /// The largest values that a motion reaches.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Extremes {
-    /// Largest acceleration.
+    /// Largest acceleration, in m/s².
     pub acceleration_mps2: f64,
-    /// Largest speed.
+    /// Largest speed, in m/s.
     pub speed_mps: f64,
 }
 

@@ -19,23 +19,23 @@ use gnss::earth::{EARTH_ROTATION_RADPS, SEMI_MAJOR_AXIS_M, rotate_earth};
 const STEP_RAD: f64 = 0.01;
 /// Knots at most, 80 bytes each: 46 days of a low orbit.
 const MOST_KNOTS: f64 = 5e5;
-/// Lowest perigee: what flies below does not stay in orbit.
+/// Lowest perigee, in metres: what flies below does not stay in orbit.
 const LOWEST_M: f64 = 80e3;
 
 /// Elements at the scene's start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orbit {
-    /// Half of the longest diameter.
+    /// Half of the longest diameter, in metres.
     pub semi_major_axis_m: f64,
     /// Eccentricity, from 0 to below 1.
     pub eccentricity: f64,
-    /// Angle between the orbit's plane and the equator.
+    /// Angle between the orbit's plane and the equator, in radians.
     pub inclination_rad: f64,
-    /// Longitude of the ascending node in the Earth-fixed axes of the scene's start.
+    /// Longitude of the ascending node in the Earth-fixed axes of the scene's start, in radians.
     pub node_longitude_rad: f64,
     /// Argument of the perigee from the ascending node, in radians.
     pub argument_of_perigee_rad: f64,
-    /// Mean anomaly at the scene's start.
+    /// Mean anomaly at the scene's start, in radians.
     pub mean_anomaly_rad: f64,
 }
 
@@ -48,17 +48,17 @@ pub enum OrbitMotionError {
          above the equator's radius: expected at least 80 000 m"
     )]
     Perigee {
-        /// Half of the longest diameter.
+        /// Half of the longest diameter, in metres.
         semi_major_axis_m: f64,
         /// Eccentricity, from 0 to below 1.
         eccentricity: f64,
-        /// Height of the perigee.
+        /// Height of the perigee, in metres.
         perigee_m: f64,
     },
     /// A flight with more knots than are kept.
     #[error("an orbit over {duration_s} s needs {knots:.0} knots: expected at most 500 000, a shorter duration_s")]
     Long {
-        /// Length of the flight.
+        /// Length of the flight, in seconds.
         duration_s: f64,
         /// Knots that it would take.
         knots: f64,

@@ -34,15 +34,15 @@ pub struct Rocket {
     pub pad: Geodetic,
     /// Direction of the thrust at the pad, kept in ECEF.
     pub azimuth_rad: f64,
-    /// Elevation of the launch.
+    /// Elevation of the launch, in radians.
     pub elevation_rad: f64,
     /// Ignition time, in true seconds since the scene's start.
     pub ignition_s: f64,
-    /// Thrust over mass while it holds.
+    /// Thrust over mass while it holds, in m/s².
     pub thrust_mps2: f64,
     /// Duration in seconds from ignition to the end of the thrust, both ramps included.
     pub burn_s: f64,
-    /// Slope of the thrust's ramps.
+    /// Slope of the thrust's ramps, in m/s³.
     pub jerk_mps3: f64,
     /// Cd·A/m; 0 flies in vacuum.
     pub drag_m2pkg: f64,
@@ -59,19 +59,19 @@ pub enum RocketError {
          ramps, not {burn_s}"
     )]
     Burn {
-        /// Largest acceleration by the thrust.
+        /// Largest acceleration by the thrust, in m/s².
         thrust_mps2: f64,
         /// Jerk by which the acceleration grows, in m/s³.
         jerk_mps3: f64,
-        /// Time that both ramps take.
+        /// Time that both ramps take, in seconds.
         ramps_s: f64,
-        /// Length of the burn.
+        /// Length of the burn, in seconds.
         burn_s: f64,
     },
     /// A thrust that does not lift the rocket.
     #[error("thrust_mps2 = {thrust_mps2} at this elevation does not lift off: net {net_mps2:.2} m/s2 upwards")]
     Weak {
-        /// Largest acceleration by the thrust.
+        /// Largest acceleration by the thrust, in m/s².
         thrust_mps2: f64,
         /// Thrust acceleration minus gravity, in m/s².
         net_mps2: f64,

@@ -46,7 +46,7 @@ pub struct Limits {
     pub turning: Turning,
     /// Largest acceleration along the path, in m/s².
     pub acceleration_mps2: f64,
-    /// Largest jerk.
+    /// Largest jerk, in m/s³.
     pub jerk_mps3: f64,
 }
 
@@ -65,7 +65,7 @@ pub enum RouteError {
     Length {
         /// Number of the waypoint at which the leg begins, from 1.
         from: usize,
-        /// Length of the leg.
+        /// Length of the leg, in metres.
         length_m: f64,
     },
     /// A leg without a speed at either end.
@@ -82,7 +82,7 @@ pub enum RouteError {
     Sharp {
         /// Number of the waypoint, from 1.
         at: usize,
-        /// Change of direction.
+        /// Change of direction, in degrees.
         angle_deg: f64,
     },
     /// A leg in which the speed cannot change as much.
@@ -94,9 +94,9 @@ pub enum RouteError {
     Short {
         /// Number of the waypoint at which the leg begins, from 1.
         from: usize,
-        /// Length of the leg.
+        /// Length of the leg, in metres.
         length_m: f64,
-        /// Length that it would take.
+        /// Length that it would take, in metres.
         needed_m: f64,
     },
 }

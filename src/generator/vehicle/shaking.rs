@@ -6,7 +6,7 @@
 
 use super::Trajectory;
 
-/// Standard gravity.
+/// Standard gravity, in m/s².
 pub const GRAVITY_MPS2: f64 = 9.806_65;
 
 /// Nodes and weights of Gauss and Legendre's rule with four points on (0, 1).
@@ -51,7 +51,7 @@ impl Shaking {
         self.per_mps2 * (self.sum_mps(t_s) - self.before_mps)
     }
 
-    /// ∫ |a| dt from the first knot.
+    /// ∫ |a| dt from the first knot, in m/s.
     fn sum_mps(&self, t_s: f64) -> f64 {
         let knots = self.trajectory.knots();
         let left = knots.partition_point(|knot| knot.t_s <= t_s).saturating_sub(1);

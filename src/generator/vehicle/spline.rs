@@ -13,7 +13,7 @@ use super::{Knot, Motion};
 pub struct Row {
     /// True time since the scene's start.
     pub t_s: f64,
-    /// Position, ECEF.
+    /// ECEF position, in metres.
     pub position_m: Vector3<f64>,
     /// Velocity, ECEF; `None` where it is not given.
     pub velocity_mps: Option<Vector3<f64>>,

@@ -51,7 +51,7 @@ const DELAYS: [(f64, f64); 15] = [
 /// Ageing of a fast correction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ageing {
-    /// Acceleration by which its error grows.
+    /// Acceleration by which its error grows, in m/s².
     pub acceleration_mps2: f64,
     /// Seconds for which it may be used.
     pub timeout_s: f64,

@@ -7,7 +7,7 @@
 
 use crate::earth::{Geodetic, Look};
 
-/// The shell and the Earth below it (A.4.4.10.1).
+/// Height of the shell and radius of the Earth below it, in metres (A.4.4.10.1).
 const SHELL_M: f64 = 350e3;
 const EARTH_M: f64 = 6_378_136.3;
 /// Bands whose points are listed by meridians, and how many of these each has.
@@ -57,7 +57,7 @@ pub fn band_of(longitude_deg: i16) -> u8 {
 /// Point at which a line of sight crosses the shell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pierce {
-    /// Latitude, north positive.
+    /// Latitude, north positive, in degrees.
     pub latitude_deg: f64,
     /// Longitude, east positive, from −180 on.
     pub longitude_deg: f64,

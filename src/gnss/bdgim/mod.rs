@@ -29,7 +29,7 @@ const POLE_LATITUDE_DEG: f64 = 80.27;
 const POLE_LONGITUDE_DEG: f64 = -72.58;
 /// Metres of delay at 1 Hz² for a TECU (equation 7-6).
 const DELAY_M_HZ2_PTECU: f64 = 40.28e16;
-/// Time for which the coefficients of the forecast hold (7.8.2).
+/// Time for which the coefficients of the forecast hold, in seconds (7.8.2).
 pub const INTERVAL_S: i64 = 7200;
 /// Modified Julian date of the beginning of GPS time, 1980-01-06.
 const FIRST_MJD: i64 = 44_244;
@@ -48,9 +48,9 @@ pub struct Bdgim {
 /// Point at which the line of sight crosses the shell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pierce {
-    /// Geographic latitude.
+    /// Geographic latitude, in radians.
     pub latitude_rad: f64,
-    /// Geographic longitude.
+    /// Geographic longitude, in radians.
     pub longitude_rad: f64,
     /// Slant over vertical content.
     pub obliquity: f64,
@@ -97,7 +97,7 @@ impl Pierce {
 pub struct UnderSun {
     /// Sine of the geomagnetic latitude.
     pub sin_latitude: f64,
-    /// Geomagnetic longitude east of the mean Sun's.
+    /// Geomagnetic longitude east of the mean Sun's, in radians.
     pub longitude_rad: f64,
 }
 

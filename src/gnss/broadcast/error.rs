@@ -40,7 +40,7 @@ pub enum OrbitError {
     Near {
         /// The satellite.
         sv: Sv,
-        /// Distance of the two.
+        /// Distance of satellite and user, in metres.
         range_m: f64,
     },
 }

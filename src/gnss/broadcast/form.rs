@@ -18,7 +18,7 @@ pub struct SetForm {
     pub group_delay_s: fn(&Ephemeris, &Signal) -> f64,
     /// True if a decoded ephemeris suffices for ranges of a signal: it then includes the signal's delays.
     pub serves: fn(&Signal) -> bool,
-    /// The group delay on the carrier of which the message gives it.
+    /// The group delay on the carrier of which the message gives it, in seconds.
     pub given_delay_s: fn(&Ephemeris) -> f64,
     /// True if an ephemeris reports the first of its signals as usable.
     pub is_healthy: fn(&Ephemeris) -> bool,

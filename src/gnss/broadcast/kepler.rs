@@ -2,7 +2,7 @@
 //!
 //! Source: IS-GPS-200N, table 20-IV. Limits: eccentricities below one.
 
-/// Residual of Kepler's equation at which it counts as solved.
+/// Residual of Kepler's equation at which it counts as solved, in radians.
 const KEPLER_TOLERANCE_RAD: f64 = 1e-13;
 const KEPLER_STEPS: u32 = 20;
 

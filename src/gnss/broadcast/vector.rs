@@ -20,7 +20,7 @@ const RADIUS_M: f64 = 6_378_136.0;
 const ROTATION_RADPS: f64 = 7.292_115_146_7e-5;
 /// Step of the integration.
 const STEP_S: f64 = 30.0;
-/// Furthest time from the reference time.
+/// Furthest time from the reference time, in seconds.
 const FARTHEST_S: f64 = 86_400.0;
 /// Least and largest distance from the Earth's centre of a satellite's state, with room.
 const DISTANCES_M: std::ops::RangeInclusive<f64> = 6.4e6..=1e8;
@@ -28,11 +28,11 @@ const DISTANCES_M: std::ops::RangeInclusive<f64> = 6.4e6..=1e8;
 /// State at the reference time, earth-fixed, and what Moon and Sun add to its acceleration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StateVector {
-    /// Position.
+    /// Position, in metres.
     pub position_m: Vector3<f64>,
-    /// Velocity in the rotating axes.
+    /// Velocity in the rotating axes, in m/s.
     pub velocity_mps: Vector3<f64>,
-    /// Pull of Moon and Sun; of augmentation systems all of the acceleration in those axes.
+    /// Pull of Moon and Sun, in m/s²; of augmentation systems all of the acceleration in those axes.
     pub acceleration_mps2: Vector3<f64>,
 }
 

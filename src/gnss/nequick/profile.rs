@@ -184,7 +184,7 @@ struct Layers {
     e: Layer,
     f1: Layer,
     f2: Layer,
-    /// Thickness above the peak.
+    /// Thickness above the peak, in kilometres.
     top_km: f64,
 }
 

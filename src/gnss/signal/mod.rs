@@ -128,9 +128,9 @@ pub enum Carrier {
     Common(f64),
     /// Frequency division: satellite `n` sends on `centre_hz + step_hz · channel(n)`.
     Channels {
-        /// Carrier of channel 0.
+        /// Carrier of channel 0, in Hz.
         centre_hz: f64,
-        /// Distance of channels.
+        /// Distance of channels, in Hz.
         step_hz: f64,
         /// Channel of a satellite by its number; `None` where none is assigned.
         channel: fn(u8) -> Option<i8>,
@@ -142,7 +142,7 @@ pub enum Carrier {
 pub struct Component {
     /// Share of the signal's power.
     pub power_share: f64,
-    /// Carrier phase relative to the signal's reference phase.
+    /// Carrier phase relative to the signal's reference phase, in cycles.
     pub phase_cycles: f64,
     /// Chips per second, by the satellite's clock.
     pub chip_rate_hz: f64,
@@ -165,7 +165,7 @@ pub struct Component {
 pub struct Layer {
     /// Amplitude. The mean power over all chips of all layers is one.
     pub weight: f64,
-    /// Carrier phase relative to the component's.
+    /// Carrier phase relative to the component's, in cycles.
     pub phase_cycles: f64,
     /// Signs of equal steps of a chip.
     pub pulse: &'static [i8],
@@ -269,7 +269,7 @@ impl Signal {
         Link { sv, signal: self }
     }
 
-    /// Middle of the band: the carrier of all satellites, or that of channel 0.
+    /// Middle of the band, in Hz: the carrier of all satellites, or that of channel 0.
     pub fn centre_hz(&self) -> f64 {
         match self.carrier {
             Carrier::Common(hz) => hz,
@@ -296,7 +296,7 @@ impl Signal {
         self.components.iter().fold(0.0_f64, |most, component| most.max(component.lobe_hz()))
     }
 
-    /// Carrier wavelength of a satellite.
+    /// Carrier wavelength of a satellite, in metres.
     pub fn wavelength_m(&self, sv: Sv) -> f64 {
         SPEED_OF_LIGHT_MPS / self.carrier_hz(sv)
     }
@@ -316,7 +316,7 @@ impl Signal {
 }
 
 impl Link {
-    /// Carrier frequency.
+    /// Carrier frequency, in Hz.
     pub fn carrier_hz(self) -> f64 {
         self.signal.carrier_hz(self.sv)
     }
@@ -346,7 +346,7 @@ impl Link {
         (first..=last).contains(&self.sv.number)
     }
 
-    /// Carrier wavelength.
+    /// Carrier wavelength, in metres.
     pub fn wavelength_m(self) -> f64 {
         self.signal.wavelength_m(self.sv)
     }

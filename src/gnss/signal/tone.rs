@@ -60,7 +60,7 @@ impl Signal {
 }
 
 impl Tone {
-    /// The line's distance from the carrier.
+    /// The line's distance from the carrier, in Hz.
     pub fn side_hz(&self, chip_rate_hz: f64) -> f64 {
         0.5 * f64::from(self.half_cycles) * chip_rate_hz
     }

@@ -38,7 +38,7 @@ pub(super) struct Folds {
     response: Option<Response>,
     rate_hz: f64,
     chip_hz: f64,
-    /// Duration of the code.
+    /// Duration of the code, in seconds.
     code_s: f64,
     /// Waveforms of chips by equal steps.
     kinds: Vec<Vec<Complex64>>,

@@ -59,7 +59,7 @@ impl Tuning {
         if self.inverted { -1.0 } else { 1.0 }
     }
 
-    /// Frequency in the samples of a radio frequency without Doppler.
+    /// Frequency in the samples of a radio frequency without Doppler, in Hz.
     pub fn place_hz(&self, carrier_hz: f64) -> f64 {
         self.sign() * (carrier_hz - self.center_hz)
     }
@@ -120,7 +120,7 @@ fn fraction_turns(cycles: f64) -> u64 {
 /// An emitter at a position, and the antenna that receives it.
 #[derive(Clone, Debug)]
 pub struct Path {
-    /// ECEF.
+    /// ECEF position of the emitter, in metres.
     pub emitter_m: Vector3<f64>,
     /// Motion of the antenna.
     pub antenna: Trajectory,

@@ -52,28 +52,28 @@ pub enum Waveform {
     Cw,
     /// Linear sweep over `sweep_hz` (downwards if negative), from the start again at once.
     Chirp {
-        /// Width of the sweep.
+        /// Width of the sweep, in Hz.
         sweep_hz: f64,
         /// Rate of the repetition.
         repetition: Repetition,
     },
     /// Linear up and down; a repetition is both.
     Fmcw {
-        /// Width of the sweep.
+        /// Width of the sweep, in Hz.
         sweep_hz: f64,
         /// Rate of the repetition.
         repetition: Repetition,
     },
     /// Frequency that follows a cosine.
     SineFm {
-        /// Largest deviation from the carrier.
+        /// Largest deviation from the carrier, in Hz.
         deviation_hz: f64,
         /// Rate of the repetition.
         repetition: Repetition,
     },
     /// A carrier that is on for `width_s`; each pulse comes late by up to `jitter` of a period, at random.
     Pulse {
-        /// Length of a pulse.
+        /// Length of a pulse, in seconds.
         width_s: f64,
         /// Rate of the repetition.
         repetition: Repetition,
@@ -91,7 +91,7 @@ pub enum Waveform {
     White,
     /// Gaussian noise of a band; `step` source samples per sample, in 2^-32.
     Noise {
-        /// Width of the band.
+        /// Width of the band, in Hz.
         width_hz: f64,
         /// Source samples per sample, in 2^-32.
         step: u64,

@@ -8,9 +8,9 @@ use crate::vehicle::Trajectory;
 use crate::vehicle::spline::{self, Row};
 use gnss::earth::SPEED_OF_LIGHT_MPS;
 
-/// Fastest motion between rows.
+/// Fastest motion between rows, in m/s.
 const MAX_SPEED_MPS: f64 = 0.1 * SPEED_OF_LIGHT_MPS;
-/// Hardest motion: a hundred thousand g, beyond any gun.
+/// Hardest motion, in m/s²: a hundred thousand g, beyond any gun.
 const MAX_ACCELERATION_MPS2: f64 = 1e6;
 
 /// Rows before and after the first bent knot among which the wrong one is looked for. From the hardest bend
@@ -35,7 +35,7 @@ impl Rows {
         Self { rows: Vec::new(), lines: Vec::new(), max_gap_s, tolerance_m, steps_m: [f64::INFINITY; 3] }
     }
 
-    /// Time of the last one.
+    /// Time of the last one, in seconds.
     pub fn last_s(&self) -> Option<f64> {
         self.rows.last().map(|row| row.t_s)
     }
@@ -139,7 +139,7 @@ impl Rows {
     }
 }
 
-/// Least distance of the straight way between two positions from the Earth's centre.
+/// Least distance of the straight way between two positions from the Earth's centre, in metres.
 fn nearest_m(from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
     let way = to - from;
     let square = way.norm_squared();

@@ -39,7 +39,7 @@ pub(in crate::beidou) struct Content {
     pub flags: f64,
     pub flags_b1c: f64,
     pub utc: UtcNumbers,
-    /// Coefficients of BDGIM; nine zeros state nothing.
+    /// Coefficients of BDGIM, in TECU; nine zeros state nothing.
     pub alpha_tecu: [f64; 9],
     pub reserved: f64,
     /// Predicted accuracies of the signal in space: the time of the prediction, of the orbit along and across

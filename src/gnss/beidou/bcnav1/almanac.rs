@@ -40,7 +40,7 @@ pub(in crate::beidou) struct Entry {
     /// Eight bits, of which the first is the satellite's and the last three are those of B1C, B2a and B2b.
     pub health: f64,
     pub delta_a_m: f64,
-    /// Argument of latitude.
+    /// Argument of latitude, in radians.
     pub phi0_rad: f64,
 }
 

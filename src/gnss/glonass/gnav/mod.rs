@@ -80,7 +80,7 @@ pub static GNAV_SETS: SetForm = SetForm {
     rinex_sources: None,
 };
 
-/// A frequency between G1 and G2.
+/// A frequency between G1 and G2, in Hz.
 const BETWEEN_HZ: f64 = 1.4e9;
 /// Bits of [`Ephemeris::health`] that the user regards, and of them the flag l.
 const UNHEALTHY: u16 = 0b1100;

@@ -177,7 +177,8 @@ pub(super) const L1_HZ: f64 = 1_575.42e6;
 const L2_HZ: f64 = 1_227.60e6;
 const L5_HZ: f64 = 1_176.45e6;
 
-/// T_GD less the correction of the signal (20.3.3.3.1.1.1); of L5 that of the pilot, which receivers follow.
+/// T_GD less the correction of the signal, in seconds (20.3.3.3.1.1.1); of L5 that of the pilot, which
+/// receivers follow.
 fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
     let [l1ca_s, l2c_s, _, l5q_s, ..] = set.isc_s;
     let own_s = match signal.centre_hz() {

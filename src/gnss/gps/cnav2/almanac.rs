@@ -40,7 +40,7 @@ pub(super) struct Entry {
     /// The elements: eccentricity and inclination count from those of the satellite's kind of orbit.
     pub elements: Almanac,
     pub delta_a_m: f64,
-    /// Node and argument of latitude of the reduced almanac.
+    /// Node and argument of latitude of the reduced almanac, in radians.
     pub node_rad: f64,
     pub phi0_rad: f64,
 }

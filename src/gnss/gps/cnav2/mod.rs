@@ -258,7 +258,8 @@ fn form(set: &Ephemeris) -> Ephemeris {
     Ephemeris { form: &CNAV2_SETS, health: u16::from(civil.health != 0), isc_s, ..civil }
 }
 
-/// T_GD less the correction of the signal (3.5.3.9.1); of L1C that of the pilot, which receivers follow.
+/// T_GD less the correction of the signal, in seconds (3.5.3.9.1); of L1C that of the pilot, which receivers
+/// follow.
 fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
     if signal.carries(&CNAV2) {
         set.tgd_s - planted!("gnss.cnav2.isc", set.isc_s[4], set.isc_s[5])

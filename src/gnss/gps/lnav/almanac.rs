@@ -38,9 +38,9 @@ pub struct Almanac {
     pub number: u8,
     /// Eccentricity of the orbit.
     pub eccentricity: f64,
-    /// Reference time in its week.
+    /// Reference time in its week, in seconds.
     pub toa_s: f64,
-    /// Inclination minus [`ALMANAC_INCLINATION_SEMICIRCLES`].
+    /// Inclination minus [`ALMANAC_INCLINATION_SEMICIRCLES`], in radians.
     pub delta_i_rad: f64,
     /// Rate of right ascension of the node, rad/s.
     pub omega_dot_radps: f64,
@@ -48,11 +48,11 @@ pub struct Almanac {
     pub health: u8,
     /// Square root of the semi-major axis, √m.
     pub sqrt_a_sqrtm: f64,
-    /// Longitude of the ascending node at the beginning of the week.
+    /// Longitude of the ascending node at the beginning of the week, in radians.
     pub omega0_rad: f64,
-    /// Argument of perigee.
+    /// Argument of perigee, in radians.
     pub omega_rad: f64,
-    /// Mean anomaly at the reference time.
+    /// Mean anomaly at the reference time, in radians.
     pub m0_rad: f64,
     /// Clock's offset at the reference time.
     pub af0_s: f64,
@@ -93,7 +93,7 @@ pub struct Utc {
     pub a0_s: f64,
     /// Rate of GPS time minus UTC, in s/s.
     pub a1_sps: f64,
-    /// Reference time in its week.
+    /// Reference time in its week, in seconds.
     pub tot_s: f64,
     /// Week of the reference time, modulo 256.
     pub week: u8,
