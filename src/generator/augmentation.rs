@@ -76,7 +76,7 @@ impl Departure {
 /// Inputs of the ground network.
 #[derive(Clone)]
 pub struct Ground {
-    /// True orbits, and what is broadcast of them.
+    /// True orbits and clocks, and the broadcast ephemerides.
     pub catalogue: Arc<Catalogue>,
     /// Faults of messages.
     pub message_faults: Vec<MessageFault>,

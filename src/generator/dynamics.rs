@@ -30,7 +30,7 @@ const PLACES: u32 = 10;
 pub struct LineOfSight {
     /// The satellite.
     pub sv: Sv,
-    /// Largest magnitude of the range's second and third derivative, in m/s².
+    /// Largest magnitude of the range's second derivative, in m/s².
     pub acceleration_mps2: f64,
     /// Largest jerk along the line of sight, in m/s³.
     pub jerk_mps3: f64,

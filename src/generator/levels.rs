@@ -72,7 +72,7 @@ pub struct Spoofed {
 /// The parts of a scene against full scale.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Levels {
-    /// Full scale in LSB of the scene's gain, and what it is.
+    /// Full scale in LSB of the scene's gain.
     pub full_scale_lsb: f64,
     /// Component to which full scale refers, in words.
     pub scale: String,

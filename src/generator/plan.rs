@@ -79,7 +79,7 @@ pub struct Plan {
     pub mask_deg: f64,
     /// True if the scene begins so high that the Earth's limb replaces the elevation mask.
     pub in_space: bool,
-    /// Largest speed and acceleration of the antenna during the scene, in m/s.
+    /// Largest speed of the antenna during the scene, in m/s.
     pub speed_mps: f64,
     /// Largest acceleration of the antenna, in m/s².
     pub acceleration_mps2: f64,

@@ -41,9 +41,9 @@ pub struct Maps {
     latitudes: Axis,
     /// Longitudes of the grid, without a last column that repeats the first one.
     longitudes: Axis,
-    /// Radius of the Earth and height of the shell above it, as the header gives them.
+    /// Radius of the Earth in metres, as the header gives it.
     pub radius_m: f64,
-    /// Height of the shell above that radius, in metres.
+    /// Height of the shell above the Earth's radius, in metres.
     pub height_m: f64,
     /// TEC units (1e16 electrons/m²): by map, latitude, longitude.
     values_tecu: Vec<f64>,

@@ -30,7 +30,7 @@ pub struct Message {
     /// Signs of the symbols that make a bit of a satellite, one after another; one sign where symbols are not
     /// of a known code.
     pub bit: fn(Sv) -> &'static [i8],
-    /// Duration of a unit, which is encoded in one piece, and when in the week the first one begins.
+    /// Duration of a unit, which is encoded as a whole, in seconds.
     pub unit_s: i64,
     /// Seconds, from one multiple of them to the next, in which all units are of one ephemeris: whole units.
     /// Messages whose units each state of which ephemeris they are have those of one unit.
@@ -137,7 +137,7 @@ pub struct Common {
     pub utc: UtcData,
     /// Galileo's time against GPS time; absent means that it is not stated.
     pub galileo: Option<TimePolynomial>,
-    /// One ephemeris a satellite, for almanacs, and the time near which they hold.
+    /// Ephemerides for the almanacs, one for each satellite.
     pub almanac: Vec<Ephemeris>,
     /// Time near which the almanac holds.
     pub reference: Option<Epoch>,

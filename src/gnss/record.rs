@@ -106,7 +106,7 @@ pub enum PassEnd {
 pub struct PassRow {
     /// The satellite.
     pub sv: Sv,
-    /// First sample in view, and the first one that is not any more.
+    /// First sample in view.
     pub sample: u64,
     /// The first sample out of view again.
     pub until_sample: u64,
@@ -398,7 +398,7 @@ pub struct AcquisitionRow {
     pub signal: &'static Signal,
     /// True if the satellite was found.
     pub acquired: bool,
-    /// Largest detection statistic of the search, and the threshold that it had to pass.
+    /// Largest detection statistic of the search.
     pub statistic: f64,
     /// Threshold of the statistic.
     pub threshold: f64,

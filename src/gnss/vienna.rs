@@ -222,7 +222,7 @@ pub(super) fn season_terms(day_of_year: f64) -> Season {
 struct Climate {
     pressure_pa: Season,
     temperature_k: Season,
-    /// Specific humidity (kg/kg).
+    /// Specific humidity in kg/kg; then the lapse rate in K/m, and the geoid undulation in metres.
     humidity: Season,
     lapse_kpm: Season,
     undulation_m: f64,

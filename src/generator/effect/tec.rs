@@ -35,7 +35,7 @@ pub enum Mapping {
 /// A sphere that holds all electrons.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shell {
-    /// Radius of the Earth, and height of the shell above it.
+    /// Radius of the Earth, in metres.
     pub radius_m: f64,
     /// Height above the sphere of the maps, in metres.
     pub height_m: f64,

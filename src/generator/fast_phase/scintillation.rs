@@ -149,7 +149,7 @@ impl Fade {
 /// The fading of every satellite in a scene.
 #[derive(Debug)]
 pub struct Scintillation {
-    /// Strength of the scintillation, and the satellites that it affects.
+    /// Strength of the scintillation on L1.
     pub strength: Strength,
     /// Nodes of the fast phase in one of the fading.
     step: u64,

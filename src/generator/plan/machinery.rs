@@ -16,7 +16,7 @@ const PLANNED_ROOTS: u64 = 16;
 /// Figures of the synthesiser that depend on the scene and the machine.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Machinery {
-    /// Shortest and longest time between knots of the signal's delay, and why it is that.
+    /// Shortest time between knots of the signal's delay, in seconds.
     pub knot_spacing_s: f64,
     /// Longest time between knots, in seconds.
     pub longest_knot_spacing_s: f64,

@@ -33,7 +33,7 @@ const MARGIN_S: f64 = 2.0;
 pub struct OrbitsSpec {
     /// SP3 files, in the order of time.
     pub files: Vec<PathBuf>,
-    /// Antenna below the centre of mass, in metres: of all satellites, and of some by name.
+    /// Offset in metres of the antenna from the centre of mass towards the Earth, for all satellites.
     pub antenna_m: f64,
     /// Offset of the antenna from the centre of mass towards the Earth, by satellite.
     pub antennas_m: Vec<(Sv, f64)>,

@@ -51,9 +51,9 @@ pub struct Run<'a> {
     pub position: u64,
     /// Code steps per sample, Q16.48.
     pub step: u64,
-    /// Carrier phase of sample 0, in 2^-64 turn, and its advance per sample.
+    /// Carrier phase of sample 0, in 2^-64 turn.
     pub turns: u64,
-    /// Advance of the carrier a sample, in 2^-64 turn.
+    /// Advance of the carrier per sample, in 2^-64 turn.
     pub turns_step: u64,
     /// Peak amplitude of the carrier, in LSB.
     pub amplitude: f64,

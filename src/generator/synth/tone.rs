@@ -34,9 +34,9 @@ pub enum Modulation {
 /// A carrier over up to 4096 samples.
 #[derive(Clone, Copy, Debug)]
 pub struct Tone {
-    /// Phase of sample 0, in 2^-64 turn, and its advance per sample, Doppler in.
+    /// Phase of sample 0, in 2^-64 turn.
     pub turns: u64,
-    /// Advance of the carrier a sample, in 2^-64 turn.
+    /// Advance of the carrier per sample, in 2^-64 turn, with the Doppler included.
     pub turns_step: u64,
     /// Position in the repetition, in 2^-64 period.
     pub place: u64,
