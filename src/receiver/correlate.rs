@@ -38,7 +38,7 @@ use rows::Rows;
 use sums::Samples;
 pub use wave::{Wave, fits, layers_refusal, steps_of_chip};
 
-/// How a replica's chips meet the samples.
+/// Rule that assigns a replica's chips to the samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Edge {
@@ -50,13 +50,13 @@ pub enum Edge {
     Nearest,
 }
 
-/// What correlations are computed in.
+/// Arithmetic of the correlations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Arithmetic {
-    /// Of samples of 8 bits: products with a table of the replica where samples are few to a chip, and else
-    /// running sums, a difference for each change of the code's sign; [`Self::I16`] where neither does, as
-    /// with a carrier far from zero.
+    /// Fast sums for samples of 8 bits. A table of the replica is multiplied where a chip has few samples.
+    /// Otherwise running sums are used, with a difference for each sign change of the code. [`Self::I16`]
+    /// replaces both where neither applies, for example with a carrier far from zero.
     Sums,
     /// Integers of 16 bits where samples have 8, `f32` where they have more.
     I16,
@@ -84,9 +84,10 @@ pub fn units_to_chips(units: i64) -> f64 {
 pub struct Replica {
     wave: Wave,
     patterns: Vec<Pattern>,
-    /// The same by pieces; none for nearest edges and where they cannot be counted.
+    /// Tables for the correlation by pieces, one per pattern. Empty for nearest edges and where the pieces
+    /// cannot be counted.
     pieces: Vec<Pieces>,
-    /// The same by rows, where samples are few to a chip.
+    /// Tables for the correlation by rows, present where a chip has few samples.
     rows: Option<Rows>,
 }
 
@@ -142,7 +143,7 @@ impl Replica {
         Some(Self { wave, patterns, pieces, rows: None })
     }
 
-    /// The same in samples whose spectrum may be inverted.
+    /// A replica as [`Self::made`] builds it, for samples whose spectrum may be inverted.
     pub fn made_in(component: &Component, number: u8, (made, edge): (Layers, Edge), inverted: bool) -> Option<Self> {
         let replica = Self::made(component, number, made, edge)?;
         Some(if inverted && component.tone().is_some() { replica.mirrored() } else { replica })
@@ -155,7 +156,7 @@ impl Replica {
         Some(Self { wave, patterns: patterns.into_iter().map(toned).collect(), pieces: Vec::new(), rows: None })
     }
 
-    /// The same where the spectrum is inverted.
+    /// Converts the replica to its form for an inverted spectrum.
     fn mirrored(mut self) -> Self {
         for pattern in &mut self.patterns {
             (pattern.half_cycles, pattern.gain) = (-pattern.half_cycles, pattern.gain.conj());
@@ -232,9 +233,9 @@ impl Replica {
         self.at_speed(kernel::Fast::Single, (i, q), nco, taps)
     }
 
-    /// The same in integers of 16 bits, for samples of 8 bits: within ±127.5, in steps of 2⁻⁷ or more. At
-    /// steps of the code that do not suit 16 bits (C/A: below 1.06 and above 65 Msps) it is
-    /// [`Self::correlate`].
+    /// Correlation in integers of 16 bits, for samples of 8 bits within ±127.5 in steps of 2⁻⁷ or more. Falls
+    /// back to [`Self::correlate`] at code steps that do not suit 16 bits (C/A: below 1.06 and above 65
+    /// Msps).
     pub fn correlate_short<const T: usize>(&self, i: &[f32], q: &[f32], nco: &Nco, taps: &[i64; T]) -> [Complex64; T] {
         self.at_speed(kernel::Fast::Short, (i, q), nco, taps)
     }
@@ -293,18 +294,20 @@ impl Replica {
         }
     }
 
-    /// The same by rows, where fixed-point samples are there and the steps of carrier and code suit it.
+    /// Correlation by rows. `None` without fixed-point samples, or where the steps of carrier and code do not
+    /// suit them.
     fn correlate_rows<const T: usize>(&self, samples: Samples, nco: &Nco, taps: &[i64; T]) -> Option<[Complex64; T]> {
         let (rows, fixed) = (self.rows.as_ref()?, samples.fixed?);
         rows.suit(nco).then(|| rows.correlate(kernel::Level::best(), fixed, nco, taps))
     }
 
-    /// Whether [`Arithmetic::Sums`] uses fixed-point samples at these steps of carrier and code.
+    /// True if [`Arithmetic::Sums`] uses fixed-point samples at these steps of carrier and code.
     pub fn takes_fixed(&self, nco: &Nco) -> bool {
         self.rows.as_ref().is_some_and(|rows| rows.suit(nco))
     }
 
-    /// The same by pieces, where running sums are there and the steps of carrier and code suit it.
+    /// Correlation by pieces. `None` without running sums, or where the steps of carrier and code do not suit
+    /// them.
     fn correlate_sums<const T: usize>(&self, samples: Samples, nco: &Nco, taps: &[i64; T]) -> Option<[Complex64; T]> {
         let sums = samples.sums?;
         if self.pieces.is_empty() || !self.pieces.iter().all(|pieces| pieces.suit(nco)) {
@@ -319,12 +322,12 @@ impl Replica {
         Some(totals)
     }
 
-    /// Whether [`Arithmetic::Sums`] uses running sums at these steps of carrier and code.
+    /// True if [`Arithmetic::Sums`] uses running sums at these steps of carrier and code.
     pub fn takes_sums(&self, nco: &Nco) -> bool {
         !self.takes_fixed(nco) && !self.pieces.is_empty() && self.pieces.iter().all(|pieces| pieces.suit(nco))
     }
 
-    /// The same in the obvious way: `f64`, one sample after the other.
+    /// Reference correlation: `f64`, one sample after the other.
     pub fn slow<const T: usize>(&self, i: &[f32], q: &[f32], nco: &Nco, taps: &[i64; T]) -> [Complex64; T] {
         self.sum(nco, taps, |pattern, nco, taps| pattern.slow((i, q), nco, taps))
     }
@@ -444,7 +447,7 @@ mod tests {
         Replica::new(gnss::gps::l1ca::code(7).unwrap(), edge).unwrap()
     }
 
-    /// What every level of this processor gives, which has to be the same.
+    /// Correlation at every instruction set of this processor. The results have to be equal.
     fn same_at_every_level<const T: usize>(
         fast: kernel::Fast,
         replica: &Replica,

@@ -15,14 +15,14 @@ use gnss::satellite::Sv;
 use gnss::signal::Signal;
 use gnss::time::{Epoch, TimePolynomial, TimeScale, WEEK_S};
 
-/// What a symbol completed.
+/// Event that a symbol completes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum News {
     /// The frame was found: the satellite's time is known from here on.
     FrameSynchronised,
-    /// Whether the symbols arrive upside down, as the latest unit showed.
+    /// Polarity of the symbols, as the latest unit of the message showed it.
     Polarity {
-        /// Whether a logical 0 arrives as a logical 1.
+        /// True if a logical 0 arrives as a logical 1.
         inverted: bool,
     },
     /// The time that the latest unit says contradicts the frame: synchronisation starts anew.
@@ -35,25 +35,25 @@ pub enum News {
     Reduced {
         /// The set.
         set: Box<Ephemeris>,
-        /// Whether it has group delays and health.
+        /// True if the elements come with group delays and health.
         with_delays: bool,
     },
     /// The ionosphere's parameters.
     Ionosphere(Coefficients),
-    /// By how much a system's time is ahead of GPS time, whole seconds apart.
+    /// Offset of a system's time from GPS time, without whole seconds.
     AheadOfGps {
         /// The system's time.
         scale: &'static TimeScale,
-        /// By how much, at GPS time.
+        /// System time less GPS time, as a polynomial in GPS time.
         ahead: TimePolynomial,
     },
     /// The satellite that sends, where it is another than was assumed.
     Sender(Sv),
-    /// What an augmentation system says of other satellites.
+    /// Statement of an augmentation system about other satellites.
     Augmentation {
         /// When its block began, GPS time.
         sent: Epoch,
-        /// What it says.
+        /// Content of the block.
         content: Box<Content>,
     },
     /// Raw parameters as decoded.
@@ -79,7 +79,7 @@ pub struct Decoder {
     /// First code period of the symbol to come.
     expected: Option<u64>,
     anchor: Option<Anchor>,
-    /// Where units lie in the week, of a message that does not say their time.
+    /// Position of the message's units in the week, for a message that does not state its time.
     undated: Option<Units>,
 }
 
@@ -117,12 +117,12 @@ impl Decoder {
         })
     }
 
-    /// Whether another signal of the satellite has to give the time.
+    /// True if another signal of the satellite has to give the time.
     pub fn is_dated_elsewhere(&self) -> bool {
         self.undated.is_some()
     }
 
-    /// Whether units of the message were found, be their time known or not.
+    /// True if units of the message were found, with known time or without.
     pub fn has_units(&self) -> bool {
         self.anchor.is_some() || self.undated.is_some_and(|units| units.begin.is_some())
     }
@@ -145,7 +145,7 @@ impl Decoder {
         self.anchor.replace(Anchor { period: begin, of_week }).is_none()
     }
 
-    /// Whether the satellite's time of week is known.
+    /// True if the satellite's time of week is known.
     pub fn is_synchronised(&self) -> bool {
         self.anchor.is_some()
     }

@@ -10,7 +10,7 @@ use gnss::signal::Signal;
 /// Symbols come a second or two after the start: of a strong signal, whose edges or secondary code are found
 /// then.
 const SYMBOLS_S: f64 = 2.0;
-/// What to check where symbols make no frame.
+/// Advice for symbols that make no frame.
 const TOO_WEAK: &str = "the signal's strength: below 27 dB-Hz words are lost to wrong bits";
 /// Minutes between transmissions of one page of subframes 4 and 5 (IS-GPS-200N, 20.3.3.5).
 const PAGE_EVERY_MIN: f64 = 12.5;
@@ -56,7 +56,7 @@ pub enum Stage {
     NoPosition {
         /// Satellites with an ephemeris.
         with_ephemeris: Vec<Sv>,
-        /// What the last attempt failed of.
+        /// Reason of the last attempt's failure.
         reason: Option<NoFix>,
     },
 }
@@ -68,7 +68,7 @@ pub struct Refusal {
     pub why: String,
     /// Satellites that sent them.
     pub svs: Vec<Sv>,
-    /// How many there were.
+    /// Number of the refused units.
     pub units: u64,
 }
 
@@ -83,11 +83,11 @@ impl fmt::Display for Refusal {
 /// Why there was no fix.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Diagnosis {
-    /// Where the chain broke.
+    /// Stage at which the processing chain broke.
     pub stage: Stage,
     /// Length of the recording.
     pub seconds: f64,
-    /// What to check, most likely first.
+    /// Checks to make, the most likely cause first.
     pub advice: Vec<String>,
 }
 
@@ -161,9 +161,9 @@ impl Diagnosis {
     }
 }
 
-/// How long a signal's time and orbit take to be read, where a recording of `seconds` may be too short for
-/// it. Nothing is read before a unit of its message is whole: the first one that begins in the recording may
-/// begin a unit's length after symbols do.
+/// Advice for a recording of `seconds` that may be too short to read a signal's time and orbit. Nothing is
+/// read before one unit of the message is complete. The first unit may begin one unit's length after the
+/// symbols.
 fn too_short_for_a_frame(signal: &Signal, seconds: f64) -> Option<String> {
     let message = signal.components.iter().find_map(|component| component.message)?;
     let (unit_s, whole_s) = (message.unit_s, SYMBOLS_S + 2.0 * message.unit_s as f64);
@@ -177,7 +177,7 @@ fn too_short_for_a_frame(signal: &Signal, seconds: f64) -> Option<String> {
     })
 }
 
-/// How long a signal's sets of orbit and clock take, where a recording of `seconds` may be too short for one.
+/// Advice for a recording of `seconds` that may be too short for a complete ephemeris of a signal.
 fn too_short_for_a_set(signal: &Signal, seconds: f64) -> Option<String> {
     let message = signal.components.iter().find_map(|component| component.message)?;
     let whole_s = SYMBOLS_S + message.set_within_s()? as f64;
@@ -191,7 +191,7 @@ fn too_short_for_a_set(signal: &Signal, seconds: f64) -> Option<String> {
     })
 }
 
-/// What to check where there are ephemerides enough, by what the last attempt failed of.
+/// Advice where enough ephemerides are known, by the reason of the last attempt's failure.
 fn without_position(reason: Option<&NoFix>, length: &str) -> Vec<String> {
     let sky = "the sky: at least four healthy satellites above position.mask_deg in different directions".to_owned();
     match reason {

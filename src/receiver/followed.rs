@@ -1,4 +1,4 @@
-//! What of each signal the loops follow, and by which settings: theory needs to know it.
+//! Components of each signal that the loops follow, with their loop settings. The theory needs both.
 
 use serde::Serialize;
 
@@ -10,10 +10,10 @@ use crate::track::{TrackingSettings, pilot_group};
 use gnss::satellite::Sv;
 use gnss::signal::{Component, Layer, Layers, Signal};
 
-/// How a signal is followed, as `receiver.json` says it.
+/// Tracking of a signal, as `receiver.json` reports it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Followed {
-    /// Its name.
+    /// Name of the signal.
     pub signal: &'static str,
     /// Place of the component among the signal's …
     pub component: usize,
@@ -28,14 +28,14 @@ pub struct Followed {
     /// Time of a loop's update once symbols are known: as long as set, in whole parts of what is sent with
     /// one sign.
     pub integration_s: f64,
-    /// The same of satellites whose message has shorter bits, where there are such.
+    /// Update time in seconds for satellites whose message has shorter bits, where such satellites exist.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub least_integration_s: Option<f64>,
     /// One-sided noise bandwidth of the phase loop, as far as such updates allow.
     pub pll_bandwidth_hz: f64,
-    /// The same of the code loop.
+    /// One-sided noise bandwidth of the code loop in hertz, as far as such updates allow.
     pub dll_bandwidth_hz: f64,
-    /// How it is searched for.
+    /// Search parameters of the signal.
     pub search: Searched,
 }
 
@@ -51,7 +51,8 @@ pub struct Searched {
 }
 
 impl Searched {
-    /// Of the component that a search is led by, at these places among its signal's.
+    /// Search parameters for the component that leads the search; `components` are indices among the
+    /// signal's.
     fn of(leading: &Component, components: Vec<usize>, settings: &AcquisitionSettings) -> Self {
         let coherent_s = leading.period_s() * f64::from(settings.periods(leading));
         let sums = settings.sums(leading);
@@ -61,7 +62,7 @@ impl Searched {
 }
 
 impl Followed {
-    /// Of a signal by these settings; `None` where nothing of it can be followed.
+    /// Tracking of a signal by these settings. `None` where no component can be followed.
     pub fn of(signal: &'static Signal, settings: &Settings) -> Option<Self> {
         let leading = lead(signal)?;
         let place = |made: &Layer| leading.layers.iter().position(|layer| std::ptr::eq(layer, made));

@@ -1,10 +1,11 @@
-//! Whether the bytes of a recording look like the format that was declared.
+//! Check of a recording's bytes against the declared format.
 //!
-//! Noise from an antenna is nearly Gaussian about zero, so the bytes of each format have a shape of their
-//! own: one peak about 0 or about 127.5 for single bytes; bytes of all values in turn with few about 0 for 16
-//! bits; and for floats, exponents near that of one. Limits: real samples cannot be distinguished from
-//! complex ones of the same width, nor anything from samples that are silent, or that saturate or are jammed
-//! until all bytes are alike; then nothing is said.
+//! Noise from an antenna is nearly Gaussian about zero, so the bytes of each format have a typical
+//! distribution. Single bytes have one peak about 0 or about 127.5. Samples of 16 bits have bytes of all
+//! values in turn, with few about 0. Floats have exponents near that of one.
+//!
+//! Limits: real samples cannot be distinguished from complex samples of the same width. Nothing is reported
+//! for silent, saturated or jammed samples whose bytes are all alike.
 
 use std::fmt;
 
@@ -31,7 +32,7 @@ const UNEVEN: f64 = 1.5;
 /// Part of the samples that must be as the format has them: the rest may be damaged.
 const MOST: f64 = 0.95;
 
-/// How components are written, whether there are one or two of them in a sample.
+/// Encoding of the sample components, for one or two components per sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Look {
     /// Two's complement of 8 bits.
@@ -51,7 +52,7 @@ pub enum Look {
 }
 
 impl Look {
-    /// That of a declared format.
+    /// Encoding of a declared format.
     pub fn of(format: Format) -> Self {
         match format {
             Format::Ci8 | Format::Ri8 => Self::Signed8,
@@ -61,7 +62,7 @@ impl Look {
         }
     }
 
-    /// What the first bytes of a recording look like; `None` where they do not show it.
+    /// Encoding that the first bytes of a recording show; `None` where they are not clear.
     pub fn judge(bytes: &[u8]) -> Option<Self> {
         let bytes = bytes.get(..bytes.len().min(LOOKED_AT_BYTES))?;
         if bytes.len() < LEAST_BYTES || bytes.iter().all(|byte| Some(byte) == bytes.first()) {
@@ -120,8 +121,8 @@ impl fmt::Display for Look {
     }
 }
 
-/// Whether both halves of a byte have one law, as samples that are packed into them have, and not an even
-/// one. Halves of whole numbers differ: the higher is the rougher half of one number.
+/// True if both halves of a byte have one distribution, and not an even one, as packed samples have. The
+/// halves of whole numbers differ, because the higher half is the coarser part of one number.
 fn are_packed(bytes: &[u8]) -> bool {
     let mut counts = [[0_u32; 16]; 2];
     for byte in bytes {
@@ -159,7 +160,7 @@ pub struct Check {
 }
 
 impl Check {
-    /// Of a recording that is declared to have this format.
+    /// A check of a recording that is declared to have this format.
     pub fn new(format: Format) -> Self {
         Self { format, bytes: Vec::new() }
     }

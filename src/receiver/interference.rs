@@ -64,7 +64,7 @@ pub struct Watch {
     powers: Vec<f64>,
     segments: u32,
     first: u64,
-    /// Whether there was a spectrum.
+    /// True if a spectrum has been reported.
     reported: bool,
 }
 
@@ -194,7 +194,7 @@ impl Watch {
             .collect()
     }
 
-    /// What the satellites' own codes make of a bin's power over that of the bins beside.
+    /// Ratio of a bin's expected power to that of the bins beside it, caused by the satellites' own codes.
     fn raised(&self, shares: &[f64], bin: usize) -> f64 {
         let bins = shares.len();
         let beside = (GUARD..GUARD + BESIDE).flat_map(|n| [(bin + n) % bins, (bin + bins - n) % bins]);
@@ -251,7 +251,7 @@ impl Watch {
         })
     }
 
-    /// Where a line peaks, in bins from the middle of the samples' band.
+    /// Peak frequency of a line, in bins from the middle of the samples' band.
     fn place(&self, bin: usize) -> f64 {
         let bins = self.powers.len();
         let power = |n: usize| self.powers[n % bins];
@@ -261,8 +261,8 @@ impl Watch {
     }
 }
 
-/// Where between its neighbours a line peaks whose powers by a Hann window are these, in bins from the middle
-/// one: two neighbours' amplitudes have the ratio (1 + δ)/(2 − δ).
+/// Peak frequency of a line, in bins from the middle bin, from three powers with a Hann window. The
+/// amplitudes of two neighbours have the ratio (1 + δ)/(2 − δ).
 pub(super) fn hann_peak(before: f64, at: f64, after: f64) -> f64 {
     let [before, at, after] = [before, at, after].map(f64::sqrt);
     let beyond = |neighbour: f64| (2.0 * neighbour - at) / (neighbour + at);

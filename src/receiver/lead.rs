@@ -89,7 +89,7 @@ pub fn followed_db(component: &Component, made: Layers) -> f64 {
     10.0 * libm::log10(component.power_share * efficiency)
 }
 
-/// What this receiver cannot do with a signal, if it cannot follow it to a position.
+/// Reason why this receiver cannot follow a signal to a position, if it cannot.
 pub fn refusal(signal: &'static Signal) -> Option<String> {
     if signal.components.iter().all(|component| component.message.is_none()) {
         return Some("no message of it is known".to_owned());

@@ -1,14 +1,14 @@
-//! What two searches of the same satellites show: how fast their codes ran in between.
+//! Code Dopplers from two searches of the same satellites.
 //!
-//! Each search gives a code phase and a Doppler. Over the seconds between two of them the code's own Doppler
-//! follows without any lock. Plotted against the carrier's it lies on a line: slope +1 through the origin is
-//! sound, slope −1 is a mirrored spectrum, and what all satellites share beside the slope parts code and
-//! carrier ([`parting`](super::parting)).
+//! Each search gives a code phase and a Doppler. Over the seconds between two searches the code's own Doppler
+//! follows without any lock. It is plotted against the carrier's Doppler. Slope +1 through the origin is
+//! correct, and slope −1 is an inverted spectrum. A common offset is code-carrier divergence
+//! ([`parting`](super::parting)).
 //!
 //! Two code phases of a search err by 0.1 chip each at most: 54 Hz of the carrier after four seconds for a
-//! satellite. Whole code periods in between are unknown, so code Dopplers are right modulo carrier/(code rate
-//! · time), 394 kHz over 4 s of C/A code, and are taken near the carrier's. Limits: a break in the samples
-//! between both searches looks like a rate.
+//! satellite. The whole code periods in between are unknown. Code Dopplers are therefore right modulo
+//! carrier/(code rate · time), 394 kHz over 4 s of C/A code, and are taken near the carrier's. Limits: a
+//! break in the samples between both searches looks like a rate.
 
 use std::collections::BTreeMap;
 
@@ -26,10 +26,10 @@ const MOST_S: f64 = 20.0;
 /// Dopplers that differ by less do not show the slope's sign.
 const LEAST_SPREAD_HZ: f64 = 300.0;
 
-/// What the codes' Dopplers are against the carriers'.
+/// Relation of the code Dopplers to the carrier Dopplers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pattern {
-    /// The same, less what the carrier is ahead by.
+    /// Code and carrier Dopplers are equal, apart from the common carrier offset given here.
     Sound(Estimate),
     /// The opposite: the spectrum is mirrored. What the carrier would be ahead by in the right one.
     Mirrored(Estimate),

@@ -17,8 +17,8 @@ use gnss::time::{Epoch, Rate, SampleClock, WEEK_S};
 /// Travel time to the nearest satellite in a medium orbit that is assumed when the clock is set from
 /// satellites alone.
 const NEAREST_TRAVEL_S: f64 = 0.070;
-/// How much longer it is to a satellite that turns with the Earth, at 42 164 km from its centre and not 26
-/// 560.
+/// Additional travel time in seconds from a geosynchronous orbit, at 42 164 km from the Earth's centre
+/// instead of 26 560 km.
 const FARTHER_S: f64 = 0.052;
 /// Semi-major axis between both kinds.
 const BETWEEN_M: f64 = 35e6;
@@ -44,12 +44,12 @@ pub struct Reading {
     pub measurement: Measurement,
     /// Time of week sent, in the time of the signal's system: whole seconds and a fraction.
     pub sent_of_week: (i64, f64),
-    /// By how much later than the measurement it is observed: less than a sample of the front end.
+    /// Time from the measurement to the observation, in seconds: less than a sample of the front end.
     pub later_s: f64,
 }
 
 impl Reading {
-    /// What a locked channel with a known frame reads.
+    /// Reading of a locked channel whose frame is known; `None` for any other channel.
     pub fn new(sv: Sv, signal: &'static Signal, measurement: &Measurement, decoder: &Decoder) -> Option<Self> {
         if !measurement.locked {
             return None;
@@ -58,13 +58,13 @@ impl Reading {
         Some(Self { sv, signal, measurement: *measurement, sent_of_week, later_s: 0.0 })
     }
 
-    /// The same carried on to an instant that is so much later.
+    /// Reading carried on to an instant `later_s` seconds later.
     pub fn later(self, later_s: f64) -> Self {
         let carrier_cycles = self.measurement.carrier_cycles - self.measurement.doppler_hz * later_s;
         Self { measurement: Measurement { carrier_cycles, ..self.measurement }, later_s, ..self }
     }
 
-    /// By how much later, by the satellite's clock, this was sent than another signal of the same system,
+    /// Transmit time less that of another signal of the same system, in seconds of the satellite's clock;
     /// less than half a week.
     pub fn sent_after_s(&self, other: &Self) -> f64 {
         let rate = |reading: &Self| 1.0 + reading.measurement.doppler_hz / reading.signal.carrier_hz(reading.sv);
@@ -73,7 +73,7 @@ impl Reading {
         weeks as f64 + (fraction - other_fraction) + self.later_s * rate(self) - other.later_s * rate(other)
     }
 
-    /// How much longer this has travelled than from a medium orbit.
+    /// Additional travel time in seconds over that from a medium orbit.
     fn farther_s(&self) -> f64 {
         if self.sv.orbit_m() > BETWEEN_M { FARTHER_S } else { 0.0 }
     }
@@ -92,7 +92,7 @@ impl Reading {
 pub struct Observed {
     /// The row as it is written.
     pub observation: Observation,
-    /// Whether the carrier's half cycle is resolved.
+    /// True if the carrier's half cycle is resolved.
     pub half_cycle_known: bool,
 }
 
@@ -111,7 +111,7 @@ impl Timebase {
         Self { rate, stated, clock: None, stated_by_message: None }
     }
 
-    /// What labels samples, once it is set.
+    /// Clock that dates samples, once it is set.
     pub fn clock(&self) -> Option<SampleClock> {
         self.clock
     }

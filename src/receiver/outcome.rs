@@ -1,4 +1,4 @@
-//! What a reception comes to: its outcome, its conditioning, and the errors that end it.
+//! Outcome of a reception, its conditioning, and the errors that end it.
 
 use std::fmt;
 
@@ -32,7 +32,7 @@ pub enum ReceiveError {
     /// A signal that cannot be followed to a position.
     #[error("acquisition.signals: {signal} cannot be received: {reason}")]
     Unsupported {
-        /// Its name.
+        /// Name of the signal.
         signal: &'static str,
         /// Why.
         reason: String,
@@ -48,7 +48,7 @@ pub enum ReceiveError {
     Read {
         /// The last sample that was read.
         sample: u64,
-        /// What the reader says.
+        /// Error that the reader returned.
         error: std::io::Error,
     },
     /// Records that cannot be written.
@@ -56,7 +56,7 @@ pub enum ReceiveError {
     Output(#[from] OutputError),
 }
 
-/// What a reception came to.
+/// Result of a reception.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// Whole samples read, and their time.
@@ -75,23 +75,23 @@ pub struct Outcome {
     pub losses: u64,
     /// Bytes of a sample that the end cut off.
     pub cut_bytes: usize,
-    /// What the bytes look like, if not like the format that was taken.
+    /// Encoding that the bytes resemble, if it is not the format that was assumed.
     pub format_warning: Option<String>,
     /// Why there was no fix, when there was none.
     pub diagnosis: Option<Diagnosis>,
     /// Continuous waves that were met; the rows are in `interference.csv`.
     pub interfered: Option<Interfered>,
-    /// How far carrier and code part on all satellites alike, where they do.
+    /// Code-carrier divergence that all satellites share, if any.
     pub parted: Option<Parted>,
-    /// Where samples are missing, or came twice.
+    /// Gaps and repetitions in the samples.
     pub jumps: Vec<Jump>,
     /// Margins to what is refused.
     pub conditioning: Conditioning,
-    /// What makes the results worse than need be, and the remedy.
+    /// Conditions that make the results worse than necessary, each with its remedy.
     pub warnings: Vec<String>,
 }
 
-/// How near the reception was to what is refused as ill-conditioned.
+/// Margins of a reception to the limits beyond which it is refused as ill-conditioned.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Conditioning {
     /// Largest ratio of the geometry's singular values that a fix had, and from which on there is none.
@@ -117,7 +117,7 @@ impl fmt::Display for Conditioning {
     }
 }
 
-/// What there was of continuous waves.
+/// Continuous-wave interference that was met.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Interfered {
     /// Spectra of a second that had a line.

@@ -1,17 +1,18 @@
-//! How fast code and carrier part, which all channels share.
+//! Code-carrier divergence that all channels share.
 //!
-//! One oscillator behind sampling and mixing moves code and carrier alike. A mixer with an error of its own,
-//! or samples at another rate than stated, part them: the carrier runs ahead of the code's Doppler by the
-//! same frequency on every satellite. A [`Line`] measures it on one channel, from what the replica's code and
-//! carrier have counted; [`common`] joins the channels, and an [`Offset`] decides when that is believed.
+//! One oscillator behind sampling and mixing moves code and carrier alike. An error of the mixer, or samples
+//! at another rate than stated, separates them: the carrier exceeds the code's Doppler by the same frequency
+//! on every satellite. A [`Line`] measures this offset on one channel, from the phases that the replica's
+//! code and carrier have counted. [`common`] joins the channels, and an [`Offset`] decides when the estimate
+//! is accepted.
 //!
-//! **Noise.** Code noise of a loop of bandwidth B is correlated as exp(−4Bt): a line through T seconds of it
+//! **Noise.** Code noise of a loop of bandwidth B is correlated as exp(−4Bt). A line through T seconds of it
 //! has the slope's variance 12σ²τ/T³ with τ = 1/(2B), when T ≫ τ (less before). σ² grows with B, so that σ²τ,
 //! and with it the slope, does not depend on B. At 45 dB-Hz (σ = 0.58 m at 0.5 Hz, 3.1 carrier cycles) that
 //! is 11 Hz/T^1.5 for one satellite and 3.7 Hz/T^1.5 for eight: 4 Hz after a second, 0.12 Hz after ten, 0.02
 //! Hz after thirty.
 //!
-//! Limits: an ionosphere that changes for all satellites alike, or a turning antenna, looks the same; the
+//! Limits: an ionosphere that changes for all satellites alike, or a turning antenna, looks the same. The
 //! first is below [`LEAST_HZ`], the second is removed like an oscillator's offset. Multipath counts by its
 //! scatter between satellites.
 
@@ -47,7 +48,7 @@ pub const LEAST_HZ: f64 = 0.1;
 /// A change of the offset by more moves the code loops by more than their noise (0.5 m).
 const RESTART_HZ: f64 = 5.0;
 
-/// What a replica has counted where a code period of it begins.
+/// Phases that a replica has counted at the beginning of a code period.
 #[derive(Clone, Copy, Debug)]
 pub struct Phases {
     /// Sample at which the period begins.
@@ -79,7 +80,7 @@ impl Phases {
 pub struct Estimate {
     /// The frequency.
     pub hz: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the frequency, in hertz.
     pub sigma_hz: f64,
 }
 
@@ -92,7 +93,7 @@ pub struct Estimate {
 pub struct Line {
     last: Option<Phases>,
     points: u32,
-    /// Of the last point, on the line, less what was measured there.
+    /// Last point of the line less the value measured there, in carrier cycles.
     ahead_cycles: f64,
     hz: f64,
     span_s: f64,
@@ -134,7 +135,7 @@ impl Line {
         (self.points >= LEAST_POINTS).then(|| Estimate { hz: self.hz, sigma_hz: variance.sqrt() })
     }
 
-    /// How far the code is ahead of where the line expects it at `phases`, in carrier cycles.
+    /// Code phase less the line's forecast at `phases`, in carrier cycles.
     pub fn code_ahead_cycles(&self, phases: &Phases, link: Link, rate: Rate) -> Option<f64> {
         let last = self.last.as_ref()?;
         let passed_s = rate.elapsed_s(phases.sample.checked_sub(last.sample)?);
@@ -142,7 +143,7 @@ impl Line {
     }
 }
 
-/// What most of the channels agree on: the weighted mean of those that lie near the weighted median.
+/// Estimate that most of the channels agree on: the weighted mean of those near the weighted median.
 pub fn common(lines: &[Estimate]) -> Option<Estimate> {
     let mut sorted = lines.to_vec();
     sorted.sort_by(|a, b| a.hz.total_cmp(&b.hz));
@@ -165,7 +166,7 @@ pub fn common(lines: &[Estimate]) -> Option<Estimate> {
     Some(Estimate { hz, sigma_hz: (excess / weights).sqrt() })
 }
 
-/// What a new estimate does to the offset in use.
+/// Effect of a new estimate on the offset in use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
     /// The offset stays as it was.
@@ -212,14 +213,15 @@ impl Offset {
     }
 }
 
-/// What a reception came to know of it.
+/// Code-carrier divergence that a reception found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Parted {
     /// The carrier's Doppler over the code's, in hertz of the carrier.
     pub offset_hz: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the offset, in hertz.
     pub sigma_hz: f64,
-    /// The same as an error of the sample rate: the true one over the stated one, less one.
+    /// Offset as an error of the sample rate, in parts per million: the true rate over the stated one, less
+    /// one.
     pub rate_error_ppm: f64,
     /// The carrier's frequency without it, if it is the mixer's …
     pub if_hz: f64,

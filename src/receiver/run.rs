@@ -381,7 +381,7 @@ pub fn receive_several<R: Read>(
     }
 }
 
-/// What `receiver.json` says.
+/// Summary of a reception, written as `receiver.json`.
 fn summary(
     metadata: &[IfMetadata],
     signals: &[Vec<&'static str>],

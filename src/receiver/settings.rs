@@ -77,7 +77,7 @@ pub enum SettingsError {
     Toml {
         /// Name of the file, with line and column where they are known.
         origin: String,
-        /// What is wrong.
+        /// Message of the parser.
         message: String,
     },
     /// A key that there is not.
@@ -87,7 +87,7 @@ pub enum SettingsError {
         origin: String,
         /// The key with its tables.
         key: String,
-        /// What is expected in its place.
+        /// Keys that are expected in its place.
         expected: String,
     },
     /// A value out of its range.
@@ -99,7 +99,7 @@ pub enum SettingsError {
         key: &'static str,
         /// The value.
         value: String,
-        /// What is expected in its place.
+        /// Values that are expected in its place.
         expected: String,
     },
     /// A setting of the search.
@@ -107,7 +107,7 @@ pub enum SettingsError {
     Acquisition {
         /// Name of the file, with line and column where they are known.
         origin: String,
-        /// What is wrong with it.
+        /// Error of the acquisition settings.
         source: AcquireError,
     },
     /// A setting of the channels.
@@ -115,7 +115,7 @@ pub enum SettingsError {
     Tracking {
         /// Name of the file, with line and column where they are known.
         origin: String,
-        /// What is wrong with it.
+        /// Error of the tracking settings.
         source: TrackingSettingsError,
     },
     /// A week reference that is no time.
@@ -123,7 +123,7 @@ pub enum SettingsError {
     Week {
         /// Name of the file, with line and column where they are known.
         origin: String,
-        /// What is wrong with it.
+        /// Error of the week's reference time.
         source: TimeError,
     },
 }

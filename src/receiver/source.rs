@@ -130,7 +130,7 @@ impl Gathered {
         self.bytes.len() >= samples * size
     }
 
-    /// What there is.
+    /// Samples gathered so far.
     pub fn packed(&self) -> Packed<'_> {
         Packed { first: self.first, format: self.format, bytes: &self.bytes }
     }
@@ -166,7 +166,7 @@ impl Lookback {
         Block { first: from, i: &planes.i, q: &planes.q }
     }
 
-    /// The same of samples of 8 bits, as fixed-point numbers; those of other formats are left out.
+    /// Samples from `from` up to `to` as fixed-point numbers, for formats of 8 bits. Other formats give none.
     pub fn fixed<'a>(&self, block: &Packed, (from, to): (u64, u64), room: &'a mut FixedSamples) -> Fixed<'a> {
         let size = block.format.bytes();
         let kept = self.kept(block, from);
@@ -195,7 +195,7 @@ impl Lookback {
         self.first + (self.bytes.len() / block.format.bytes()) as u64 == block.first
     }
 
-    /// What is kept from number `from` on, if the block comes next.
+    /// Bytes of the kept samples from number `from` on, if the block comes next.
     fn kept(&self, block: &Packed, from: u64) -> &[u8] {
         let start = from.saturating_sub(self.first) as usize * block.format.bytes();
         if self.is_before(block) { self.bytes.get(start..).unwrap_or_default() } else { &[] }

@@ -20,7 +20,7 @@ use gnss::signal::Link;
 /// A row for a candidate, and where it was found.
 type Found = (AcquisitionRow, Option<Acquired>);
 
-/// Whether `hit` may be nothing but cross-correlation with `other`, of another signal.
+/// True if `hit` may be cross-correlation with `other`, a hit of another signal.
 fn is_covered(hit: &Acquired, other: &Acquired) -> bool {
     hit.signal != other.signal && other.cn0_dbhz + 10.0 * libm::log10(WEAK_SHARE) > hit.cn0_dbhz
 }

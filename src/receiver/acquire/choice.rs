@@ -15,11 +15,11 @@ use super::grid::Peaks;
 use super::grid::{Grid, Map, Peak, Strip};
 use super::multiple_access::{LEAST_CODES, Raised};
 
-/// What is so many times its threshold, or where that is not known so many times what other codes reach
-/// there, needs no column: cross-correlations of a family differ by less.
+/// Ratio of a statistic to its threshold that needs no column. Without a known threshold it is the ratio to
+/// the values that other codes reach. Cross-correlations of a family differ by less.
 const SURE: f64 = 4.0;
-/// What a satellite has to exceed of the threshold that is expected, for its column to be filled. Where noise
-/// has most of what the first dwells show, the threshold is 0.8 of what they let expect.
+/// Share of the expected threshold that a satellite has to exceed for its column to be filled. Where noise
+/// dominates the first dwells, the threshold is 0.8 of the value expected from them.
 const DOUBTFUL: f64 = 0.7;
 
 /// Place of the largest value, of equal ones the first.
@@ -55,7 +55,7 @@ impl Grid {
         (heights.iter().enumerate().map(choice).collect(), bar.crowded)
     }
 
-    /// Whether a Doppler may be crowded that lacks sums of some codes.
+    /// True if a Doppler may be crowded but lacks sums of some codes.
     pub fn is_unknown(&self, map: &Map, bin: usize) -> bool {
         map.raised[bin] != Raised::No && map.strips[bin].iter().any(|strip| strip.sums < self.sums)
     }

@@ -46,7 +46,7 @@ impl Sent {
     }
 }
 
-/// What is searched for of one satellite.
+/// Codes of one satellite's signal that are searched for.
 pub(super) struct Code {
     leading: Sent,
     /// The data beside a pilot, where both are searched for.
@@ -70,7 +70,7 @@ impl Code {
         correlate::Replica::of(Wave::new(component, number)?, Edge::Area)
     }
 
-    /// Whether the leading codes are the same.
+    /// True if the leading codes are equal.
     pub fn is_alike(&self, other: &Self) -> bool {
         self.leading.spectrum == other.leading.spectrum
     }
@@ -124,7 +124,7 @@ impl Codes {
         self.0.get(link)
     }
 
-    /// Those that are there, by satellite and signal.
+    /// Codes that exist, in the order of satellite and signal.
     #[cfg(test)]
     pub fn values(&self) -> impl Iterator<Item = &Code> {
         self.0.values()

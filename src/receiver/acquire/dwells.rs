@@ -32,9 +32,9 @@ use crate::threshold::{of_one_cell, threshold};
 
 /// A share of the dwells after which a Doppler may be left, and the probability that noise stays.
 type Stay = (f64, f64);
-/// Of data and pilot.
+/// Dwell shares and probabilities for data and pilot together.
 const PAIR: [Stay; 6] = [(0.25, 0.25), (0.375, 0.12), (0.5, 0.06), (0.625, 0.03), (0.75, 0.02), (0.875, 0.01)];
-/// Of one code.
+/// Dwell shares and probabilities for one code alone.
 const ALONE: [Stay; 5] = [(0.5, 0.25), (0.6, 0.06), (0.7, 0.03), (0.8, 0.02), (0.9, 0.01)];
 /// Fewer sums of one code are all made: a data bit that turns in the middle of one takes it, and with it a
 /// half or a quarter of those before the first bar.
@@ -51,14 +51,14 @@ pub(super) type Spectra<'a> = [&'a Spectrum; 2];
 pub(super) struct Dwells {
     /// Code periods from the first sample to each, in the order in which they are looked at.
     begins: Vec<f64>,
-    /// What the largest cell has to exceed after each dwell, in units of half a sum's noise power; zero where
-    /// nothing is left.
+    /// Value that the largest cell has to exceed after each dwell, in units of half a sum's noise power. It
+    /// is zero where no Doppler is left.
     stay: Vec<f64>,
     /// Codes whose powers are added in a dwell.
     codes: usize,
 }
 
-/// What writes the spectrum of a dwell at a Doppler, onto zeros.
+/// Function that writes the spectrum of a dwell at a Doppler, into zeroed memory.
 pub(super) type Make<'a> = dyn FnMut(usize, &mut [Complex<f32>]) + 'a;
 
 /// Rooms for the Dopplers of all looks at some samples: as many as are worked on at a time.
@@ -82,9 +82,9 @@ pub(super) struct Room {
     fft: Vec<Complex<f32>>,
     short: Vec<Complex<f32>>,
     powers: Powers,
-    /// Those of satellites that stay after the first dwells.
+    /// Powers of the satellites that stay after the first dwells.
     kept: Vec<Powers>,
-    /// Of every dwell, and whether it has been made.
+    /// Spectrum of every dwell, with a flag that is true once it has been made.
     spectra: Vec<(bool, Vec<Complex<f32>>)>,
 }
 
@@ -142,7 +142,7 @@ impl Dwells {
         self.stay.iter().position(|bar| *bar > 0.0).map(|last| last + 1)
     }
 
-    /// What the largest cell has to exceed after each dwell; zero where nothing is left.
+    /// Value that the largest cell has to exceed after each dwell; zero where no Doppler is left.
     pub fn stay(&self) -> &[f64] {
         &self.stay
     }
@@ -182,7 +182,8 @@ impl Grid {
         (column, Raised::Perhaps)
     }
 
-    /// The same of one code a satellite: `first` dwells of all codes show what cross-correlation adds.
+    /// Column of a Doppler with one code per satellite. The `first` dwells of all codes show the power that
+    /// cross-correlation adds.
     fn column_alone(
         &self,
         spectra: &[Spectra<'_>],
@@ -304,7 +305,8 @@ impl Grid {
         powers.strip(self.near_cells(), self.sums)
     }
 
-    /// Of a Doppler that was left after so many dwells: its peak is what it reached of the bar.
+    /// Strip of a Doppler that was left after `dwells` dwells. The peak is the share of the bar that it
+    /// reached.
     fn left(&self, reached: f64, total: f64, dwells: usize) -> Strip {
         let sums = self.dwells.sums_after(dwells);
         Strip { peak: reached as f32, half_lag: 0, total, near: 0.0, near_cells: 0, sums }

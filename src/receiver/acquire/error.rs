@@ -12,9 +12,9 @@ pub enum AcquireError {
     Setting {
         /// Name of the setting.
         key: &'static str,
-        /// What it is.
+        /// Value that was given.
         value: f64,
-        /// Its range.
+        /// Range of the allowed values.
         expected: &'static str,
     },
     /// A block that is too short.
@@ -50,7 +50,7 @@ pub enum AcquireError {
     OutOfBand {
         /// The signal.
         signal: &'static str,
-        /// Its distance from their centre.
+        /// Distance of the signal from the band's centre, in hertz.
         if_hz: f64,
         /// Half the sample rate.
         half_hz: f64,

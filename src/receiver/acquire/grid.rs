@@ -42,7 +42,8 @@ pub(super) struct Grid {
     pub period_samples: f64,
     pub chips_per_sample: f64,
     pub rate_hz: f64,
-    /// Of the carrier; of a component that is one side of a sub-carrier the middle of that.
+    /// Intermediate frequency of the carrier in hertz. For one sideband of a sub-carrier it is the middle of
+    /// that sideband.
     if_hz: f64,
     /// In the samples, for each hertz of the carrier: negative in an inverted spectrum.
     doppler_sign: f64,
@@ -53,7 +54,7 @@ pub(super) struct Grid {
     /// Code periods that the search looks at.
     pub periods: u32,
     pub(super) dwells: Dwells,
-    /// Whether data and pilot are searched for together.
+    /// True if data and pilot are searched for together.
     pub(super) is_pair: bool,
     pub dopplers_hz: Vec<f64>,
     /// From one of them to the next.
@@ -63,11 +64,12 @@ pub(super) struct Grid {
     pub lag_samples: f64,
     /// Independent cells that have the same law.
     pub cells: usize,
-    /// What a satellite's statistic has to exceed, by Doppler.
+    /// Law of the threshold that a satellite's statistic has to exceed, by Doppler.
     pub(super) law: Law,
-    /// Of one code: the dwells after which a Doppler may be left for the first time, and the law then.
+    /// Dwells after which a Doppler may be left for the first time, and the law then. Used for one code
+    /// alone.
     pub(super) early: Option<(usize, Law)>,
-    /// What the statistic is multiplied by where a real recording's noise is not circular.
+    /// Factor of the statistic where a real recording's noise is not circular.
     pub(super) image_scale: f64,
     is_real: bool,
     pub(super) forward: Arc<dyn Fft<f32>>,
@@ -79,9 +81,9 @@ pub(super) struct Grid {
 pub(super) struct Peak {
     /// In units in which noise alone is chi-square with 2K degrees of freedom.
     pub statistic: f64,
-    /// What it has to exceed at its Doppler.
+    /// Threshold of the statistic at this Doppler.
     pub threshold: f64,
-    /// Whether no law of that Doppler would make it cross-correlation.
+    /// True if no law of this Doppler would make the peak cross-correlation.
     pub is_sure: bool,
     pub doppler_hz: f64,
     /// In halves of a cell.
@@ -96,14 +98,14 @@ pub(super) struct Peaks {
     pub map: Map,
 }
 
-/// What a search saw, for the next one in the same samples.
+/// Results of a search that the next search in the same samples uses.
 #[derive(Clone, Default)]
 pub(super) struct Map {
-    /// By Doppler, then by satellite.
+    /// Strips by Doppler, then by satellite.
     pub(super) strips: Vec<Vec<Strip>>,
-    /// By Doppler, as far as first dwells showed it.
+    /// Effect of cross-correlation by Doppler, as far as the first dwells showed it.
     pub(super) raised: Vec<Raised>,
-    /// What samples were multiplied by.
+    /// Scale factor of the samples.
     scale: f64,
 }
 
@@ -227,8 +229,8 @@ impl Grid {
         samples_needed(self.period_samples, periods, sums, 1.0 + slowest_hz / self.carrier_hz)
     }
 
-    /// Whether the carrier lies so near its own image (at a multiple of half the rate of a real
-    /// recording) that a coherent sum's noise has one degree of freedom instead of two.
+    /// True if the carrier is so near its own image that a coherent sum's noise has one degree of freedom
+    /// instead of two. Images of a real recording lie at multiples of half the rate.
     pub(super) fn meets_image(&self, doppler_hz: f64) -> bool {
         let turns = 2.0 * self.frequency_hz(doppler_hz) / self.rate_hz;
         let coherent_samples = f64::from(self.coherent_periods) * self.period_samples;
@@ -333,13 +335,14 @@ impl Grid {
         Peaks { of, crowded, map }
     }
 
-    /// What a statistic has to exceed in noise.
+    /// Threshold of a statistic in noise alone.
     #[cfg(test)]
     pub fn threshold(&self) -> f64 {
         self.law.threshold
     }
 
-    /// Of every satellite one strip has all dwells: where none stayed, that which came nearest to it.
+    /// Completes one strip of every satellite with all dwells. Where no strip stayed, it is the one that came
+    /// nearest to the bar.
     fn complete(&self, strips: &mut [Vec<Strip>], spectra: &[Spectra<'_>], sums: &Sums<'_>, rooms: &Rooms) {
         let missing: Vec<(usize, usize)> = (0..spectra.len())
             .filter(|&satellite| strips.iter().all(|column| column[satellite].sums < self.sums))
@@ -375,7 +378,7 @@ impl Grid {
         }
     }
 
-    /// Where a carrier of that Doppler appears in the samples.
+    /// Frequency of a carrier in the samples at a Doppler, in hertz.
     pub fn frequency_hz(&self, doppler_hz: f64) -> f64 {
         self.if_hz + self.doppler_sign * doppler_hz
     }

@@ -30,7 +30,7 @@ impl Phasors {
         Self { re, im, turn: fourth * fourth }
     }
 
-    /// Those of the next eight.
+    /// Advances the phasors by eight steps.
     #[inline(always)]
     fn turn(&mut self) {
         for (re, im) in self.re.iter_mut().zip(&mut self.im) {
@@ -371,7 +371,7 @@ fn parts(numbers: &[Complex<f32>]) -> &[f32] {
     unsafe { std::slice::from_raw_parts(numbers.as_ptr().cast(), 2 * numbers.len()) }
 }
 
-/// The same, to be written.
+/// Real and imaginary parts in turn, as a mutable slice.
 #[inline(always)]
 fn parts_mut(numbers: &mut [Complex<f32>]) -> &mut [f32] {
     // SAFETY: as above.

@@ -110,30 +110,30 @@ pub struct Acquired {
     pub code_phase_chips: f64,
     /// Positive when approaching.
     pub doppler_hz: f64,
-    /// Of the whole signal, estimated by the search.
+    /// C/N0 of the whole signal in dB-Hz, as the search estimated it.
     pub cn0_dbhz: f64,
 }
 
 impl Acquired {
-    /// What was found.
+    /// Satellite and signal of the hit.
     pub fn link(&self) -> Link {
         Link { sv: self.sv, signal: self.signal }
     }
 }
 
-/// Whether a signal's carrier lies within the band of the samples, with both sides of its sub-carrier if it
-/// has one. Of a real recording the IF may lie beyond half the rate on purpose.
+/// True if a signal's carrier lies within the band of the samples, with both sidebands of its sub-carrier if
+/// it has one. The IF of a real recording may lie beyond half the rate on purpose.
 pub fn can_hold(metadata: &IfMetadata, signal: &Signal) -> bool {
     !metadata.format.is_complex() || far_hz(metadata, signal, signal.centre_hz()).abs() <= 0.5 * metadata.rate.hz()
 }
 
-/// The same of a satellite's own carrier.
+/// True if a satellite's own carrier lies within the band of the samples.
 pub(crate) fn can_hold_carrier(metadata: &IfMetadata, link: Link) -> bool {
     let far_hz = far_hz(metadata, link.signal, link.carrier_hz());
     !metadata.format.is_complex() || far_hz.abs() <= 0.5 * metadata.rate.hz()
 }
 
-/// Where a carrier lies in the samples, or the farther side of its sub-carrier.
+/// Frequency of a carrier in the samples in hertz, or that of the farther sideband of its sub-carrier.
 fn far_hz(metadata: &IfMetadata, signal: &Signal, carrier_hz: f64) -> f64 {
     let if_hz = metadata.if_hz(carrier_hz);
     if_hz + libm::copysign(signal.sides_hz(), if_hz)
@@ -151,11 +151,13 @@ pub fn cell_chips(
     grid(metadata, signal, settings).map(|grid| grid.lag_samples * grid.chips_per_sample)
 }
 
-/// What the largest cell of a Doppler has to exceed after each sum of a search for `signal`, in units in
-/// which noise is chi-square; zero where no Doppler is left. What many codes reach raises it.
+/// Values that the largest cell of a Doppler has to exceed after each sum of a search for `signal`. The unit
+/// is that in which noise is chi-square. Values are zero where no Doppler is left. Cross-correlation that
+/// many codes show raises them.
 ///
 /// # Errors
-/// As [`cell_chips`].
+///
+/// Same as [`cell_chips`].
 pub fn bars(
     metadata: &IfMetadata,
     signal: &'static Signal,
@@ -210,7 +212,7 @@ pub struct Searcher {
     codes: Codes,
 }
 
-/// What candidates share a grid: signal and carrier, in hertz from the middle of the signal's band.
+/// Key of the candidates that share a grid: signal, and carrier offset in hertz from the middle of its band.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Band {
     signal: &'static Signal,
@@ -243,10 +245,11 @@ impl Searcher {
         Self::around(metadata, settings, 0.0)
     }
 
-    /// The same with Dopplers around `centre_hz`, to a step of the grid, in place of zero.
+    /// A search of Dopplers around `centre_hz`, to a step of the grid, in place of zero.
     ///
     /// # Errors
-    /// As [`AcquisitionSettings::validate`].
+    ///
+    /// Same as [`AcquisitionSettings::validate`].
     pub fn around(metadata: &IfMetadata, settings: &AcquisitionSettings, centre_hz: f64) -> Result<Self, AcquireError> {
         settings.validate()?;
         Ok(Self {
@@ -284,10 +287,11 @@ impl Searcher {
         Ok(room.map(|room| AcquisitionSettings { doppler_max_hz: self.settings.doppler_max_hz, ..room }))
     }
 
-    /// Whether there are samples enough to search for this signal at all.
+    /// True if there are enough samples to search for this signal.
     ///
     /// # Errors
-    /// As [`AcquisitionSettings::validate`].
+    ///
+    /// Same as [`AcquisitionSettings::validate`].
     pub(crate) fn has_room(&self, signal: &Signal) -> Result<bool, AcquireError> {
         Ok(self.settings_of(signal)?.is_some())
     }
@@ -306,11 +310,12 @@ impl Searcher {
         self.search_beside(block, candidates, &[])
     }
 
-    /// The same beside satellites that are known to be there, and where: they are taken out of the samples
-    /// first, and none of `candidates` has to be one of them.
+    /// Searches for `candidates` after the signals of known satellites have been subtracted from the samples.
+    /// No candidate has to be one of the known satellites.
     ///
     /// # Errors
-    /// As [`Searcher::search`].
+    ///
+    /// Same as [`Searcher::search`].
     pub fn search_beside(
         &mut self,
         block: &Block,
@@ -323,7 +328,7 @@ impl Searcher {
         self.search_stretch(&Stretch::Planes(*block), candidates, known)
     }
 
-    /// The same of samples as they are.
+    /// Searches samples that are given without a block.
     pub(crate) fn search_stretch(
         &mut self,
         stretch: &Stretch,
@@ -512,7 +517,7 @@ impl Searcher {
     }
 }
 
-/// What a search found of one satellite.
+/// Result of a search for one satellite.
 struct Finding {
     statistic: f64,
     threshold: f64,

@@ -1,20 +1,22 @@
-//! What a peak has to exceed where other signals' cross-correlation raises the cells around it.
+//! Thresholds of peaks where cross-correlation with other signals raises the cells.
 //!
-//! C/A codes repeat every millisecond, so another satellite shows in every Doppler bin that differs from its
-//! own by a multiple of 1 kHz: in a quarter of the cells at −24 dB, in some up to −21 dB, the same in every
-//! sum. Those cells are not chi-square about the map's noise floor, and their tail reaches much further.
-//! Whoever sends: a satellite that was not found yet, one beyond the searched Dopplers, one of another system
-//! with codes of the same family, or what a subtraction left over.
+//! C/A codes repeat every millisecond. Another satellite therefore shows in every Doppler bin that differs
+//! from its own by a multiple of 1 kHz: in a quarter of the cells at −24 dB, in some up to −21 dB, equal in
+//! every sum. Those cells are not chi-square about the map's noise floor, and their tail is much longer. The
+//! source can be a satellite that was not found yet, or one beyond the searched Dopplers. It can also be
+//! another system with codes of the same family, or the rest of a subtraction.
 //!
 //! All codes that are searched for meet those signals alike, and few of the codes are present. So the largest
-//! cells of all codes in one Doppler bin are a sample of that bin's own law. Where their median is above what
-//! noise explains, the bin is *crowded*. Cross-correlation of a code family is bounded, so what lies beyond
-//! the values that many codes reach is noise about a cross-correlation, and that adds to the amplitude: the
-//! root of a cell is nearly normal with unit deviation, whatever its mean. In amplitude the bar is
-//! therefore the bin's median, plus the [`REACHED`] quantile of what the codes exceed the medians of their
-//! bins by (all crowded bins together), plus what a normal variable goes on from that quantile to the false
-//! alarm. Elsewhere the threshold is that of noise. Limits: fewer codes than [`LEAST_CODES`] say nothing; a
-//! bin that is raised by less than 0.7 dB is not noticed.
+//! cells of all codes in one Doppler bin are a sample of that bin's own distribution. Where their median
+//! exceeds that of noise, the bin is *crowded*. Cross-correlation of a code family is bounded. Beyond the
+//! values that many codes reach, there is only noise about a cross-correlation. Such noise adds to the
+//! amplitude: the root of a cell is nearly normal with unit deviation, whatever its mean.
+//!
+//! The bar in amplitude is a sum of three terms. The first is the bin's median. The second is the [`REACHED`]
+//! quantile of the codes' excess over the medians of their bins, all crowded bins together. The third is the
+//! distance of a normal variable from that quantile to the false alarm. Elsewhere the threshold is that of
+//! noise. Limits: fewer codes than [`LEAST_CODES`] give no estimate, and a bin that is raised by less than
+//! 0.7 dB is not noticed.
 
 use crate::threshold::{of_one_cell, threshold};
 
@@ -42,29 +44,29 @@ const RAISED: f64 = 1.0 / 16.0;
 /// The law of the largest cell of one Doppler bin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Law {
-    /// What a peak has to exceed in noise, and with what probability a bin does.
+    /// Threshold of a peak in noise alone.
     pub threshold: f64,
     /// Deviations of a normal variable from the [`REACHED`] quantile of a bin's largest cell to the false
     /// alarm.
     further: f64,
-    /// Of the largest cell of a bin in noise: median and scale, circular and where a carrier meets its image.
+    /// Median and scale of a bin's largest cell in noise: circular, and where a carrier meets its image.
     circular: (f64, f64),
     image: (f64, f64),
     /// Deviation of a cell's root where a carrier meets its image; one elsewhere.
     image_deviation: f64,
 }
 
-/// Whether cross-correlation raises the cells of all codes in a bin.
+/// Effect of cross-correlation on the cells of all codes in a bin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Raised {
     No,
-    /// By too little to tell from noise, or too few codes were seen.
+    /// The rise cannot be told from noise, or too few codes were seen.
     Perhaps,
-    /// What nine codes in ten stay below.
+    /// The bin is raised: nine codes in ten stay below this value.
     Yes(f64),
 }
 
-/// What every bin's peak has to exceed.
+/// Thresholds of the peaks, bin by bin.
 pub(super) struct Bar {
     pub thresholds: Vec<f64>,
     /// Numbers of the bins that other signals raise.
@@ -77,8 +79,8 @@ fn gumbel(probability: f64) -> f64 {
 }
 
 impl Law {
-    /// Of bins with so many cells of `sums` powers, in a search of `bins` of them with a total of
-    /// `false_alarm`. `image_scale` is what statistics of one degree of freedom a sum were multiplied by.
+    /// A law for bins of `cells` cells, each with `sums` powers, in a search of `bins` bins with a total of
+    /// `false_alarm`. Statistics with one degree of freedom per sum were multiplied by `image_scale`.
     pub fn new(false_alarm: f64, cells: usize, bins: usize, sums: u32, image_scale: f64) -> Self {
         let per_cell = of_one_cell(false_alarm, (cells * bins) as f64);
         // A share p of bins stays below the value that a cell exceeds with 1 − p^(1/cells).
@@ -124,7 +126,8 @@ impl Law {
         bar
     }
 
-    /// What the largest cells of all codes in a bin say after a part of the sums. Noise is circular.
+    /// Effect of cross-correlation on a bin after a part of the sums, from the largest cells of all codes.
+    /// Noise is circular.
     pub fn raised(&self, column: Vec<f64>) -> Raised {
         if column.len() < LEAST_CODES {
             return Raised::Perhaps;
@@ -141,7 +144,7 @@ impl Law {
         }
     }
 
-    /// What a peak has to exceed in a crowded bin where nine codes in ten stay below `reached`.
+    /// Threshold of a peak in a crowded bin where nine codes in ten stay below `reached`.
     pub fn beyond(&self, reached: f64) -> f64 {
         let root = reached.sqrt() + self.further;
         root * root
@@ -157,7 +160,7 @@ impl Law {
         (self.deviations(median, beyond.len(), image) > CROWDED).then(|| (median.sqrt(), beyond))
     }
 
-    /// How far the median of so many codes is above that of noise, in its standard deviations.
+    /// Excess of the median of `codes` codes over that of noise, in its standard deviations.
     fn deviations(&self, median: f64, codes: usize, image: bool) -> f64 {
         let (place, scale) = if image { self.image } else { self.circular };
         (median - place) / (MEDIAN_SPREAD * scale / (codes as f64).sqrt())
@@ -175,14 +178,13 @@ fn median_and_excesses(mut column: Vec<f64>) -> (f64, Vec<f64>) {
     (median, column.iter().map(|height| height.sqrt() - median.sqrt()).collect())
 }
 
-/// Whether more codes than the quantile leaves room for are higher than cross-correlation explains.
+/// True if more codes than the quantile allows are higher than cross-correlation explains.
 fn stands_out(column: &[f64], median: f64) -> bool {
     let beyond = column.iter().filter(|height| is_beyond_cross_correlation(**height, median)).count();
     beyond as f64 > (1.0 - REACHED) * column.len() as f64
 }
 
-/// Whether a cell is a satellite's own: cross-correlations of a family differ by the root of two in
-/// amplitude.
+/// True if a cell is a satellite's own. Cross-correlations of a family differ by a factor of √2 in amplitude.
 fn is_beyond_cross_correlation(height: f64, median: f64) -> bool {
     height.sqrt() > OWN_RATIO * median.sqrt() + OWN_DEVIATIONS
 }

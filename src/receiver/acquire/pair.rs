@@ -28,7 +28,7 @@ pub(super) struct Transforms {
 }
 
 impl Grid {
-    /// Where a Doppler appears in the transform of a dwell: its bin, and the parts of a bin beyond that.
+    /// Position of a Doppler in the transform of a dwell: its bin, and the rest in parts of a bin.
     fn place(&self, doppler_hz: f64) -> (i64, i64) {
         let bins = self.frequency_hz(doppler_hz) / self.rate_hz * self.forward.len() as f64;
         let parts = (bins * PARTS).round() as i64;

@@ -66,7 +66,7 @@ impl Powers {
         ([own, other], scale, total)
     }
 
-    /// What a search keeps of so many sums; cells within `side` of the largest are near it.
+    /// Strip that a search keeps of so many sums. Cells within `side` of the largest cell count as near it.
     pub fn strip(&self, side: usize, sums: u32) -> Strip {
         let count = self.cells.len();
         let ([own, other], scale, total) = self.largest();

@@ -21,8 +21,8 @@ const BESIDE: usize = 3;
 const APART_CHIPS: f64 = 0.35;
 /// Parts of that shape: the mean over the sample, the code at its instant, and the means beside it.
 const PARTS: usize = 2 + 2 * BESIDE;
-/// What is added to each part's energy, of it: parts are alike where edges fall between the samples of a rate
-/// that is a multiple of the chips'. It leaves so much of the amplitude.
+/// Share of each part's energy that is added to it. Parts are alike where edges fall between the samples of a
+/// rate that is a multiple of the chip rate. This share also bounds the amplitude that is left.
 const RIDGE: f64 = 1e-6;
 
 /// Takes a satellite out of the samples. A real recording holds the carrier's cosine only. Returns the mean
@@ -87,7 +87,7 @@ fn make(number: usize, replica: &Replica, (start, step): (f64, f64), part: &mut 
     }
 }
 
-/// How much of each part is in samples, by the products of both and each part's energy.
+/// Amplitudes of the parts in samples, from the products with the samples and the energy of each part.
 fn amplitudes(parts: &[Vec<f32>], projected: &[(Complex<f64>, f64)]) -> Vec<Complex<f64>> {
     let alone = |(sum, energy): &(Complex<f64>, f64)| if *energy > 0.0 { sum / energy } else { Complex::default() };
     if let [one] = projected {

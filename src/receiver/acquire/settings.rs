@@ -49,8 +49,8 @@ pub const ALL: &str = "all";
 /// Code periods of a symbol that are too few to sum more than one coherently before its edges are known.
 const FEW: u32 = 3;
 
-/// Whether the sign may turn after every code period, or nearly: by a secondary code, or by symbols of few
-/// periods. Sums as long all straddle an edge if one does, and half of the power is then found beside the
+/// True if the sign may turn after every code period, or nearly: by a secondary code, or by symbols of few
+/// periods. Sums of that length all contain an edge if one does. Half of the power is then found beside the
 /// Doppler.
 pub(super) fn sign_turns_often(component: &Component) -> bool {
     let few = |periods: Option<u32>| periods.is_none_or(|periods| periods <= FEW);
@@ -84,7 +84,7 @@ impl AcquisitionSettings {
         }
     }
 
-    /// Whether it is left to the bands what is searched for.
+    /// True if the bands decide which signals are searched for.
     pub fn is_all(&self) -> bool {
         self.signals == [ALL]
     }

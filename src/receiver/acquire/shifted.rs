@@ -14,7 +14,7 @@ use super::grid::Grid;
 use super::kernel;
 use crate::source::Block;
 
-/// What a shift may be off a whole bin, in bins: a period's sum then loses 0.0002 of its power.
+/// Largest distance of a shift from a whole bin, in bins. A period's sum then loses 0.0002 of its power.
 const MOST_OFF: f64 = 0.008;
 /// Spectra are kept up to so many bytes.
 const MOST_BYTES: usize = 64 << 20;
@@ -86,7 +86,7 @@ pub(super) struct Shifted {
     groups: usize,
     /// Bins beyond the band on either side.
     reach: usize,
-    /// By group, then by period: bins from the band's lowest less `reach` on.
+    /// Spectra by group, then by period; each begins `reach` bins below the band's lowest bin.
     spectra: Vec<Vec<Complex<f32>>>,
 }
 
@@ -147,7 +147,7 @@ fn middle_hz(grid: &Grid, groups: usize, group: usize) -> f64 {
     grid.dopplers_hz[group + members / 2 * groups]
 }
 
-/// By how many bins a Doppler's spectrum is shifted against that of its group's middle.
+/// Shift of a Doppler's spectrum against that of its group's middle, in bins.
 fn bins(grid: &Grid, groups: usize, bin: usize) -> f64 {
     let apart_hz = grid.frequency_hz(grid.dopplers_hz[bin]) - grid.frequency_hz(middle_hz(grid, groups, bin % groups));
     apart_hz * grid.forward.len() as f64 / grid.rate_hz

@@ -8,7 +8,7 @@ use super::tests::{Noise, Recording, Sent, all, difference_chips, metadata, reco
 use super::*;
 use gnss::samples::Format;
 
-/// What searches of many skies came to.
+/// Counts of the searches of many skies.
 #[derive(Debug, Default)]
 struct Count {
     skies: u32,
@@ -160,8 +160,8 @@ fn strong_signals_that_are_no_candidates_bring_no_false_satellites() {
     assert!(f64::from(total.found) >= 0.9 * f64::from(total.there), "{total:?}");
 }
 
-/// What is sent at four times the rate behind two poles at 1.7 MHz, little more than the main lobe and not
-/// evenly, and every fourth sample of it.
+/// A signal sampled at four times the rate behind two poles at 1.7 MHz, of which every fourth sample is kept.
+/// The filter passes little more than the main lobe, and not evenly.
 fn filtered(samples: usize, sent: &[Sent], seed: u64) -> Recording {
     let fine = record(metadata(Format::Ci8, 4.0 * 2.6e6, 0.0, false), 4 * samples, sent, seed);
     let behind = |x: &[f32]| {

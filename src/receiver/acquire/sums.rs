@@ -1,4 +1,4 @@
-//! Where the coherent sums of a search come from.
+//! Sources of the coherent sums of a search.
 
 use num_complex::Complex;
 
@@ -9,11 +9,11 @@ use crate::source::Block;
 
 /// Samples from which the coherent sums of any Doppler are made.
 pub(super) enum Sums<'a> {
-    /// Of data and pilot.
+    /// Sums of data and pilot together.
     Pair(Transforms),
-    /// Of one code, from spectra that Dopplers share.
+    /// Sums of one code, from spectra that Dopplers share.
     Shared(Shifted),
-    /// Of one code, where they share none.
+    /// Sums of one code, where Dopplers share no spectra.
     Alone { block: &'a Block<'a>, scale: f64 },
 }
 
@@ -26,7 +26,7 @@ impl<'a> Sums<'a> {
         shared.map_or(Self::Alone { block, scale }, Self::Shared)
     }
 
-    /// What makes the spectrum of one dwell after the other at a Doppler.
+    /// Function that makes the spectrum of one dwell after the other at a Doppler.
     pub fn at<'b>(&'b self, grid: &'b Grid, bin: usize) -> impl FnMut(usize, &mut [Complex<f32>]) + 'b {
         let doppler_hz = grid.dopplers_hz[bin];
         let (mut long, mut scratch) = (Vec::new(), Vec::new());

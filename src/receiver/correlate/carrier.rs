@@ -54,14 +54,15 @@ pub(super) struct Carrier {
 }
 
 impl Carrier {
-    /// Of vectors of sixteen samples.
+    /// Carrier for vectors of sixteen samples.
     #[inline(always)]
     pub fn new(nco: &Nco) -> Self {
         let (within, vector_turn) = Sixteen::powers(phasor(nco.carrier_step));
         Self::of(nco, within, vector_turn)
     }
 
-    /// Of vectors of sixteen pairs of samples, over each of which it stands still in the middle.
+    /// Carrier for vectors of sixteen pairs of samples. It is constant over each pair, at the value in its
+    /// middle.
     #[inline(always)]
     pub fn of_pairs(nco: &Nco) -> Self {
         let one = phasor(nco.carrier_step);

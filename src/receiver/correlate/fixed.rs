@@ -25,7 +25,7 @@ impl<'a> Fixed<'a> {
         Some(Self { i: self.i.get(from..to)?, q: self.q.get(from..to)? })
     }
 
-    /// The same numbers in floating point.
+    /// Samples in floating point, as in-phase and quadrature planes.
     pub(super) fn planes(&self) -> [Vec<f32>; 2] {
         let scale = 1.0 / (1_u32 << POINT_BITS) as f32;
         [self.i, self.q].map(|plane| plane.iter().map(|&x| f32::from(x) * scale).collect())

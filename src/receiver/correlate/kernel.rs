@@ -20,7 +20,7 @@ pub(super) use reduce::{fixed_power, fold, power};
 
 /// Entries of a chip table beyond one period.
 pub(super) const TABLE_MARGIN: usize = CHUNK + LANES;
-/// The same of a table of short integers.
+/// Entries of a chip table of short integers beyond one period.
 pub(super) const SHORT_MARGIN: usize = GROUP;
 /// Steps of the code up to this keep a vector's chips within one register of the table.
 #[cfg(target_arch = "x86_64")]
@@ -30,7 +30,7 @@ const LOOKUP_STEP: u64 = 15 << (CODE_BITS - 4);
 /// what they need fit the registers of AVX-512 but for a few.
 const AT_ONCE: usize = 5;
 
-/// What the fast correlators compute in.
+/// Arithmetic of the fast correlators.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fast {
     /// `short`, or `single` where the code's step does not suit it.
@@ -49,7 +49,7 @@ pub(crate) enum Level {
 }
 
 impl Level {
-    /// What this processor can run, the best last.
+    /// Instruction sets that this processor can run, the best one last.
     #[cfg(test)]
     pub(crate) fn all() -> Vec<Self> {
         let mut levels = vec![Self::Baseline];

@@ -18,7 +18,7 @@ const HALF_TURN_OF_CHIP: u64 = 1 << (63 - CODE_BITS);
 #[derive(Clone, Debug)]
 pub(super) struct Table<T> {
     pub values: Vec<T>,
-    /// What each value is short of the next, in short integers by −1, 0 or 1 of them.
+    /// Differences from each value to the next; in short integers −1, 0 or 1 times the step.
     pub changes: Vec<T>,
 }
 
@@ -29,7 +29,7 @@ pub(super) struct Pattern {
     pub steps_per_chip: usize,
     /// Entry j holds the 64 steps from step 32 j on, cyclically, first step in the top bit, 1 for −1.
     pub words: Vec<u64>,
-    /// What a period's steps are sent as.
+    /// Values of a period's steps.
     pub steps: Vec<i8>,
     pub edge: Edge,
     /// Tables that only kernels with AVX-512 and these numbers want, made when one does.
@@ -41,7 +41,7 @@ pub(super) struct Pattern {
     pub half_cycles: i32,
     /// … and whether taps beside the prompt have the sub-carrier's phase there, or the prompt's.
     pub turns_at_taps: bool,
-    /// Whether its part is taken the other way.
+    /// True if the pattern's part enters with the opposite sign.
     pub is_inverted: bool,
 }
 
@@ -136,7 +136,7 @@ impl Pattern {
         }
     }
 
-    /// What a sum at a tap is multiplied by: gain, and the sub-carrier's turn from the prompt to there.
+    /// Factor of a sum at a tap: the gain, and the sub-carrier's turn from the prompt to the tap.
     pub fn factor(&self, tap: i64) -> Complex64 {
         let gain = if self.is_inverted { -self.gain } else { self.gain };
         if !self.turns_at_taps {

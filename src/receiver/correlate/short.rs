@@ -18,7 +18,7 @@ pub(super) const GROUP: usize = 2 * LANES;
 /// Groups whose sums stay in 32 bits: 64 samples a lane · 127.5·2⁷·√2 · 2⁸ < 2²⁹.
 const GROUPS: usize = 32;
 const CHUNK: usize = GROUPS * GROUP;
-/// What a chip is sent as.
+/// Value of a chip in the table.
 pub(super) const AMPLITUDE: i16 = 256;
 /// A float of this size has 2⁻⁷ in its last bit, and zeros in its last sixteen.
 pub(super) const ALIGN: f32 = 98_304.0;
@@ -29,7 +29,7 @@ const ROUND: f32 = 12_582_912.0;
 /// Undoes the scales of samples, replica and phasors; products with phasors lose 15 bits.
 const SCALE: f64 = 32_768.0 / (128.0 * AMPLITUDE as f64 * UNIT as f64);
 
-/// How the code moves, in 16 bits.
+/// Motion of the code in 16 bits.
 pub(super) struct Steps {
     /// Phase of samples k and k + 16 of a group, from that of its first one.
     pub lanes: [[u16; 2]; LANES],

@@ -27,7 +27,7 @@ pub(super) struct Chunk<'a> {
     pub sin: [f32; VECTORS],
 }
 
-/// How the code moves.
+/// Motion of the code in single precision.
 pub(super) struct Steps {
     pub lane: [u32; LANES],
     pub inverse_width: f32,

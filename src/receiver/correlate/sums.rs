@@ -16,9 +16,9 @@ pub struct Samples<'a> {
     pub i: &'a [f32],
     /// Quadrature samples; none where they were left out.
     pub q: &'a [f32],
-    /// What all of them before each one add up to, as far as that was made.
+    /// Running sums of the samples before each one, where they were made.
     pub sums: Option<Sums<'a>>,
-    /// The same samples in 16 bits, where they were made.
+    /// Samples in 16 bits, where they were made.
     pub fixed: Option<Fixed<'a>>,
 }
 
@@ -39,7 +39,7 @@ impl<'a> Samples<'a> {
         self.fixed.map_or_else(|| power(self.i, self.q), |fixed| fixed.power())
     }
 
-    /// What `of` makes of the planes, which are made where they were left out.
+    /// Result of `of` on the planes. Planes that were left out are made first.
     pub(super) fn by_planes<R>(&self, of: impl FnOnce(&[f32], &[f32]) -> R) -> R {
         match self.fixed.filter(|_| self.i.is_empty()) {
             Some(fixed) => {
@@ -100,7 +100,7 @@ impl RunningSums {
         self.made(samples, |entries| kernel::running_sums(Level::best(), &i[..samples], &q[..samples], entries))
     }
 
-    /// The same of samples in 16 bits.
+    /// Running sums of samples in 16 bits.
     pub fn of_fixed(&mut self, fixed: Fixed) -> Option<Sums<'_>> {
         self.made(fixed.count(), |entries| kernel::running_sums_of_fixed(Level::best(), fixed.i, fixed.q, entries))
     }

@@ -62,7 +62,7 @@ impl Wave {
     }
 }
 
-/// Whether a replica can be made of a component's code: its period has fewer than 2¹⁶ steps.
+/// True if a replica can be made of a component's code: its period has fewer than 2¹⁶ steps.
 pub fn fits(component: &Component) -> bool {
     let each = steps_of_chip(component);
     (64..super::MOST_STEPS).contains(&(component.code_chips as usize * each))

@@ -53,7 +53,7 @@ pub struct Trend {
     power: f64,
 }
 
-/// What a trend expects, and its variance over that of a look.
+/// Code phase that a trend forecasts, and its variance over that of a look.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expected {
     /// Code, in chips.
@@ -82,7 +82,7 @@ impl Trend {
         self.power
     }
 
-    /// Where the code is to be at `t_s`.
+    /// Forecast of the code phase at `t_s`, in seconds.
     pub fn forecast(&self, t_s: f64) -> Option<Expected> {
         let (n, &(last_s, _)) = (self.looks.len(), self.looks.back()?);
         if n < LEAST_LOOKS {
@@ -113,13 +113,13 @@ impl Trend {
 pub struct Step {
     /// Code, in chips.
     pub chips: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the code phase, in chips.
     pub sigma_chips: f64,
     /// Chips a second that the code gains by Doppler.
     pub doppler_chips: f64,
 }
 
-/// Those of the steps that lie near the weighted median, if they are enough.
+/// Steps that lie near the weighted median, if there are enough of them.
 fn agreeing(steps: &[Step]) -> Option<Vec<Step>> {
     let mut sorted = steps.to_vec();
     sorted.sort_by(|a, b| a.chips.total_cmp(&b.chips));
@@ -147,18 +147,18 @@ pub fn common_step(steps: &[Step], sample_chips: f64) -> Option<f64> {
     beyond.then_some(fit.chips)
 }
 
-/// Whether codes moved by their own Dopplers, as they do when whole code periods are missing.
+/// True if codes moved in proportion to their Dopplers, as they do when whole code periods are missing.
 pub fn doppler_step(steps: &[Step]) -> bool {
     let fit = Fit::robust(steps, None).filter(|_| steps.len() > LEAST_CHANNELS + 1);
     fit.is_some_and(|fit| fit.seconds.abs() > SUSPICIOUS_SIGMAS * fit.sigma_s + SUSPICIOUS_S)
 }
 
-/// What the steps of all channels have in common, and the seconds of Doppler in them.
+/// Common step of all channels, with the seconds of Doppler in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
     /// Code, in chips.
     pub chips: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the code step, in chips.
     pub sigma_chips: f64,
     /// Seconds of Doppler.
     pub seconds: f64,
@@ -197,7 +197,7 @@ impl Fit {
         Some(Self { chips, sigma_chips: variance.sqrt(), seconds, sigma_s: of_seconds.sqrt() })
     }
 
-    /// The same of those steps that agree once `seconds` of Doppler are taken off.
+    /// Fit of the steps that agree once `seconds` of Doppler are subtracted.
     pub fn robust(steps: &[Step], seconds: Option<f64>) -> Option<Self> {
         let first = Self::of(steps, seconds)?;
         let off = first.seconds;
@@ -217,7 +217,7 @@ impl Fit {
 pub struct Edges {
     products: Vec<f64>,
     count: u64,
-    /// Of a secondary code: the sign that has been taken off each product.
+    /// Signs of a secondary code's products, which have been removed from the sums.
     signs: Option<Vec<f64>>,
 }
 
@@ -235,7 +235,7 @@ impl Edges {
         Self { signs: Some(signs), ..Self::new(chips.len() as u32) }
     }
 
-    /// The same before any prompt.
+    /// Edges of this form before any prompt.
     pub fn emptied(&self) -> Self {
         Self { signs: self.signs.clone(), ..Self::new(self.products.len() as u32) }
     }
@@ -268,8 +268,9 @@ impl Edges {
     }
 }
 
-/// By how many code periods, modulo a symbol's, the counts of all channels are short: each came with its
-/// products since the jump, and the period in which its symbols began before. `None` while it is in doubt.
+/// Number of code periods by which the counts of all channels are short, modulo a symbol's. Each channel
+/// gives its products since the jump, and the period in which its symbols began before. `None` while it is in
+/// doubt.
 pub fn turned_by(channels: &[(&Edges, u64)]) -> Option<u64> {
     let length = channels.first()?.0.products.len();
     if channels.first()?.0.signs.is_some() {

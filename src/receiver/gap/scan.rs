@@ -26,7 +26,7 @@ const STEP_S: f64 = 0.04;
 /// No jump of whole seconds is taken for what one within a step explains as well as this.
 const AS_GOOD: f64 = 0.97;
 
-/// What a scan came to: the codes are ahead by so many samples, modulo a code period, with so many seconds of
+/// Result of a scan. The codes are ahead by so many samples, modulo a code period, with so many seconds of
 /// Doppler.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
@@ -107,8 +107,8 @@ impl Scan {
         self.inverse.process(samples);
     }
 
-    /// What the profiles show together, each with what its code gains by Doppler in a second, in samples.
-    /// `None` while they show too little.
+    /// Jump that the profiles show together. Each profile comes with the samples that its code gains by
+    /// Doppler in a second. `None` while they show too little.
     pub fn decide(&self, profiles: &[(&Profile, f64)]) -> Option<Found> {
         let periods = profiles.iter().map(|(profile, _)| profile.periods).min()?;
         if periods < LEAST_PERIODS {

@@ -152,8 +152,8 @@ fn a_jump_says_how_many_samples_and_which_way() {
     assert_eq!(of(-5000), "5000 samples doubled near sample 77");
 }
 
-/// What a scan of 20 ms of four satellites finds whose codes are ahead by so many samples, with Dopplers for
-/// so many seconds.
+/// Result of a scan of 20 ms of four satellites. Their codes are ahead by `samples`, with Dopplers for
+/// `seconds`.
 fn scanned(samples: i64, seconds: f64, dbhz: f64, state: &mut u64) -> Option<Found> {
     let rate_hz = 2.6e6;
     let length = 52_000;

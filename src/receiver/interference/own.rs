@@ -1,13 +1,17 @@
-//! What the codes of the satellites that are followed put into the bins of a spectrum.
+//! Power of the tracked satellites' codes in the bins of a spectrum.
 //!
-//! A segment is hardly longer than a code period of C/A, whose lines lie further apart than a bin: so one bin
-//! holds more of the satellites' power than the next. Under ten satellites of 46 dB-Hz the bins beside have
-//! 0.35 of the noise from them in the mean, and some 0.9: 1.4 times what is beside. With that some spectrum
-//! passes a threshold for even density 12 times as often as meant at 1e-6, and 38 times at 1e-8. Code, phase
-//! and Doppler of a channel give its share of every bin exactly, because segments are whole code periods
-//! apart; the satellites' phases to one another are random from one segment to the next, so that powers add.
-//! Limits: symbols that turn within a segment spread the lines; layers of a pulse other than the strongest,
-//! and signals that are not followed, are not counted.
+//! A segment is hardly longer than a code period of C/A, whose lines lie further apart than a bin. One bin
+//! therefore holds more of the satellites' power than the next. Under ten satellites of 46 dB-Hz the bins
+//! have 0.35 of the noise from them in the mean, and some bins 0.9, which is 1.4 times the power beside. A
+//! spectrum then passes a threshold for even density 12 times as often as meant at 1e-6, and 38 times at
+//! 1e-8.
+//!
+//! Code, phase and Doppler of a channel give its share of every bin exactly, because segments are whole code
+//! periods apart. The satellites' phases to one another are random from one segment to the next, so that
+//! powers add.
+//!
+//! Limits: symbols that turn within a segment spread the lines. Only the strongest layer of a pulse is
+//! counted, and only signals that are tracked.
 
 use fft::Fft;
 use num_complex::Complex;
@@ -19,9 +23,9 @@ use gnss::signal::Link;
 /// A satellite that is followed.
 #[derive(Clone, Copy, Debug)]
 pub struct Followed {
-    /// What is followed.
+    /// Satellite and signal of the channel.
     pub link: Link,
-    /// Of the whole signal.
+    /// C/N0 of the whole signal, in hertz.
     pub cn0_hz: f64,
     /// Positive when approaching.
     pub doppler_hz: f64,

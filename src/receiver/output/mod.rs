@@ -1,8 +1,8 @@
-//! What a receiver reports ([`Record`]), who takes it ([`Sink`]), and the sink that writes files: one CSV
-//! file a kind of record, and `receiver.json` with settings and outcome.
+//! Records of a receiver ([`Record`]), the trait that takes them ([`Sink`]), and the sink that writes files.
+//! Each kind of record has one CSV file. `receiver.json` holds settings and outcome.
 //!
-//! Rows go out as they come, so memory stays flat. Headers are written at once: a file without rows says that
-//! there were none, a missing file that nothing ran.
+//! Rows are written as they come, so memory stays flat. Headers are written at once: a file without rows says
+//! that there were none, a missing file that nothing ran.
 
 mod json;
 mod nmea;
@@ -36,7 +36,7 @@ pub enum OutputError {
     Create {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         error: std::io::Error,
     },
     /// A file that cannot be written.
@@ -44,7 +44,7 @@ pub enum OutputError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Error of the operating system.
         error: std::io::Error,
     },
     /// A sink that takes no records.
@@ -61,7 +61,7 @@ pub enum Record {
     Tracking(TrackingRow),
     /// Something that happened to a channel.
     Event(EventRow),
-    /// What a channel measured at a common epoch.
+    /// Measurement of a channel at a common epoch.
     Observation(Observation),
     /// Parameters as decoded; those of a set that is read again come again.
     Navigation(Vec<NavigationRow>),
@@ -69,7 +69,7 @@ pub enum Record {
     Fix(Fix),
     /// The clocks of the fix before: one a time scale.
     Clocks(Vec<ClockRow>),
-    /// Where the satellites of the fix before stand, those too that it left out.
+    /// Directions of the satellites at the fix before, including those that it left out.
     Sights(Vec<SightRow>),
     /// The ionosphere at the fix before, of satellites with two bands.
     Ionosphere(Vec<IonosphereRow>),
@@ -171,7 +171,7 @@ pub struct Output {
     navigation: Sheet,
     events: Sheet,
     interference: Sheet,
-    /// Of the second front end and those after it: there once one has a line.
+    /// Files of the second and later front ends; each exists once it has a line.
     interference_of: BTreeMap<usize, Sheet>,
     /// There once a fix has another time scale than GPS time.
     clocks: Option<Sheet>,

@@ -1,11 +1,11 @@
-//! Whether the ranges look as if there were a troposphere, against what the settings say.
+//! Test for a troposphere in the ranges, against the choice in the settings.
 //!
-//! Samples of some generators have none; corrected for one, the ranges of low satellites are too short by up
-//! to 14 m, and sound satellites contradict each other. Of every position the ranges above the mask are
-//! solved with the other choice too. Without faults either sum of squares follows chi-square under its own
-//! hypothesis, so half of their difference is the logarithm of the odds between the two (of equal prior
-//! probability, Gaussian errors of the stated deviations). Errors of one minute are nearly the same, so all
-//! positions together count as one: the mean of the differences decides.
+//! Samples of some generators have no troposphere. Corrected for one, the ranges of low satellites are too
+//! short by up to 14 m, and sound satellites contradict each other. The ranges above the mask of every
+//! position are therefore solved with the other choice too. Without faults either sum of squares follows
+//! chi-square under its own hypothesis. Half of their difference is then the logarithm of the odds between
+//! the two, for equal prior probability and Gaussian errors of the stated deviations. Errors within one
+//! minute are nearly equal, so all positions together count as one: the mean of the differences decides.
 
 use nalgebra::Vector3;
 
@@ -18,7 +18,7 @@ const DECISIVE: f64 = 9.2;
 /// Positions that say nothing yet.
 const LEAST_POSITIONS: u32 = 20;
 
-/// What both choices come to.
+/// Number of positions, and the sum of their logarithmic odds for the other choice.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Air {
     positions: u32,
@@ -41,7 +41,7 @@ impl Air {
         self.gain += all.chi_square - other.chi_square;
     }
 
-    /// Whether the other choice is right.
+    /// True if the other choice is right.
     pub fn is_otherwise(&self) -> bool {
         let mean = self.gain / f64::from(self.positions.max(1));
         self.positions >= LEAST_POSITIONS && mean > DECISIVE
@@ -54,7 +54,7 @@ mod tests {
     use super::super::{least_squares::Ionosphere, troposphere};
     use super::*;
 
-    /// What is found of samples that have a troposphere or none, by a correction for one or none.
+    /// Decision on samples with a troposphere or without, under a correction for one or for none.
     fn seen(is_there: bool, is_corrected: bool) -> bool {
         let corrections = Corrections { ionosphere: Ionosphere::Absent, troposphere: is_corrected, model_sigma_m: 0.1 };
         let (mut air, mut state) = (Air::default(), 3);

@@ -34,7 +34,7 @@ const DAY_S: f64 = 86_400.0;
 /// Indicator of ageing until it is said: the fastest.
 const FASTEST: u8 = 15;
 
-/// How a satellite stands with the system.
+/// Status of a satellite in an augmentation system.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Standing {
     /// It must not be used.
@@ -45,7 +45,7 @@ pub(super) enum Standing {
     Corrected(Correction),
 }
 
-/// What is added to a range, its satellite and its variance.
+/// Corrections of a range, of its satellite's position and velocity, and the variance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Correction {
     range_m: f64,
@@ -92,7 +92,7 @@ struct Band {
     delays: BTreeMap<Point, (Vertical, Epoch)>,
 }
 
-/// What one satellite of an augmentation system has said. Satellites go by their numbers.
+/// Messages of one augmentation satellite. Satellites are keyed by their numbers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Store {
     mask: Option<(Mask, Epoch)>,
@@ -104,7 +104,7 @@ pub(super) struct Store {
     closed: Option<Epoch>,
 }
 
-/// What all of them have said.
+/// Messages of all augmentation satellites.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Augmentation(BTreeMap<Sv, Store>);
 
@@ -228,7 +228,7 @@ impl Store {
         Some((quick, quick.udrei))
     }
 
-    /// How a satellite stands whose elements have an issue, in what it sends at `at`.
+    /// Status at `at` of a satellite whose elements have the issue `iode`.
     pub fn standing(&self, number: u8, iode: u16, at: Epoch) -> Standing {
         let Some((quick, udrei)) = self.indicator(number, at) else { return Standing::Without };
         if udrei == DO_NOT_USE {

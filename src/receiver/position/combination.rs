@@ -29,7 +29,7 @@ pub struct Combination<'a> {
 }
 
 impl<'a> Combination<'a> {
-    /// Of two signals of a satellite; `None` where their carriers are in one band.
+    /// Combination of two signals of a satellite; `None` where their carriers are in one band.
     pub fn of(first: &'a Observation, second: &'a Observation) -> Option<Self> {
         let weights = weights(first.sv, first.signal, second.signal)?;
         Some(Self { first, second, weights })
@@ -66,13 +66,14 @@ impl<'a> Combination<'a> {
         planted!("receiver.position.dispersion", -self.weights[1], self.weights[0]) * apart_m
     }
 
-    /// The same by the carriers, but for a constant: they are advanced by what delays the codes.
+    /// Ionospheric group delay on the first carrier in metres, from the carrier phases, except for a
+    /// constant. The ionosphere advances carriers by the amount that it delays codes.
     pub fn carrier_dispersion_m(&self) -> f64 {
         let metres = |row: &Observation| row.carrier_cycles * row.signal.wavelength_m(row.sv);
         -self.weights[1] * (metres(self.first) - metres(self.second))
     }
 
-    /// What a difference of both signals, second minus first, comes to in the ionosphere.
+    /// Ionospheric part of a difference of both signals, second minus first.
     pub fn dispersed(&self, apart: f64) -> f64 {
         -self.weights[1] * apart
     }

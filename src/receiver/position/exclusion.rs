@@ -24,8 +24,8 @@ use gnss::satellite::Sv;
 const LARGEST_TRIED: usize = 1000;
 /// Sets of one size that are solved.
 const SOLVED: usize = 8;
-/// How far apart an atmosphere that is modelled wrongly takes two sets: a troposphere of 2.4 m at the zenith
-/// is 14 m at 10°, and one satellite's range moves a position by about as much.
+/// Separation of two sets in metres that a wrong model of the atmosphere causes. A troposphere of 2.4 m at
+/// the zenith is 14 m at 10°. One satellite's range moves a position by about as much.
 const ATMOSPHERE_M: f64 = 20.0;
 
 /// The value that chi-square with so many degrees of freedom exceeds with the probability `false_alarm`.
@@ -172,8 +172,8 @@ fn sets(count: usize, size: usize) -> Option<Vec<Vec<usize>>> {
     Some(sets)
 }
 
-/// Whether two solutions lie further apart than the noise of both explains at that probability. What both
-/// share is counted twice, so that only clear separations count.
+/// True if two solutions lie further apart than the noise of both explains at that probability. Common noise
+/// is counted twice, so that only clear separations count.
 fn elsewhere(one: &Solution, other: &Solution, false_alarm: f64) -> bool {
     let block = |solution: &Solution| -> Matrix3<f64> { solution.covariance.fixed_view::<3, 3>(0, 0).into_owned() };
     let apart_m = one.position_m - other.position_m;

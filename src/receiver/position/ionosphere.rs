@@ -37,13 +37,13 @@ const GRADIENT_RAD: [f64; 2] = [10.0 / 180.0 * PI, 20.0 / 180.0 * PI];
 /// The delays that a model foresees.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Delays {
-    /// By a formula for every place, which gives the delay on a carrier.
+    /// Klobuchar's formula, which gives the delay at any position on a carrier of this frequency.
     Klobuchar(Klobuchar, f64),
-    /// The same by BeiDou's form of the formula.
+    /// Klobuchar's formula in BeiDou's form.
     Beidou(Klobuchar),
-    /// By the model of BeiDou's third generation.
+    /// Model of BeiDou's third generation.
     Bdgim(Bdgim),
-    /// By the electrons on the way to each satellite, in TECU, from near where the receiver is.
+    /// Electron content on the path to each satellite in TECU, computed for a position near the receiver.
     Electrons(Vec<(Sv, f64)>),
 }
 
@@ -68,7 +68,7 @@ impl Delays {
 /// Standard deviation of a modelled vertical delay.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DelayError {
-    /// As a share of the delay …
+    /// Standard deviation of the delay's error as a share of the delay.
     pub share: f64,
     /// … beside a constant of so many metres.
     pub least_m: f64,

@@ -64,11 +64,11 @@ pub struct Range {
     pub noise_m: f64,
     /// Relative weight of the Doppler: carrier power over noise density.
     pub cn0_hz: f64,
-    /// Whether two carriers were combined, so that the ionosphere is not in it.
+    /// True if two carriers were combined, so that the range is free of the ionosphere.
     pub is_combined: bool,
 }
 
-/// What is known of the ionosphere.
+/// Knowledge about the ionosphere.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ionosphere {
     /// There is none.
@@ -82,12 +82,12 @@ pub enum Ionosphere {
     Grid(Grid, Box<Self>),
 }
 
-/// What corrects and weights ranges.
+/// Corrections and weights of ranges.
 #[derive(Clone, Debug)]
 pub struct Corrections {
     /// The ionosphere's model.
     pub ionosphere: Ionosphere,
-    /// Whether there is a troposphere to correct.
+    /// True if a troposphere is corrected.
     pub troposphere: bool,
     /// Standard deviation of the models at the zenith; grows with one over the sine of the elevation.
     pub model_sigma_m: f64,
@@ -101,7 +101,7 @@ pub struct Solution {
     /// The time scales of the ranges, GPS time first, with the reading of the receiver's clock minus each but
     /// for whole seconds, in metres.
     pub clocks: Vec<(&'static TimeScale, f64)>,
-    /// Of each range: the place of its clock among them …
+    /// Index of each range's clock among the clocks.
     pub clock_of: Vec<usize>,
     /// … measured minus computed, standard deviation, unit vector to the satellite, elevation.
     pub residuals_m: Vec<f64>,
@@ -111,11 +111,11 @@ pub struct Solution {
     pub sights: Vec<Vector3<f64>>,
     /// Elevation of each satellite.
     pub elevations_rad: Vec<f64>,
-    /// What one prior deviation of each of the ionosphere's common errors adds to each range.
+    /// Effect on each range, in metres, of one prior deviation of each of the ionosphere's common errors.
     pub commons_m: Vec<Vector3<f64>>,
     /// Covariance of ECEF coordinates and clocks, in m².
     pub covariance: DMatrix<f64>,
-    /// The same for unit variances: squares of the dilutions of precision.
+    /// Covariance for unit variances: squares of the dilutions of precision.
     pub dilution: DMatrix<f64>,
     /// Ratio of the extreme singular values of the geometry.
     pub condition: f64,
@@ -200,7 +200,7 @@ struct Line {
     sight: Vector3<f64>,
     sigma_m: f64,
     elevation_rad: f64,
-    /// What one prior deviation of each of the ionosphere's common errors adds to the range.
+    /// Effect on the range, in metres, of one prior deviation of each of the ionosphere's common errors.
     common_m: Vector3<f64>,
 }
 

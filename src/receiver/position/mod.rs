@@ -54,21 +54,20 @@ use reduced::InShort;
 pub use sets::Sets;
 use smooth::Smoother;
 
-/// How the ionosphere is corrected.
+/// Correction of the ionosphere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IonosphereChoice {
-    /// Where a satellite is observed on two carriers by the combination of both that has none; else as
-    /// `Broadcast`.
+    /// Ionosphere-free combination where a satellite is observed on two carriers; otherwise `Broadcast`.
     Combined,
-    /// By the model that satellites send: Klobuchar's where signals are received that bring it, else
-    /// NeQuick-G, else BDGIM. Until its coefficients are decoded, by a nominal ionosphere and its error.
+    /// Model that satellites send: Klobuchar's where received signals carry it, else NeQuick-G, else BDGIM. A
+    /// nominal ionosphere with its error is used until the coefficients are decoded.
     Broadcast,
-    /// The same by Klobuchar's model and no other.
+    /// Klobuchar's model only.
     Klobuchar,
-    /// The same by NeQuick-G and no other.
+    /// NeQuick-G only.
     NequickG,
-    /// The same by BDGIM and no other.
+    /// BDGIM only.
     Bdgim,
     /// Not at all: recordings made without an ionosphere.
     None,
@@ -104,25 +103,25 @@ pub enum TroposphereChoice {
     None,
 }
 
-/// What is used of what augmentation systems say of other satellites and of the ionosphere.
+/// Use of the messages of augmentation systems about other satellites and the ionosphere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SbasChoice {
     /// Corrections and integrity of systems that are fit for safety.
     Corrections,
-    /// Those of systems in test mode too.
+    /// Corrections and integrity, also of systems in test mode.
     Test,
     /// Nothing: their satellites range and that is all.
     None,
 }
 
-/// What is taken for the difference of two systems' times.
+/// Difference of two systems' times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SystemClocks {
     /// Nothing: each time scale has a clock of its own among the unknowns.
     Estimated,
-    /// What the systems broadcast of it; a clock of its own until that is decoded.
+    /// Offset that the systems broadcast. Each time scale has its own clock until the offset is decoded.
     Broadcast,
 }
 
@@ -251,7 +250,7 @@ pub enum NoFix {
         /// Length of the last step.
         step_m: f64,
     },
-    /// As many ranges as unknowns, and two places that explain them.
+    /// Exactly as many ranges as unknowns, and two positions that explain them.
     #[error(
         "the ranges agree on two places, {separation_m:.0} m apart, and one more satellite is needed to tell which"
     )]
@@ -259,7 +258,7 @@ pub enum NoFix {
         /// Distance of both.
         separation_m: f64,
     },
-    /// As many ranges as unknowns, and no place to receive them.
+    /// Exactly as many ranges as unknowns, and no position that explains them.
     #[error(
         "the ranges agree on no place that sees its satellites past the Earth and moves at less than 12 km/s: at \
          least one of them is wrong"
@@ -273,7 +272,7 @@ pub enum NoFix {
     Inconsistent {
         /// Weighted sum of squared residuals.
         chi_square: f64,
-        /// What it has to stay below.
+        /// Threshold that the sum has to stay below.
         threshold: f64,
     },
     /// A fault that several satellites explain.
@@ -315,7 +314,7 @@ pub struct Solved {
     pub fix: Fix,
     /// The clock against each time scale.
     pub clocks: Vec<ClockRow>,
-    /// Where the satellites stand that have an ephemeris.
+    /// Directions of the satellites that have an ephemeris.
     pub sights: Vec<SightRow>,
     /// The ionosphere of satellites with two bands.
     pub ionosphere: Vec<IonosphereRow>,
@@ -332,7 +331,7 @@ pub struct Solver {
     noises: Noises,
     smoother: Smoother,
     air: Air,
-    /// The same of differences of two carriers.
+    /// Smoothing of the differences of two carriers.
     dispersion: Smoother,
     electrons: Electrons,
     rate: Rate,
@@ -340,9 +339,9 @@ pub struct Solver {
     ready_since: Option<u64>,
     /// Elements in short.
     reduced: BTreeMap<Sv, InShort>,
-    /// What other times are ahead of GPS time.
+    /// Offsets of other system times from GPS time.
     ahead: Vec<(&'static TimeScale, TimePolynomial)>,
-    /// What augmentation systems say.
+    /// Messages of augmentation systems.
     augmentation: Augmentation,
 }
 
@@ -478,7 +477,7 @@ impl Solver {
         Ok(Solved { fix, clocks, sights, ionosphere: measured, used, excluded })
     }
 
-    /// What corrects for the ionosphere near a place, and its name in a fix.
+    /// Ionospheric correction near a position, and its name in a fix.
     fn ionosphere(
         &mut self,
         sent: Option<Coefficients>,
@@ -510,7 +509,7 @@ impl Solver {
         (Ionosphere::Known(delays), model)
     }
 
-    /// What to say where the ranges show that the choice of troposphere is the wrong one.
+    /// Advice where the ranges show that the choice of troposphere is wrong.
     pub fn other_troposphere(&self) -> Option<&'static str> {
         self.air.is_otherwise().then_some(match self.settings.troposphere {
             TroposphereChoice::Standard => {

@@ -30,10 +30,10 @@ const LARGEST_LOSS: f64 = 1.5;
 
 /// Ranges that a position may be made of.
 pub(super) struct Offered {
-    /// As they are.
+    /// Ranges without corrections of an augmentation system.
     pub plain: Vec<Range>,
-    /// Those that an augmentation system corrects, with ranges of systems that it says nothing of, and its
-    /// grid of the ionosphere.
+    /// Ranges that an augmentation system corrects, and its ionospheric grid. Ranges of systems without
+    /// corrections are included.
     pub corrected: Option<(Vec<Range>, Option<Grid>)>,
 }
 
@@ -127,8 +127,8 @@ impl Solver {
         Offered { plain, corrected: (count > 0).then_some((corrected, grid)) }
     }
 
-    /// Those that a position is made of: the corrected ones where enough of them are seen from there, never
-    /// some corrected and some not, whose errors differ.
+    /// Ranges for a position. Corrected ranges are used where enough of them are available, and never mixed
+    /// with uncorrected ones, because their errors differ.
     pub(super) fn chosen(&self, offered: Offered) -> (Vec<Range>, Option<Grid>) {
         let Offered { plain, corrected: Some((corrected, grid)) } = offered else { return (offered.plain, None) };
         let bare = Corrections {
@@ -189,8 +189,7 @@ impl Solver {
     }
 }
 
-/// Where the satellite was when it sent what this observation met; `None` when its ephemeris is stale or no
-/// orbit.
+/// Range with the satellite's position at transmission; `None` when its ephemeris is stale or no orbit.
 fn range(
     observation: &Observation,
     ephemeris: &Ephemeris,

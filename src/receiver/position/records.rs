@@ -66,7 +66,7 @@ pub(super) fn fix(
     }
 }
 
-/// Where the satellites of the ranges stand, each once, from a position that is metres off at most.
+/// Directions of the satellites of the ranges, each once, from a position with an error of metres at most.
 pub(super) fn sights(sample: u64, ranges: &[Range], from: &Solution) -> Vec<SightRow> {
     let axes = Geodetic::from_ecef(&from.position_m).ecef_to_enu();
     let mut rows: Vec<SightRow> = (ranges.iter().zip(&from.sights))

@@ -14,7 +14,7 @@ use gnss::time::Epoch;
 
 /// Standard deviation of a range by the elements.
 const ELEMENTS_M: f64 = 2.0;
-/// Of a group delay that is not known yet.
+/// Standard deviation in metres of a group delay that is not known yet.
 const DELAY_M: f64 = 1.5;
 
 /// A set in short.
@@ -26,7 +26,7 @@ pub(super) struct InShort {
 }
 
 impl InShort {
-    /// Whether it describes the orbit at a time, and the clock of some signals.
+    /// True if it describes the orbit at a time, and the clock of some signals.
     pub(super) fn serves(&self, signals: &[&'static Signal], at: Epoch) -> bool {
         let holds = (0.0..=REDUCED_VALID_S).contains(&at.since(self.set.toe));
         holds && signals.iter().all(|signal| (self.set.form.serves)(signal))

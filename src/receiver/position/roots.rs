@@ -52,7 +52,8 @@ pub fn first(ranges: &[Range], start_m: Vector3<f64>, corrections: &Corrections)
     }
 }
 
-/// Whether a receiver can be there: it sees its satellites past the Earth, and does not leave the Earth.
+/// True if a receiver can be at this solution: it sees its satellites past the Earth, and does not leave the
+/// Earth.
 pub fn is_possible(ranges: &[Range], solution: &Solution) -> bool {
     let place_m = &solution.position_m;
     let is_seen = |sight: &Vector3<f64>| {

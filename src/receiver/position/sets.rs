@@ -55,7 +55,7 @@ impl Sets {
         all().find(carried).or_else(|| all().next())
     }
 
-    /// Whether no set of a satellite says that a signal must not be used.
+    /// True if no ephemeris of a satellite marks the signal as unhealthy.
     pub fn is_healthy_on(&self, sv: Sv, signal: &Signal) -> bool {
         self.of(sv).iter().all(|set| set.is_healthy_on(signal) != Some(false))
     }

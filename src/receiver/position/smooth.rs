@@ -29,7 +29,7 @@ const LARGEST_JUMP_M: f64 = 30.0;
 pub struct Smoothed {
     /// Code smoothed by the carrier.
     pub pseudorange_m: f64,
-    /// Its variance over that of one code measurement.
+    /// Variance over that of one code measurement.
     pub variance_ratio: f64,
 }
 
@@ -40,14 +40,14 @@ struct State {
     carrier_m: f64,
     locked_s: f64,
     age_s: f64,
-    /// What a hertz between carrier and code has brought in.
+    /// Divergence in metres accumulated so far, per hertz of carrier offset.
     parted_m_per_hz: f64,
     /// Variance, and covariance with the latest code error, over the code's variance.
     variance: f64,
     covariance: f64,
 }
 
-/// What a filter belongs to: a signal of a satellite, or two in combination.
+/// Key of a filter: a signal of a satellite, or two signals in combination.
 type Key = (Sv, &'static Signal, Option<&'static Signal>);
 
 /// Code and carrier as a filter takes them.
@@ -57,10 +57,11 @@ struct Input {
     pseudorange_m: f64,
     carrier_m: f64,
     locked_s: f64,
-    /// By how much the carrier's Doppler exceeds the code's, and the metres a second of each hertz of it.
+    /// Excess of the carrier's Doppler over the code's in hertz, and the metres per second of each hertz of
+    /// it.
     offset_hz: f64,
     metres_per_hz: f64,
-    /// By how much noise is larger than that of one signal.
+    /// Factor of the noise over that of one signal.
     gain: f64,
 }
 
@@ -85,7 +86,7 @@ impl Smoother {
         self.offsets_hz.insert(signal, hz);
     }
 
-    /// By how much the carrier's Doppler of a signal exceeds the code's.
+    /// Excess of a signal's carrier Doppler over its code's, in hertz.
     pub fn carrier_offset_hz(&self, signal: &Signal) -> f64 {
         self.offsets_hz.get(signal).copied().unwrap_or(0.0)
     }

@@ -35,7 +35,7 @@ pub(super) fn ranges(sky: &[(f64, f64)], bias_s: f64) -> Vec<Range> {
     ranges_at(&sky, bias_s)
 }
 
-/// The same to satellites in these directions and distances.
+/// Ranges to satellites in these directions and distances.
 pub(super) fn ranges_at(sky: &[(f64, f64, f64)], bias_s: f64) -> Vec<Range> {
     let here_m = place().to_ecef();
     let axes = place().ecef_to_enu().transpose();

@@ -1,4 +1,4 @@
-//! What the channels' symbols say, and what follows from it for the session.
+//! Decoding of the channels' symbols, and the effects on the session.
 
 use super::step::Counted;
 use super::{FrontEnd, Session, Shared, Track};

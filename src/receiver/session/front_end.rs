@@ -35,7 +35,7 @@ const PART_SAMPLES: usize = 1 << 15;
 /// … and of so many of the longest code period, as one that a part's end cuts is unpacked again.
 const PART_PERIODS: f64 = 4.0;
 
-/// What is made of samples for all channels of a front end.
+/// Forms of the samples that the channels of a front end need.
 #[derive(Clone, Copy)]
 struct Wanted {
     sums: bool,
@@ -60,7 +60,7 @@ pub(super) struct Track {
     pub report: Report,
     pub since: u64,
     pub cn0_dbhz: f64,
-    /// By the search that found it.
+    /// C/N0 in dB-Hz and Doppler in hertz, as the search estimated them.
     pub found_dbhz: f64,
     pub found_hz: f64,
     pub symbols: u64,
@@ -69,7 +69,7 @@ pub(super) struct Track {
 }
 
 impl Track {
-    /// What its code puts into a spectrum.
+    /// Description of the channel's code for the spectrum's own-code model.
     fn followed(&self) -> Followed {
         let phases = self.channel.phases();
         Followed {
@@ -85,7 +85,7 @@ impl Track {
 /// Samples collected for a search.
 pub(super) struct Window {
     pub samples: Gathered,
-    /// What is searched for; all where there is none.
+    /// Satellites that are searched for; all where there is none.
     pub near: Option<Near>,
 }
 
@@ -105,7 +105,7 @@ pub(super) struct FrontEnd {
     pub signals: Vec<&'static Signal>,
     pub candidates: Vec<Link>,
     pub searcher: Searcher,
-    /// Where it looks, and whether as after the first search.
+    /// Dopplers that the search covers, and true if they are those after the first search.
     pub aimed: Option<(plan::Sweep, bool)>,
     pub widenings: usize,
     /// About which Dopplers are expected while the clock is unknown.
@@ -121,7 +121,7 @@ pub(super) struct FrontEnd {
     pub next_foreseen: u64,
     pub window: Option<Window>,
     pub tracks: Vec<Track>,
-    /// Of each share of the tracks.
+    /// Work buffers, one for each share of the tracks.
     rooms: Vec<Room>,
     /// Samples of code periods that the last block's end has cut.
     lookback: Lookback,
@@ -131,7 +131,7 @@ pub(super) struct FrontEnd {
     pub doubles: BTreeMap<Link, Link>,
     /// The first samples, for the search at the end of a short recording.
     pub opening: Option<Gathered>,
-    /// What searches found in them.
+    /// Hits of searches in the first samples.
     pub opened: Vec<Acquired>,
     pub missed: BTreeMap<Link, Missed>,
     pub offset: Offset,
@@ -249,7 +249,7 @@ impl FrontEnd {
         self.lookback.keep(block, needed.unwrap_or(block.end()));
     }
 
-    /// What channels want to be shown.
+    /// Forms of the samples that the channels need.
     fn wanted(&self) -> Wanted {
         let channels = || self.tracks.iter().map(|track| &track.channel);
         let sums = channels().any(Channel::takes_sums);
@@ -275,7 +275,7 @@ impl FrontEnd {
         Ok(())
     }
 
-    /// What follows when the block has been measured: the spectrum, the channels that end, the next search.
+    /// Actions after a block has been measured: the spectrum, the channels that end, the next search.
     pub fn close(&mut self, block: &Packed, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let sink = &mut Counted { sink, step: self.step, ticks: &[] };
         self.watch(Some(block), sink)?;
@@ -376,7 +376,7 @@ fn clear(report: &mut Report) {
     report.events.clear();
 }
 
-/// Those of the ascending `ticks` that lie in `first..end`.
+/// Ticks of the ascending `ticks` that lie in `first..end`.
 fn within(ticks: &[u64], first: u64, end: u64) -> &[u64] {
     let of = |sample: u64| ticks.partition_point(|tick| *tick < sample);
     ticks.get(of(first)..of(end)).unwrap_or_default()

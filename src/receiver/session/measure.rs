@@ -14,7 +14,7 @@ const SHOWING: usize = 3;
 const AGREEING_S: f64 = 1e-6;
 
 impl FrontEnd {
-    /// What its channels read at a tick.
+    /// Readings of this front end's channels at a tick.
     fn readings(&self, main: u64) -> Vec<Reading> {
         let Some(Tick { own, .. }) = self.ticks.iter().find(|tick| tick.main == main) else { return Vec::new() };
         let later_s = self.step.later_s(main, *own);
@@ -109,9 +109,9 @@ impl Session {
         each.try_for_each(|front_end| front_end.date(tick, &known, sink))
     }
 
-    /// What all channels read at a tick, sorted as channels are. A front end that lost an unknown number of
-    /// samples is put in step again by the satellites that another one follows too; until then it is left
-    /// out.
+    /// Readings of all channels at a tick, in the order of the channels. A front end that lost an unknown
+    /// number of samples is left out until it is synchronised again. Satellites that another front end
+    /// follows too allow that.
     fn readings(&mut self, tick: u64, sink: &mut dyn Sink) -> Result<Vec<Reading>, ReceiveError> {
         let mut all: Vec<Vec<Reading>> = self.front_ends.iter().map(|front_end| front_end.readings(tick)).collect();
         let known = |front_ends: &[FrontEnd]| -> Vec<bool> {
@@ -149,8 +149,8 @@ impl Session {
     }
 }
 
-/// By how much later readings of one front end were sent than those of others by the same satellites: the
-/// median, where enough agree with it.
+/// Difference in transmit time between readings of one front end and those of others by the same satellites.
+/// It is the median in seconds, where enough readings agree with it.
 fn apart_s(own: &[Reading], others: &[Reading]) -> Option<f64> {
     let mut apart_s: Vec<f64> = own
         .iter()

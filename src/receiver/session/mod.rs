@@ -88,7 +88,8 @@ impl Session {
         })
     }
 
-    /// Where a block ends in the samples of every front end that ends at `main` in those of the first.
+    /// Ends of a block in the samples of every front end, for a block that ends at `main` in those of the
+    /// first.
     pub fn ends(&self, main: u64) -> Vec<u64> {
         self.front_ends.iter().map(|front_end| front_end.step.own(main)).collect()
     }
@@ -156,7 +157,7 @@ impl Session {
         measured
     }
 
-    /// What came of it; the caller adds what it knows of the samples.
+    /// Outcome of the session; the caller adds its own knowledge of the samples.
     pub fn outcome(&self) -> Outcome {
         let shared = &self.shared;
         let strongest = self.front_ends.iter().filter_map(|front_end| front_end.interfered.clone());
@@ -216,7 +217,7 @@ impl Session {
         warnings
     }
 
-    /// What to say of a week that was resolved without a start time.
+    /// Note on a week number that was resolved without a start time.
     fn assumed_era(&self) -> Option<String> {
         let clock = self.shared.timebase.clock().filter(|_| self.shared.start.is_none())?;
         Some(format!(
@@ -233,7 +234,7 @@ impl Session {
         self.front_ends.iter().map(names).collect()
     }
 
-    /// What flags fit these samples better, in words.
+    /// Flags that fit these samples better, in words.
     pub fn findings(&self) -> Vec<String> {
         self.front_ends.iter().flat_map(|front_end| front_end.findings(&self.shared)).collect()
     }
@@ -243,7 +244,7 @@ impl Session {
         self.shared.failed_stage()
     }
 
-    /// Whether there were samples enough for a search.
+    /// True if there were enough samples for a search.
     pub fn has_searched(&self) -> bool {
         self.front_ends.iter().any(|front_end| front_end.searched)
     }

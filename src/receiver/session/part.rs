@@ -1,4 +1,4 @@
-//! How code and carrier part on all channels, and what follows from it for loops, smoothing and velocity.
+//! Code-carrier divergence of all channels, and its effect on loops, smoothing and velocity.
 
 use super::FrontEnd;
 use super::plan::SKY_HZ;
@@ -76,7 +76,7 @@ impl FrontEnd {
         }
     }
 
-    /// What flags fit these samples better, in words.
+    /// Flags that fit these samples better, in words.
     pub(super) fn findings(&self, shared: &Shared) -> Vec<String> {
         let Some(signal) = self.signal() else { return Vec::new() };
         let mut findings = Vec::new();
@@ -108,7 +108,7 @@ impl FrontEnd {
         findings
     }
 
-    /// What the outcome says of it.
+    /// Code-carrier divergence for the outcome.
     pub(super) fn parted(&self, shared: &Shared) -> Option<Parted> {
         let offset = self.offset.believed()?;
         let carrier_hz = self.signal()?.centre_hz();

@@ -32,7 +32,7 @@ pub(super) struct Sweep {
 }
 
 impl FrontEnd {
-    /// Where to look now.
+    /// Dopplers to search now.
     pub(super) fn sweep(&self, shared: &Shared) -> Sweep {
         let half_hz = self.settings.acquisition.doppler_max_hz;
         let carrier_hz = self.signal().map_or(0.0, |signal| signal.centre_hz());

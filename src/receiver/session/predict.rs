@@ -32,7 +32,7 @@ const OLDEST_S: f64 = 60.0;
 /// Time between such searches over that between searches for all while a satellite is lost.
 const SHARE: f64 = 0.25;
 
-/// What such searches do not find is waited for twice as long each time, up to so many times.
+/// Largest number of doublings of the waiting time after such searches without a hit.
 const MOST_DOUBLINGS: u32 = 4;
 
 /// Satellites that should be there, with their Dopplers, and how far these may be off.
@@ -44,7 +44,7 @@ pub(super) struct Missed {
     times: u32,
     /// The sample from which on it is searched for again.
     until: u64,
-    /// Whether another signal of the satellite was followed.
+    /// True if another signal of the satellite was tracked.
     led: bool,
 }
 
@@ -106,8 +106,8 @@ impl FrontEnd {
         (shared.ephemerides.satellites().filter_map(one).collect(), later_s)
     }
 
-    /// Whether searches for all leave a link out: its satellite sends another signal as well, by its block,
-    /// that is received and costs less to search for, and by which this one is foreseen.
+    /// True if searches for all leave a link out. Its satellite then also sends another signal, by its block,
+    /// that is received and costs less to search for. That signal predicts this one.
     pub(super) fn is_led(link: Link, shared: &Shared) -> bool {
         let at = shared.near();
         // Dopplers as many as the period is long, of lags as many as there are chips.
@@ -144,8 +144,7 @@ impl FrontEnd {
         self.samples(if self.lost.is_empty() { wait_s } else { SHARE * wait_s }).max(1)
     }
 
-    /// Those results that no satellite that is followed may have made by cross-correlation, and whether there
-    /// were others.
+    /// Results that cannot be cross-correlation with a tracked satellite, and true if there were others.
     pub(super) fn believed(
         &self,
         results: Vec<(AcquisitionRow, Option<Acquired>)>,

@@ -37,8 +37,8 @@ const WORTH: f64 = 1.5;
 const SAME_CHIPS: f64 = 0.75;
 const SAME_CYCLES: f64 = 0.5;
 
-/// How far below a signal another code of its family may pass for one: three times the root mean square of
-/// what random codes of the length have in common, which C/A's have nowhere more of.
+/// Level in decibels below a signal at which another code of its family may be mistaken for it. It is three
+/// times the root-mean-square cross-correlation of random codes of that length. C/A codes exceed it nowhere.
 fn apart_db(hit: &Acquired) -> f64 {
     let chips = lead(hit.signal).map_or(1.0, |component| f64::from(component.code_chips));
     10.0 * libm::log10(chips / 9.0)
@@ -106,9 +106,9 @@ impl FrontEnd {
         Ok(())
     }
 
-    /// Where the satellites are that are followed beyond doubt; none before there was a fix, while searches
-    /// may still say that the samples are not what they seem, and none while codes are not where they were
-    /// to be.
+    /// Satellites whose tracking is beyond doubt, with their code phases and Dopplers. There are none before
+    /// a fix, while searches may still show that the samples are not as described, and while codes are not at
+    /// their expected positions.
     fn known(&self, shared: &Shared) -> Vec<Acquired> {
         let trusted = shared.fixes > 0 && !self.gap.is_busy();
         let settled = self.tracks.iter().filter(|track| trusted && track.channel.is_settled());
@@ -126,7 +126,7 @@ impl FrontEnd {
         settled.map(place).collect()
     }
 
-    /// Whether a search begins with this block: one for all, or one for the satellites that are foreseen.
+    /// Search that begins with this block, if any: one for all, or one for predicted satellites.
     fn due(&mut self, block: &Packed, shared: &Shared) -> Result<Option<Option<Near>>, AcquireError> {
         if block.end() > self.next_search {
             self.aim(self.sweep(shared))?;
@@ -284,8 +284,8 @@ impl FrontEnd {
         Ok(())
     }
 
-    /// The same without hits at the delay and Doppler of a stronger one of their signal: one code that is
-    /// received passes for another of its family.
+    /// Results without hits at the delay and Doppler of a stronger one of their signal. One received code can
+    /// look like another of its family.
     fn single(&mut self, mut results: Vec<Found>) -> Vec<Found> {
         let hits: Vec<Acquired> = results.iter().filter_map(|(_, hit)| *hit).collect();
         for (row, found) in &mut results {
@@ -299,7 +299,7 @@ impl FrontEnd {
         results
     }
 
-    /// Whether two hits of one signal and carrier have equal delays and Dopplers.
+    /// True if two hits of one signal and carrier have equal delays and Dopplers.
     fn are_at_one_place(&self, a: &Acquired, b: &Acquired) -> bool {
         let Some(component) = lead(a.signal).filter(|_| a.signal == b.signal) else { return false };
         let length = f64::from(component.code_chips);

@@ -1,5 +1,5 @@
-//! What all front ends of a reception have in common: navigation data, the receiver's clock, the solver, and
-//! what became of the satellites.
+//! State that all front ends of a reception share: navigation data, the receiver's clock, the solver, and the
+//! progress of the satellites.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,7 +14,7 @@ use gnss::satellite::Sv;
 use gnss::signal::{Link, Signal};
 use gnss::time::{Epoch, Rate};
 
-/// What became of a satellite, for the diagnosis.
+/// Progress of a satellite, for the diagnosis.
 #[derive(Clone, Default)]
 pub(super) struct Progress {
     pub symbols: bool,
@@ -45,7 +45,7 @@ pub(super) struct Shared {
     pub ionosphere_model: Option<Model>,
     pub ionosphere: Option<Coefficients>,
     pub last_fix: Option<LastFix>,
-    /// By which satellites are predicted.
+    /// Fix that predicts the satellites.
     pub latest: Option<Fix>,
     /// Dopplers that are followed, in parts of the carrier.
     pub dopplers: BTreeMap<Link, f64>,
@@ -104,7 +104,7 @@ impl Shared {
         self.noises.iter().find(|(of, _)| *of == signal).map(|(_, noise)| noise)
     }
 
-    /// What was found as one satellite is another.
+    /// Renames a satellite that turned out to be another one.
     pub fn rename(&mut self, from: Sv, to: Sv) {
         self.acquired.remove(&from);
         self.acquired.insert(to);

@@ -11,7 +11,7 @@ use gnss::time::Rate;
 /// The clock of one front end against that of the first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Step {
-    /// Its place among the front ends.
+    /// Index of the front end.
     pub number: usize,
     rate: Rate,
     main: Rate,
@@ -34,7 +34,7 @@ impl Step {
         }
     }
 
-    /// What the first front end has lost so far.
+    /// Takes the number of samples that the first front end has lost so far.
     pub fn follow(&mut self, main_behind: i64) {
         self.main_behind = main_behind;
     }

@@ -1,4 +1,5 @@
-//! What of samples and settings makes the results worse than need be, and which links samples can hold.
+//! Properties of samples and settings that make the results worse than necessary, and links that samples can
+//! hold.
 
 use crate::acquire::{self, AcquisitionSettings};
 use crate::correlate::{layers_refusal, standing_bias_m};
@@ -11,7 +12,7 @@ use gnss::signal::{self, Component, Link, Signal};
 /// Errors of the code from which on a rate is warned of.
 const STANDING_BIAS_M: f64 = 0.5;
 
-/// What of samples and settings makes the results worse than need be.
+/// Warnings about samples and settings that make the results worse than necessary.
 pub(super) fn warnings(metadata: &IfMetadata, settings: &Settings) -> Vec<String> {
     let rate_hz = metadata.rate.hz();
     let one = |signal: &Signal, component: &Component| {
@@ -69,7 +70,7 @@ pub(super) fn candidates(metadata: &IfMetadata, settings: &AcquisitionSettings) 
         .collect()
 }
 
-/// Of those that a search cannot tell apart the first.
+/// First link of each group that a search cannot tell apart.
 pub(super) fn distinct(candidates: &[Link]) -> Vec<Link> {
     let mut all: Vec<Link> = Vec::with_capacity(candidates.len());
     for link in candidates {
@@ -80,16 +81,16 @@ pub(super) fn distinct(candidates: &[Link]) -> Vec<Link> {
     all
 }
 
-/// Of the main lobes of a signal's spectrum this much has to lie within a band for it to be searched for
-/// unasked: at 4 Msps E1, L1C and B1C do, at 2.6 Msps they do not.
+/// Share of the main lobes of a signal's spectrum that has to lie within a band for a default search. At 4
+/// Msps E1, L1C and B1C reach it, at 2.6 Msps they do not.
 const HELD_SHARE: f64 = 0.9;
 
 /// Recorders of real samples convert no higher frequency than this.
 const HIGHEST_IF_HZ: f64 = 100e6;
 
-/// Whether that much of a signal lies within one band of the samples: between minus and plus half the rate of
-/// complex samples, of real ones in one of the bands of half the rate above 0 Hz, as recorders sample beyond
-/// the first on purpose and nothing says which is meant.
+/// True if [`HELD_SHARE`] of a signal lies within one band of the samples. The band of complex samples is
+/// minus to plus half the rate. Real samples have bands of half the rate above 0 Hz, and any of them counts.
+/// Recorders sample beyond the first one on purpose, and nothing tells which one is meant.
 fn is_within(metadata: &IfMetadata, signal: &Signal) -> bool {
     let half_hz = 0.5 * metadata.rate.hz();
     let (if_hz, lobe_hz) = (metadata.if_hz(signal.centre_hz()), HELD_SHARE * signal.lobe_hz());

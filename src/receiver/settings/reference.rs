@@ -17,9 +17,9 @@ pub struct Described {
     pub name: String,
     /// Default as TOML.
     pub default: String,
-    /// What a value is expected to be.
+    /// Values that the key accepts.
     pub expected: String,
-    /// What it does.
+    /// Meaning of the key.
     pub meaning: String,
 }
 
@@ -51,7 +51,7 @@ pub fn tables() -> Vec<(String, Vec<Described>)> {
     defaults.iter().map(of).collect()
 }
 
-/// What is expected of a key, by what its refusal says.
+/// Values that a key accepts, taken from its error message.
 fn expected(section: &str, name: &str, default: &Value) -> String {
     // What no key can be.
     let bad = match default {

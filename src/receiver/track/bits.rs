@@ -12,13 +12,13 @@ const LEAST_PERIODS: u64 = 300;
 const MOST_BITS: u64 = 300;
 /// Standard deviations by which the best place leads every other.
 const LEAD_SIGMAS: f64 = 5.0;
-/// Of the best place's energy any other has less than this: of wrong places of D1 the best has a ninth
-/// without noise, those of D2 have a half, ± 0.04 after 150 bits.
+/// Upper bound of the energy at any other position, as a share of the best position's energy. Without noise,
+/// the best wrong position has a ninth for D1 and a half for D2, ± 0.04 after 150 bits.
 const NEXT_SHARE: f64 = 0.7;
 
-/// Of the energy that prompts have where all are in step, noise included, bits have more than this: from 27
-/// dB-Hz on, where prompts of a millisecond have as much noise as signal. Other signs than the code's have a
-/// twentieth.
+/// Lower bound of the energy of bits, as a share of the prompts' energy with all in step, noise included. It
+/// is reached from 27 dB-Hz on, where prompts of a millisecond have as much noise as signal. Signs other than
+/// the code's have a twentieth.
 const LEAST_SHARE: f64 = 0.5;
 
 /// Search for the code period in which bits begin.

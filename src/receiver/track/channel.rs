@@ -60,7 +60,7 @@ const SETTLED: f64 = 1.0;
 /// ten, and a frequency loop's discriminator, ±250 Hz wide, scatters by more than 40 Hz.
 const WEAK_DBHZ: f64 = 40.0;
 
-/// What a channel is shown of the samples.
+/// Samples that a channel is given, in the forms that were made.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown<'a> {
     /// Number of the first sample.
@@ -88,7 +88,7 @@ struct Kept {
     fixed: FixedSamples,
 }
 
-/// How far a channel is.
+/// Stage of a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
     /// The carrier's oscillator runs free.
@@ -124,15 +124,15 @@ pub struct Channel {
     /// +1, or −1 where the spectrum is inverted: sense of Doppler in the samples.
     sense: f64,
     chip_rate_hz: f64,
-    /// What the carrier's Doppler exceeds the code's by: now, and from the next code period on.
+    /// Excess of the carrier's Doppler over the code's in hertz: now, and from the next code period on.
     carrier_offset_hz: f64,
     next_offset_hz: f64,
     period_s: f64,
     /// Code periods a symbol, or those summed where there are none; 1 while a secondary code is unknown.
     group: u32,
     has_symbols: bool,
-    /// Of symbols of one period that are a bit's by known signs, and at which periods bits begin, once that
-    /// is known: `group` has those of a bit then.
+    /// Bit synchronisation for symbols of one period that build a bit by known signs. `bit_begin` is the
+    /// period at which bits begin, once that is known; `group` is then the number of periods per bit.
     bits: Option<BitSync>,
     bit_begin: Option<u64>,
     secondary_code: Option<SecondaryCodeSync>,
@@ -176,7 +176,7 @@ pub struct Channel {
     /// When the pull-in began, and its prompts.
     pull_in_since: u64,
     batch: Batch,
-    /// Whether the pull-in is that of a weak signal, by a batch.
+    /// True if the pull-in is that of a weak signal, by a batch.
     is_batched: bool,
     confirmed: bool,
 
@@ -187,7 +187,8 @@ pub struct Channel {
     previous_sum: Option<Complex64>,
     symbol: (Complex64, u32),
     rotation: Rotation,
-    /// The same within code periods, and whether it has shown no false lock since the last pull-in.
+    /// Rotation of the carrier within code periods. `is_true` is true if no false lock was seen since the
+    /// last pull-in.
     halves: Halves,
     is_true: bool,
     power: Option<f64>,
@@ -339,7 +340,7 @@ impl Channel {
         channel
     }
 
-    /// Whether the signal was lost; the channel does nothing any more.
+    /// True if the signal was lost; the channel is then inactive.
     pub fn is_lost(&self) -> bool {
         self.lost
     }
@@ -360,7 +361,7 @@ impl Channel {
         self.signal
     }
 
-    /// What is followed.
+    /// Satellite and signal that are tracked.
     pub fn link(&self) -> Link {
         Link { sv: self.sv, signal: self.signal }
     }
@@ -381,7 +382,7 @@ impl Channel {
         }
     }
 
-    /// What the replica has counted where the running code period begins.
+    /// Phases that the replica has counted at the beginning of the current code period.
     pub fn phases(&self) -> Phases {
         let carrier = if self.sense < 0.0 { -self.carrier } else { self.carrier };
         Phases { sample: self.first, periods: self.period, chips: units_to_chips(self.code), carrier }
@@ -392,7 +393,7 @@ impl Channel {
         self.sense * self.loops.carrier.rate
     }
 
-    /// Whether the carrier is locked, and the code no longer on its way from where the search left it.
+    /// True if the carrier is locked, and the code loop has settled after the search.
     pub fn is_settled(&self) -> bool {
         let passed_s = self.start.map_or(0.0, |start| self.since_s(start));
         !self.lost && self.lock.is_locked() && passed_s >= SETTLED / self.settings.dll_pull_in_bandwidth_hz
@@ -430,13 +431,13 @@ impl Channel {
         self.start.filter(|_| !self.lost).map(|_| self.first)
     }
 
-    /// Whether running sums of the samples are of use.
+    /// True if the channel uses running sums of the samples.
     pub fn takes_sums(&self) -> bool {
         self.arithmetic == Arithmetic::Sums
             && self.replica.as_ref().is_some_and(|replica| replica.takes_sums(&self.oscillators()))
     }
 
-    /// Whether samples in 16 bits are of use.
+    /// True if the channel uses samples in 16 bits.
     pub fn takes_fixed(&self) -> bool {
         self.arithmetic == Arithmetic::Sums
             && self.replica.as_ref().is_some_and(|replica| replica.takes_fixed(&self.oscillators()))

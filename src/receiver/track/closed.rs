@@ -30,7 +30,7 @@ impl Mode {
     }
 }
 
-/// What an update measured, and the jumps of the oscillators' phases that follow from it.
+/// Measurements of an update, and the jumps of the oscillators' phases that follow from them.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Update {
     /// Prompt sum, scaled to noise of the variance of one code period's.

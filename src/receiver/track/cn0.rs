@@ -38,7 +38,7 @@ pub struct Cn0 {
     known: bool,
     previous: Option<Complex64>,
     seen: u32,
-    /// Of a symbol's prompts so far the sum, that of their powers and that of their squares.
+    /// Sum of a symbol's prompts so far, sum of their powers, and sum of their squares.
     sum: Complex64,
     power: f64,
     square: Complex64,
@@ -50,7 +50,7 @@ pub struct Cn0 {
 
 /// Largest C/N0 reported: a noise-free signal has no other.
 pub const LARGEST_CN0_DBHZ: f64 = 100.0;
-/// The same in Hz.
+/// Largest C/N0 reported, in hertz.
 const LARGEST_CN0_HZ: f64 = 1e10;
 /// Periods that are averaged before the first value is given while symbols are unknown.
 const LEAST_PERIODS: f64 = 50.0;
@@ -128,7 +128,7 @@ impl Cn0 {
         self.signal.set([noise + gain * (re - noise), gain * im]);
     }
 
-    /// Whether [`Self::add`] needs the noise reference.
+    /// True if [`Self::add`] needs the noise reference.
     pub fn needs_reference(&self) -> bool {
         !self.known
     }
@@ -175,7 +175,7 @@ impl Cn0 {
         (self.seen, self.sum, self.power, self.square) = (0, Complex64::ZERO, 0.0, Complex64::ZERO);
     }
 
-    /// What a symbol's edges leave of the mean product of neighbours.
+    /// Share of the mean product of neighbouring prompts that remains with a symbol's edges.
     fn share(&self) -> f64 {
         if self.group < 2 { 1.0 } else { 1.0 - 1.0 / f64::from(self.group) }
     }

@@ -46,10 +46,10 @@ struct Start {
     locked: bool,
     /// Doppler that the search found, and at the end, less the true one.
     doppler_errors_hz: [f64; 2],
-    /// Whether the secondary code was known at the end.
+    /// True if the secondary code was known at the end.
     known: bool,
     searches: u32,
-    /// Of the carrier, seconds after the channel's first sample.
+    /// Events of the carrier, with seconds after the channel's first sample.
     events: Vec<(f64, Event)>,
 }
 
@@ -198,7 +198,7 @@ fn no_cold_start_holds_a_side_peak_and_none_leaves_the_main_one() {
     }
 }
 
-/// What theory expects of a channel on a signal.
+/// Expected performance of a channel on a signal.
 struct Theory {
     code_chips: f64,
     carrier_cycles: f64,
@@ -208,7 +208,7 @@ struct Theory {
 }
 
 impl Theory {
-    /// Of the leading component of a signal of `cn0_dbhz`, followed with settings that are fitted to it.
+    /// Theory for the leading component of a signal of `cn0_dbhz`, with settings fitted to it.
     fn new(component: &Component, settings: &TrackingSettings, rate_hz: f64, cn0_dbhz: f64) -> Self {
         let made = match settings.waveform {
             Layers::Strongest => vec![Layer { weight: 1.0, ..*component.strongest().unwrap() }],
@@ -243,7 +243,7 @@ impl Theory {
     }
 }
 
-/// What a loop makes of unit noise of its discriminator.
+/// Response of a loop to unit noise of its discriminator.
 struct Response {
     /// Variance that a phase which runs at the loop's rate adds at any time within updates: x² of the rate in
     /// phase an update, 1/12 in the mean.
@@ -343,11 +343,11 @@ struct Sent {
     signal: &'static Signal,
     rate_hz: f64,
     cn0_dbhz: f64,
-    /// Of its noise, and of all that is drawn.
+    /// Seed of the noise, and of all other random values.
     seed: u64,
 }
 
-/// What was measured on a signal, and what theory expects.
+/// Jitter measured on a signal, and the value that theory expects.
 struct Jitter {
     /// Which signal and settings.
     case: String,

@@ -1,9 +1,9 @@
-//! How the carrier turns within code periods whose signs are not known.
+//! Rotation of the carrier within code periods of unknown sign.
 //!
-//! Where each period has a sign of its own, of a symbol or of a secondary code's chip, neighbouring periods
-//! show the frequency modulo half a cycle a period: the search of sums over two of them has side lobes there,
-//! and frequency detector and Costas loop rest there. The two halves of one period have the same sign, so
-//! what they turn by is the frequency itself, within a cycle a period on either side.
+//! Each period may have its own sign, of a symbol or of a secondary code's chip. Neighbouring periods then
+//! show the frequency modulo half a cycle a period. The search of sums over two periods has side lobes there,
+//! and frequency detector and Costas loop can settle there. The two halves of one period have the same sign.
+//! The turn between them is therefore the frequency itself, within a cycle a period on either side.
 
 use std::f64::consts::PI;
 

@@ -101,7 +101,7 @@ impl PhaseLock {
         if sum <= 0.0 { 0.0 } else { planted!("receiver.lock.always", (difference / sum).clamp(-1.0, 1.0), 1.0) }
     }
 
-    /// Whether the mean has run in.
+    /// True if the mean has settled.
     pub fn settled(&self) -> bool {
         self.mean.count >= self.mean.terms
     }
@@ -111,7 +111,7 @@ impl PhaseLock {
 #[derive(Clone, Debug)]
 pub struct SymbolLock {
     mean: Mean,
-    /// Of the last symbols, the latest first: squares of both components, difference and sum.
+    /// Squares of both components of the last symbols, as difference and sum, the latest first.
     last: VecDeque<[f64; 2]>,
 }
 
@@ -152,30 +152,29 @@ impl SymbolLock {
         if coherence <= 0.0 { 0.0 } else { (cosine / coherence).clamp(-1.0, 1.0) }
     }
 
-    /// Whether the mean has run in.
+    /// True if the mean has settled.
     pub fn settled(&self) -> bool {
         self.mean.count >= self.mean.terms
     }
 }
 
-/// Whether C/N0 is below what a channel is kept for ([`TrackingSettings::least_cn0_hz`]); nothing is known
-/// of a signal without an estimate.
+/// True if C/N0 is below the least one for which a channel is kept ([`TrackingSettings::least_cn0_hz`]). It
+/// is false for a signal without an estimate.
 pub fn is_weak(cn0_hz: Option<f64>, least_cn0_hz: f64) -> bool {
     cn0_hz.is_some_and(|hz| hz < least_cn0_hz)
 }
 
-/// What changed in a [`LockState`].
+/// Change of a [`LockState`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LockChange {
     /// The carrier has locked.
     Locked,
-    /// Its count is broken.
+    /// The cycle count is broken.
     Broken,
 }
 
-/// What the detectors decide of a carrier: whether it is locked, and whether lock or strength has been
-/// missing for so long that the signal is lost. Instants are counts of the caller's clock, samples or code
-/// periods.
+/// Lock state of a carrier, as the detectors decide it. The signal is lost when lock or strength has been
+/// missing for too long. Instants are counts of the caller's clock, samples or code periods.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LockState {
     locked_since: Option<u64>,
@@ -193,12 +192,12 @@ impl LockState {
         self.locked_since
     }
 
-    /// Whether the carrier is locked.
+    /// True if the carrier is locked.
     pub fn is_locked(&self) -> bool {
         self.locked_since.is_some()
     }
 
-    /// Whether a lock has neither been found nor lost so far.
+    /// True if a lock has neither been found nor lost so far.
     pub fn is_new(&self) -> bool {
         self.locked_since.is_none() && self.missing_since.is_none()
     }
@@ -242,15 +241,15 @@ impl LockState {
         change
     }
 
-    /// Whether the signal is lost: lock or strength has been missing for `loss_s`. `passed_s` gives the time
-    /// since an instant.
+    /// True if the signal is lost: lock or strength has been missing for `loss_s`. `passed_s` gives the
+    /// seconds since an instant.
     pub fn is_lost(&self, passed_s: impl Fn(u64) -> f64, settings: &TrackingSettings) -> bool {
         self.missing_since.is_some_and(|since| passed_s(since) >= settings.loss_s)
     }
 }
 
-/// How the carrier turns within symbols, between quarters of one: where a Costas loop rests on a wrong
-/// frequency, it shows.
+/// Rotation of the carrier within symbols, between quarters of one. It shows where a Costas loop has settled
+/// on a wrong frequency.
 #[derive(Clone, Debug, Default)]
 pub struct Rotation {
     sum: Complex64,

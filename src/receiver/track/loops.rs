@@ -67,7 +67,7 @@ impl Gains {
     }
 }
 
-/// What a loop knows besides its phase.
+/// Rates that a loop estimates besides its phase.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Rates {
     /// Rate at the boundary where the running interval began, in units a second.

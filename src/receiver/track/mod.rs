@@ -38,7 +38,7 @@ pub use channel::{Channel, Glance, Shown, pilot_group};
 pub use model::ReplicaModel;
 pub use settings::{CodeDiscriminator, LoopMargin, TrackingSettings, TrackingSettingsError};
 
-/// What a channel found in a block.
+/// Results of a channel for a block.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
     /// States at the samples that were asked for.
@@ -64,15 +64,15 @@ pub struct Measurement {
     /// removed: θ(n)/turns − f_IF·n/fs, negated, and negated once more for an inverted spectrum. Unknown
     /// whole number, and half while `half_cycle_known` is false.
     pub carrier_cycles: f64,
-    /// Whether the carrier's half cycle is resolved.
+    /// True if the carrier's half cycle is resolved.
     pub half_cycle_known: bool,
     /// Positive when approaching.
     pub doppler_hz: f64,
-    /// Of the whole signal.
+    /// C/N0 of the whole signal in dB-Hz.
     pub cn0_dbhz: f64,
     /// Time since the carrier was locked.
     pub locked_s: f64,
-    /// Whether the carrier loop is locked now.
+    /// True if the carrier loop is locked now.
     pub locked: bool,
 }
 

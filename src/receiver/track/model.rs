@@ -1,4 +1,4 @@
-//! What a component looks like in this receiver's correlators.
+//! Model of a component in this receiver's correlators.
 
 use super::TrackingSettings;
 use super::loops::CodeShape;
@@ -23,7 +23,8 @@ impl ReplicaModel {
         Self::of(settings, component, None, rate_hz)
     }
 
-    /// Of both sides of a sub-carrier together, of which `component` is one; `None` of one that is none.
+    /// A model of both sidebands of a sub-carrier together, of which `component` is one. `None` for a
+    /// component without sub-carrier.
     pub fn of_both_sides(settings: &TrackingSettings, component: &Component, rate_hz: f64) -> Option<Self> {
         Self::of(settings, component, Some(component.tone()?), rate_hz)
     }
@@ -50,7 +51,7 @@ impl ReplicaModel {
 /// A side peak of a replica's correlation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SidePeak {
-    /// Its distance from the main peak.
+    /// Distance from the main peak, in chips.
     pub chips: f64,
     /// Correlation there over that of the main peak, with its sign.
     pub ratio: f64,

@@ -31,11 +31,11 @@ pub struct Batch {
     prompts: Vec<Complex64>,
     /// Prompts that it waits for, before which nothing is searched.
     wanted: usize,
-    /// Whether it has been extended once.
+    /// True if the batch has been extended once.
     extended: bool,
 }
 
-/// Where symbols begin, and the carrier against the oscillator.
+/// Beginning of the symbols, and the carrier's error against the oscillator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
     /// Prompts before the first whole symbol, below the symbol's length.
@@ -44,12 +44,12 @@ pub struct Found {
     pub cycles: f64,
     /// Cycles by which it is ahead at the end of the last prompt, up to a half.
     pub phase_cycles: f64,
-    /// Whether symbols change sign in the batch: where none does, their edges are not to be seen.
+    /// True if symbols change sign in the batch. Without a change their edges cannot be found.
     pub changes: bool,
 }
 
-/// Where symbols change sign, the worst place of the edges is below the best by this share of a symbol's
-/// energy at least: one change takes a whole symbol.
+/// Least difference between the best and the worst position of the edges, as a share of a symbol's energy,
+/// where symbols change sign. One change takes a whole symbol.
 const LEAST_CHANGE: f64 = 0.75;
 
 impl Batch {
@@ -58,7 +58,7 @@ impl Batch {
         Self { group: group.max(1) as usize, prompts: Vec::new(), wanted, extended: false }
     }
 
-    /// Whether it has as many prompts as it waits for.
+    /// True if the batch has all the prompts that it waits for.
     pub fn is_full(&self) -> bool {
         self.prompts.len() >= self.wanted
     }
@@ -78,7 +78,7 @@ impl Batch {
         self.prompts.push(prompt);
     }
 
-    /// How many prompts there are.
+    /// Number of prompts in the batch.
     pub fn periods(&self) -> usize {
         self.prompts.len()
     }

@@ -22,7 +22,7 @@ pub struct SecondaryCodePhase {
     /// Added to the number of a code period it gives the secondary code chip's, modulo the secondary code's
     /// length.
     pub shift: u64,
-    /// Whether prompts have the other sign than the code: the carrier is half a cycle off.
+    /// True if prompts have the opposite sign of the code: the carrier is half a cycle off.
     pub inverted: bool,
 }
 
@@ -73,7 +73,7 @@ impl SecondaryCodeSync {
         Self { shifts: Shifts::new(code.len()), code }
     }
 
-    /// Its length in code periods.
+    /// Length of the secondary code in code periods.
     pub fn periods(&self) -> usize {
         self.code.len()
     }

@@ -110,9 +110,9 @@ pub enum TrackingSettingsError {
     Range {
         /// Name of the setting.
         key: &'static str,
-        /// What it is.
+        /// Value that was given.
         value: f64,
-        /// Its range.
+        /// Range of the allowed values.
         expected: &'static str,
     },
     /// A loop that is too wide for its update time.
@@ -144,7 +144,7 @@ pub const LARGEST_BANDWIDTH_TIME: f64 = 0.4;
 /// Code periods that an update may have.
 const INTEGRATIONS: [u32; 6] = [1, 2, 4, 5, 10, 20];
 
-/// How near a loop is to what [`TrackingSettings::validate`] refuses.
+/// Margin of a loop to the limit of [`TrackingSettings::validate`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LoopMargin {
     /// The bandwidth's key.
@@ -157,7 +157,7 @@ pub struct LoopMargin {
     pub bandwidth_time: f64,
     /// The largest product.
     pub limit: f64,
-    /// What is left of the limit, as a share of it.
+    /// Remaining margin to the limit, as a share of the limit.
     pub margin_share: f64,
 }
 
@@ -190,9 +190,9 @@ impl TrackingSettings {
         }
     }
 
-    /// What early and late of a component are nearer to each other by than those of BPSK: as many times as
-    /// its chips have steps. Both sides of a sub-carrier count as a square wave of as many half cycles, and
-    /// chips about them.
+    /// Factor by which the early-late spacing of a component is smaller than that of BPSK: the number of
+    /// steps in its chips. Both sidebands of a sub-carrier count as a square wave of as many half cycles,
+    /// with chips about them.
     pub fn narrower(&self, component: &Component) -> f64 {
         if let Some(tone) = component.tone() {
             return 1.0 + f64::from(tone.half_cycles.abs());

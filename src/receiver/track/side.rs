@@ -26,7 +26,7 @@ use gnss::signal::{Component, Layers};
 
 /// Mean time between false moves of a channel on the main peak, at least: ten years.
 const BETWEEN_FALSE_S: f64 = 3.15e8;
-/// What is used of the largest weight: room for echoes.
+/// Share of the largest weight that is used; the rest is margin for echoes.
 const WEIGHT_SHARE: f64 = 0.5;
 
 /// The evidence for a main peak beside the prompt.
@@ -48,7 +48,7 @@ impl SidePeaks {
         Some(Self::at(side_peak(component, made)?, component))
     }
 
-    /// Of both sides of a sub-carrier that are followed together, of which `component` is one.
+    /// Side peaks of both sidebands of a sub-carrier that are tracked together, of which `component` is one.
     pub fn of_both_sides(component: &Component) -> Option<Self> {
         Some(Self::at(side_peak_of_both(component)?, component))
     }
@@ -74,7 +74,7 @@ impl SidePeaks {
         self.enough
     }
 
-    /// Of each difference of powers in the evidence, where the prompt has T·C/N0 of `snr`.
+    /// Weight of each difference of powers in the evidence, where the prompt has T·C/N0 of `snr`.
     pub fn weight(snr: f64) -> f64 {
         let square = 2.0 * snr;
         WEIGHT_SHARE * square / (2.0 * (2.0 + square))

@@ -16,16 +16,16 @@ use crate::correlate::{Replica, chips_to_units};
 use crate::lead::other_side;
 use gnss::signal::{Component, Signal};
 
-/// What a channel needs to follow the other side too.
+/// State that a channel needs to track the other sideband too.
 #[derive(Clone, Debug)]
 pub struct Sides {
-    /// Of both; handed over where it is first used.
+    /// Replica of both sidebands, handed over at its first use.
     replica: Option<Replica>,
     secondary_codes: [SecondaryCodeSync; 2],
     both: Both,
 }
 
-/// What both sides together look like in the correlators.
+/// Model of both sidebands together in the correlators.
 #[derive(Clone, Debug)]
 pub struct Both {
     /// Code phases of early, prompt and late.
@@ -65,12 +65,12 @@ impl Sides {
         self.replica.take()
     }
 
-    /// What both look like.
+    /// Model of both sidebands together.
     pub fn both(&self) -> &Both {
         &self.both
     }
 
-    /// Whether the secondary codes of both sides have different signs in a code period.
+    /// True if the secondary codes of both sidebands have opposite signs in a code period.
     pub fn are_opposed(&self, phase: SecondaryCodePhase, number: u64) -> bool {
         let [first, second] = self.secondary_codes.each_ref().map(|secondary_code| secondary_code.chip(phase, number));
         planted!("receiver.sides.secondary_code", first != second, false)

@@ -18,7 +18,7 @@ struct Sky {
     link: Link,
     rate_hz: f64,
     doppler_hz: f64,
-    /// What the satellite's clock reads at sample 0, in seconds since an epoch at which all codes begin.
+    /// Satellite clock at sample 0, in seconds since an epoch at which all codes begin.
     sent_s: f64,
     cn0_dbhz: f64,
     seed: u64,
@@ -91,7 +91,8 @@ impl Sky {
         all.sum::<Complex64>() / f64::from(looks)
     }
 
-    /// Its samples. Means over samples have less power than what they are of: C/N0 is that of the samples.
+    /// Samples of the signal. Means over samples have less power than the signal itself. C/N0 is that of the
+    /// samples.
     fn stream(&self) -> Stream {
         let mut stream = Stream::new(self.link, self.rate_hz, self.seed);
         (stream.sent_s, stream.doppler_hz) = (self.sent_s, self.doppler_hz);

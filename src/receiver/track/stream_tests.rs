@@ -79,7 +79,7 @@ pub(super) fn symbol(number: i64) -> f64 {
 }
 
 impl Integral {
-    /// Of layers in phase or against it and, where there are any at right angles, of those.
+    /// Integrals of the layers in phase or antiphase and, where there are any, of the layers in quadrature.
     fn all(component: &'static Component, number: u8) -> impl Iterator<Item = Self> {
         let quarters = |layer: &Layer| 4.0 * layer.phase_cycles;
         assert!(component.layers.iter().all(|layer| quarters(layer).fract() == 0.0));
@@ -164,9 +164,9 @@ pub(super) struct Stream {
     pub link: Link,
     pub rate_hz: f64,
     pub doppler_hz: f64,
-    /// What the satellite's clock reads at sample 0, in seconds since an epoch at which all codes begin.
+    /// Satellite clock at sample 0, in seconds since an epoch at which all codes begin.
     pub sent_s: f64,
-    /// Of the whole signal before anything is averaged over samples.
+    /// C/N0 of the whole signal in dB-Hz, before averaging over samples.
     pub cn0_dbhz: f64,
     pub echo: Option<Echo>,
     components: Vec<Integral>,

@@ -202,7 +202,7 @@ impl Sky {
     }
 }
 
-/// The same hit as a search reports it of a signal of such strength.
+/// A copy of a hit with this C/N0, as a search reports it.
 fn of_strength(hit: Acquired, cn0_dbhz: f64) -> Acquired {
     Acquired { cn0_dbhz, ..hit }
 }

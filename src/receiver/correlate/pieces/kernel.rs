@@ -57,7 +57,7 @@ pub(in super::super) fn running_sums(level: Level, i: &[f32], q: &[f32], entries
     }
 }
 
-/// How far sums are, and what they are there.
+/// Number of samples summed so far, and the sums there.
 struct Done {
     samples: usize,
     halves: [i32; 2],
@@ -94,7 +94,7 @@ fn running_sums_avx2(i: &[f32], q: &[f32], entries: &mut [[i32; 2]]) -> Done {
     Done { samples, halves: [x86::_mm_extract_epi32::<0>(pair), x86::_mm_extract_epi32::<1>(pair)] }
 }
 
-/// The same of samples in 16 bits.
+/// Fills `entries` with the running sums of samples in 16 bits.
 pub(in super::super) fn running_sums_of_fixed(level: Level, i: &[i16], q: &[i16], entries: &mut [[i32; 2]]) {
     const DOWN: u32 = POINT_BITS - 1;
     let done = match level {
@@ -159,7 +159,7 @@ fn running_sums_of_fixed_avx2(i: &[i16], q: &[i16], entries: &mut [[i32; 2]]) ->
     Done { samples, halves: [x86::_mm_extract_epi32::<0>(pair), x86::_mm_extract_epi32::<1>(pair)] }
 }
 
-/// What is made of a group before its samples are looked at.
+/// Values of a group that are made before its samples are read.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy)]
 #[repr(C, align(32))]
@@ -279,7 +279,7 @@ fn sines(y: x86::__m256) -> x86::__m256 {
     x86::_mm256_mul_ps(y, sum)
 }
 
-/// What lies behind the points of eight places.
+/// Fractions behind the points of eight positions.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 #[inline]
@@ -326,7 +326,7 @@ unsafe fn two(entries: *const [i32; 2], places: &[u32; GROUP], half: usize) -> [
     [x86::_mm256_unpacklo_epi64(a, b), x86::_mm256_unpackhi_epi64(a, b)]
 }
 
-/// What is taken off all entries, four times.
+/// Offset that is subtracted from all entries, four times.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 #[inline]

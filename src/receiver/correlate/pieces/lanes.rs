@@ -24,7 +24,7 @@ pub(super) struct Chunk<'a, const T: usize> {
     pub middles: &'a [[u32; GROUP]],
     pub levels: &'a [[f32; GROUP]],
     pub sums: Sums<'a>,
-    /// What is taken off all entries.
+    /// Offset that is subtracted from all entries, in-phase and quadrature.
     pub base: [i32; 2],
     /// The entry from which places count, which may lie before the first one.
     pub origin: isize,
@@ -33,7 +33,7 @@ pub(super) struct Chunk<'a, const T: usize> {
     /// Place of a start: this and so much for each step, in 2⁻²⁶ samples.
     pub place: i64,
     pub samples_a_step: u32,
-    /// What taps add to a place.
+    /// Shifts of the taps that are added to a position.
     pub taps: [i32; T],
     /// Phase of a middle: this and so much for each half step, in 2⁻³² turns.
     pub phase: u32,
@@ -80,8 +80,8 @@ pub(super) fn anywhere<const T: usize>(chunk: &Chunk<T>, groups: (usize, usize),
     add(products, &own);
 }
 
-/// The same where the first three taps, early, prompt and late, are a sample apart at most: these from the
-/// four sums about the prompt's place, all of which are there.
+/// Sums of groups where the first three taps are at most one sample apart: early, prompt and late. They come
+/// from the four entries about the prompt's position, all of which exist.
 pub(super) fn window<const T: usize>(chunk: &Chunk<T>, groups: (usize, usize), products: &mut Products<T>) {
     let mut own = Products::after(products.last);
     let gains = changes(chunk, groups, &mut own.last);
@@ -157,7 +157,7 @@ fn in_order() -> impl Iterator<Item = (usize, usize)> {
     HALVES.iter().flat_map(|half| half.iter().copied().zip(0..))
 }
 
-/// What the replica times the phasor is before each start, less what it is after.
+/// Differences across each start: the replica times the phasor before it, less that product after it.
 fn changes<const T: usize>(
     chunk: &Chunk<T>,
     (from, to): (usize, usize),
@@ -181,7 +181,7 @@ fn place<const T: usize>(chunk: &Chunk<T>, g: usize, k: usize) -> i32 {
     (product.wrapping_add(chunk.place as u64) >> (PRODUCT_BITS - PLACE_BITS)) as i32
 }
 
-/// What lies behind a place's point.
+/// Fraction behind the point of a position.
 fn fraction(at: i32) -> f32 {
     f32::from_bits((at as u32 & 0xffff) << (23 - PLACE_BITS) | 0x3f80_0000) - 1.0
 }

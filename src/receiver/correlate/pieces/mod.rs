@@ -55,10 +55,10 @@ pub(super) struct Pieces {
     steps_per_chip: usize,
     /// Steps of a period.
     length: usize,
-    /// Where pieces begin, in steps, and where their middles are, in half steps.
+    /// Beginnings of the pieces in steps, and their middles in half steps.
     starts: Vec<[u32; GROUP]>,
     middles: Vec<[u32; GROUP]>,
-    /// What the replica is there.
+    /// Values of the replica in the pieces.
     levels: Vec<[f32; GROUP]>,
     /// Pieces for each step.
     density: f64,
@@ -111,7 +111,7 @@ impl Pieces {
         self.gain
     }
 
-    /// Whether pieces do, and are quicker than products of every sample, at these steps of carrier and code.
+    /// True if pieces suit these steps of carrier and code, and are quicker than products of every sample.
     pub fn suit(&self, nco: &Nco) -> bool {
         let samples_a_chip = (1_u64 << CODE_BITS) as f64 / nco.code_step.max(1) as f64;
         let samples_a_step = samples_a_chip / self.steps_per_chip as f64;
@@ -156,7 +156,7 @@ impl Pieces {
         (i128::from(code) + i128::from(tap)).rem_euclid(i128::from(self.period())) as i64
     }
 
-    /// The same for taps that are near each other: over one end of the table after the other.
+    /// Correlation for taps that are near each other, over one end of the table after the other.
     fn together<const T: usize>(&self, level: Level, sums: Sums, nco: &Nco, taps: [i64; T]) -> [Complex64; T] {
         let (samples, period, step) = (sums.samples(), self.period(), nco.code_step as i64);
         let (low, high) = extent(&taps);

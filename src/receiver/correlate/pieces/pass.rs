@@ -10,7 +10,7 @@ use super::{GROUP, GROUPS, LONGEST_CHIPS, MARGIN, MOST_SAMPLES, Pieces, extent, 
 
 /// Places of chunks are held within 16 bits.
 const FARTHEST: f64 = 32_000.0;
-/// What entries count.
+/// Unit of the entries.
 const HALF: f64 = 0.5;
 /// 2³².
 const PHASE: f64 = 4_294_967_296.0;
@@ -66,7 +66,7 @@ pub(super) fn correlate<const T: usize>(
     found
 }
 
-/// How the table lies over the samples.
+/// Position of the table over the samples.
 struct Way {
     /// Phase of the table's steps where the first sample's interval begins.
     begin: i64,

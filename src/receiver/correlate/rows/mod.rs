@@ -30,7 +30,7 @@ const SEGMENTS: usize = 2;
 /// Entries of a row before the period and after it: half a segment, a whole one, and a little more.
 const BEFORE: usize = SEGMENT / 2 + 2;
 const AFTER: usize = SEGMENT + LANES + 2;
-/// What a step of ±1 is in a row.
+/// Value of a step of ±1 in a row.
 const AMPLITUDE: f64 = 127.0;
 /// The weights of two rows add up to this.
 const WEIGHTS: i64 = 64;
@@ -45,7 +45,7 @@ const MOST_SAMPLES: f64 = 8192.0;
 const MOST_SAMPLES_A_CHANGE: f64 = 12.0;
 /// Turns of the carrier a sample at most.
 const MOST_TURNS: f64 = 0.01;
-/// What the code rate may be off the nominal one: 0.013 sample at a segment's ends.
+/// Largest relative error of the code rate against the nominal one: 0.013 sample at a segment's ends.
 const MOST_APART: f64 = 5e-5;
 
 /// A period of the replica at every row's place.
@@ -94,7 +94,7 @@ impl Rows {
         })
     }
 
-    /// Whether rows do at these steps of carrier and code.
+    /// True if rows suit these steps of carrier and code.
     pub fn suit(&self, nco: &Nco) -> bool {
         let samples = nco.code_step as f64 * self.steps_per_chip as f64 * self.samples_a_unit;
         let turns = (nco.carrier_step as i64 as f64 / TURN).abs();
@@ -149,16 +149,16 @@ struct Job<'a> {
     step: i64,
 }
 
-/// Where a tap is in the table, in 2⁻⁴⁰ samples.
+/// Position of a tap in the table, in 2⁻⁴⁰ samples.
 #[derive(Clone, Copy)]
 struct Place {
-    /// Of the segment's first sample, less than a period.
+    /// Position of the segment's first sample, less than a period.
     at: i64,
-    /// What rounding owes.
+    /// Rounding error that is still to be corrected.
     owed: i64,
 }
 
-/// How places move, in 2⁻⁴⁰ samples.
+/// Motion of the positions, in 2⁻⁴⁰ samples.
 struct Motion {
     /// Beyond a sample, in a sample.
     gain: i64,

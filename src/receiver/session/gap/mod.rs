@@ -46,23 +46,23 @@ const CLOCK_LEAST_S: f64 = 1e-6;
 /// Less is a pause only when a jump is known whose size is not.
 const PAUSE_S: f64 = 1.05;
 
-/// What a channel showed of its code.
+/// Observations of a channel's code.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Watched {
     trend: Trend,
-    /// The same without the latest looks, which are kept beside it.
+    /// Code observations without the latest looks, which are kept beside it.
     settled: suspect::Settled,
     /// Rates when it last took a look.
     rates: Option<[Rates; 2]>,
-    /// The same of the last looks, with their times in seconds, the latest last.
+    /// Rates at the last looks with their times in seconds, the latest last.
     rates_of_late: VecDeque<(f64, [Rates; 2])>,
     /// Looks in a row without a carrier lock.
     unlocked: usize,
-    /// Where the signs of a secondary code turned in the window before the running one.
+    /// Edges of the signs of a secondary code in the window before the current one.
     turns: Option<Edges>,
     moved_chips: f64,
     profile: Profile,
-    /// Where symbols began before the jump.
+    /// Sample at which symbols began before the jump.
     begin: Option<u64>,
     /// Steps since the code was reseated: sum of chips, of seconds, and number.
     since: (f64, f64, u32),
@@ -101,7 +101,7 @@ impl Watched {
     }
 }
 
-/// How far the search for a jump is.
+/// Stage of the search for a jump.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum Stage {
     #[default]
@@ -112,14 +112,14 @@ enum Stage {
     Settling(Moved),
 }
 
-/// How the replicas were moved.
+/// Move of the replicas.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Moved {
     /// Sample of the suspicion, and of the move.
     since: u64,
     at: u64,
     found: Found,
-    /// Whether carriers are whole.
+    /// True if the carriers keep their whole cycles.
     whole: bool,
 }
 
@@ -139,7 +139,7 @@ pub(super) struct Gap {
 }
 
 impl Gap {
-    /// Whether codes are where they are not expected.
+    /// True if codes are not at their expected positions.
     pub fn is_busy(&self) -> bool {
         self.stage != Stage::Quiet
     }
@@ -217,8 +217,8 @@ impl FrontEnd {
         noise.sigma_m(libm::pow(10.0, track.cn0_dbhz / 10.0)) * open / noise.chip_m
     }
 
-    /// What a look of so many periods at `chips` beyond what was expected, with that variance over a look's,
-    /// says of a jump.
+    /// Step that a look of `periods` code periods implies for the code. The look lies `chips` beyond the
+    /// forecast. The third number is the forecast's variance over a look's.
     fn step_of(
         &self,
         track: &Track,

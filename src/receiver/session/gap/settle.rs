@@ -1,4 +1,4 @@
-//! How many samples are missing, once the replicas are where the codes are.
+//! Number of missing samples, once the replicas are aligned with the codes again.
 
 use super::reseat::whole_number;
 use super::{FrontEnd, LOOK_S, Moved, Stage, Track, Units};

@@ -1,5 +1,5 @@
-//! What makes a jump suspected: steps that all codes share, steps by their Dopplers, power that vanishes, and
-//! signs that turn in the wrong places.
+//! Signs of a jump: steps that all codes share, steps in proportion to their Dopplers, lost power, and sign
+//! changes at the wrong code periods.
 
 use std::collections::VecDeque;
 
@@ -73,8 +73,9 @@ impl Settled {
     }
 }
 
-/// Where signs turned of late, and where symbols begin: of a secondary code over the last two windows, of
-/// symbols since the last comparison where another is `due`; `None` where there is nothing to compare.
+/// Latest sign changes, and the first sample of symbols. For a secondary code they are those of the last two
+/// windows. For symbols they are those since the last comparison, where another is `due`. `None` where there
+/// is nothing to compare.
 fn latest_turns(track: &mut Track, due: bool) -> Option<(Edges, u64)> {
     let begin = track.channel.symbols_begin();
     if !track.channel.has_secondary_code() {
@@ -137,7 +138,7 @@ impl FrontEnd {
         }
     }
 
-    /// Whether channels follow pilots whose secondary code is known.
+    /// True if channels follow pilots whose secondary code is known.
     pub(super) fn has_secondary_codes(&self) -> bool {
         self.tracks.iter().any(|track| track.channel.has_secondary_code())
     }
@@ -151,8 +152,8 @@ impl FrontEnd {
         self.tracks.iter().filter(|track| track.channel.is_settled()).filter_map(one).collect()
     }
 
-    /// Whether signs turn elsewhere than where symbols or secondary codes have them turn: then code periods
-    /// are missing, and nothing else shows it.
+    /// Compares the edges of signs with those expected from symbols or secondary codes. A difference means
+    /// that code periods are missing, which nothing else shows.
     pub(super) fn compare_edges(&mut self, now: u64, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         if self.gap.stage != Stage::Quiet {
             return Ok(());

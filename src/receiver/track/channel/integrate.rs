@@ -16,12 +16,12 @@ const HALVES_EVERY: u64 = 16;
 /// The power is measured in one of this many periods.
 const POWER_EVERY: u64 = 8;
 
-/// What a code period correlates to.
+/// Correlations of a code period.
 #[derive(Clone, Copy, Debug, Default)]
 struct Correlations {
     /// Early, prompt and late.
     sums: [Complex64; 3],
-    /// Where the code does not correlate with itself, if it was asked for.
+    /// Correlation at a delay where the code does not correlate with itself, if it was requested.
     noise: Option<Complex64>,
     /// On the neighbouring peaks, ahead and behind, of a signal that has them.
     sides: Option<[Complex64; 2]>,
@@ -116,7 +116,7 @@ impl Channel {
         }
     }
 
-    /// Where the noise of the running period is to be measured, if it has to be.
+    /// Tap at which the noise of the current period is measured, if it has to be.
     fn quiet_tap(&self) -> Option<i64> {
         let wanted = self.whole && self.cn0.needs_reference();
         let place = self.period as usize % self.noise_taps.len().max(1);

@@ -1,4 +1,4 @@
-//! What a channel measures: the state of its replica at a sample.
+//! Measurements of a channel: the state of its replica at a sample.
 
 use super::Channel;
 use crate::correlate::{Replica, TURN, units_to_chips};

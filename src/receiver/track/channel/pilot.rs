@@ -17,7 +17,7 @@ use crate::track::secondary_code::{SecondaryCodePhase, SecondaryCodeSync};
 use gnss::satellite::Sv;
 use gnss::signal::{Component, Signal};
 
-/// What is read beside a pilot.
+/// Data component that is read beside a pilot.
 #[derive(Clone, Debug)]
 pub(super) struct Data {
     replica: Replica,
@@ -65,7 +65,7 @@ impl Data {
         })
     }
 
-    /// What its code correlates with.
+    /// Replica of the data component.
     pub(super) fn replica(&self) -> &Replica {
         &self.replica
     }

@@ -1,4 +1,4 @@
-//! What a channel shows of a jump of all codes at once, and how its oscillators are moved by one.
+//! Observations of a channel about a jump of all codes at once, and the move of its oscillators by a jump.
 
 use num_complex::Complex64;
 
@@ -17,10 +17,11 @@ use super::LOCK_PERIODS;
 /// Means over the code periods since the last glance.
 #[derive(Clone, Copy, Debug)]
 pub struct Glance {
-    /// Where the signal's code is, beyond where the carrier's aid alone would have it: what the loop has
-    /// moved and what the discriminator still shows. It does not depend on the loop, and its noise is white.
+    /// Position of the signal's code in chips, relative to the code that the carrier's aid alone would give.
+    /// It is the loop's total move plus the discriminator's current error. It does not depend on the loop,
+    /// and its noise is white.
     pub code_chips: f64,
-    /// Where the replica's code is, in the same sense.
+    /// Position of the replica's code in chips, in the same sense.
     pub moved_chips: f64,
     /// Power of the prompts over that of their noise's two components, less that: T·C/N0 of a code period.
     pub power: f64,
@@ -66,7 +67,7 @@ impl Glances {
 }
 
 impl Channel {
-    /// What the channel has seen since it was last asked; `None` where that is nothing.
+    /// Observations since the last call; `None` without any.
     pub fn glance(&mut self) -> Option<Glance> {
         let (code, updates) = std::mem::take(&mut self.glances.code);
         let (power, periods) = std::mem::take(&mut self.glances.power);
@@ -90,8 +91,8 @@ impl Channel {
         }
     }
 
-    /// Where the signs of prompts have turned since the code was last reseated, or [`Self::forget_edges`] was
-    /// called.
+    /// Edges at which the signs of prompts have turned since the code was last reseated, or
+    /// [`Self::forget_edges`] was called.
     pub fn edges(&self) -> &Edges {
         &self.glances.edges
     }
@@ -101,13 +102,13 @@ impl Channel {
         self.take_edges();
     }
 
-    /// Where signs have turned so far; begins anew to look.
+    /// Edges of the signs so far. The collection starts again afterwards.
     pub fn take_edges(&mut self) -> Edges {
         let emptied = self.glances.edges.emptied();
         std::mem::replace(&mut self.glances.edges, emptied)
     }
 
-    /// Whether a secondary code has been recognised, and is taken off the prompts.
+    /// True if a secondary code has been recognised, and is removed from the prompts.
     pub fn has_secondary_code(&self) -> bool {
         self.secondary_code_phase.is_some()
     }

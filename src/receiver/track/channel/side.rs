@@ -1,4 +1,4 @@
-//! What a channel does about side peaks: it shows the evidence its sums, and moves by what that finds.
+//! Side peaks of a channel: collection of the evidence, and the move to the main peak.
 
 use num_complex::Complex64;
 

@@ -81,13 +81,13 @@ impl Channel {
         self.verify_within_periods(report);
     }
 
-    /// Whether each code period has a sign of its own, as far as is known.
+    /// True if each code period has its own sign, as far as is known.
     pub(super) fn has_single_periods(&self) -> bool {
         self.group == 1 && self.has_symbols
     }
 
-    /// Where each period has a sign of its own, loops also rest half a cycle a period off; between the halves
-    /// of periods it shows.
+    /// Checks for a frequency error of half a cycle a period, where loops also settle if each period has its
+    /// own sign. The halves of periods show it.
     fn verify_within_periods(&mut self, report: &mut Report) {
         let Some(cycles) = self.halves.cycles() else { return };
         self.halves = Halves::default();
