@@ -21,7 +21,7 @@ pub enum JudgeError {
     File {
         /// The file or directory.
         path: PathBuf,
-        /// What the system or the parser reports.
+        /// Error of the operating system or of the parser.
         source: io::Error,
     },
     /// A file cannot be read.
@@ -29,7 +29,7 @@ pub enum JudgeError {
     Read {
         /// The file or directory.
         path: PathBuf,
-        /// What the system or the parser reports.
+        /// Error of the operating system or of the parser.
         source: io::Error,
     },
     /// A row of a table is not as its columns ask, or cannot be written.
@@ -37,7 +37,7 @@ pub enum JudgeError {
     Row {
         /// The file or directory.
         path: PathBuf,
-        /// What the system or the parser reports.
+        /// Error of the parser.
         source: csv::Error,
     },
     /// A JSON file is not as its record asks.
@@ -45,7 +45,7 @@ pub enum JudgeError {
     Json {
         /// The file or directory.
         path: PathBuf,
-        /// What the system or the parser reports.
+        /// Error of the parser.
         source: serde_json::Error,
     },
     /// A fact of the scene is one that cannot be judged.
@@ -55,7 +55,7 @@ pub enum JudgeError {
         key: &'static str,
         /// The value as written.
         value: f64,
-        /// What was expected, in words.
+        /// Expected value, in words.
         expected: &'static str,
     },
     /// The receiver's rows and the truth's have no sample in common.
@@ -64,7 +64,7 @@ pub enum JudgeError {
          with the same measurement interval?"
     )]
     NothingJoins {
-        /// What is wrong, or which rows, in words.
+        /// Description of the rows, in words.
         what: &'static str,
         /// Number of the receiver's rows.
         count: usize,
@@ -76,7 +76,7 @@ pub enum JudgeError {
         path: PathBuf,
         /// Line of the file, counted from 1.
         line: u64,
-        /// What is wrong, or which rows, in words.
+        /// Description of the fault, in words.
         what: String,
     },
     /// A foreign receiver's file belongs to another time or place than the truth.
@@ -84,7 +84,7 @@ pub enum JudgeError {
     NotOfThisTruth {
         /// The file or directory.
         path: PathBuf,
-        /// What is wrong, or which rows, in words.
+        /// Description of the rows that do not match, in words.
         what: String,
     },
     /// The drawing library failed.

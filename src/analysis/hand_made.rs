@@ -37,7 +37,7 @@ impl Draw {
     }
 }
 
-/// What is planted.
+/// Errors that a run made by hand contains.
 pub(crate) struct Planted {
     pub code_bias_m: f64,
     pub code_sigma_m: f64,
@@ -273,7 +273,7 @@ pub(crate) fn planted_run(planted: &Planted) -> tempfile::TempDir {
     run
 }
 
-/// What a receiver reports of a continuous wave in a second.
+/// Row of a receiver that reports a continuous wave in a second.
 pub(crate) fn reported(second: u64, frequency_hz: f64) -> LineRow {
     LineRow {
         sample: second * RATE_HZ,

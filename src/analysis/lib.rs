@@ -58,10 +58,11 @@ pub fn judge(run: &Path) -> Result<Summary, JudgeError> {
     judge_against(run, None)
 }
 
-/// The same with a user's limits beside those of theory; what came of them is in the summary's details.
+/// Judges a run by theory and by a user's limits. The summary's details hold the result.
 ///
 /// # Errors
-/// As [`judge()`].
+///
+/// Same as [`judge()`].
 pub fn judge_against(run: &Path, limits: Option<&Limits>) -> Result<Summary, JudgeError> {
     // On one of the threads that draw: what it needed before serves again.
     rayon::scope(|_| judged(run, limits))
@@ -93,7 +94,7 @@ fn judged(run: &Path, limits: Option<&Limits>) -> Result<Summary, JudgeError> {
     Ok(summary)
 }
 
-/// What came of a run, its tables written and its pictures not drawn yet.
+/// Results of a run whose tables are written and whose pictures are not drawn yet.
 struct Found {
     summary: Summary,
     sketches: Vec<(&'static Picture, Sketch)>,
@@ -103,7 +104,7 @@ struct Found {
     report: (),
 }
 
-/// What is measured of a run.
+/// Measurements of a run.
 struct Measured {
     read: Run,
     errors: Errors,

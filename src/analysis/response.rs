@@ -18,9 +18,9 @@ const EDGE: f64 = 0.05;
 /// Amplitude response against the frequency from the filter's middle.
 #[derive(Clone, Debug)]
 pub enum Response {
-    /// Of a wall.
+    /// Response of a brick-wall filter.
     Wall(KaiserSinc, f64),
-    /// Of poles.
+    /// Response of a filter with poles.
     Poles {
         /// Poles of the prototype, radians a second.
         poles: Vec<Complex<f64>>,
@@ -30,7 +30,7 @@ pub enum Response {
 }
 
 impl Response {
-    /// Of a filter for samples at `rate_hz`.
+    /// Response of a filter for samples at `rate_hz`.
     pub fn of(filter: &FilterSpec, rate_hz: f64) -> Self {
         let width = filter.bandwidth_hz / rate_hz;
         match filter.shape {
@@ -74,7 +74,7 @@ impl Response {
         }
     }
 
-    /// The same squared.
+    /// Power response: the square of the amplitude.
     pub fn power(&self, f_hz: f64) -> f64 {
         let amplitude = self.amplitude(f_hz);
         amplitude * amplitude

@@ -7,7 +7,7 @@
 /// Mean, standard deviation and 95 % figure of one error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spread {
-    /// How many values there were.
+    /// Number of the values.
     pub count: usize,
     /// Mean of the values.
     pub mean: f64,
@@ -45,7 +45,7 @@ impl Sum {
         }
     }
 
-    /// How many were finite.
+    /// Number of the finite values.
     pub fn count(&self) -> usize {
         self.count
     }
@@ -55,12 +55,12 @@ impl Sum {
         self.squares
     }
 
-    /// As [`mean`].
+    /// Mean of the values, as in [`mean`].
     pub fn mean(&self) -> Option<f64> {
         (self.count > 0).then(|| self.sum / self.count as f64)
     }
 
-    /// As [`rms`].
+    /// Root mean square of the values, as in [`rms`].
     pub fn rms(&self) -> Option<f64> {
         (self.count > 0).then(|| (self.squares / self.count as f64).sqrt())
     }

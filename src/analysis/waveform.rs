@@ -35,7 +35,7 @@ const STEPS: f64 = 64.0;
 const LOBES: f64 = 24.0;
 
 impl KaiserSinc {
-    /// Of a cut-off (−6 dB) in cycles a sample, a half width of the window in samples and its β.
+    /// Response for a cut-off (−6 dB) in cycles a sample, a half width of the window in samples and its β.
     pub fn new(cutoff_cps: f64, half_width: f64, beta: f64) -> Self {
         let step_cps = 1.0 / (half_width * STEPS);
         let transform = |f: f64| {
@@ -76,7 +76,7 @@ impl KaiserSinc {
     }
 }
 
-/// What makes samples of a waveform: how edges of chips fall between them, and how often.
+/// Sampling of a waveform: the rule for chip edges between samples, and the rate.
 #[derive(Clone, Debug)]
 pub struct Sampler {
     edge: Edge,
@@ -90,7 +90,7 @@ impl Sampler {
         Self::with_cutoff(edge, rate_hz, CUTOFF_CPS)
     }
 
-    /// The same with band-limited edges cut off (−6 dB) at so many cycles a sample.
+    /// A sampler whose band-limited edges are cut off (−6 dB) at so many cycles a sample.
     pub fn with_cutoff(edge: Edge, rate_hz: f64, cutoff_cps: f64) -> Self {
         let limited = (edge == Edge::BandLimited).then(|| {
             let (half_width, beta) = LIMITED;
@@ -99,7 +99,7 @@ impl Sampler {
         Self { edge, rate_hz, limited }
     }
 
-    /// Of a front end of a scene, by its place among several.
+    /// Sampler of a front end of a scene, by its index among several.
     pub fn of(scene: &SceneFacts, front_end: usize) -> Self {
         let (edge, rate_hz, cutoff_cps) = match scene.front_ends.get(front_end) {
             Some(own) => (own.code_edge, own.sample_rate_hz, own.edge_cutoff_cps),
@@ -108,7 +108,7 @@ impl Sampler {
         Self::with_cutoff(edge, rate_hz, cutoff_cps.unwrap_or(CUTOFF_CPS))
     }
 
-    /// How edges fall.
+    /// Rule for the chip edges.
     pub fn edge(&self) -> Edge {
         self.edge
     }
@@ -128,7 +128,7 @@ impl Sampler {
         }
     }
 
-    /// By how many sample rates aliases are away that count.
+    /// Range of the aliases that count, in sample rates from the carrier.
     pub fn aliases(&self) -> std::ops::RangeInclusive<i32> {
         match self.edge {
             // Beyond one and a half rates the filter stops by more than 60 dB.
@@ -165,19 +165,20 @@ pub fn leading(signal: &Signal) -> Option<&'static Component> {
 }
 
 impl Waveform {
-    /// Of a whole signal; `None` of one without components.
+    /// Waveform of a whole signal; `None` for one without components.
     pub fn of(signal: &Signal) -> Option<Self> {
         Self::sent(signal, Layers::Whole)
     }
 
-    /// Of what is sent of a signal: its power is less than one where layers are left out.
+    /// Waveform of the layers of a signal that are sent. Its power is less than one where layers are left
+    /// out.
     pub fn sent(signal: &Signal, layers: Layers) -> Option<Self> {
         let chip_rate_hz = leading(signal)?.chip_rate_hz;
         let part = |component: &Component| (component.power_share, component.shape_of(layers));
         Some(Self { parts: signal.components.iter().map(part).collect(), chip_rate_hz })
     }
 
-    /// Of one shape, for chips of that rate.
+    /// Waveform of one shape, for chips of that rate.
     pub fn of_shape(shape: Shape, chip_rate_hz: f64) -> Self {
         Self { parts: vec![(1.0, shape)], chip_rate_hz }
     }
@@ -233,13 +234,13 @@ impl Waveform {
         self.parts.iter().map(|(share, shape)| share * shape.density(hz)).sum()
     }
 
-    /// The same as the sampler meets it, before anything aliases.
+    /// Power density at `hz` after the sampler's response, before aliasing, per hertz.
     pub fn met(&self, sampler: &Sampler, hz: f64) -> f64 {
         let amplitude = sampler.amplitude(hz);
         if amplitude == 0.0 { 0.0 } else { self.density(hz) * amplitude * amplitude }
     }
 
-    /// The same in the samples, aliases in.
+    /// Power density at `hz` in the samples, with aliases, per hertz.
     pub fn sampled(&self, sampler: &Sampler, hz: f64) -> f64 {
         let rate_hz = sampler.rate_hz();
         let within_hz = hz - rate_hz * (hz / rate_hz).round();
@@ -266,7 +267,7 @@ impl Waveform {
         Some(waveform)
     }
 
-    /// What is left of a whole signal's power in samples that have it with some of its layers alone.
+    /// Share of a whole signal's power that is left in samples with some of its layers.
     pub fn kept(signal: &Signal, layers: Layers, sampler: &Sampler) -> f64 {
         let power = |component: &Component, layers| {
             Self::of_shape(component.shape_of(layers), component.chip_rate_hz).power(sampler)

@@ -6,7 +6,7 @@ use serde_json::Value;
 /// Share of a limit below which what is left of it is marginal.
 pub const MARGINAL_SHARE: f64 = 0.1;
 
-/// What a figure is compared with.
+/// Bound of a figure.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Bound {
     /// The figure must not be larger.
@@ -27,7 +27,7 @@ impl std::fmt::Display for Bound {
     }
 }
 
-/// How a figure came out.
+/// Status of a figure against its bound.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
@@ -55,22 +55,21 @@ impl Status {
 pub struct Judgement {
     /// In words, or its path in `summary.json` where a user named it so.
     pub figure: String,
-    /// Its path, if it has one.
+    /// Path of the figure in `summary.json`, if it has one.
     pub path: Option<String>,
     /// Null where the run has no such figure.
     pub value: Value,
     /// Unit of the value.
     pub unit: String,
-    /// What it is compared with.
+    /// Bound that the value is compared with.
     pub bound: Bound,
-    /// What is left of the limit as a share of it, negative beyond it; `None` where the limit is zero or no
-    /// number.
+    /// Margin to the limit as a share of it, negative beyond it; `None` where the limit is zero or no number.
     pub margin: Option<f64>,
-    /// How it came out.
+    /// Status of the figure.
     pub status: Status,
-    /// Where the limit comes from.
+    /// Origin of the limit.
     pub source: String,
-    /// What is behind it: satellites and times, hints.
+    /// Evidence behind the figure: satellites and times, hints.
     pub why: Vec<String>,
 }
 
@@ -108,7 +107,7 @@ impl Judgement {
         shown(&self.value)
     }
 
-    /// By how much it lies within its limit or beyond, in words.
+    /// Margin to the limit in words, within it or beyond.
     pub fn margin_text(&self) -> String {
         match (self.margin, &self.bound, self.value.as_f64()) {
             _ if self.value.is_null() => "no figure".to_owned(),
@@ -144,7 +143,7 @@ pub(crate) fn number(value: f64) -> String {
     digits(value, 4)
 }
 
-/// That many significant digits, no trailing zeros.
+/// Number in words with `digits` significant digits, without trailing zeros.
 pub(crate) fn digits(value: f64, digits: i32) -> String {
     if value == 0.0 || !value.is_finite() {
         return if value == 0.0 { "0".to_owned() } else { value.to_string() };

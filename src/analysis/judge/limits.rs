@@ -26,7 +26,7 @@ pub enum LimitsError {
     Toml {
         /// Name of the file of limits.
         name: String,
-        /// What the parser reports, with line and column.
+        /// Message of the parser, with line and column.
         message: String,
     },
     /// A path that the file of figures does not have.
@@ -36,7 +36,7 @@ pub enum LimitsError {
         name: String,
         /// The file of figures.
         file: &'static str,
-        /// Where a user finds all paths.
+        /// File in which a user finds all paths.
         listed: &'static str,
         /// The path into that file.
         path: String,
@@ -54,7 +54,7 @@ pub enum LimitsError {
         key: String,
         /// The value as written.
         value: String,
-        /// What was expected, in words.
+        /// Expected value, in words.
         expected: &'static str,
     },
     /// A path without a limit.
@@ -115,10 +115,11 @@ impl Limits {
         Self::parse_for(&schema::SUMMARY, text, name)
     }
 
-    /// The same for another file of figures.
+    /// Reads and checks a text of limits for another file of figures.
     ///
     /// # Errors
-    /// As [`Limits::parse`].
+    ///
+    /// Same as [`Limits::parse`].
     pub fn parse_for(figures: &'static Figures, text: &str, name: &str) -> Result<Self, LimitsError> {
         let table: Table = text.parse().map_err(|error: toml::de::Error| LimitsError::Toml {
             name: Keys::new(name, text).place(error.span().map_or(0, |span| span.start)),

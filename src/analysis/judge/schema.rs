@@ -17,9 +17,9 @@ pub struct Leaf {
     pub path: String,
     /// Unit of the value.
     pub unit: String,
-    /// What it means, in words.
+    /// Meaning of the figure, in words.
     pub meaning: String,
-    /// Whether it is a number, so that it can have a largest or smallest value.
+    /// True if the figure is a number, so that it can have a largest or smallest value.
     pub is_number: bool,
 }
 
@@ -56,10 +56,10 @@ fn walk(path: &str, schema: &Value, leaves: &mut Vec<Leaf>) {
     }
 }
 
-/// What replaces any key in the schema's paths, such as the name of a signal.
+/// Wildcard in the schema's paths, for any key such as the name of a signal.
 const ANY: &str = "*";
 
-/// Whether a path is one of those that a path of the schema covers.
+/// True if a path of the schema covers a path.
 pub fn covers(pattern: &str, path: &str) -> bool {
     let (mut keys, mut own) = (pattern.split('.'), path.split('.'));
     loop {
@@ -76,13 +76,13 @@ pub fn covers(pattern: &str, path: &str) -> bool {
 pub struct Figures {
     /// The file.
     pub file: &'static str,
-    /// Where a user finds all paths.
+    /// File in which a user finds all paths.
     pub listed: &'static str,
     /// All of them.
     pub leaves: fn() -> &'static [Leaf],
 }
 
-/// Those of `summary.json`.
+/// Figures of `summary.json`.
 pub static SUMMARY: Figures =
     Figures { file: "summary.json", listed: "src/analysis/assets/summary.schema.json", leaves };
 
@@ -93,7 +93,7 @@ impl Figures {
         Some(Leaf { path: path.to_owned(), ..found.clone() })
     }
 
-    /// Whether figures lie below a path.
+    /// True if figures lie below a path.
     pub fn is_branch(&self, path: &str) -> bool {
         let keys = path.split('.').count();
         let begin = |leaf: &Leaf| leaf.path.split('.').take(keys).collect::<Vec<_>>().join(".");
@@ -112,7 +112,7 @@ pub fn leaf(path: &str) -> Option<Leaf> {
     SUMMARY.leaf(path)
 }
 
-/// Whether figures of `summary.json` lie below a path.
+/// True if figures of `summary.json` lie below a path.
 pub fn is_branch(path: &str) -> bool {
     SUMMARY.is_branch(path)
 }

@@ -1,6 +1,6 @@
-//! What passed, what is marginal, what failed, and by how much: the list of all judgements of a run.
+//! Verdict of a run: the list of all judgements, each passed, marginal or failed, with its margin.
 //!
-//! The figures and their limits are filled in by the rules, a user's limits by [`super::limits`].
+//! The rules fill in the figures and their limits, and [`super::limits`] fills in a user's limits.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -12,14 +12,14 @@ use crate::judge::judgement::{Bound, Judgement, MARGINAL_SHARE, Status};
 pub struct Verdict {
     /// Every judgement, those of a user first.
     pub rows: Vec<Judgement>,
-    /// How many of the first rows hold a user's limits.
+    /// Number of the first rows that hold a user's limits.
     pub of_user: usize,
     /// Figures that are not judged, each with the reason.
     pub not_judged: Vec<String>,
 }
 
 impl Verdict {
-    /// How many have a status.
+    /// Number of judgements with a status.
     pub fn count(&self, status: Status) -> usize {
         self.rows.iter().filter(|row| row.status == status).count()
     }
@@ -29,7 +29,7 @@ impl Verdict {
         self.rows.iter().map(|row| row.status).max().unwrap_or(Status::Pass)
     }
 
-    /// Its counts in words.
+    /// Counts of the judgements in words.
     pub fn in_words(&self) -> String {
         let [pass, marginal, fail] = [Status::Pass, Status::Marginal, Status::Fail].map(|status| self.count(status));
         format!("{pass} passed, {marginal} marginal, {fail} failed")

@@ -1,11 +1,11 @@
-//! Whether fixes are consistent with the covariance that the receiver states: normalised error squared.
+//! Consistency of fixes with the covariance that the receiver states: normalised error squared (NEES).
 //!
 //! With e the error of a fix east, north, up and P the covariance that the receiver states, eᵀP⁻¹e is
-//! chi-square of three degrees if P is right (Bar-Shalom, Li and Kirubarajan 2001, 5.4), so that its mean is
-//! 3. Fixes of smoothed ranges remember each other: the mean of n of them is compared with the band of as
-//! many *independent* ones as the autocorrelation of L⁻¹e says, P = LLᵀ, about zero, so that a lasting error
-//! counts once. Limits: with a window of smoothing as long as the run there are few, and the band is wide; a
-//! fix without a formal covariance is left out.
+//! chi-square of three degrees if P is right (Bar-Shalom, Li and Kirubarajan 2001, 5.4). Its mean is then 3.
+//! Fixes of smoothed ranges are correlated. The mean of n of them is therefore compared with the band of n'
+//! *independent* ones. The number n' follows from the autocorrelation of L⁻¹e, P = LLᵀ, about zero, so that a
+//! lasting error counts once. Limits: with a window of smoothing as long as the run there are few, and the
+//! band is wide. A fix without a formal covariance is left out.
 
 use nalgebra::{Cholesky, Matrix3};
 use serde::Serialize;
@@ -24,7 +24,7 @@ pub const FREEDOM: f64 = 3.0;
 /// Probability with which the mean of a consistent receiver lies within the band.
 pub const CONFIDENCE: f64 = 0.95;
 
-/// What the comparison says.
+/// Result of the comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Calibration {
@@ -38,7 +38,7 @@ pub enum Calibration {
 }
 
 impl Calibration {
-    /// Its name in `summary.json`.
+    /// Name of the result in `summary.json`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Consistent => "consistent",
@@ -63,9 +63,9 @@ pub struct NormalisedError {
     pub up_m: f64,
     /// Standard deviation to the east that the receiver states, metres.
     pub sigma_east_m: f64,
-    /// The same to the north, metres.
+    /// Standard deviation to the north that the receiver states, metres.
     pub sigma_north_m: f64,
-    /// The same upward, metres.
+    /// Standard deviation upward that the receiver states, metres.
     pub sigma_up_m: f64,
     /// Normalised error squared.
     pub nees: f64,
@@ -102,11 +102,11 @@ pub struct Consistency {
     pub rows: Table<NormalisedError>,
     /// Mean of the normalised errors squared; 3 where the covariance is right.
     pub nees_mean: Option<f64>,
-    /// How many independent fixes the mean is worth.
+    /// Number of independent fixes that the mean is worth.
     pub independent: Option<f64>,
     /// Ends of the 95 % band of the mean.
     pub band: Option<(f64, f64)>,
-    /// What the comparison says.
+    /// Result of the comparison of the mean with the band.
     pub verdict: Option<Calibration>,
     /// Share of east, north and up errors within twice their sigma; 0.954 of normal ones.
     pub within_two_sigma: Option<f64>,

@@ -48,7 +48,7 @@ pub struct Satellite {
     pub signal: &'static str,
     /// Number of observations.
     pub observations: usize,
-    /// Its mean elevation, degrees.
+    /// Mean elevation of the satellite, degrees.
     pub elevation_mean_deg: Option<f64>,
     /// Mean of its code errors, metres.
     pub code_mean_m: Option<f64>,
@@ -91,12 +91,12 @@ pub struct Band {
     pub multipath_rms_m: Option<f64>,
 }
 
-/// What all points come to.
+/// Statistics of all points.
 #[derive(Clone, Debug, Default)]
 pub struct Elevations {
     /// Every satellite's signal.
     pub satellites: Vec<Satellite>,
-    /// Those that have observations, from the horizon up.
+    /// Bands that have observations, from the horizon up.
     pub bands: Vec<Band>,
 }
 
@@ -271,12 +271,12 @@ impl Arcs {
     }
 }
 
-/// Whether an arc goes on with a row, by the lock of the one before.
+/// True if an arc continues with a row, by the lock time of the one before.
 fn goes_on(before_s: f64, row: &SignalError) -> bool {
     row.locked_s > before_s
 }
 
-/// Those means on a second way through the rows.
+/// Means of the arcs, used in a second pass through the rows.
 struct ArcMeans {
     locked_s: Option<f64>,
     means_m: std::vec::IntoIter<Sum>,

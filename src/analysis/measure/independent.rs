@@ -1,11 +1,11 @@
-//! How much a series of correlated errors says: independent values, intervals of a spread, a test of
+//! Information in a series of correlated errors: independent values, intervals of a spread, a test of
 //! normality.
 //!
-//! Errors of loops and of smoothed fixes remember the ones before, so that n of them count as fewer. With ρ
-//! the autocorrelation, a mean square of n normal values varies like one of n/(1 + 2Σρ²) independent ones
-//! (Bartlett 1946), a mean like one of n/(1 + 2Σρ). Sums run to the first lag whose ρ is not positive: what
-//! comes after is mostly the noise of the estimate. Limits: even spacing within a group; processes that ring
-//! need another cut.
+//! Errors of loops and of smoothed fixes are correlated, so that n of them count as fewer. With ρ the
+//! autocorrelation, a mean square of n normal values varies like one of n/(1 + 2Σρ²) independent ones
+//! (Bartlett 1946), a mean like one of n/(1 + 2Σρ). Sums run to the first lag whose ρ is not positive,
+//! because later values are mostly the noise of the estimate. Limits: even spacing within a group. Processes
+//! that ring need another cut.
 
 /// Largest number of lags looked at.
 const MOST_LAGS: usize = 4096;

@@ -1,7 +1,7 @@
-//! What the receiver measured of the ionosphere with two bands, against the truth's delays.
+//! Ionospheric delays that the receiver measured with two bands, against the truth's delays.
 //!
-//! The truth has a delay on each signal's carrier; (f/1575.42 MHz)² of that carrier brings it to the
-//! receiver's. Limits: delays between the receiver's own bands count as its error.
+//! The truth has a delay on each signal's carrier. The factor (f/1575.42 MHz)² of that carrier converts it to
+//! the receiver's. Limits: delays between the receiver's own bands count as its error.
 
 use serde::Serialize;
 

@@ -37,7 +37,7 @@ pub struct LinkJitter {
     pub which: Loop,
     /// Unit of sigmas and limits: chips, degrees or hertz.
     pub unit: &'static str,
-    /// As the receiver measured it, mean over what is counted here.
+    /// C/N0 that the receiver measured in dB-Hz, mean over the updates that are counted.
     pub cn0_dbhz: f64,
     /// Time of an update, seconds.
     pub integration_s: f64,
@@ -48,7 +48,7 @@ pub struct LinkJitter {
     pub raw_theory_sigma: Option<f64>,
     /// Oscillator minus truth.
     pub values: usize,
-    /// How many independent values they are worth.
+    /// Number of independent values that they are worth.
     pub independent: f64,
     /// Their mean.
     pub mean: f64,
@@ -58,7 +58,7 @@ pub struct LinkJitter {
     pub sigma_interval: f64,
     /// Standard deviation by theory, of thermal noise alone.
     pub thermal_theory_sigma: f64,
-    /// The same, of the oscillators alone.
+    /// Standard deviation by theory, of the oscillators alone.
     pub oscillator_theory_sigma: f64,
     /// Error that the true motion leaves in the loop without noise: root mean square, and largest.
     pub stress_rms: f64,
@@ -76,7 +76,7 @@ pub struct LinkJitter {
     pub rule: f64,
     /// The end of the range.
     pub rule_limit: f64,
-    /// Whether the rule is kept.
+    /// True if the rule is kept.
     pub holds: bool,
     /// Probability of a distribution so far from normal, if it were normal.
     pub normality_p: Option<f64>,
@@ -91,14 +91,14 @@ pub struct Jitter {
     pub rows: Vec<LinkJitter>,
 }
 
-/// What all satellites' rows of one loop come to; of several thresholds the least.
+/// Root mean squares of one loop over all satellites' rows; of several thresholds the least.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Pooled {
-    /// Of the discriminator's values.
+    /// Standard deviation of the discriminator's values.
     pub raw_sigma: Option<f64>,
     /// Theory of the same.
     pub raw_theory_sigma: Option<f64>,
-    /// Of the closed loop.
+    /// Standard deviation of the closed loop.
     pub sigma: f64,
     /// Theory of the same.
     pub theory_sigma: f64,
@@ -167,7 +167,7 @@ impl Jitter {
     }
 }
 
-/// What is taken of an observation past its pull-in.
+/// Data of an observation past its pull-in.
 #[derive(Clone, Copy)]
 struct Past {
     sample: u64,
@@ -211,7 +211,7 @@ fn settled(
     Ok((past, span.unwrap_or_default()))
 }
 
-/// What a loop puts out in an update, in its unit.
+/// Output of a loop in an update, in the loop's unit.
 fn put_out(which: Loop, row: &TrackingRow) -> f64 {
     match which {
         Loop::Dll => row.dll_discriminator_chips,
@@ -220,7 +220,7 @@ fn put_out(which: Loop, row: &TrackingRow) -> f64 {
     }
 }
 
-/// What `of` makes of the loop updates within those spans.
+/// Values of `of` for the loop updates within those spans.
 fn of_updates(
     run: &Run,
     link: Link,

@@ -23,11 +23,11 @@ pub const LEAST_DBHZ: f64 = 45.0;
 pub struct Lines {
     /// Spectra in which the receiver reported a line.
     pub told: usize,
-    /// Those of them in whose second nothing was on.
+    /// Number of reported spectra in whose second no interference was on.
     pub false_told: usize,
     /// Seconds all through which a strong continuous wave was on.
     pub wave_seconds: usize,
-    /// Those of them that the receiver reported.
+    /// Number of those seconds in which the receiver reported the wave.
     pub wave_seconds_told: usize,
     /// Largest distance in frequency of a report from the nearest wave where nothing else was on, Hz.
     pub frequency_error_max_hz: Option<f64>,

@@ -96,7 +96,7 @@ impl Psd {
         })
     }
 
-    /// The same in decibels of LSB²/Hz: the rows of `psd.csv`. None before the first whole segment.
+    /// Density in decibels of LSB²/Hz: the rows of `psd.csv`. `None` before the first whole segment.
     pub fn rows(&self) -> Option<Vec<PsdRow>> {
         let row = |(frequency_hz, density)| PsdRow { frequency_hz, density_db: decibels(density) };
         Some(self.density()?.into_iter().map(row).collect())

@@ -26,11 +26,11 @@ use gnss::record::Event;
 
 /// A fall of the true C/N0 against its median over the run that counts as an obstruction or a fade.
 pub const FADE_DB: f64 = 6.0;
-/// What interference must take from C/N0 to count.
+/// Loss of C/N0 by interference in decibels from which on it counts as a cause.
 pub const JAMMED_DB: f64 = 3.0;
-/// How far back a cause is looked for.
+/// Time before a break in which a cause is sought, seconds.
 const BEFORE_S: f64 = 0.5;
-/// How long before a break is declared its cause may lie.
+/// Time by which a cause may lie before the declaration of a break, seconds.
 pub fn noticed_s(run: &Run) -> f64 {
     BEFORE_S + run.tracking_setting("loss_s").unwrap_or(0.0)
 }
@@ -38,7 +38,7 @@ pub fn noticed_s(run: &Run) -> f64 {
 /// Rows on either side that fix the constant.
 const SIDE: usize = 10;
 
-/// What happened.
+/// Kind of break.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
@@ -94,18 +94,18 @@ pub struct Slip {
     pub signal: &'static str,
     /// Slip or loss.
     pub kind: Kind,
-    /// Whether the receiver said so itself.
+    /// True if the receiver declared the break.
     pub declared: bool,
     /// Change of the carrier's constant, to the half cycle.
     pub size_cycles: Option<f64>,
-    /// What rounding to the half cycle took away.
+    /// Remainder of the size after rounding to the half cycle, cycles.
     pub remainder_cycles: Option<f64>,
-    /// What the truth says of its cause.
+    /// Cause that the truth shows.
     pub cause: Cause,
     /// The evidence: least C/N0 that the scene allowed, what interference took of it, largest error that the
     /// motion leaves in the phase loop, and 3σ of its noise at that C/N0, the oscillator's with it.
     pub cn0_dbhz: Option<f64>,
-    /// By how much interference lowers C/N0, dB.
+    /// Loss of C/N0 by interference, dB.
     pub interference_db: Option<f64>,
     /// Error that the motion leaves in the phase loop, degrees.
     pub motion_deg: Option<f64>,
@@ -146,7 +146,7 @@ impl Slips {
         Ok(Self { rows })
     }
 
-    /// How many have each cause.
+    /// Number of slips for each cause.
     pub fn causes(&self) -> BTreeMap<Cause, usize> {
         let mut counts: BTreeMap<Cause, usize> = Cause::ALL.into_iter().map(|cause| (cause, 0)).collect();
         for row in &self.rows {
@@ -165,7 +165,7 @@ struct Break {
     size_cycles: Option<f64>,
 }
 
-/// What an observation says of a slip.
+/// Data of an observation for the search for slips.
 #[derive(Clone, Copy)]
 struct Carrier {
     sample: u64,
@@ -236,7 +236,7 @@ fn undeclared(all: &[Carrier], declared: &[u64]) -> Vec<(u64, f64)> {
     found
 }
 
-/// What the truth knows of a run.
+/// Evidence from the truth of a run.
 struct Evidence<'r> {
     run: &'r Run,
     access: MultipleAccess<'r>,
@@ -253,7 +253,7 @@ struct Strength {
     effective_dbhz: f64,
 }
 
-/// What it knows of one satellite.
+/// Evidence about one satellite.
 struct Known {
     rows: Vec<Strength>,
     usual_dbhz: f64,

@@ -1,13 +1,15 @@
-//! How far the spectrum of the samples is from the expected one, and how far scatter lets it be.
+//! Deviation of the samples' spectrum from the expected one, with the limits that its scatter sets.
 //!
-//! Three figures of the ratio of measured to expected density: its mean over all bins (the level), the mean
-//! over each thirty-second of the band over the level (broad shape), and each bin over the level (narrow
+//! Three figures describe the ratio of measured to expected density: its mean over all bins (the level), the
+//! mean over each thirty-second of the band over the level (broad shape), and each bin over the level (narrow
 //! shape). Each is a mean of squares with a relative variance v, the sum of three:
-//! - that of Welch's estimate of Gaussian samples ([`welch::variance`]), times what an unsteady density adds;
-//! - that of lines of codes, which are taken as random: in a band B of a component of period T there are B·T,
-//!   each with a standard deviation of its mean; half as many where B spans the carrier, about which a real
-//!   code's lines are alike;
-//! - that of the number of pulses of interference within the looks.
+//! - the variance of Welch's estimate of Gaussian samples ([`welch::variance`]), times a factor for an
+//! unsteady
+//!   density;
+//! - the variance of lines of codes, which are taken as random. A band B of a component of period T has B·T
+//!   lines, each with a standard deviation of its mean. It has half as many where B spans the carrier, about
+//!   which a real code's lines are alike;
+//! - the variance of the number of pulses of interference within the looks.
 //!
 //! A mean of squares is near gamma with shape 1/v, whose quantiles are (1 − v/9 ± z·√v/3)³ (Wilson and
 //! Hilferty 1931); z is that of the false alarm over the number of slices or bins. Nothing is added for an
@@ -44,14 +46,14 @@ pub struct Departure {
     pub at_hz: f64,
 }
 
-/// What is found of a front end's spectrum.
+/// Deviations of a front end's spectrum from the expected one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Departures {
-    /// Of the whole; `None` where the truth does not state the level.
+    /// Deviation of the whole; `None` where the truth does not state the level.
     pub level: Option<Departure>,
-    /// Of the worst slice.
+    /// Deviation of the worst slice.
     pub broad: Departure,
-    /// Of the worst bin; `None` where sweeps or pulses make bins that are no mean of squares.
+    /// Deviation of the worst bin. `None` where sweeps or pulses make bins that are no mean of squares.
     pub narrow: Option<Departure>,
 }
 
@@ -111,9 +113,10 @@ impl Bins<'_> {
 }
 
 impl Departures {
-    /// Of the spectrum of a front end; the reason why it is not judged where there is one.
+    /// Deviations of a front end's spectrum, or the reason why it is not judged.
     ///
     /// # Errors
+    ///
     /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn of(run: &Run, front_end: &FrontEnd<'_>, rows: &[PsdRow]) -> Result<Result<Self, &'static str>, JudgeError> {
         if let Some(reason) = excuse(run, front_end) {

@@ -1,7 +1,8 @@
-//! What a spoofer did to the fixes: how far from the truth they went, and how near to its claim.
+//! Effect of a spoofer on the fixes: their distance from the truth, and from the spoofer's claim.
 //!
-//! A fix counts as captured when it lies nearer to what the first spoofer claims than to the truth and the
-//! two are further apart than the fixes' own scatter. Limits: one spoofer; its clock is not judged.
+//! A fix counts as captured under two conditions. It is nearer to the position that the first spoofer claims
+//! than to the truth. The two positions are further apart than the fixes' own scatter. Limits: one spoofer,
+//! whose clock is not judged.
 
 use serde::Serialize;
 

@@ -1,11 +1,9 @@
-//! What all satellites' signals have in common in the samples beside the receiver's clock, as the truth knows
-//! it.
+//! Common errors of all satellites' signals in the samples besides the receiver's clock, from the truth.
 //!
-//! A front end's filter delays every code by its group delay; a local oscillator off its frequency shifts
-//! every carrier; an antenna that turns winds up every carrier. A receiver that measures them is right: they
-//! are part of the truth. The first two are facts of the scene, the third is what the truth's carriers do
-//! beside its pseudoranges on average. Limits: the mean of carrier less pseudorange holds twice the
-//! ionosphere's rate too, millimetres a second.
+//! A front end's filter delays every code by its group delay. A local oscillator off its frequency shifts
+//! every carrier. An antenna that turns winds up every carrier. A receiver that measures them is right: they
+//! are part of the truth. The first two are facts of the scene. The third is the mean of the truth's carriers
+//! less its pseudoranges. Limits: that mean holds twice the ionosphere's rate too, millimetres a second.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -17,14 +15,14 @@ use gnss::facts::{FilterSpec, SceneFacts, filters, oscillator_offset_hz};
 use gnss::record::Observation;
 use gnss::signal::{Link, Signal};
 
-/// What the ionosphere may make of a carrier less its pseudorange, metres a second.
+/// Largest rate of a carrier less its pseudorange that the ionosphere may cause, metres a second.
 const LEAST_WOUND_MPS: f64 = 0.02;
 
 /// Distance of early and late where the receiver does not state it, chips.
 const USUAL_SPACING_CHIPS: f64 = 0.5;
 
-/// How the receiver's replica meets samples, as it says itself; one that does not say it has the samples'
-/// own edges, but no filter.
+/// Edge rule of the receiver's replica, from its own settings. A receiver that does not state it has the
+/// samples' own edges, but no filter.
 pub(crate) fn replica_edge(receiver: &Value, samples: Edge) -> Edge {
     let settings = receiver.get("settings").unwrap_or(receiver);
     match (settings.pointer("/tracking/replica").and_then(Value::as_str), samples) {
@@ -48,7 +46,7 @@ pub struct Common {
     /// Delay of every code in the front end, by its signal, and of how many satellites.
     code_delays_s: BTreeMap<&'static Signal, f64>,
     satellites: BTreeMap<&'static Signal, usize>,
-    /// By how much every Doppler is higher.
+    /// Common offset of every Doppler, in hertz.
     pub doppler_hz: f64,
     last: HashMap<Link, (u64, f64)>,
     /// Sample of each epoch in their order, with sum and number of what each satellite's carrier gained on
@@ -89,12 +87,12 @@ impl Common {
         self.code_delays_s.get(signal).copied().unwrap_or(0.0)
     }
 
-    /// That of all codes on average, which a clock solved from them has.
+    /// Mean delay of all codes in seconds, which a clock solved from them has.
     pub fn clock_delay_s(&self) -> f64 {
         self.mean_delay_s(|_| true)
     }
 
-    /// That of the codes of one time scale on average, and by how much one of them may differ from it.
+    /// Mean delay of the codes of one time scale, and the largest difference of one of them from it, seconds.
     pub fn scale_delay_s(&self, scale: &str) -> (f64, f64) {
         let is_own = |signal: &Signal| signal.time.name == scale;
         let mean_s = self.mean_delay_s(is_own);
@@ -132,7 +130,7 @@ impl Common {
         }
     }
 
-    /// Where the epoch of a sample is among the gains, or would be.
+    /// Index of a sample's epoch among the gains, or the index at which it would be inserted.
     fn place(&self, sample: u64) -> Result<usize, usize> {
         self.gains.binary_search_by_key(&sample, |gain| gain.0)
     }

@@ -1,12 +1,12 @@
-//! By how much a front end's filter delays a code, as an early-minus-late loop measures it.
+//! Delay of a code by a front end's filter, as an early-minus-late loop measures it.
 //!
-//! A filter whose phase is not straight spreads the correlation unevenly: the loop rests where early and late
+//! A filter with a non-linear phase spreads the correlation unevenly. The loop settles where early and late
 //! are equally strong, R(τ − d/2)² = R(τ + d/2)². R is the transform of the code's spectrum times the
 //! responses of the sampler, of the replica's samples and of the sampled filter ([`Response`]), which repeats
-//! with the sample rate: what folds back has passed the filter where it lies in the samples, and is found by
-//! the replica, whose samples fold alike. For a Butterworth filter just wider than the main lobe that is
-//! metres more than the delay in the middle of its band. Limits: the code lies in the middle of the filter;
-//! the replica has all layers.
+//! with the sample rate. Aliases have passed the filter at their frequency in the samples, and the replica's
+//! samples alias in the same way. For a Butterworth filter just wider than the main lobe the delay exceeds
+//! the one in the middle of its band by metres. Limits: the code lies in the middle of the filter. The
+//! replica has all layers.
 
 use num_complex::Complex64;
 
@@ -18,13 +18,13 @@ use gnss::facts::{FilterShape, FilterSpec};
 /// lag of a chip turns in.
 const STEPS: u32 = 1000;
 
-/// What a code's samples and a replica's have in common, in lines.
+/// Cross-spectrum of a code's samples and a replica's, in lines.
 struct Lines {
     step_hz: f64,
     rate_hz: f64,
     /// The filter's response at each line within the band.
     gains: Vec<Complex64>,
-    /// Of each line all densities that fold to it, from the lowest alias on.
+    /// Densities that alias to each line, from the lowest alias on.
     densities: Vec<Vec<f64>>,
     lowest: i32,
 }
@@ -120,9 +120,9 @@ mod tests {
         assert!(narrow_m > 104.9, "{narrow_m}");
     }
 
-    /// The same by the filter's taps: each shifts the correlation of the samples with the replica's, which is
-    /// the triangle of the chips, averaged over an interval once for the replica and once more for samples
-    /// that are means.
+    /// Delay by the filter's taps, as a second way to the result. Each tap shifts the correlation of the
+    /// samples with the replica's. That correlation is the triangle of the chips, averaged over an interval
+    /// once for the replica and once more for samples that are means.
     fn tapped_m(bandwidth_hz: f64, rate_hz: f64, more: f64, edge: Edge) -> f64 {
         let chip_hz = 1.023e6;
         let poles = [5.0, 7.0, 9.0, 11.0].map(|eighths| phasor(std::f64::consts::PI * eighths / 8.0));

@@ -19,7 +19,7 @@ pub struct Emission {
 }
 
 impl Emission {
-    /// That of a satellite.
+    /// Emission of a satellite's signal.
     pub fn of(link: Link) -> Self {
         Self { signal: link.signal, carrier: link.carrier_hz().to_bits() }
     }

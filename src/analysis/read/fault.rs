@@ -1,6 +1,6 @@
-//! What is wrong with a text file, and where.
+//! Faults of text files.
 
-/// What is wrong with a file of a foreign receiver, and where.
+/// Fault of a foreign receiver's file, with its line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
     /// Line of the file, counted from 1.

@@ -23,7 +23,7 @@ pub(crate) fn each<T: DeserializeOwned>(
     each_of(fs::File::open(path).map_err(|source| open_error(path, remedy, source))?, path, take)
 }
 
-/// The same of a file that a run may lack.
+/// Gives every row of a CSV file to `take`, if the run has that file.
 pub(super) fn each_of_any<T: DeserializeOwned>(
     path: &Path,
     take: impl FnMut(u64, T) -> Result<(), JudgeError>,

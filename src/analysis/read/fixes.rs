@@ -172,12 +172,12 @@ impl Fixes {
         Fix { excluded: self.texts.at(row.excluded), time_scale: self.texts.at(row.time_scale), ..row.fix }
     }
 
-    /// How many there are.
+    /// Number of fixes.
     pub fn len(&self) -> usize {
         self.table.len()
     }
 
-    /// Whether there is none.
+    /// True if there is none.
     pub fn is_empty(&self) -> bool {
         self.table.is_empty()
     }
@@ -197,7 +197,7 @@ impl Fixes {
         self.most_satellites as usize
     }
 
-    /// Whether one was corrected by that model of the ionosphere.
+    /// True if a fix was corrected by that model of the ionosphere.
     pub fn uses(&self, model: IonosphereModel) -> bool {
         self.models.contains(&model)
     }
@@ -210,10 +210,11 @@ impl Fixes {
         self.table.each(|row| see(self.whole(row)))
     }
 
-    /// What `of` makes of each fix.
+    /// Values of `of` for each fix.
     ///
     /// # Errors
-    /// As [`Self::each`].
+    ///
+    /// Same as [`Self::each`].
     pub fn map<U>(&self, mut of: impl FnMut(Fix) -> U) -> Result<Vec<U>, JudgeError> {
         self.table.map(|row| of(self.whole(row)))
     }
@@ -246,15 +247,16 @@ impl Fixes {
         Ok(InOrder { fixes: self, cursor: None, sorted: sorted.into_values().collect::<Vec<_>>().into_iter() })
     }
 
-    /// As [`Table::sound`].
+    /// Checks that all rows could be read, like [`Table::sound`].
     ///
     /// # Errors
-    /// As there.
+    ///
+    /// Same as there.
     pub fn sound(&self) -> Result<(), JudgeError> {
         self.table.sound()
     }
 
-    /// The same fixes after a change of their list.
+    /// Changes the list of the fixes.
     #[cfg(test)]
     pub(crate) fn change(&mut self, change: impl FnOnce(&mut Vec<Fix>)) {
         let mut all = self.map(|fix| fix).unwrap();

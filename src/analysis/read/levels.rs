@@ -83,10 +83,11 @@ impl<K: Copy + Ord + Hash> Levels<K> {
         LevelFinder { levels: self, found: BTreeMap::new() }
     }
 
-    /// As [`SpillStore::sound`].
+    /// Checks that all rows could be read, like [`SpillStore::sound`].
     ///
     /// # Errors
-    /// As there.
+    ///
+    /// Same as there.
     pub fn sound(&self) -> Result<(), JudgeError> {
         self.store.sound()
     }

@@ -18,7 +18,7 @@ use gnss::time::Epoch;
 /// One position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlaceFix {
-    /// As the receiver labels it, in GPS time.
+    /// Time label of the receiver, in GPS time.
     pub label: Epoch,
     /// Place, Earth-fixed, metres.
     pub position_m: Vector3<f64>,
@@ -35,7 +35,7 @@ pub struct Places {
     pub fixes: Vec<PlaceFix>,
     /// Sentences that say that there is no fix, and fixes that RMC's status V takes back.
     pub without_fix: usize,
-    /// Whether the date came from RMC or ZDA sentences.
+    /// True if the date came from RMC or ZDA sentences.
     pub dated: bool,
     /// Fixes whose sentence has no geoid separation. Their altitude was taken as one above mean sea level,
     /// and EGM96's separation added.
@@ -62,7 +62,7 @@ struct Instant {
     day: Option<i64>,
     fix: Option<Candidate>,
     talkers: Vec<String>,
-    /// Whether an RMC says that it is valid.
+    /// True if an RMC sentence says that the fix is valid.
     valid: Option<bool>,
     ground: Option<(f64, f64)>,
 }
@@ -107,7 +107,7 @@ enum Refusal {
     Again(String),
 }
 
-/// Whether the end of a sentence is missing.
+/// True if the end of a sentence is missing.
 fn cut_off(error: &SentenceError) -> bool {
     match error {
         SentenceError::Short { checked, .. } => !checked,

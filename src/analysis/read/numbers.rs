@@ -18,7 +18,7 @@ const HELD: usize = 1 << 14;
 #[derive(Debug)]
 pub struct Numbers {
     file: WordFile,
-    /// What came after those.
+    /// Numbers after those of the file.
     held: Vec<f64>,
 }
 
@@ -43,12 +43,12 @@ impl Numbers {
         Ok(())
     }
 
-    /// How many there are.
+    /// Number of values.
     pub fn len(&self) -> usize {
         self.file.len() as usize + self.held.len()
     }
 
-    /// Whether there is none.
+    /// True if there is none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -67,10 +67,11 @@ impl Numbers {
         Ok(())
     }
 
-    /// The same, until `see` fails.
+    /// Shows each number to `see`, until `see` fails.
     ///
     /// # Errors
-    /// As [`Self::each`], and those of `see`.
+    ///
+    /// Same as [`Self::each`], and those of `see`.
     pub fn try_each(&self, mut see: impl FnMut(f64) -> Result<(), JudgeError>) -> Result<(), JudgeError> {
         let mut seen = Ok(());
         self.each(|value| {
@@ -209,7 +210,7 @@ impl Pooled {
         Ok(())
     }
 
-    /// As [`crate::statistics::pooled_std`].
+    /// Standard deviation of the pooled groups, as in [`crate::statistics::pooled_std`].
     pub fn std(&self) -> Option<f64> {
         (self.freedom > 0).then(|| (self.squares / self.freedom as f64).sqrt())
     }

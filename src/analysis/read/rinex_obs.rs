@@ -22,7 +22,7 @@ use gnss::satellite::Sv;
 use gnss::time::Epoch;
 pub use header::Header;
 
-/// What one satellite's signal gave at one epoch; a blank or a zero in the file is `None`.
+/// Observables of one satellite's signal at one epoch; a blank or a zero in the file is `None`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Values {
     /// Pseudorange, metres.
@@ -42,9 +42,9 @@ pub struct Values {
 /// One epoch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObservedEpoch {
-    /// As the receiver labels it, in GPS time.
+    /// Time label of the receiver, in GPS time.
     pub label: Epoch,
-    /// By satellite and RINEX band and attribute, as `1C`.
+    /// Observables by satellite and RINEX band and attribute, as `1C`.
     pub values: BTreeMap<(Sv, String), Values>,
 }
 
@@ -57,7 +57,7 @@ pub struct Observations {
     pub epochs: Vec<ObservedEpoch>,
     /// Event records passed over.
     pub events: usize,
-    /// Whether the header says that a clock offset was applied to epoch, code and phase.
+    /// True if the header says that a clock offset was applied to epoch, code and phase.
     pub clock_applied: bool,
     /// Interval of the epochs by the header, seconds.
     pub interval_s: Option<f64>,
@@ -108,7 +108,7 @@ fn columns(line: &str, from: usize, to: usize) -> &str {
 /// A file in reading: one epoch is held.
 pub struct Reader<R> {
     lines: Lines<R>,
-    /// What the header says.
+    /// Header of the file.
     pub header: Header,
     /// Event records passed over so far.
     pub events: usize,
@@ -337,12 +337,12 @@ fn more_lines(satellites: usize) -> usize {
     satellites.div_ceil(NAMES).saturating_sub(1)
 }
 
-/// What an epoch line says.
+/// Content of an epoch line.
 struct Head {
-    /// Its time, which the file's header says is GPS time, and as it is written.
+    /// Time of the epoch, which the file's header says is GPS time, and its text.
     label: Option<Epoch>,
     time: String,
-    /// How a time is written.
+    /// Form in which a time is written.
     form: &'static str,
     flag: u8,
     /// Satellites, or lines of an event.

@@ -1,4 +1,4 @@
-//! How the rows of a run's long tables are put into a [`super::spill_store::SpillStore`].
+//! Rows of a run's long tables in a [`super::spill_store::SpillStore`].
 
 use crate::read::spill_store::{SpillRow, Words};
 use gnss::record::{ClockRow, IonosphereRow, Observation, RayRow, SkyRow, TrackingRow, TrajectoryRow};

@@ -28,7 +28,7 @@ use gnss::record::{
 use gnss::satellite::Sv;
 use gnss::signal::{Link, Signal, all};
 
-/// How fast the stages ran: `speed.json`, and the section of the summary.
+/// Speed of the stages: `speed.json`, and the section of the summary.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Speed {
@@ -68,7 +68,7 @@ pub struct Run {
     pub scenario: Option<String>,
     /// True observations.
     pub truth: SpillStore<Link, Observation>,
-    /// Where the satellites are, and what delays their signals.
+    /// Directions of the satellites, and the delays of their signals.
     pub sky: SpillStore<Link, SkyRow>,
     /// The truth's signals.
     pub signals: BTreeSet<&'static Signal>,
@@ -78,7 +78,7 @@ pub struct Run {
     pub cn0_sums_hz: Levels<Emission>,
     /// C/N0 of a signal's strongest satellite at a sample.
     pub cn0_most_hz: Levels<&'static Signal>,
-    /// What satellites' carriers and front end have in common beside the clock.
+    /// Common errors of the satellites' carriers and of the front end besides the clock.
     pub common: Common,
     /// Largest delays of the atmosphere.
     pub ionosphere_m: f64,
@@ -96,20 +96,20 @@ pub struct Run {
     pub truth_navigation: Vec<NavigationRow>,
     /// Empty without interference.
     pub interference: Vec<InterferenceRow>,
-    /// What the first spoofer claims; empty without one.
+    /// Trajectory that the first spoofer claims; empty without one.
     pub claimed: Table<TrajectoryRow>,
     /// Signals that a search cannot tell from one of the truth, on the same carrier with the same code, by
     /// whose name they count: until its message says who a satellite is, a receiver takes either name.
     pub alike: BTreeMap<Link, Sv>,
-    /// Where the receiver's tables lie; none of a truth alone.
+    /// Directory of the receiver's tables; `None` for a truth alone.
     pub rx: Option<PathBuf>,
     /// The receiver's observations.
     pub observations: SpillStore<Link, Observation>,
     /// The receiver's fixes.
     pub fixes: Fixes,
-    /// What its search found.
+    /// Results of the receiver's search.
     pub acquisition: Vec<AcquisitionRow>,
-    /// Its loops' updates.
+    /// Updates of the receiver's loops.
     pub tracking: SpillStore<Link, TrackingRow>,
     /// Median time of the loops' updates.
     pub update_s: Option<f64>,
@@ -117,22 +117,23 @@ pub struct Run {
     pub front_ends: BTreeMap<&'static Signal, usize>,
     /// The ionosphere that it measured with two bands; none without.
     pub ionosphere: SpillStore<Sv, IonosphereRow>,
-    /// Its clock against each time scale, by the scales' names; none of a receiver of GPS time alone.
+    /// Clock of the receiver against each time scale, by the scales' names; empty for a receiver of GPS time
+    /// alone.
     pub clocks: SpillStore<&'static str, ClockRow>,
     /// Parameters as it decoded them.
     pub navigation: Vec<NavigationRow>,
-    /// What happened to its channels.
+    /// Events of the receiver's channels.
     pub events: Vec<EventRow>,
-    /// What the receiver reported of lines in the spectrum; `None` of one that does not look.
+    /// Spectral lines that the receiver reported; `None` for one that does not look for them.
     pub lines: Option<Vec<LineRow>>,
     /// `rx/receiver.json`, or null when there is none.
     pub receiver: Value,
     /// Spectrum of the samples, of several front ends of those of the first; empty where it was not
     /// estimated.
     pub psd: Vec<PsdRow>,
-    /// Of several front ends the spectra of the others by their places, as far as they were estimated.
+    /// Spectra of the second and later front ends by their indices, as far as they were estimated.
     pub other_psds: BTreeMap<usize, Vec<PsdRow>>,
-    /// How fast the stages ran.
+    /// Speed of the stages.
     pub speed: Speed,
 }
 
@@ -333,19 +334,21 @@ impl Run {
         self.sky.keys().map(|link| link.sv).collect()
     }
 
-    /// What `of` makes of the rows of a satellite in the sky: those of one of its signals, the one that is
-    /// there longest, as where it stands is the same for all.
+    /// Values of `of` for the rows of a satellite in the sky. The rows are those of its signal that is there
+    /// longest. A satellite's direction is equal for all of its signals.
     ///
     /// # Errors
+    ///
     /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn seen<U>(&self, sv: Sv, of: impl FnMut(SkyRow) -> U) -> Result<Vec<U>, JudgeError> {
         self.seen_longest(sv).map_or(Ok(Vec::new()), |link| self.sky.map(link, of))
     }
 
-    /// The same rows by their samples.
+    /// Rows of a satellite in the sky, found by their samples.
     ///
     /// # Errors
-    /// As [`SpillStore::finder`].
+    ///
+    /// Same as [`SpillStore::finder`].
     pub fn seen_at(&self, sv: Sv) -> Result<Option<Finder<'_, Link, SkyRow>>, JudgeError> {
         self.seen_longest(sv).map(|link| self.sky.finder(link)).transpose()
     }
@@ -356,10 +359,11 @@ impl Run {
         own.rev().max_by_key(|link| self.sky.count(link))
     }
 
-    /// That all rows could be read which were looked for by their samples.
+    /// Checks that all rows which were looked up by their samples could be read.
     ///
     /// # Errors
-    /// As [`SpillStore::sound`].
+    ///
+    /// Same as [`SpillStore::sound`].
     pub fn sound(&self) -> Result<(), JudgeError> {
         self.truth.sound()?;
         self.sky.sound()?;
@@ -389,7 +393,7 @@ impl Run {
         self.scene.stages(self.front_end(signal)).1
     }
 
-    /// What makes the samples of a front end, by its place among several.
+    /// Sampler of a front end, by its index among several.
     pub fn sampler(&self, front_end: usize) -> Sampler {
         Sampler::of(&self.scene, front_end)
     }
@@ -462,7 +466,7 @@ fn observations(
     Ok(store)
 }
 
-/// How often each of a few different numbers came.
+/// Number of occurrences of each of a few different numbers.
 #[derive(Default)]
 struct Counts(BTreeMap<u64, usize>);
 
@@ -476,7 +480,7 @@ impl Counts {
         }
     }
 
-    /// As [`crate::statistics::median`] has it.
+    /// Median of the numbers, as in [`crate::statistics::median`].
     fn median(&self) -> Option<f64> {
         let last = self.0.values().sum::<usize>().checked_sub(1)?;
         let at = |rank: usize| {

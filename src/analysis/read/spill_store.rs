@@ -19,8 +19,8 @@ use crate::read::word_file::WordFile;
 /// Rows of a key that are kept in memory.
 const MOST_ROWS: usize = 256;
 
-/// What a store can take: a row as words of 64 bits, its key left out. The first word is its sample, by which
-/// it is found.
+/// Row that a store can take, as words of 64 bits without its key. The first word is its sample, by which it
+/// is found.
 pub trait SpillRow<K>: Sized {
     /// Words of a row.
     const WORDS: usize;
@@ -52,7 +52,7 @@ impl Words<'_> {
 pub struct SpillStore<K, T> {
     file: WordFile,
     stacks: BTreeMap<K, Stack>,
-    /// What a [`Finder`] could not read.
+    /// Error of a [`Finder`] that could not read.
     failed: Mutex<Option<io::Error>>,
     kind: std::marker::PhantomData<fn() -> T>,
 }
@@ -60,7 +60,7 @@ pub struct SpillStore<K, T> {
 #[derive(Debug, Default)]
 struct Stack {
     lots: Vec<Lot>,
-    /// What is not in the file yet.
+    /// Words that are not in the file yet.
     words: Vec<u64>,
     /// Sample of the newest row, and whether one came with the sample of the row before, or with a smaller
     /// one.
@@ -78,7 +78,7 @@ impl Stack {
 /// A full lot of rows in the file.
 #[derive(Clone, Copy, Debug)]
 struct Lot {
-    /// Where it begins, in words.
+    /// Beginning of the lot in the file, in words.
     start: u64,
     /// Sample of its first row.
     first: u64,
@@ -91,7 +91,7 @@ impl<K: Copy + Ord, T: SpillRow<K>> SpillStore<K, T> {
         Self { file, stacks, failed, kind: std::marker::PhantomData }
     }
 
-    /// Where its file is made.
+    /// Directory of the file.
     pub fn directory(&self) -> &Path {
         self.file.directory()
     }
@@ -122,7 +122,7 @@ impl<K: Copy + Ord, T: SpillRow<K>> SpillStore<K, T> {
         self.stacks.keys().copied()
     }
 
-    /// Whether a key has rows.
+    /// True if a key has rows.
     pub fn contains(&self, key: &K) -> bool {
         self.stacks.contains_key(key)
     }
@@ -137,7 +137,7 @@ impl<K: Copy + Ord, T: SpillRow<K>> SpillStore<K, T> {
         self.stacks.keys().map(|key| self.count(key)).sum()
     }
 
-    /// Whether there is none.
+    /// True if there is no row.
     pub fn is_empty(&self) -> bool {
         self.stacks.is_empty()
     }
@@ -150,10 +150,11 @@ impl<K: Copy + Ord, T: SpillRow<K>> SpillStore<K, T> {
         self.map(key, |row| row)
     }
 
-    /// What `of` makes of each row of a key, which is all that is held of them.
+    /// Values of `of` for each row of a key. Only these values are held in memory.
     ///
     /// # Errors
-    /// As [`Self::rows`].
+    ///
+    /// Same as [`Self::rows`].
     pub fn map<U>(&self, key: K, mut of: impl FnMut(T) -> U) -> Result<Vec<U>, JudgeError> {
         let mut found = Vec::with_capacity(self.count(&key));
         self.each(key, |row| found.push(of(row)))?;
@@ -199,19 +200,20 @@ impl<K: Copy + Ord, T: SpillRow<K>> SpillStore<K, T> {
         Ok(finder)
     }
 
-    /// Whether the samples of a key's rows ascend.
+    /// True if the samples of a key's rows ascend.
     pub fn ascends(&self, key: &K) -> bool {
         self.stacks.get(key).is_none_or(Stack::ascends)
     }
 
-    /// Whether no row of a key has a smaller sample than the one before.
+    /// True if no row of a key has a smaller sample than the one before.
     pub fn is_ordered(&self, key: &K) -> bool {
         self.stacks.get(key).is_none_or(|stack| !stack.falls)
     }
 
-    /// That every [`Finder`] could read what it looked for.
+    /// Checks that every [`Finder`] could read the rows that it looked up.
     ///
     /// # Errors
+    ///
     /// [`JudgeError::Read`] where one could not.
     pub fn sound(&self) -> Result<(), JudgeError> {
         let failed = self.failed.lock().unwrap_or_else(PoisonError::into_inner).take();

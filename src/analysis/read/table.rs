@@ -32,7 +32,7 @@ impl<T: SpillRow<()> + Clone> Table<T> {
         Ok(())
     }
 
-    /// Where its file is made.
+    /// Directory of the file.
     pub fn directory(&self) -> &Path {
         self.rows.directory()
     }
@@ -42,7 +42,7 @@ impl<T: SpillRow<()> + Clone> Table<T> {
         self.rows.count(&())
     }
 
-    /// Whether there is none.
+    /// True if there is no row.
     pub fn is_empty(&self) -> bool {
         self.first.is_none()
     }
@@ -65,10 +65,11 @@ impl<T: SpillRow<()> + Clone> Table<T> {
         self.rows.each((), see)
     }
 
-    /// What `of` makes of each row.
+    /// Values of `of` for each row.
     ///
     /// # Errors
-    /// As [`Self::each`].
+    ///
+    /// Same as [`Self::each`].
     pub fn map<U>(&self, of: impl FnMut(T) -> U) -> Result<Vec<U>, JudgeError> {
         self.rows.map((), of)
     }
@@ -86,15 +87,16 @@ impl<T: SpillRow<()> + Clone> Table<T> {
         self.rows.finder(())
     }
 
-    /// Whether the samples of its rows ascend.
+    /// True if the samples of the rows ascend.
     pub fn ascends(&self) -> bool {
         self.rows.ascends(&())
     }
 
-    /// As [`SpillStore::sound`].
+    /// Checks that all rows could be read, like [`SpillStore::sound`].
     ///
     /// # Errors
-    /// As there.
+    ///
+    /// Same as there.
     pub fn sound(&self) -> Result<(), JudgeError> {
         self.rows.sound()
     }

@@ -10,7 +10,7 @@ use crate::error::JudgeError;
 /// The file, made once there is something to write.
 #[derive(Debug)]
 pub(super) struct WordFile {
-    /// Where it is made.
+    /// Directory in which the file is made.
     directory: PathBuf,
     file: Option<Mutex<File>>,
     /// Words in it.
@@ -23,12 +23,12 @@ impl WordFile {
         Self { directory: directory.to_owned(), file: None, words: 0 }
     }
 
-    /// Where it is made.
+    /// Directory in which the file is made.
     pub fn directory(&self) -> &Path {
         &self.directory
     }
 
-    /// How many words it has.
+    /// Length of the file in words.
     pub fn len(&self) -> u64 {
         self.words
     }
@@ -71,7 +71,7 @@ impl WordFile {
         Ok(())
     }
 
-    /// What could not be read, with its place.
+    /// Error of a read, with the file's directory.
     pub fn unreadable(&self, source: io::Error) -> JudgeError {
         JudgeError::Read { path: self.directory.clone(), source }
     }

@@ -56,12 +56,12 @@ impl Staged {
         Ok(Self { path })
     }
 
-    /// Where it is made.
+    /// Path of the file or directory.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What was made at `path` without being staged, from here on as if it had been.
+    /// Takes over the file or directory at `path`, which was made without staging.
     pub fn adopt(path: PathBuf) -> Self {
         known().insert(path.clone());
         Self { path }
@@ -121,17 +121,18 @@ pub fn abandon() {
     std::mem::forget(known);
 }
 
-/// Where the name of a replaced directory's old self is: beside the new one's, and gone with it.
+/// Path of a replaced directory's old content, beside the new one; it is removed with the staged part.
 fn aside(part: &Path) -> PathBuf {
     let mut name = part.as_os_str().to_owned();
     name.push(".old");
     PathBuf::from(name)
 }
 
-/// Whether something is there, a dangling link too.
+/// True if a file exists at the path, also for a dangling link.
 ///
 /// # Errors
-/// Those of looking.
+///
+/// Errors of the file system.
 pub fn present(path: &Path) -> io::Result<bool> {
     match fs::symlink_metadata(path) {
         Ok(_) => Ok(true),

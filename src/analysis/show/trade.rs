@@ -97,7 +97,7 @@ pub struct Width {
     pub sample_error: f64,
     /// Power lost against noise in a correlation.
     pub cn0_loss_db: f64,
-    /// What the code moved by, over pieces of 20 ms: mean and spread.
+    /// Mean of the code's shift in metres, over pieces of 20 ms.
     pub code_mean_m: f64,
     /// Standard deviation of the receiver's code, metres.
     pub code_sigma_m: f64,
@@ -145,8 +145,8 @@ pub fn write_widths(directory: &Path, rows: &[Width], machine: &str) -> Result<(
     write_whole(&directory.join("widths.md"), text.as_bytes())
 }
 
-/// Whether row `index` is beaten or equalled in cost and error by another of its scene, and beaten in one of
-/// them.
+/// True if another row of the same scene is at most as costly and as wrong as row `index`, and better in one
+/// of both.
 pub fn dominated(rows: &[TradeRow], index: usize) -> bool {
     let Some(row) = rows.get(index) else { return false };
     let error = row.pseudorange_m();

@@ -53,7 +53,7 @@ pub fn write_rows<T: Serialize>(path: &Path, mut rows: impl Iterator<Item = T>) 
     table.finish()
 }
 
-/// The same of rows that are read while they are written.
+/// Writes rows as a CSV file while they are read.
 pub fn write_read_rows<T: Serialize>(
     path: &Path,
     mut rows: impl Iterator<Item = Result<T, JudgeError>>,

@@ -1,10 +1,10 @@
-//! What a receiver takes the ionosphere for in a fix, and how far it trusts that.
+//! Ionospheric model of a receiver in a fix, and the weight that the receiver gives it.
 //!
-//! A fix says which model corrected it. Parameters that were decoded are taken as exact, or with the share of
-//! error that the settings state; before they are decoded, delays are those of a nominal ionosphere with a
-//! stated deviation. Such a deviation is common to all satellites: a level, and what it gains northwards and
-//! eastwards, which a fix estimates with its position. Limits: a grid's delays are not computed here, so that
-//! its fixes may have the whole ionosphere as their error.
+//! A fix says which model corrected it. Decoded parameters are taken as exact, or with the share of error
+//! that the settings state. Before they are decoded, delays are those of a nominal ionosphere with a stated
+//! deviation. Such a deviation is common to all satellites: a level, and its gradients northwards and
+//! eastwards. A fix estimates them with its position. Limits: a grid's delays are not computed here. Fixes
+//! that use a grid may therefore have the whole ionosphere as their error.
 
 use std::f64::consts::PI;
 
@@ -38,11 +38,11 @@ pub struct Sight<'a> {
     pub user: Geodetic,
     /// Direction to the satellite.
     pub look: Look,
-    /// Where the satellite is, earth-fixed, metres.
+    /// Earth-fixed position of the satellite, in metres.
     pub satellite_m: &'a Vector3<f64>,
     /// When the signal arrives, GPS time.
     pub at: Epoch,
-    /// Its carrier.
+    /// Frequency of the carrier, in hertz.
     pub carrier_hz: f64,
     /// The scene's own delays.
     pub sky: &'a SkyRow,
@@ -60,8 +60,8 @@ pub struct Air {
 }
 
 impl Air {
-    /// As the word of a fix has it: with the coefficients that were sent of the model which the settings
-    /// choose, and the share by which they say that it errs.
+    /// Ionosphere that the model of a fix corrects. It has the coefficients that were sent of the model in
+    /// the settings, and `share`, the relative error that the settings state.
     pub fn of(model: IonosphereModel, sent: Option<&Coefficients>, share: f64, sight: &Sight<'_>) -> Self {
         let Sight { user, look, at, carrier_hz, .. } = *sight;
         if user.height_m > TOP_M && (share > 0.0 || model == IonosphereModel::Nominal) {

@@ -25,7 +25,7 @@ const WINDOW_S: f64 = 600.0;
 /// Carriers nearer to each other than this share are no two bands.
 const SAME_BAND: f64 = 0.05;
 
-/// What is expected of one measurement of the ionosphere.
+/// Expected measurement of the ionosphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dispersion {
     /// The satellite.
@@ -38,9 +38,9 @@ pub struct Dispersion {
     pub links: [Link; 2],
     /// Standard deviation of its noise on 1575.42 MHz, metres.
     pub sigma_m: f64,
-    /// What the front end's filters and chip edges leave of both codes, metres.
+    /// Error of both codes in metres that the front end's filters and chip edges cause.
     pub allowed_m: f64,
-    /// Whether each C/N0 was measured as it is: what is stated follows from it.
+    /// True if each C/N0 was measured at its true value, on which the stated deviation depends.
     pub steady: bool,
 }
 

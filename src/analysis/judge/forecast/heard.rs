@@ -1,4 +1,4 @@
-//! What a receiver says that it knows of satellites, by its own events.
+//! Knowledge of a receiver about satellites, from its own events.
 
 use std::collections::BTreeMap;
 
@@ -10,14 +10,14 @@ use gnss::signal::Link;
 
 /// From when on each satellite's message is known, and while it says that a signal is unhealthy: samples.
 pub struct Heard {
-    /// Of each message, in short or whole.
+    /// Message of each satellite, complete or in short form, with the sample from which it is known.
     known: BTreeMap<(Sv, &'static str), (u64, &'static Message)>,
     whole: BTreeMap<Sv, u64>,
     health: BTreeMap<Link, Vec<(u64, bool)>>,
 }
 
 impl Heard {
-    /// By the events of a run.
+    /// Knowledge that the events of a run give.
     pub fn of(run: &Run) -> Self {
         let mut heard = Self { known: BTreeMap::new(), whole: BTreeMap::new(), health: BTreeMap::new() };
         for row in &run.events {
@@ -38,7 +38,7 @@ impl Heard {
         heard
     }
 
-    /// Whether a fix at that sample may use the signal of the satellite, by its messages.
+    /// True if a fix at that sample may use the signal of the satellite, by its messages.
     pub fn usable(&self, link: Link, sample: u64) -> bool {
         let mut own = self.known.iter().filter(|((sv, _), _)| *sv == link.sv).map(|(_, known)| known);
         let known = own.any(|(since, message)| *since <= sample && (message.sets.serves)(link.signal));
@@ -46,7 +46,7 @@ impl Heard {
         known && last.is_none_or(|(_, healthy)| *healthy)
     }
 
-    /// Whether more is known of a satellite at that sample than elements in short.
+    /// True if more than the reduced elements of a satellite is known at that sample.
     pub fn is_whole(&self, sv: Sv, sample: u64) -> bool {
         self.whole.get(&sv).is_some_and(|since| *since <= sample)
     }

@@ -25,18 +25,18 @@ use crate::waveform::Edge;
 use gnss::record::TrackingRow;
 use gnss::signal::Link;
 
-/// By how much theory's σ may be too small or too large: 1 dB of C/N0 (1.12), and 7 % between linear loops
-/// and real ones; the code's theory leaves out the rounding of both replicas, which lowers jitter by as much
-/// again.
+/// Factors by which theory's σ may be too small or too large. They hold 1 dB of C/N0 (1.12), and 7 % between
+/// linear and real loops. The code's theory leaves out the rounding of both replicas, which lowers jitter by
+/// as much again.
 const THEORY: f64 = 1.2;
 const THEORY_LOW: f64 = 1.35;
-/// By how much the codes of other satellites may disturb one satellite more than on average: two codes whose
-/// Dopplers differ by whole kilohertz are 24 dB below their peak instead of noise of 38 dB below it in 4 ms;
-/// most pairs are near the average.
+/// Power of the codes of other satellites for the worst pair, over the average. Two codes whose Dopplers
+/// differ by whole kilohertz are 24 dB below their peak, instead of noise of 38 dB below it in 4 ms. Most
+/// pairs are near the average.
 const WORST_PAIR: f64 = 10.0;
 /// A sound estimate of C/N0 is right within this.
 pub const CN0_DB: f64 = 1.0;
-/// What rounding, light time and knots leave in a carrier: a hundredth of a cycle, and of a hertz.
+/// Errors of a carrier from rounding, light time and interpolation: a hundredth of a cycle, and of a hertz.
 const REST_CYCLES: f64 = 0.01;
 const REST_HZ: f64 = 0.01;
 /// Least number of settled observations that are judged.
@@ -47,13 +47,13 @@ const LEAST: usize = 30;
 pub struct Worst {
     /// The satellite, or satellite and signal.
     pub name: String,
-    /// Its figure.
+    /// Value of the figure.
     pub value: f64,
-    /// Its limit.
+    /// Limit of the figure.
     pub limit: f64,
 }
 
-/// What is judged satellite by satellite.
+/// Figure that is judged satellite by satellite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Figure {
     /// Mean of the code errors, metres.
@@ -175,7 +175,7 @@ impl Links {
 /// Sums over a satellite's loop updates.
 struct Updates {
     count: usize,
-    /// Of what each loop puts out in its unit, and of its square.
+    /// Sums of each loop's output in its unit, and of the output's square.
     put_out: [(Loop, f64, f64); 3],
     cn0_dbhz: f64,
     power: f64,
@@ -210,7 +210,7 @@ struct One<'a> {
     name: String,
     theory: &'a Theory,
     rows: Settled,
-    /// Of rays: what a carrier and C/N0 may be off by.
+    /// Errors of a carrier in cycles and of C/N0 in decibels that rays may cause.
     ray_cycles: f64,
     ray_db: f64,
     /// Largest error of the code that chip edges leave.
@@ -229,8 +229,8 @@ struct One<'a> {
     middle_dbhz: f64,
     /// Factor of σ that the worst pair of codes makes.
     pair: f64,
-    /// Whether samples come as they are received: a filter's noise is not white, and prompts count in units
-    /// of white noise.
+    /// True if the samples have no filter. Noise behind a filter is not white, and prompts count in units of
+    /// white noise.
     white: bool,
 }
 
@@ -361,7 +361,7 @@ impl<'a> One<'a> {
         links.put(most, &self.name, self.rows.most_off_db, limit_db);
     }
 
-    /// What the loops put out, update by update.
+    /// Outputs of the loops, update by update.
     fn updates(&self, links: &mut Links, sums: &Updates) {
         let count = sums.count as f64;
         for (which, sum, squares) in sums.put_out {

@@ -1,10 +1,10 @@
-//! What a sound receiver must reach: errors of fixes and the sigmas that it should state.
+//! Expected accuracy of a sound receiver: errors of fixes and the sigmas that it should state.
 //!
-//! [`air`] has what a receiver takes the ionosphere for, [`ranges`] bias and noise of every range, [`links`]
-//! the loops of every satellite, and [`solution`] what weighted least squares makes of the ranges at each
-//! fix, [`dispersion`] what two bands show of the ionosphere, and [`heard`] from when
-//! on messages are known. All follow from truth and settings. Nothing
-//! that the receiver states of its own quality enters; of its results, only which observations there are.
+//! [`air`] has the receiver's model of the ionosphere, and [`ranges`] has bias and noise of every range.
+//! [`links`] has the loops of every satellite. [`solution`] applies weighted least squares to the ranges at
+//! each fix. [`dispersion`] has the ionosphere measured with two bands, and [`heard`] the times from which
+//! messages are known. All follow from truth and settings. The receiver's statements about its own quality do
+//! not enter. Of its results, only the list of observations enters.
 
 pub mod air;
 pub mod dispersion;

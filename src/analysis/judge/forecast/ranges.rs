@@ -39,7 +39,7 @@ use gnss::time::GPST;
 /// The receiver's choices that its accuracy follows from.
 #[derive(Clone, Debug)]
 pub struct Choices {
-    /// Of the loops.
+    /// Settings of the loops.
     pub loops: Settings,
     /// Time of a loop's update, by signal.
     pub updates_s: BTreeMap<Link, f64>,
@@ -49,16 +49,16 @@ pub struct Choices {
     pub mask_rad: f64,
     /// Deviation of the receiver's models of the atmosphere at the zenith, metres.
     pub model_sigma_m: f64,
-    /// By which broadcast model it corrects the ionosphere, if by one.
+    /// Broadcast model that corrects the ionosphere, if any.
     pub ionosphere: Option<Model>,
-    /// Whether it combines two carriers of a satellite.
+    /// True if the receiver combines two carriers of a satellite.
     pub combined: bool,
-    /// Of the ionosphere's model, as a share of its delay.
+    /// Error of the ionosphere's model, as a share of its delay.
     pub ionosphere_error_share: f64,
 }
 
 impl Choices {
-    /// As `receiver.json` has them; `None` where it does not.
+    /// Choices that `receiver.json` states; `None` where one is missing.
     pub fn of(run: &Run) -> Option<Self> {
         let position = run.receiver.get("settings")?.get("position")?;
         let number = |key: &str| position.get(key)?.as_f64();
@@ -95,7 +95,7 @@ fn klobuchar(run: &Run) -> Model {
     Model::KLOBUCHAR.into_iter().find(brought).unwrap_or(Model::Klobuchar)
 }
 
-/// That of every satellite's signal; `None` where one has none.
+/// Update time in seconds of every satellite's signal; `None` where one has none.
 fn updates_s(run: &Run) -> Option<BTreeMap<Link, f64>> {
     run.truth.keys().map(|link| Some((link, update_s(run, link)?))).collect()
 }
@@ -110,8 +110,8 @@ const IN_SHORT_M: f64 = 2.2;
 const MULTIPATH_SHARE: f64 = 0.5;
 /// Time that a phase loop takes back to its signal after a fade.
 const FADE_S: f64 = 0.5;
-/// How quickly a strength is forgotten against which a signal fades, dB a second: what is weaker for longer
-/// is shaded, not fading.
+/// Rate in dB a second at which the reference strength of a fading signal decays. A signal that is weaker for
+/// longer is shaded, not fading.
 const FORGOTTEN_DBPS: f64 = 2.0;
 /// Satellites this near to the mask may be used or not: true and computed elevation differ.
 const MASK_SLACK_RAD: f64 = 2e-3;
@@ -123,17 +123,17 @@ pub struct Forecast {
     pub sv: Sv,
     /// Which of [`Scene::scales`] its clock is counted against.
     pub clock: usize,
-    /// Of its carrier.
+    /// Frequency of the carrier, in hertz.
     pub carrier_hz: f64,
     /// Towards the satellite: east, north, up.
     pub sight: Vector3<f64>,
     /// Expected bias once the ionosphere is corrected, metres.
     pub bias_m: f64,
-    /// Whether the satellite's clock has jumped so lately that the range is anywhere up to that bias.
+    /// True if the satellite's clock has jumped so lately that the range error is anywhere up to that bias.
     pub stepping: bool,
-    /// What the receiver takes the ionosphere for.
+    /// Ionosphere as the receiver models it.
     pub air: Air,
-    /// What the true troposphere delays, for the share that a model of it errs by.
+    /// True tropospheric delay in metres, of which a model errs by a share.
     pub troposphere_m: f64,
     /// Variance of one code value by thermal noise, m².
     pub code_m2: f64,
@@ -143,7 +143,7 @@ pub struct Forecast {
     pub short_m2: f64,
     /// Variance of what chip edges, reflected rays and beats leave, m².
     pub other_m2: f64,
-    /// How long a range remembers its noise, seconds.
+    /// Correlation time of the range's noise, seconds.
     pub memory_s: f64,
     /// Standard deviation of its Doppler as a rate, m/s.
     pub rate_sigma_mps: f64,
@@ -152,16 +152,16 @@ pub struct Forecast {
     pub rate_bias_mps: f64,
     /// C/N0 that the scene allows, Hz.
     pub cn0_hz: f64,
-    /// Whether the C/N0 observed is near the true one: in fades and jamming averages lag, which rows of their
+    /// True if the C/N0 observed is near the true one. Averages lag in fades and jamming, which rows of their
     /// own judge.
     pub steady: bool,
-    /// Whether the signal has faded so lately that its phase turns quicker than the truth's rows show.
+    /// True if the signal has faded so lately that its phase turns faster than the truth's rows show.
     pub fading: bool,
-    /// Of a model's error at the zenith: one over the elevation's sine.
+    /// Mapping factor of a model's error at the zenith: one over the elevation's sine.
     pub slant: f64,
-    /// Whether it is so near to the mask that it may be used or not.
+    /// True if the satellite is so near to the mask that it may be used or not.
     pub near_mask: bool,
-    /// Whether the fix leaves it out.
+    /// True if the fix leaves the range out.
     pub excluded: bool,
 }
 
@@ -172,17 +172,17 @@ impl Forecast {
     }
 }
 
-/// What is the same for all satellites of a run.
+/// Data that all satellites of a run share.
 pub struct Scene<'r> {
     /// The run.
     pub run: &'r Run,
-    /// What the receiver's designer chose.
+    /// Choices of the receiver's designer.
     pub choices: Choices,
-    /// What the satellites sent.
+    /// Messages that the satellites sent.
     pub message: Message,
     /// Names of the time scales of the run's signals, GPS time first.
     pub scales: Vec<&'static str>,
-    /// What the receiver knows of satellites.
+    /// Knowledge of the receiver about the satellites.
     pub(in crate::judge) heard: Heard,
     stated: &'r Stated,
     beats: Beats,
@@ -414,8 +414,8 @@ fn scales(run: &Run) -> Vec<&'static str> {
     names
 }
 
-/// What a receiver computes of a range from the message alone: geometry, light time, Earth rotation and
-/// satellite clock.
+/// Range that a receiver computes from the message alone: geometry, light time, Earth rotation and satellite
+/// clock.
 fn computed_m(ephemeris: &Ephemeris, row: &Observation, place: &TrajectoryRow) -> Option<(Vector3<f64>, f64)> {
     let sent = row.sent();
     let rough = ephemeris.clock_of_signal(sent, row.signal).ok()?;
@@ -441,7 +441,7 @@ impl Rate {
     }
 }
 
-/// Whether a signal fades, from its true strengths one after the other.
+/// State of a signal's fading, from its true strengths one after the other.
 struct Fades {
     time_s: f64,
     strongest_dbhz: f64,
@@ -455,7 +455,7 @@ impl Default for Fades {
 }
 
 impl Fades {
-    /// Whether it fades at the newest strength, or did a moment ago.
+    /// True if the signal fades at the newest strength, or did a moment ago.
     fn take(&mut self, time_s: f64, cn0_dbhz: f64) -> bool {
         let forgotten_db = FORGOTTEN_DBPS * (time_s - self.time_s);
         self.strongest_dbhz = cn0_dbhz.max(self.strongest_dbhz - forgotten_db);

@@ -1,5 +1,5 @@
-//! What a satellite's observations come to by which its loops are judged: sums and lists of errors, over
-//! those past their pull-in, without interference and with a steady C/N0.
+//! Sums and lists of errors of a satellite's observations, by which its loops are judged. They cover the
+//! observations past their pull-in, without interference and with a steady C/N0.
 
 use std::collections::VecDeque;
 
@@ -13,15 +13,15 @@ use crate::measure::errors::{Errors, PULL_IN_S, SignalError};
 use crate::read::{Numbers, Run};
 use gnss::signal::Link;
 
-/// What interference may cost before thermal theory no longer describes the loops.
+/// Largest loss of C/N0 by interference, in decibels, for which thermal theory still describes the loops.
 const JAMMED_DB: f64 = 1.0;
-/// What the true C/N0 may move within [`STEADY_S`] before averages lag.
+/// Largest change of the true C/N0 within [`STEADY_S`] that averages follow.
 const STEADY_DB: f64 = 1.0;
 const STEADY_S: f64 = 3.0;
 
 /// A satellite's settled observations.
 pub(super) struct Settled {
-    /// How many there are where the scene expects no errors, and at all.
+    /// Number of observations where the scene expects no errors, and number of all.
     pub count: usize,
     all: usize,
     /// Times of the first and the last.
@@ -31,7 +31,7 @@ pub(super) struct Settled {
     locked_s: f64,
     /// Errors without what rays make of them, metres.
     pub code: Numbers,
-    /// Where in the loops' intervals they fall.
+    /// Positions of the observations in the loops' update intervals.
     pub places: Places,
     /// Largest part that rays have in one.
     pub ray_m: f64,
@@ -51,11 +51,12 @@ pub(super) struct Settled {
 }
 
 impl Settled {
-    /// Those of a satellite. The front end lowers its C/N0; what else the stated one lacks is in theory's
-    /// share of the power or does not disturb loops.
+    /// Settled observations of a satellite. The front end lowers its C/N0. Other losses of the stated C/N0
+    /// are in theory's share of the power or do not disturb loops.
     ///
     /// # Errors
-    /// [`JudgeError`] where rows cannot be read or numbers cannot be put away.
+    ///
+    /// [`JudgeError`] where rows cannot be read or numbers cannot be stored.
     pub fn of(
         (run, access): (&Run, &MultipleAccess<'_>),
         errors: &Errors,

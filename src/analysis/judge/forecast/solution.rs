@@ -1,14 +1,14 @@
-//! What weighted least squares makes of the expected ranges at each fix: bias, noise, and the covariance that
-//! should be stated.
+//! Weighted least squares of the expected ranges at each fix: bias, noise, and the covariance to be stated.
 //!
-//! With rows h = (−sight, 1 at the place of the range's clock), weights W of the receiver's choices at the
-//! true C/N0 and N = Σ h W hᵀ: biases b become N⁻¹ Σ h W b, noise of covariance R becomes N⁻¹ (Σ h W R W hᵀ)
-//! N⁻¹, and N⁻¹ is what the receiver ought to state. Fixes are taken one after the other, with the rows of
-//! all satellites side by side, so that the sums of one are held; of several clocks the first with ranges is
-//! the fix's. Limits: weights by the measured C/N0 differ from these by its noise.
+//! The rows are h = (−sight, 1 at the position of the range's clock). W are the weights of the receiver's
+//! choices at the true C/N0, and N = Σ h W hᵀ. Biases b become N⁻¹ Σ h W b. Noise of covariance R becomes N⁻¹
+//! (Σ h W R W hᵀ) N⁻¹. N⁻¹ is the covariance that the receiver ought to state. Fixes are taken one after the
+//! other, with the rows of all satellites side by side, so that the sums of one fix are held. Of several
+//! clocks the first with ranges is the fix's. Limits: weights by the measured C/N0 differ from these by its
+//! noise.
 //!
-//! Two bands of a satellite that the receiver combines are one range here too, with a₁ = f₁²/(f₁²−f₂²) and
-//! a₂ = 1 − a₁: what the ionosphere adds to either cancels, noise grows to √(a₁²σ₁² + a₂²σ₂²).
+//! Two bands of a satellite that the receiver combines are one range here too, with a₁ = f₁²/(f₁²−f₂²) and a₂
+//! = 1 − a₁. The ionosphere cancels, and noise grows to √(a₁²σ₁² + a₂²σ₂²).
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix4, Vector4};
 
@@ -144,7 +144,7 @@ impl Sums {
     }
 }
 
-/// What is expected of one fix: east, north, up and clock, the clock's sign as the receiver's bias has it.
+/// Expected errors of one fix: east, north, up and clock, in the sign of the receiver's clock bias.
 #[derive(Clone, Debug)]
 pub struct Expected {
     /// Number of the sample, counted from the first one.
@@ -155,7 +155,7 @@ pub struct Expected {
     pub blameless: u32,
     /// Known bias, metres.
     pub bias: Vector4<f64>,
-    /// What may come on top of it in either direction, metres.
+    /// Additional error that is allowed in either direction, metres.
     pub allowed: Vector4<f64>,
     /// Covariance of all that may vary, m².
     pub noise: Matrix4<f64>,
@@ -167,29 +167,29 @@ pub struct Expected {
     pub dilution: Matrix4<f64>,
     /// Ratio of the extreme singular values of the geometry, all clocks counted.
     pub condition: f64,
-    /// Whether it is known what corrects its ionosphere.
+    /// True if the ionospheric correction is known.
     pub corrected: bool,
-    /// Whether every satellite's C/N0 was measured as it is: what is stated follows from it.
+    /// True if every satellite's C/N0 was measured at its true value, on which the stated covariance depends.
     pub steady: bool,
-    /// Whether a signal of it fades: nothing is known of its rate then.
+    /// True if a signal of the fix fades. Its rate is then unknown.
     pub fading: bool,
-    /// How long a fix remembers its noise, seconds.
+    /// Correlation time of a fix's noise, seconds.
     pub memory_s: f64,
     /// Covariance of velocity and of c times the drift, (m/s)².
     pub rate_noise: Matrix4<f64>,
-    /// What the atmosphere may add to either rate, m/s.
+    /// Error of the rates that the atmosphere may add in either direction, m/s.
     pub rate_allowed: Vector4<f64>,
 }
 
-/// What is expected of one more clock of a fix: by how much its time scale lies behind that of the fix, as
-/// the receiver's biases have it.
+/// Expected offset of one more clock of a fix: the lag of its time scale behind that of the fix, in the sign
+/// of the receiver's biases.
 #[derive(Clone, Copy, Debug)]
 pub struct Offset {
     /// Which of [`Scene::scales`].
     pub scale: usize,
     /// Known bias, metres.
     pub bias_m: f64,
-    /// What may come on top of it in either direction, metres.
+    /// Additional error that is allowed in either direction, metres.
     pub allowed_m: f64,
     /// Standard deviation of all that may vary, metres.
     pub sigma_m: f64,
@@ -369,7 +369,7 @@ impl Expected {
         }
     }
 
-    /// Whether that many satellites are all that should be used.
+    /// True if that many satellites are all that should be used.
     pub fn is_whole(&self, satellites: u32) -> bool {
         (self.satellites.0..=self.satellites.1).contains(&satellites)
     }

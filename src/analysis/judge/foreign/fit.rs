@@ -13,12 +13,12 @@ use std::collections::BTreeMap;
 pub struct Estimate {
     /// The estimate.
     pub value: f64,
-    /// Its standard deviation.
+    /// Standard deviation of the value.
     pub sigma: f64,
 }
 
 impl Estimate {
-    /// Whether it differs from `from` by more than three standard deviations.
+    /// True if the value differs from `from` by more than three standard deviations.
     pub fn differs_from(&self, from: f64) -> bool {
         (self.value - from).abs() > 3.0 * self.sigma
     }

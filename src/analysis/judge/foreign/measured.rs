@@ -1,4 +1,4 @@
-//! What is measured of a foreign receiver's observables: rows of its tables, and their figures.
+//! Measurements of a foreign receiver's observables: rows of its tables, and their figures.
 
 use serde::Serialize;
 
@@ -33,15 +33,15 @@ pub struct ObservationError {
     /// When the signal was received, by the truth's time in seconds after the truth began.
     #[serde(skip)]
     pub at_s: f64,
-    /// As the file has it.
+    /// Values of the file.
     #[serde(skip)]
     pub values: Values,
-    /// What a receiver with a perfect clock would have seen.
+    /// Values that a receiver with a perfect clock would have observed.
     #[serde(skip)]
     pub truth: State,
 }
 
-/// What an epoch's satellites have in common: a row of `foreign_clock.csv`.
+/// Common errors of an epoch's satellites: a row of `foreign_clock.csv`.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct ClockRow {
     /// The receiver's label, in seconds after the truth began.
@@ -64,7 +64,7 @@ pub struct Slip {
     pub sv: String,
     /// To the half cycle; unknown where the count was interrupted.
     pub size_cycles: Option<f64>,
-    /// By the file's loss-of-lock indicator.
+    /// True if the file's loss-of-lock indicator declares the slip.
     pub declared: bool,
     /// Satellite and signal.
     #[serde(skip)]
@@ -88,7 +88,7 @@ pub struct Arc {
     pub code_carrier_mps: Option<f64>,
 }
 
-/// What one satellite's errors come to: a row of `foreign_satellites.csv`.
+/// Statistics of one satellite's errors: a row of `foreign_satellites.csv`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Satellite {
     /// The satellite.
@@ -97,7 +97,7 @@ pub struct Satellite {
     pub signal: &'static str,
     /// Epochs in which it was observed.
     pub epochs: usize,
-    /// Its mean elevation, degrees.
+    /// Mean elevation of the satellite, degrees.
     pub elevation_deg: f64,
     /// Mean error of the code, metres.
     pub code_bias_m: Option<f64>,
@@ -130,7 +130,7 @@ pub struct Measured {
     pub joined: usize,
     /// Observations that the truth has.
     pub observations: usize,
-    /// Of satellites or times that the truth does not have.
+    /// Number of observations whose satellite or time is not in the truth.
     pub unmatched: usize,
     /// Epochs and observations less than a row of the truth before its beginning or after its end.
     pub at_edge: (usize, usize),
@@ -138,9 +138,9 @@ pub struct Measured {
     pub outliers: usize,
     /// Distance from the others of their epoch and signal from which on they are, metres.
     pub outlier_limit_m: f64,
-    /// By how much labels are late, seconds.
+    /// Delay of the time labels, seconds.
     pub time_tag_s: Option<Estimate>,
-    /// Whether it was significant, so that the truth was taken at the corrected times.
+    /// True if the delay was significant, so that the truth was taken at the corrected times.
     pub time_tag_applied: bool,
     /// Every observation.
     pub rows: Vec<ObservationError>,
@@ -168,9 +168,9 @@ pub struct Measured {
     pub cn0_db: Option<Estimate>,
     /// Drift of the receiver's clock by its code, seconds a second.
     pub drift_code: Option<f64>,
-    /// The same by its carrier.
+    /// Drift of the receiver's clock by its carrier, seconds a second.
     pub drift_carrier: Option<f64>,
-    /// The same by its Doppler.
+    /// Drift of the receiver's clock by its Doppler, seconds a second.
     pub drift_doppler: Option<f64>,
     /// Rate of code minus carrier beside that of the truth, m/s.
     pub code_carrier_mps: Option<Estimate>,

@@ -108,7 +108,7 @@ pub struct Judgement {
     pub run: Run,
     /// Everything that was measured.
     pub judged: Judged,
-    /// What it comes to.
+    /// Summary of the measurements.
     pub summary: ForeignSummary,
 }
 

@@ -69,8 +69,8 @@ pub fn measure(epochs: &[ObservedEpoch], timeline: &Timeline, shift_s: i64) -> M
     measured
 }
 
-/// What the receiver's clock is ahead by at each epoch: the median of its code errors, as one signal may be
-/// wrong. Epochs without a pseudorange take the reading before them, the first ones that of the next.
+/// Clock offset of the receiver at each epoch in seconds: the median of its code errors, as one signal may be
+/// wrong. Epochs without a pseudorange take the offset of the epoch before, the first ones that of the next.
 fn readings_s(pairs: &[Pair<'_>], epochs: usize) -> Vec<f64> {
     let mut found = vec![None; epochs];
     for epoch in by_epoch(pairs) {
@@ -191,7 +191,7 @@ fn doppler_and_strength(measured: &mut Measured, pairs: &[Pair<'_>]) {
     measured.cn0_db = mean_of_means(&strengths.values().filter_map(|errors| mean(errors)).collect::<Vec<_>>());
 }
 
-/// Whether code, carrier and Doppler of the receiver agree on one clock and one motion.
+/// Tests code, carrier and Doppler of the receiver for one clock and one motion.
 fn consistency(measured: &mut Measured, pairs: &[Pair<'_>], carriers: &Carriers, arcs: &Arcs) {
     let mut drifts = Vec::new();
     let mut turns = Vec::new();
@@ -218,7 +218,7 @@ fn consistency(measured: &mut Measured, pairs: &[Pair<'_>], carriers: &Carriers,
     measured.doppler_carrier_hz = mean_of_means(&turns);
 }
 
-/// What an arc's carriers come to; none of fewer than three.
+/// Line through an arc's carriers; `None` for fewer than three.
 fn line_of(pairs: &[Pair<'_>], carriers: &Carriers, arc: &[usize]) -> Option<Arc> {
     let (first, last) = (pairs.get(*arc.first()?)?, pairs.get(*arc.last()?)?);
     let points =

@@ -74,7 +74,7 @@ pub(super) fn by_epoch<'p, 'a>(pairs: &'p [Pair<'a>]) -> impl Iterator<Item = &'
 /// Something of each epoch and signal, by epoch number.
 pub(super) type BySignal = BTreeMap<(usize, &'static Signal), f64>;
 
-/// The same epochs with their signals apart: a receiver's delays differ by signal.
+/// Pairs of each epoch and signal. Signals are separate, because a receiver's delays differ by signal.
 pub(super) fn by_signal<'p, 'a>(pairs: &'p [Pair<'a>]) -> impl Iterator<Item = Vec<&'p Pair<'a>>> {
     by_epoch(pairs).flat_map(|epoch| {
         let mut groups: BTreeMap<&'static Signal, Vec<&'p Pair<'a>>> = BTreeMap::new();
@@ -84,7 +84,7 @@ pub(super) fn by_signal<'p, 'a>(pairs: &'p [Pair<'a>]) -> impl Iterator<Item = V
 }
 
 impl Pair<'_> {
-    /// Its epoch and signal.
+    /// Epoch and signal of the pair.
     pub fn group(&self) -> (usize, &'static Signal) {
         (self.epoch, self.link.signal)
     }

@@ -27,7 +27,7 @@ pub struct FixError {
     pub north_m: f64,
     /// Error upward, metres.
     pub up_m: f64,
-    /// Of the velocity over ground.
+    /// Error of the velocity over ground, eastward, m/s.
     pub velocity_east_mps: Option<f64>,
     /// Error of the velocity to the north, m/s.
     pub velocity_north_mps: Option<f64>,
@@ -43,7 +43,7 @@ impl FixError {
     }
 }
 
-/// What the positions come to.
+/// Statistics of the positions.
 #[derive(Clone, Debug, Default)]
 pub struct Places {
     /// Fixes of the file.
@@ -62,9 +62,10 @@ pub struct Places {
     pub error_3d_p95_m: Option<f64>,
     /// Root mean square of the error of the ground speed, m/s.
     pub ground_speed_rms_mps: Option<f64>,
-    /// By how much labels are late along the motion, seconds.
+    /// Delay of the time labels along the motion, seconds.
     pub time_tag_s: Option<Estimate>,
-    /// The same without what all errors have in common: of a motion that turns or changes its speed.
+    /// Delay of the time labels in seconds, without the common part of all errors. It needs a motion that
+    /// turns or changes its speed.
     pub changing_s: Option<Estimate>,
     /// Fixes at the place of the one before, to the last digit.
     pub repeated: usize,

@@ -1,8 +1,8 @@
-//! What a foreign receiver comes to: `foreign.json`, and the biases by name.
+//! Result for a foreign receiver: `foreign.json`, and the biases by name.
 //!
-//! A bias is named when it differs from nothing (a scale: from one) by more than three of its standard
-//! deviations, and said to be absent otherwise, with the bound that the file allows. The clock is no error:
-//! it is named for who builds on the file.
+//! A bias is named when it differs from zero (a scale: from one) by more than three of its standard
+//! deviations. Otherwise the report states that it is absent, with the bound that the file allows. The clock
+//! is not an error. It is named for users of the file.
 
 use std::fmt;
 use std::sync::OnceLock;
@@ -47,9 +47,9 @@ fn leaves() -> &'static [Leaf] {
 pub struct ForeignSummary {
     /// The scene's name.
     pub scene: String,
-    /// As its RINEX header says.
+    /// Receiver that the RINEX header names.
     pub receiver: Option<String>,
-    /// How the files were joined with the truth.
+    /// Join of the files with the truth.
     pub join: Join,
     /// The receiver's clock.
     pub clock: Clock,
@@ -67,7 +67,7 @@ pub struct ForeignSummary {
     pub findings: Vec<String>,
 }
 
-/// How files and truth were brought together.
+/// Join of files and truth.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Join {
     /// Epochs of the file of observations.
@@ -76,7 +76,7 @@ pub struct Join {
     pub epochs_joined: usize,
     /// Observations that the truth has.
     pub observations: usize,
-    /// Of satellites or times that the truth does not have.
+    /// Number of observations whose satellite or time is not in the truth.
     pub observations_unmatched: usize,
     /// Pseudoranges so far from the others that another signal must have been followed.
     pub observations_outliers: usize,
@@ -88,15 +88,15 @@ pub struct Join {
     pub interpolation_carrier_cycles: f64,
     /// Largest error of a Doppler between the truth's rows, Hz.
     pub interpolation_doppler_hz: f64,
-    /// By how many weeks the dates of observations and positions were off.
+    /// Weeks by which the observations' labels were moved.
     pub observations_week_offset: i64,
     /// Weeks by which the positions' labels were moved.
     pub positions_week_offset: i64,
-    /// By how much labels of observations are late, from the slope of pseudorange errors over Doppler.
+    /// Delay of the observations' labels in seconds, from the slope of pseudorange errors over Doppler.
     pub time_tag_offset_s: Option<f64>,
     /// Standard deviation of the time tag, seconds.
     pub time_tag_sigma_s: Option<f64>,
-    /// Whether that was significant, and the truth taken at the corrected times.
+    /// True if the delay was significant, and the truth taken at the corrected times.
     pub time_tag_applied: bool,
 }
 
@@ -105,8 +105,8 @@ pub struct Join {
 pub struct Clock {
     /// Mean over the epochs of the pseudoranges' common error: label minus GPS time, as the file has it.
     pub pseudorange_common_m: Option<f64>,
-    /// The same less the sampler's clock: a bias of all pseudoranges, of a receiver that labels its epochs by
-    /// counting samples.
+    /// Mean common error of the pseudoranges in metres, less the sampler's clock. It is a bias of all
+    /// pseudoranges for a receiver that labels its epochs by counting samples.
     pub pseudorange_common_less_sampler_m: Option<f64>,
     /// Mean reading minus GPS time, seconds.
     pub bias_mean_s: Option<f64>,
@@ -135,7 +135,7 @@ pub struct Code {
     pub largest_bias_sv: Option<String>,
     /// Slope over time of code minus carrier.
     pub minus_carrier_drift_mps: Option<f64>,
-    /// Its standard deviation, m/s.
+    /// Standard deviation of the slope, m/s.
     pub minus_carrier_drift_sigma_mps: Option<f64>,
 }
 
@@ -148,7 +148,7 @@ pub struct Carrier {
     pub rms_cycles: Option<f64>,
     /// Breaks of a count.
     pub slips: usize,
-    /// Those that the file does not declare.
+    /// Slips that the file does not declare.
     pub slips_undeclared: usize,
 }
 
@@ -163,7 +163,7 @@ pub struct Doppler {
     pub rms_hz: Option<f64>,
     /// Doppler plus the carrier's own rate.
     pub minus_carrier_rate_hz: Option<f64>,
-    /// Its standard deviation, Hz.
+    /// Standard deviation of the difference, Hz.
     pub minus_carrier_rate_sigma_hz: Option<f64>,
 }
 
@@ -172,7 +172,7 @@ pub struct Doppler {
 pub struct Cn0 {
     /// Mean error, dB.
     pub bias_db: Option<f64>,
-    /// Its standard deviation, dB.
+    /// Standard deviation of the mean error, dB.
     pub bias_sigma_db: Option<f64>,
 }
 

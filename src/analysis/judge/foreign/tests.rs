@@ -21,7 +21,7 @@ const RATE_HZ: u64 = 2_600_000;
 const PRNS: [u8; 9] = [2, 5, 7, 12, 15, 18, 21, 26, 29];
 const SAMPLER: (f64, f64) = (1.3e-4, 5e-8);
 
-/// What a receiver does to what it receives.
+/// Biases of a foreign receiver's files.
 struct Planted {
     late_s: f64,
     clock: (f64, f64),

@@ -74,7 +74,7 @@ fn strangers(run: &Run) -> Found {
     found
 }
 
-/// What a channel has reached at each of its events, and before its first observation.
+/// Checks the order of a channel's events, and of the events before its first observation.
 fn order(run: &Run) -> Result<Found, JudgeError> {
     let mut reached: BTreeMap<Link, BTreeMap<u8, u64>> = BTreeMap::new();
     let mut found = Found::default();
@@ -107,7 +107,7 @@ fn order(run: &Run) -> Result<Found, JudgeError> {
     Ok(found)
 }
 
-/// What `receiver.json` counts; `None` without it.
+/// Checks the counts in `receiver.json`; `None` without the file.
 fn counts(run: &Run) -> Result<Option<Found>, JudgeError> {
     if run.receiver.is_null() {
         return Ok(None);

@@ -1,9 +1,8 @@
-//! What several columns say of the same time: lock times, pseudoranges against times sent, a fix's bias
-//! against its time.
+//! Agreement of several columns about time: lock times, pseudoranges against times sent, a fix's bias against
+//! its time.
 //!
-//! A receiver's clock reads what it reads: its readings may differ from the nominal ones of the truth by any
-//! constant. That constant is the same for every row of every table. Limits: a receiver that sets its clock
-//! anew within a run has several.
+//! The offset of a receiver's clock from the truth's nominal time may be any constant. That constant is the
+//! same for every row of every table. Limits: a receiver that sets its clock anew within a run has several.
 
 use super::{Finding, Found};
 use crate::error::JudgeError;
@@ -13,7 +12,7 @@ use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::record::{Event, Observation};
 use gnss::signal::Link;
 
-/// What a lock time may err by: it counts whole updates, of which none is longer than a bit.
+/// Allowed error of a lock time in seconds: it counts whole updates, of which none is longer than a bit.
 const LOCK_S: f64 = 0.02;
 /// Rounding of readings: pseudoranges of 1e8 m in a double are known to 2e-8 m, and GPS time's fraction to
 /// 1e-16 s.

@@ -1,11 +1,10 @@
-//! What people and other programs read of a run, against the tables that are judged: geographic columns of
+//! Files of a run for people and other programs, against the tables that are judged: geographic columns of
 //! `fixes.csv`, `observations.rnx`, `fixes.nmea`.
 //!
 //! The files go through the readers for other receivers' results, one epoch at a time, so that memory stays
-//! flat. Differences are judged by what would mislead a user: a place by the fix's own sigma, a measurement
-//! by what noise makes of it. Limits: the formats round less than that; a carrier's constant is free, so that
-//! carriers are compared by what they grow from epoch to epoch; tracks for maps and `navigation.rnx` are not
-//! read.
+//! flat. A difference is judged by its effect on a user: a position by the fix's own sigma, a measurement by
+//! its noise. Limits: the formats round less than that. A carrier's constant is free, so that carriers are
+//! compared by their change from epoch to epoch. Tracks for maps and `navigation.rnx` are not read.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -148,7 +147,7 @@ struct Compared {
 struct Beside {
     reader: Reader<BufReader<File>>,
     epoch: Option<ObservedEpoch>,
-    /// Of each signal the reading before, and the carrier as the table and the file have it, cycles.
+    /// Reading before of each signal, with the carrier in the table and in the file, cycles.
     before: BTreeMap<(Sv, &'static str), (Epoch, f64, Option<f64>)>,
     compared: Compared,
 }

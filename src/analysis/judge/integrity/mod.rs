@@ -1,10 +1,10 @@
-//! Whether a receiver's tables are whole and agree with one another.
+//! Completeness and consistency of a receiver's tables.
 //!
-//! A value may be right and its row still not be what a receiver wrote: doubled, out of order, repeated,
-//! missing, of another time. `tables` looks at rows of one table, `clocks` at what several columns say of
-//! time, `acquisition` at searches against truth and events, `claims` at messages, events and `receiver.json`
-//! against the tables, `files` at what is written for people and other programs. Each finding is a count or a
-//! measure with its limit and where it was first found.
+//! A value may be right and its row still be wrong: doubled, out of order, repeated, missing, or of another
+//! time. `tables` checks the rows of one table, and `clocks` the columns about time. `acquisition` checks
+//! searches against truth and events. `claims` checks messages, events and `receiver.json` against the
+//! tables. `files` checks the files for people and other programs. Each finding is a count or a measure with
+//! its limit and its first occurrence.
 
 mod acquisition;
 mod claims;
@@ -19,7 +19,7 @@ use crate::read::Run;
 /// One law of the tables and how far it is broken.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
-    /// What is measured, in words.
+    /// Name of the measured figure, in words.
     pub figure: &'static str,
     /// The value.
     pub value: f64,
@@ -44,7 +44,7 @@ impl Finding {
     }
 }
 
-/// How many there are, and where the first is.
+/// Number of occurrences, and the first one.
 #[derive(Clone, Debug, Default)]
 struct Found {
     count: usize,

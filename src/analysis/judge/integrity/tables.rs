@@ -19,7 +19,7 @@ const GAP: f64 = 1.5;
 /// Time in which every loop has been updated, and every value of it with noise.
 const RENEWED_S: f64 = 0.095;
 
-/// Whether measured values repeat, row after row.
+/// Repetition of measured values, row after row.
 struct Repeats<const N: usize> {
     renewed: Option<u64>,
     before: Option<[u64; N]>,
@@ -33,7 +33,7 @@ impl<const N: usize> Repeats<N> {
         Self { renewed: run.scene.noise.then_some(renewed), before: None, last: None }
     }
 
-    /// Whether the values at a sample are those of before.
+    /// True if the values at a sample are equal to those before.
     fn take(&mut self, sample: u64, values: [f64; N]) -> bool {
         let values = values.map(f64::to_bits);
         let all = self.before.replace(values) == Some(values);
@@ -50,7 +50,7 @@ impl<const N: usize> Repeats<N> {
     }
 }
 
-/// What is looked for in every table.
+/// Faults of rows that are sought in every table.
 #[derive(Default)]
 struct Rows {
     doubled: Found,

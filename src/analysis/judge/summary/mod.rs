@@ -1,7 +1,7 @@
-//! What a run comes to: the numbers that scripts gate on, and the finer ones that the report prints.
+//! Summary of a run: the numbers that scripts gate on, and the finer ones that the report prints.
 //!
-//! The serialised keys and their order are a contract; a number that a scene cannot have is null.
-//! [`Details`] stays in memory.
+//! The serialised keys and their order are a contract. A number that a scene cannot have is null. [`Details`]
+//! stays in memory.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -65,7 +65,7 @@ pub struct Summary {
     /// Continuous waves that the receiver reported; absent of one that does not look.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interference: Option<Lines>,
-    /// What a spoofer did; absent without one.
+    /// Effect of a spoofer on the fixes; absent without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spoofing: Option<Spoofing>,
     /// The ionosphere that two bands showed; absent without a satellite that has them.
@@ -73,17 +73,17 @@ pub struct Summary {
     pub ionosphere: Option<Ionosphere>,
     /// Figures that the verdict does not judge, each with the reason.
     pub not_judged: Vec<String>,
-    /// How fast the stages ran.
+    /// Speed of the stages.
     pub speed: Speed,
-    /// Whether there was interference.
+    /// True if there was interference.
     #[serde(skip)]
     pub jammed: bool,
-    /// What the report prints beyond the keys.
+    /// Further figures that the report prints.
     #[serde(skip)]
     pub details: Details,
 }
 
-/// How many satellites there were and what became of them.
+/// Number of satellites, by the stages that they reached.
 #[derive(Clone, Debug, Serialize)]
 pub struct Satellites {
     /// Above the scene's mask at its first sample.
@@ -113,7 +113,7 @@ pub struct Position {
     pub error_3d_p95_m: Option<f64>,
     /// Mean of the errors east, north, up.
     pub bias_enu_m: Option<[f64; 3]>,
-    /// Of the three-dimensional velocity error.
+    /// 95th percentile of the three-dimensional velocity error, m/s.
     pub velocity_p95_mps: Option<f64>,
     /// Mean normalised error squared with the receiver's own covariance, 3 of a consistent one; the 95 % band
     /// of that mean for as many independent fixes as the errors' autocorrelation leaves.
@@ -122,7 +122,7 @@ pub struct Position {
     pub nees_band: Option<[f64; 2]>,
     /// Independent fixes that the mean is worth.
     pub nees_independent: Option<f64>,
-    /// Where the mean lies against the band.
+    /// Result of the comparison of the mean with the band.
     pub nees_verdict: Option<Calibration>,
 }
 
@@ -150,13 +150,13 @@ pub struct Clock {
     pub tdev_1s_s: Option<f64>,
     /// The true clock's, over the whole run.
     pub true_oadev_1s: Option<f64>,
-    /// That of a clock solved from independent code measurements: √3 × TDOP × σ of the code/(speed of light ×
-    /// 1 s).
+    /// Overlapping Allan deviation at 1 s of a clock solved from independent code measurements. It is √3 ×
+    /// TDOP × σ of the code/(speed of light × 1 s).
     pub code_noise_oadev_1s: Option<f64>,
     /// Strengths h₂, h₁, h₀, h₋₁, h₋₂ of power-law noises (S_y = Σ h f^α, in Hz^(−α − 1)) fitted to the Allan
     /// deviations of the estimate and of the true clock.
     pub h: Option<[f64; 5]>,
-    /// The same of the truth.
+    /// Strengths of the power-law noises of the true clock.
     pub true_h: Option<[f64; 5]>,
 }
 
@@ -178,8 +178,8 @@ pub struct Observables {
     pub cn0_bias_db: Option<f64>,
 }
 
-/// How well the loops held: the loop's oscillator minus truth, each satellite about its own mean, without the
-/// first [`PULL_IN_S`](crate::measure::errors::PULL_IN_S) of each lock.
+/// Tracking errors: the loop's oscillator minus truth, each satellite about its own mean, without the first
+/// [`PULL_IN_S`](crate::measure::errors::PULL_IN_S) of each lock.
 #[derive(Clone, Debug, Serialize)]
 pub struct Tracking {
     /// Number of losses of lock.
@@ -205,14 +205,14 @@ pub struct Tracking {
     pub fll_hz: Option<Pooled>,
 }
 
-/// What [`Observables`] and [`Tracking`] say, of one signal.
+/// [`Observables`] and [`Tracking`] of one signal.
 #[derive(Clone, Debug, Serialize)]
 pub struct BySignal {
-    /// That were observed.
+    /// Number of observed satellites.
     pub satellites: usize,
     /// Errors of its observations.
     pub observables: Observables,
-    /// Its loops.
+    /// Standard deviations of the signal's loops.
     pub tracking: SignalTracking,
 }
 
@@ -238,7 +238,7 @@ pub struct Navigation {
     pub parameters_wrong: usize,
 }
 
-/// What the report adds to the summary.
+/// Figures that the report adds to the summary.
 #[derive(Clone, Debug, Default)]
 pub struct Details {
     /// Code error with the epoch's common part removed.
@@ -251,7 +251,7 @@ pub struct Details {
     pub cn0_db: Option<Spread>,
     /// Mean of the C/N0 that the scene sets, dB-Hz.
     pub cn0_true_dbhz: Option<f64>,
-    /// The same with other satellites and interference counted as noise, dB-Hz.
+    /// Mean C/N0 with other satellites and interference counted as noise, dB-Hz.
     pub cn0_effective_dbhz: Option<f64>,
     /// Mean of the C/N0 that the receiver measures, dB-Hz.
     pub cn0_measured_dbhz: Option<f64>,
@@ -281,7 +281,7 @@ pub struct Details {
     pub false_satellites: Vec<String>,
     /// Every figure against its limit.
     pub verdict: Verdict,
-    /// What the stated C/N0 lacks.
+    /// Losses that the stated C/N0 does not contain.
     pub stated: Stated,
 }
 
@@ -290,7 +290,7 @@ pub struct Details {
 pub struct Thresholds {
     /// A sixth of the early-late spacing: 3σ stays inside the discriminator's linear zone.
     pub dll_chips: f64,
-    /// Of the phase loop, degrees.
+    /// Bound of the phase loop, degrees.
     pub pll_deg: f64,
     /// A twelfth of the inverse integration time.
     pub fll_hz: f64,
@@ -467,7 +467,7 @@ fn by_signal(run: &Run, errors: &Errors, stated: &Stated) -> Result<BTreeMap<&'s
     signals.into_iter().map(one).collect()
 }
 
-/// Of one signal, or of all.
+/// Observables of one signal, or of all.
 fn observables(
     errors: &Errors,
     (signal, stated): (Option<&Signal>, &Stated),

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use super::Point;
 use crate::expect::theory::clock::{EXPONENTS, PowerLaw, allan_variance_of_each};
 
-/// What a further noise must take off the weighted sum of squares: that of two standard deviations.
+/// Reduction of the weighted sum of squares that a further noise must bring: that of two standard deviations.
 const WORTH: f64 = 4.0;
 /// Steps of Gauss and Newton, of which fewer than ten are needed.
 const STEPS: usize = 50;

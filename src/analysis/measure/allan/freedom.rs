@@ -9,14 +9,14 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// How an estimator takes its differences.
+/// Form of an estimator's differences.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Estimator {
     /// Order of the phase difference: 2 for Allan's variances, 3 for Hadamard's.
     pub order: usize,
-    /// Whether phase is averaged over τ first.
+    /// True if phase is averaged over τ first.
     pub modified: bool,
-    /// Whether a difference starts at every sample, or only every τ.
+    /// True if a difference starts at every sample, false if only every τ.
     pub overlapped: bool,
 }
 
@@ -56,7 +56,7 @@ pub fn degrees_of_freedom(estimator: Estimator, alpha: i32, m: usize, count: usi
     Some(terms as f64 * squared(0) / (ends + 2.0 * between))
 }
 
-/// What averages the phase; the unit of time is τ.
+/// Filter that averages the phase; the unit of time is τ.
 #[derive(Clone, Copy)]
 enum Filter {
     /// A mean over continuous time of 1/steps.
@@ -77,7 +77,7 @@ fn integral(t: f64, alpha: i32) -> f64 {
     if matches!(alpha, 2 | -1 | -2) { -size } else { size }
 }
 
-/// Of the phase after the averaging.
+/// Autocovariance of the phase after the averaging.
 fn averaged(t: f64, filter: Filter, alpha: i32) -> f64 {
     match filter {
         Filter::Mean { steps } => {
@@ -93,8 +93,8 @@ fn averaged(t: f64, filter: Filter, alpha: i32) -> f64 {
     }
 }
 
-/// Of its differences of that order over τ: the weights are the binomials of twice the order with alternating
-/// sign.
+/// Autocovariance of the differences of order `order` over τ. The weights are the binomials of twice the
+/// order with alternating sign.
 fn differenced(t: f64, order: usize, filter: Filter, alpha: i32) -> f64 {
     let weights: &[f64] = match order {
         1 => &[2.0, -1.0],

@@ -18,7 +18,7 @@ fn thousand_points() -> Vec<f64> {
     x
 }
 
-/// Whether a value rounds to what was printed.
+/// True if a value rounds to the printed one.
 fn prints_as(value: f64, printed: &str) -> bool {
     let mantissa = printed.split('e').next().unwrap_or(printed);
     let digits = mantissa.bytes().filter(u8::is_ascii_digit).count();

@@ -79,7 +79,7 @@ impl Line {
         (square > 0.0).then(|| Self { middle, slope: product / square })
     }
 
-    /// Its value at a time.
+    /// Value of the line at a time in seconds.
     pub fn at(&self, time_s: f64) -> f64 {
         self.middle.1 + self.slope * (time_s - self.middle.0)
     }
@@ -164,7 +164,7 @@ pub struct Clock {
     pub truth_line: Option<Line>,
     /// Straight line of the error.
     pub error_line: Option<Line>,
-    /// Those that have an interval.
+    /// Series that have an interval.
     pub series: Vec<Series>,
     /// Standard deviation of a clock solved from independent code measurements of this run's scatter.
     pub code_sigma_s: Option<f64>,

@@ -60,7 +60,7 @@ pub struct PositionError {
     pub enu_m: Vector3<f64>,
     /// Speed of light times the error of GPS time.
     pub clock_m: f64,
-    /// What the receiver's clock read minus GPS time, in truth.
+    /// True offset of the receiver's clock from GPS time, seconds.
     pub true_clock_s: f64,
     /// Error of the velocity east, north and up, m/s.
     pub velocity_enu_mps: Vector3<f64>,
@@ -132,7 +132,7 @@ impl SpillRow<&'static Signal> for EpochSum {
     }
 }
 
-/// What the code errors of a signal have in common, by the samples of their epochs.
+/// Common code error of a signal, by the samples of its epochs.
 pub struct Common<'e>(Finder<'e, &'static Signal, EpochSum>);
 
 impl Common<'_> {
@@ -141,7 +141,7 @@ impl Common<'_> {
         self.0.get(sample).map(|EpochSum { sum_m, count, .. }| (sum_m / count as f64, count))
     }
 
-    /// The same where there are several.
+    /// Common code error of a signal where several satellites are observed.
     pub fn of_several(&mut self, sample: u64) -> Option<f64> {
         self.get(sample).filter(|(_, count)| *count > 1).map(|(mean_m, _)| mean_m)
     }
@@ -151,7 +151,8 @@ impl Common<'_> {
 pub struct Errors {
     /// In the order of their samples.
     pub signals: SpillStore<Link, SignalError>,
-    /// Those of each epoch together, signal by signal: what signals differ by is no error of a satellite.
+    /// Code errors of each epoch together, signal by signal. Differences between signals are not errors of a
+    /// satellite.
     epochs: SpillStore<&'static Signal, EpochSum>,
     /// Errors of all fixes that have a truth.
     pub positions: Table<PositionError>,
@@ -167,8 +168,8 @@ pub struct Errors {
 /// twenty where noise delays it as it does once in a thousand times. A tick of 0.1 s comes on top.
 const DETECTION_S: f64 = 0.5;
 
-/// Whether a sample that the truth has for other satellites follows so closely on this one's last row that no
-/// receiver can know yet that the signal is gone.
+/// True if a sample of the truth for other satellites follows this one's last row so closely that no receiver
+/// can know yet that the signal is gone.
 fn has_just_gone(run: &Run, link: Link, sample: u64, truth: &mut Finder<'_, Link, Observation>) -> bool {
     let last = truth.before(sample);
     run.cn0_most_hz.finder().get(sample, link.signal).is_some()
@@ -323,10 +324,11 @@ impl Errors {
         self.pooled_by(signal, |_, row| of(row))
     }
 
-    /// The same of a number that depends on the satellite's signal too.
+    /// Pool of a number of every observation that depends on the satellite's signal too.
     ///
     /// # Errors
-    /// As [`Self::pooled`].
+    ///
+    /// Same as [`Self::pooled`].
     pub fn pooled_by(
         &self,
         signal: Option<&Signal>,
@@ -399,18 +401,20 @@ impl Errors {
         Ok(all)
     }
 
-    /// What the code errors of a signal have in common.
+    /// Common code error of a signal.
     ///
     /// # Errors
-    /// As [`SpillStore::finder`].
+    ///
+    /// Same as [`SpillStore::finder`].
     pub fn common(&self, signal: &'static Signal) -> Result<Common<'_>, JudgeError> {
         Ok(Common(self.epochs.finder(signal)?))
     }
 
-    /// That all rows could be read which were looked for by their samples.
+    /// Checks that all rows which were looked up by their samples could be read.
     ///
     /// # Errors
-    /// As [`SpillStore::sound`].
+    ///
+    /// Same as [`SpillStore::sound`].
     pub fn sound(&self) -> Result<(), JudgeError> {
         self.signals.sound()?;
         self.epochs.sound()?;

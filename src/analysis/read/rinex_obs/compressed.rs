@@ -16,7 +16,7 @@ const ORDERS: usize = 5;
 /// Digits of a value, its sign and point among them.
 const DIGITS: usize = 14;
 
-/// What lines to come are differences from.
+/// State from which later lines are differences.
 pub(super) struct Restorer {
     /// The first character of an epoch line: as it is plain, and where it begins anew.
     first: [char; 2],

@@ -6,20 +6,20 @@ use std::io::BufRead;
 use super::{Lines, Parsed, columns};
 use gnss::satellite::{Sv, System};
 
-/// What a file's header says.
+/// Header of a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Header {
     /// `PGM` and `REC # / TYPE / VERS`, to say whose file it is.
     pub receiver: String,
-    /// Whether it says that a clock offset was applied to epoch, code and phase.
+    /// True if the header says that a clock offset was applied to epoch, code and phase.
     pub clock_applied: bool,
     /// Interval of its epochs, if it says one, seconds.
     pub interval_s: Option<f64>,
     /// Frequency channels of GLONASS satellites.
     pub channels: BTreeMap<Sv, i8>,
-    /// Whether the records are those of RINEX 2.
+    /// True if the records are those of RINEX 2.
     pub(super) is_second: bool,
-    /// Whether they are compressed by Hatanaka's scheme.
+    /// True if the records are compressed by Hatanaka's scheme.
     pub(super) is_compressed: bool,
     /// System of satellites without a letter.
     letter: char,
@@ -183,7 +183,7 @@ impl Header {
         Ok(())
     }
 
-    /// By how much the values of a code are multiplied in the file.
+    /// Factor of the values of a code in the file.
     pub(super) fn scale_of(&self, sv: Sv, code: &str) -> f64 {
         if self.scales.is_empty() {
             return 1.0;

@@ -45,11 +45,12 @@ pub(super) struct Glyph {
     pub id: u16,
     /// In units of the font size.
     pub advance: f32,
-    /// Its bytes in the text.
+    /// Byte range of the glyph in the text.
     pub range: Range<usize>,
 }
 
-/// Where a line may break: at blanks and tabulators, not at the blanks that bind.
+/// Words of a text, between which a line may break. Blanks and tabulators separate them, and non-breaking
+/// blanks do not.
 pub(super) fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split([' ', '\t', '\n']).filter(|word| !word.is_empty())
 }

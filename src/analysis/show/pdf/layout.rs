@@ -9,7 +9,7 @@ pub(super) const PAGE: (f32, f32) = (595.28, 841.89);
 pub(super) const LEFT: f32 = 56.0;
 const TOP: f32 = 64.0;
 const BOTTOM: f32 = 60.0;
-/// Of the text.
+/// Width of the text in points.
 pub(super) const WIDTH: f32 = PAGE.0 - 2.0 * LEFT;
 
 pub(super) type Colour = [u8; 3];

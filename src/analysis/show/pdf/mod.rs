@@ -36,13 +36,13 @@ pub enum PdfError {
     Write(String),
 }
 
-/// How a cell or a banner is to be taken. Colours that colour-blind people distinguish; words say the same.
+/// Meaning of a cell or a banner. Its colours are distinct for colour-blind people, and the words say it too.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tone {
-    /// As the text about it.
+    /// Same weight as the surrounding text.
     #[default]
     Plain,
-    /// Of less weight.
+    /// Less weight than the surrounding text.
     Faint,
     /// In bold.
     Strong,
@@ -57,9 +57,9 @@ pub enum Tone {
 /// One cell of a table.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Cell {
-    /// What it says.
+    /// Text of the cell.
     pub text: String,
-    /// How it is set.
+    /// Meaning of the cell, which sets its colour.
     pub tone: Tone,
 }
 
@@ -109,10 +109,10 @@ impl Table {
     }
 }
 
-/// What flows down the pages.
+/// Element in the flow of the pages.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Item {
-    /// Of a chapter: in the outline.
+    /// Heading of a chapter, listed in the outline.
     Heading(String),
     /// Within a chapter.
     Subheading(String),
@@ -130,7 +130,7 @@ pub enum Item {
     Figure(Drawing, String),
     /// Lines as they are, in a font of equal widths.
     Listing(String),
-    /// What follows begins on a page of its own.
+    /// Page break.
     NewPage,
 }
 

@@ -89,8 +89,8 @@ fn draw(sheet: &mut Sheet<'_>, table: &Table, row: &TableRow, widths: &[f32]) {
     sheet.skip(row.height);
 }
 
-/// As wide as their longest cells if the page holds that; otherwise the longest are cut, though no column
-/// below its longest word while there is room for all of those.
+/// Widths of the columns in points. They are as wide as their longest cells if the page holds that. Otherwise
+/// the longest are cut, though no column below its longest word while there is room for all of those.
 fn widths(table: &Table, fonts: &Fonts) -> Vec<f32> {
     let columns = table.columns.len();
     let (mut natural, mut least) = (vec![0.0_f32; columns], vec![0.0_f32; columns]);

@@ -19,12 +19,12 @@ use crate::show::write::write_whole;
 /// A run's report, complete but for its pictures.
 pub(crate) struct RunReport {
     report: Report,
-    /// Where among its items they come.
+    /// Index among the items at which the pictures are inserted.
     figures: usize,
 }
 
 impl RunReport {
-    /// What a run's report says.
+    /// Report of a run.
     pub fn new(judged: &Judged<'_>) -> Result<Self, JudgeError> {
         let summary = judged.summary;
         let head = format!("receiver against truth · seed {}", summary.seed);

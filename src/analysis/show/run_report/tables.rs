@@ -65,7 +65,7 @@ fn accuracy(report: &mut Report, judged: &Judged<'_>) {
     report.table(table);
 }
 
-/// What each of several signals came to.
+/// Adds a table with the results of each signal, if there are several.
 fn signals(report: &mut Report, judged: &Judged<'_>) {
     if judged.summary.signals.len() < 2 {
         return;
