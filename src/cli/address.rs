@@ -18,11 +18,13 @@ pub fn path(text: &str) -> Result<PathBuf, String> {
     if text.is_empty() { Err("expected a path".to_owned()) } else { Ok(text.into()) }
 }
 
-/// Where a listener waits: `PORT` and `localhost:PORT` on this machine alone, `IP:PORT` on the interface that
-/// has this address, `0.0.0.0:PORT` and `[::]:PORT` on all of them.
+/// Parses the address of a listener. `PORT` and `localhost:PORT` are on this machine alone. `IP:PORT` is on
+/// the interface that has this address. `0.0.0.0:PORT` and `[::]:PORT` are on all interfaces.
 ///
 /// # Errors
-/// What was expected, of any other text. Host names are refused: what they mean changes from place to place.
+///
+/// Expected form, for any other text. Host names are refused, because their meaning changes from place to
+/// place.
 pub fn listen_address(text: &str) -> Result<SocketAddr, String> {
     let port = text.strip_prefix("localhost:").or_else(|| text.strip_prefix(':')).unwrap_or(text);
     if let Ok(port) = port.parse() {

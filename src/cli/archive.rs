@@ -9,7 +9,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 /// A file in an archive.
 pub struct Member {
     pub name: String,
-    /// Where its contents begin.
+    /// Offset of the member's contents in the archive, bytes.
     pub first: u64,
     pub size: u64,
 }

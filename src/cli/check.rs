@@ -10,7 +10,7 @@ use crate::cli::error::CliError;
 use crate::cli::printed::Printed;
 use crate::cli::scenario;
 
-/// What a run must keep for the program to end with 0.
+/// Conditions under which the program ends with 0.
 pub enum Gate {
     /// Nothing: the verdict is printed.
     Open,

@@ -1,4 +1,4 @@
-//! What `generate` writes of a scene with several front ends: a directory with a SigMF recording of each, a
+//! Output of `generate` for a scene with several front ends: a directory with a SigMF recording of each, a
 //! collection over them, and the truth of all.
 
 use std::fs::{self, File};
@@ -57,7 +57,7 @@ pub fn generate(arguments: &args::Generate, scenes: &[Scene]) -> Result<(), CliE
     })
 }
 
-/// What several front ends cannot have.
+/// Refuses arguments that several front ends cannot have.
 fn check(arguments: &args::Generate, names: &[&str]) -> Result<(), CliError> {
     let (count, known) = (names.len(), names.join(", "));
     if arguments.seek != 0 || arguments.samples.is_some() {
@@ -77,7 +77,7 @@ fn check(arguments: &args::Generate, names: &[&str]) -> Result<(), CliError> {
     Ok(())
 }
 
-/// What ends the work early.
+/// Error that ends the work early.
 enum Failure {
     Generate(GenerateError),
     Write(CliError),

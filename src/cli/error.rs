@@ -1,8 +1,8 @@
-//! What ends the program, and with which exit code.
+//! Errors that end the program, and their exit codes.
 //!
-//! 0 done · 2 usage · 3 a check failed or a result is incomplete · 65 input data is bad · 70 our bug · 73
-//! output cannot be created · 74 read or write failed · 75 passing trouble, try again · 129, 130, 141, 143 by
-//! signal.
+//! 0 done · 2 usage · 3 a check failed or a result is incomplete · 65 input data is bad · 70 internal error ·
+//! 73 output cannot be created · 74 read or write failed · 75 temporary failure, try again · 129, 130, 141,
+//! 143 by signal.
 
 use std::fmt::Display;
 use std::io::{self, Write};
@@ -109,8 +109,8 @@ pub fn shown(path: &Path) -> String {
     escaped(&path.display().to_string()).replace('\n', "\\n")
 }
 
-/// Whether an I/O error may go away by itself, by making room, or on another machine: a disk that fails, a
-/// file server that does not answer or has replaced a file.
+/// True if an I/O error may disappear with time, with more room, or on another machine. Examples are a disk
+/// that fails, and a file server that does not answer or has replaced a file.
 fn passing(error: &io::Error) -> bool {
     matches!(
         error.kind(),

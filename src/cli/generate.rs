@@ -143,8 +143,8 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
     )
 }
 
-/// What takes the truth into an existing directory: its tables, and the forms of other programs that are
-/// asked for.
+/// Sinks that write the truth into an existing directory: its tables, and the requested forms of other
+/// programs.
 pub fn truth_files(arguments: &args::Generate, directory: &Path) -> Result<truth::Several, CliError> {
     let mut sinks: Vec<Box<dyn truth::Sink + Send>> =
         vec![Box::new(truth::Writer::create(directory).map_err(truth_error)?)];

@@ -19,9 +19,9 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use crate::analysis::show::staged;
 use crate::cli::error::CliError;
 
-/// How often that thread looks where it cannot be woken.
+/// Polling interval of that thread where it cannot be woken.
 const LOOK: Duration = Duration::from_millis(50);
-/// Its stack.
+/// Stack size of that thread.
 const STACK_BYTES: usize = 1 << 18;
 
 // A signal handler has no other place to write to.
@@ -50,8 +50,7 @@ fn handle() -> std::io::Result<()> {
     Ok(())
 }
 
-/// Whether whoever started the program wants it to outlive the terminal (`nohup`): hang-ups are ignored then,
-/// and stay so.
+/// True if the program was started to outlive the terminal (`nohup`). Hang-ups are then ignored, and stay so.
 fn is_detached() -> bool {
     // Linux reports it there (proc(5)), bit 0 for signal 1; elsewhere it is taken not to be.
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

@@ -1,7 +1,7 @@
-//! Where lines of text go while a receiver runs: standard output, a file, a FIFO, TCP clients.
+//! Outputs of text lines while a receiver runs: standard output, a file, a FIFO, TCP clients.
 //!
-//! TCP clients come and go: each gets what is written from its coming on. One that does not take its lines in
-//! time is sent away, so that no client holds the receiver up.
+//! A TCP client gets the lines written after its connection. One that does not take its lines in time is
+//! disconnected, so that no client delays the receiver.
 
 use std::fmt;
 use std::fs::File;
@@ -44,7 +44,7 @@ impl FromStr for Spec {
     }
 }
 
-/// As it is written.
+/// Form of the specification on the command line.
 impl fmt::Display for Spec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -61,7 +61,7 @@ pub struct Lines {
     pub made: Made,
 }
 
-/// What an output becomes once it is whole.
+/// Final form of an output.
 pub enum Made {
     /// Nothing more.
     Nothing,

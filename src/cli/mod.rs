@@ -97,7 +97,7 @@ fn execute(arguments: Arguments) -> Result<(), CliError> {
     }
 }
 
-/// What a program without the feature says.
+/// Error of a program without the Parquet feature.
 #[cfg(not(feature = "parquet"))]
 fn no_parquet() -> CliError {
     CliError::usage("this program was built without Parquet: build it with --features parquet")

@@ -34,12 +34,12 @@ pub struct Bits {
 }
 
 impl Bits {
-    /// Whether samples are packed.
+    /// True if samples are packed.
     pub fn given(&self) -> bool {
         self.bits.is_some()
     }
 
-    /// How samples of one channel lie in the file, real or complex ones; nothing where no flag says it.
+    /// Layout of the samples of one channel in the file, real or complex. `None` without a flag for it.
     fn interleaved(&self, real: bool) -> Result<Option<Interleaved>, CliError> {
         let Some(bits) = self.bits else { return Ok(None) };
         let components = match (real, self.qi) {
@@ -60,10 +60,11 @@ impl Bits {
         }))
     }
 
-    /// How `samples` samples of a scene are packed; nothing where no flag says it.
+    /// Layout of the samples of a scene in packed form. `None` without a flag for it.
     ///
     /// # Errors
-    /// A scene whose converter has other levels, and samples that are no whole words.
+    ///
+    /// A scene whose converter has other levels, and samples that do not fill whole words.
     pub fn of_scene(&self, scene: &Scene, samples: u64) -> Result<Option<(Interleaved, Layout)>, CliError> {
         let format = scene.metadata.format;
         let Some(of) = self.interleaved(!format.is_complex())? else { return Ok(None) };

@@ -130,7 +130,7 @@ fn write_group(
     Ok(count)
 }
 
-/// What a column holds; the first of them that all its cells are.
+/// Type of a column: the first one that fits all its cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Empty,
@@ -141,7 +141,7 @@ enum Kind {
 }
 
 impl Kind {
-    /// Of a column that has had this kind, with one more cell.
+    /// Type of a column of this type after one more cell.
     fn with(self, cell: &[u8]) -> Self {
         let own = match cell {
             [] => return self,

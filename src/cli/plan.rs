@@ -120,7 +120,7 @@ impl<'s> Loops<'s> {
         out
     }
 
-    /// The same as values: of each line of sight what it demands, and the stress and its limit.
+    /// JSON object with the demand, the stress and its limit for each line of sight.
     fn object(&self) -> Value {
         let row = |(line, _, answer): &(LineOfSight, Demand, Answer)| {
             json!({
@@ -133,7 +133,7 @@ impl<'s> Loops<'s> {
         self.rows.iter().map(row).collect()
     }
 
-    /// What the loop does not follow, and settings that would.
+    /// Warning about motions that the loop does not follow, with settings that would.
     fn warning(&self) -> Option<String> {
         let broken = self.rows.iter().filter(|(_, _, answer)| answer.breaks());
         let count = broken.clone().count();

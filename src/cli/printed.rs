@@ -1,7 +1,7 @@
-//! How much a command prints of its results: words, one JSON object, or nothing.
+//! Form of a command's printed results: words, one JSON object, or nothing.
 //!
-//! Warnings and errors go to standard error in any case. Results are printed on standard output as they
-//! always are; the object is one line, so that several runs in a row are JSON lines.
+//! Warnings and errors go to standard error in any case. Results go to standard output. The object is one
+//! line, so that several runs in a row are JSON lines.
 
 use clap::Args;
 use serde_json::{Value, json};
@@ -32,7 +32,7 @@ impl Printed {
         }
     }
 
-    /// Whether results are printed in words, with progress on a terminal.
+    /// True if results are printed in words, with progress on a terminal.
     pub fn in_words(self) -> bool {
         !self.quiet && !self.json
     }

@@ -112,7 +112,7 @@ fn searched(recordings: &[Recording], mut settings: Settings, arguments: &args::
     Ok(settings)
 }
 
-/// What came of it, on standard output unless lines go there.
+/// Prints the outcome on standard output unless lines go there.
 fn report(arguments: &args::Receive, outcome: &Outcome, summary: &Value) -> Result<(), CliError> {
     if let Some(warning) = &outcome.format_warning {
         scenario::warn(&format!("{}: {warning}: check --format or the metadata", shown(&arguments.file)));
@@ -133,12 +133,12 @@ fn report(arguments: &args::Receive, outcome: &Outcome, summary: &Value) -> Resu
     printed.results(&text, || json!({ "results": arguments.out, "receiver": summary }))
 }
 
-/// How much is printed: `--json` without a place for lines is the object.
+/// Form of the printed results. `--json` without a target for lines selects the object.
 fn printed(arguments: &args::Receive) -> Printed {
     Printed { quiet: arguments.quiet, json: matches!(arguments.json, Some(None)) }
 }
 
-/// Where lines go.
+/// Targets of the text lines.
 fn to_lines(arguments: &args::Receive) -> impl Iterator<Item = &lines::Spec> {
     arguments.nmea.iter().chain(arguments.json.iter().flatten())
 }
@@ -163,7 +163,7 @@ fn read_ahead(recordings: Vec<Recording>, live: bool) -> Result<Vec<FrontEnd>, C
     recordings.into_iter().map(one).collect()
 }
 
-/// Where the tables are made.
+/// Directory in which the tables are made.
 enum Directory {
     Hidden(Staging),
     InSight(InSight),
@@ -197,12 +197,12 @@ impl Directory {
 /// All that takes the receiver's records.
 struct Listeners {
     output: Output,
-    /// Whether rows go out as they come.
+    /// True if rows are written as they come.
     live: bool,
     /// The sample of the newest state of channels.
     tracked: u64,
     lines: Vec<Box<dyn Sink>>,
-    /// What `receiver.json` says, at the end.
+    /// Content of `receiver.json`, set at the end.
     summary: Value,
 }
 
@@ -230,7 +230,7 @@ impl Listeners {
 }
 
 impl Listeners {
-    /// Whether a record is the last of its instant, the first of a later one, or one that comes seldom.
+    /// True if a record is the last of its instant, the first of a later one, or of a rare kind.
     fn ends_tick(&mut self, record: &Record) -> bool {
         match record {
             Record::Tracking(row) => std::mem::replace(&mut self.tracked, row.sample) != row.sample,

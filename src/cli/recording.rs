@@ -25,9 +25,9 @@ pub struct Recording {
     /// The signals that its metadata name.
     pub signals: Vec<&'static Signal>,
     pub reader: Box<dyn Read + Send>,
-    /// How many there are, where that is known.
+    /// Number of samples, where it is known.
     pub samples: Option<u64>,
-    /// Where it is written if the sender breaks off.
+    /// Cell that takes the reason if the sender breaks off.
     pub broken: Option<Arc<OnceLock<String>>>,
 }
 
@@ -68,7 +68,7 @@ fn unpacked(layout: Option<Layout>, reader: impl Read + Send + 'static) -> Box<d
     }
 }
 
-/// Where a file has its samples, and what they are.
+/// File of a recording with the position and form of its samples.
 struct Found {
     name: String,
     file: File,
@@ -277,7 +277,7 @@ fn pair(file: &Path) -> (PathBuf, PathBuf) {
     }
 }
 
-/// What samples are, and how they are unpacked: what is described, and flags over it.
+/// Format of the samples and their packing: the description, with flags over it.
 fn metadata(arguments: &args::Receive, of: Description) -> Result<(IfMetadata, Option<Layout>), CliError> {
     let rate = match arguments.rate_hz {
         None => None,

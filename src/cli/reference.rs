@@ -15,7 +15,7 @@ use crate::study::sweep::keys::STUDY;
 
 /// One section of the reference.
 struct Section {
-    /// How the command line calls it.
+    /// Name of the section on the command line.
     name: String,
     text: String,
 }

@@ -128,7 +128,7 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     gate.enforce(verdict, arguments.printed)
 }
 
-/// What takes the fixes as NMEA 0183.
+/// Sink that writes the fixes as NMEA 0183.
 fn sentences(directory: &Path) -> Result<Nmea<File>, CliError> {
     let path = directory.join("fixes.nmea");
     let file = File::create(&path).map_err(|error| CliError::create(path.display(), &error))?;

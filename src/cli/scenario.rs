@@ -18,9 +18,9 @@ pub const LARGEST_BYTES: u64 = 4 << 20;
 /// A scenario as written, and the directory that its paths are relative to.
 pub struct Named {
     pub scenario: Scenario,
-    /// Its text.
+    /// Text of the scenario.
     pub text: String,
-    /// What messages call it.
+    /// Name of the scenario in messages.
     pub name: String,
     pub directory: PathBuf,
 }

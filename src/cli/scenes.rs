@@ -21,7 +21,7 @@ static SHIPPED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/scenarios");
 const COMMENTED: &str = include_str!("../../assets/commented_scene.toml");
 /// The name of the schema beside a copy.
 const SCHEMA: &str = "scenario.schema.json";
-/// How a scene names its schema.
+/// Directive with which a scene names its schema.
 const DIRECTIVE: &str = "#:schema ";
 
 /// Lists all scenes, or copies some.

@@ -83,7 +83,7 @@ fn object(keys: &'static [Key]) -> Json {
     schema
 }
 
-/// Whether a key is of some kinds alone, all of them among the words.
+/// True if a key belongs to some kinds only, all of them among the words.
 fn belongs(key: &Key, words: &[&str]) -> bool {
     !key.kinds.is_empty() && key.kinds.iter().all(|kind| words.contains(kind))
 }

@@ -11,7 +11,7 @@ use crate::gnss::samples::Format;
 use crate::gnss::signal::Signal;
 use crate::gnss::time::Epoch;
 
-/// What is filled in stands between signs.
+/// Template of the configuration. Values to fill in are marked by signs.
 const TEMPLATE: &str = include_str!("../../assets/gnss-sdr.conf.in");
 /// Channels of a system that the samples have.
 const CHANNELS: u32 = 12;

@@ -1,8 +1,8 @@
-//! Where `receive` takes samples from while they are made: a FIFO, a TCP server, a server of rtl_tcp.
+//! Sources of samples for `receive` while they are made: a FIFO, a TCP server, a server of rtl_tcp.
 //!
-//! A sender that breaks off ends the stream: what came before it counts, and the reason is kept
-//! ([`Stream::broken`]). [`Ahead`] reads on while the receiver is busy, and ends where a signal asks for it.
-//! Source of rtl_tcp's framing: see `sink::rtl_tcp`.
+//! A sender that breaks off ends the stream: the samples before count, and the reason is kept
+//! ([`Stream::broken`]). [`Ahead`] continues to read while the receiver is busy, and ends on a signal. Source
+//! of rtl_tcp's framing: see `sink::rtl_tcp`.
 
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
@@ -31,7 +31,7 @@ pub enum Spec {
     RtlTcp(String),
 }
 
-/// How long a server of rtl_tcp may take for its first twelve bytes.
+/// Time limit for the first twelve bytes of an rtl_tcp server.
 const GREETING: Duration = Duration::from_secs(10);
 
 impl Spec {
@@ -88,7 +88,7 @@ fn reached(peer: &str) -> Result<TcpStream, CliError> {
     })
 }
 
-/// What a server of rtl_tcp is set to: whole hertz.
+/// Settings for a server of rtl_tcp, in whole hertz.
 struct Wanted {
     rate_hz: u32,
     center_hz: u32,
@@ -142,12 +142,12 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// Of what messages call so.
+    /// A stream with this name in messages.
     pub fn new(name: String, inner: Box<dyn Read + Send>) -> Self {
         Self { name, inner, bytes: 0, broken: Arc::default() }
     }
 
-    /// Where it is written if the sender breaks off.
+    /// Cell that takes the reason if the sender breaks off.
     pub fn broken(&self) -> Arc<OnceLock<String>> {
         Arc::clone(&self.broken)
     }
@@ -174,7 +174,7 @@ impl Read for Stream {
 /// Bytes of a block that is read ahead, and blocks: 16 MiB, which is 3 s of 8-bit samples at 2.6 Msps.
 const BLOCK_BYTES: usize = 1 << 16;
 const BLOCKS: usize = 256;
-/// How often a signal is looked for while nothing comes.
+/// Polling interval for signals while no data comes.
 const LOOK: Duration = Duration::from_millis(50);
 /// Stack of the thread that reads.
 const STACK_BYTES: usize = 1 << 18;

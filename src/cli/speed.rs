@@ -1,4 +1,4 @@
-//! How fast a run was: wall time, processor time and memory, for `speed.json` and never for a result.
+//! Speed of a run: wall time, processor time and memory, for `speed.json` and never for a result.
 
 use std::time::Duration;
 

@@ -44,7 +44,7 @@ impl Staging {
         self.making.path()
     }
 
-    /// What takes the contents of a file.
+    /// Writer of a file's contents.
     pub fn writer(&self) -> impl Write + '_ {
         Writer(self.file.as_ref())
     }
@@ -105,7 +105,7 @@ impl InSight {
         Ok((Self { path, target }, file))
     }
 
-    /// Where it grows.
+    /// Path at which the directory is made.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -164,7 +164,7 @@ impl Write for Writer<'_> {
     }
 }
 
-/// Where it is made: beside its place, which is created.
+/// Path of the unfinished output, beside its final path. The parent directory is created.
 fn part(target: &Path) -> Result<PathBuf, CliError> {
     let mut part = OsString::from(".");
     part.push(name(target)?);
@@ -187,7 +187,7 @@ fn parent(target: &Path) -> Result<PathBuf, CliError> {
     Ok(parent)
 }
 
-/// Whether a directory is there that is empty or one of ours.
+/// True if a directory exists that is empty or one of this program's.
 fn replaceable(target: &Path) -> io::Result<bool> {
     if !fs::metadata(target)?.is_dir() {
         return Ok(false);

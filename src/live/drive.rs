@@ -16,7 +16,7 @@ use generator::vehicle::joining::{Joiner, Push, Refusal, Tick};
 pub struct Driver<'a> {
     scene: &'a Scene,
     stream: Stream<'a>,
-    /// Where the motion is pushed.
+    /// Joiner of the pushed motion; `None` where motion is not pushed.
     joiner: Option<Joiner>,
     tick_samples: u64,
     /// Ticks made.
@@ -31,7 +31,7 @@ pub struct Made {
     /// First sample of it, and the sample after its last one. The last tick of a scene may go on beyond the
     /// scene's samples.
     pub samples: (u64, u64),
-    /// What it became, where the motion is pushed.
+    /// Tick of the motion, where motion is pushed.
     pub tick: Option<Tick>,
 }
 
@@ -59,7 +59,7 @@ impl<'a> Driver<'a> {
         Ok(Self { scene, stream: Stream::new(scene, truth, &options)?, joiner, tick_samples, ticks: 0 })
     }
 
-    /// Whether the motion is pushed.
+    /// True if the motion is pushed.
     pub fn is_pushed(&self) -> bool {
         self.joiner.is_some()
     }
@@ -79,7 +79,7 @@ impl<'a> Driver<'a> {
         self.ticks
     }
 
-    /// Whether the scene's last sample was made.
+    /// True if the scene's last sample was made.
     pub fn is_done(&self) -> bool {
         self.ticks.saturating_mul(self.tick_samples) >= self.scene.samples
     }

@@ -41,25 +41,25 @@ pub enum StepError {
     Receive(#[from] ReceiveError),
 }
 
-/// What a step brings.
+/// Results of a step.
 #[derive(Clone, Debug)]
 pub struct Step {
     /// The tick that was made, with the motion at its end.
     pub made: Made,
-    /// What is true of its samples.
+    /// Truth records of the step's samples.
     pub truth: Vec<truth::Record>,
-    /// What the receiver found meanwhile.
+    /// Records of the receiver during the step.
     pub received: Vec<output::Record>,
 }
 
-/// What is left at the end.
+/// Results at the end.
 #[derive(Clone, Debug)]
 pub struct Finished {
-    /// What the generator did.
+    /// Result of the generator.
     pub generated: Generated,
     /// The receiver's last records.
     pub received: Vec<output::Record>,
-    /// What came of the reception.
+    /// Outcome of the reception.
     pub outcome: Option<Outcome>,
 }
 
@@ -98,7 +98,7 @@ pub struct Finished {
 pub struct Lockstep<'a> {
     driver: Driver<'a>,
     receiver: Option<Receiver>,
-    /// Of the last step; the receiver has had those before.
+    /// Samples of the last step and of the current one; the receiver has taken those before.
     samples: Vec<u8>,
     next: Vec<u8>,
 }
@@ -123,7 +123,7 @@ impl<'a> Lockstep<'a> {
         self.driver.scene().elapsed_s((self.driver.next_tick() + 1) * self.driver.tick_samples())
     }
 
-    /// Whether the scene's last sample was made.
+    /// True if the scene's last sample was made.
     pub fn is_done(&self) -> bool {
         self.driver.is_done()
     }

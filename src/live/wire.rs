@@ -89,7 +89,8 @@ pub struct Reader {
 }
 
 impl Reader {
-    /// Of states of a scene that starts at `start`, for times of day; until a height comes it is `height_m`.
+    /// A reader of states of a scene that starts at `start`, which completes times of day. The height is
+    /// `height_m` metres until a state brings one.
     pub fn new(start: Epoch, height_m: f64) -> Self {
         Self { nmea: nmea::Reader::new(start, height_m) }
     }

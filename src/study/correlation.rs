@@ -15,12 +15,12 @@ use receiver::track::loops::CodeShape;
 pub enum Correlation {
     /// 1−|τ|, of rectangular chips without a front end.
     Triangle,
-    /// Of other pulses without a front end.
+    /// Autocorrelation of other pulses, without a front end.
     Pulses(Waveform),
-    /// Of a component with a replica that has one of its layers, and of that replica with itself, without a
-    /// front end.
+    /// Cross-correlation of a component with a replica that has one of its layers, and autocorrelation of
+    /// that replica, without a front end.
     Replica {
-        /// What is sent with the replica.
+        /// Cross-correlation of the component with the replica.
         found: Waveform,
         /// The replica with itself.
         own: Waveform,
@@ -45,7 +45,7 @@ const LARGEST_CHIPS: f64 = 3.0;
 const INTERVALS: f64 = 96.0;
 
 impl Correlation {
-    /// Of a component with the replica that this receiver makes of it, without a front end.
+    /// Correlation of a component with the replica that this receiver makes of it, without a front end.
     pub fn of_component(component: &Component, made: Layers) -> Self {
         let rate_hz = component.chip_rate_hz;
         match shapes(component, made) {
@@ -56,7 +56,7 @@ impl Correlation {
         }
     }
 
-    /// Of a signal, behind a front end of so many hertz (two-sided) if there is one.
+    /// Correlation of a signal behind a front end of `band_hz` (two-sided, in hertz), if there is one.
     pub fn of(code: Waveform, band_hz: Option<f64>) -> Self {
         let (step_s, chip_s) = code.scales_s();
         match band_hz {
@@ -134,7 +134,7 @@ impl Correlation {
         peak * peak / self.noise_power()
     }
 
-    /// What a receiver that knows the peak's shape takes for a spacing of `d` chips.
+    /// Shape of the peak that a receiver with exact knowledge of it assumes for a spacing of `d` chips.
     pub fn code_shape(&self, d: f64) -> CodeShape {
         match self {
             Self::Triangle => CodeShape::triangle(d),

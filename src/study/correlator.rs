@@ -31,21 +31,21 @@ pub struct Case {
     pub signal: &'static Signal,
     /// The component of it whose replica is made.
     pub component: &'static Component,
-    /// As validated, and fitted to the component.
+    /// Settings of the channel, validated and fitted to the component.
     pub settings: TrackingSettings,
     /// Which loops run.
     pub mode: Mode,
-    /// Of the whole signal; `None` for no noise.
+    /// C/N0 of the whole signal in dB-Hz; `None` for no noise.
     pub cn0_dbhz: Option<f64>,
-    /// How the truth moves.
+    /// Motion of the truth.
     pub motion: Motion,
     /// Noise of the receiver's oscillator, if it has any.
     pub oscillator: Option<PowerLaw>,
     /// Shape of the correlation's peak.
     pub correlation: Correlation,
-    /// Whether the receiver's detectors may give the signal up.
+    /// True if the receiver's detectors may declare the signal lost.
     pub watched: bool,
-    /// By how much the code is late at the beginning.
+    /// Delay of the code at the beginning, in chips.
     pub start_chips: f64,
     /// Time before anything is measured; the loops begin on the true Doppler and its rate.
     pub settle_s: f64,
@@ -117,11 +117,11 @@ pub struct Epoch {
     pub phase_cycles: f64,
     /// Mean error of the frequency, Hz.
     pub frequency_hz: f64,
-    /// What the discriminators gave, and what the loops made of it.
+    /// Discriminator values, and the loops' response to them.
     pub update: Update,
 }
 
-/// What was measured over a run.
+/// Measurements over a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Outcome {
     /// Time of an update, seconds.
@@ -136,9 +136,9 @@ pub struct Outcome {
     pub frequency_hz: Moments,
     /// Values of the discriminators.
     pub raw_code_chips: Moments,
-    /// Of the phase, cycles.
+    /// Values of the phase discriminator, cycles.
     pub raw_phase_cycles: Moments,
-    /// Of the frequency, Hz.
+    /// Values of the frequency discriminator, Hz.
     pub raw_frequency_hz: Moments,
     /// Passages to the next point of lock, half a cycle away with symbols and a whole one without.
     pub slips: u64,
@@ -148,7 +148,7 @@ pub struct Outcome {
     pub lost: Option<(f64, Loss)>,
     /// Last time at which the code was off the main peak, from the start on.
     pub off_main_s: f64,
-    /// Whether it was on the main peak at the end.
+    /// True if the code was on the main peak at the end.
     pub on_main: bool,
 }
 
@@ -218,7 +218,7 @@ pub fn simulate(case: &Case, mut each: impl FnMut(&Epoch)) -> (u64, Option<(f64,
 #[derive(Clone, Copy, Debug)]
 struct Taps {
     count: usize,
-    /// By how much each is ahead of the prompt, chips.
+    /// Lead of each tap over the prompt, chips.
     ahead_chips: [f64; MOST_TAPS],
     /// Rows that give them their covariance, from independent normals (Cholesky).
     rows: [[f64; MOST_TAPS]; MOST_TAPS],

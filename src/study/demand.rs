@@ -1,10 +1,11 @@
-//! Whether the carrier loop of some settings follows a motion, and which settings would.
+//! Test of a carrier loop against a motion, and settings that would follow it.
 //!
-//! The error of the receiver's own loop is that of its discrete gains: of order 3 jerk·T³/K3, but no more
-//! than a step of the whole swing of acceleration leaves at its peak; of order 2 acceleration·T²/K2. It holds
-//! while 3σ + θ is within 45° (Kaplan and Hegarty, eq. 5.5, the same as σ + θ/3 within 15°) and the lock
-//! detector, cos 2θ·e^(−2σ²), stays above its threshold. Limits: thermal noise alone for σ; the phase loop
-//! after pull-in, not the search or the frequency loop before it.
+//! The error of the receiver's own loop is that of its discrete gains. For order 3 it is jerk·T³/K3, but no
+//! more than the peak error after a step of the whole swing of acceleration. For order 2 it is
+//! acceleration·T²/K2. The loop holds under two conditions. 3σ + θ is within 45° (Kaplan and Hegarty, eq.
+//! 5.5, equal to σ + θ/3 within 15°). The lock detector, cos 2θ·e^(−2σ²), stays above its threshold. Limits:
+//! σ holds thermal noise alone. Only the phase loop after pull-in is tested, not the search or the frequency
+//! loop before it.
 
 use std::f64::consts::TAU;
 
@@ -13,7 +14,7 @@ use analysis::expect::theory::pll;
 use receiver::track::TrackingSettings;
 use receiver::track::loops::Gains;
 
-/// What a line of sight asks of the loop.
+/// Motion along a line of sight that the loop has to follow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
     /// Along the line of sight, m/s².
@@ -24,11 +25,11 @@ pub struct Demand {
     pub swing_mps2: f64,
     /// Radius of a circle that the antenna describes besides, and turns a second.
     pub circle: Option<(f64, f64)>,
-    /// Of the signal, dB-Hz; `None` for no noise.
+    /// C/N0 of the signal, dB-Hz; `None` for no noise.
     pub cn0_dbhz: Option<f64>,
 }
 
-/// What the loop makes of it.
+/// Response of the loop to a demand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
     /// Error that the motion leaves in the phase loop, radians.
@@ -40,13 +41,13 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// What is left of the limit.
+    /// Margin to the limit, in radians.
     pub fn margin_rad(&self) -> f64 {
         self.limit_rad - self.stress_rad
     }
 
-    /// Whether the motion breaks what would hold without it. A signal too weak for the loop at rest is no
-    /// fault of the motion.
+    /// True if the motion breaks a loop that would hold without it. A signal too weak for the loop at rest is
+    /// not a fault of the motion.
     pub fn breaks(&self) -> bool {
         self.margin_rad() < 0.0 && (self.limit_rad > 0.0 || self.stress_rad > pll::LIMIT_RAD)
     }
@@ -58,7 +59,7 @@ const STEP_HZ: u32 = 5;
 /// Bandwidth times update time up to which a discrete loop is near the analogue one.
 const SUGGESTED_BANDWIDTH_TIME: f64 = 0.1;
 
-/// What a loop with `settings` makes of a demand, for a code of `period_s` on a carrier of `wavelength_m`.
+/// Response of a loop with `settings` to a demand, for a code of `period_s` on a carrier of `wavelength_m`.
 pub fn answer(settings: &TrackingSettings, (period_s, wavelength_m): (f64, f64), demand: &Demand) -> Answer {
     let t_s = period_s * f64::from(settings.integration);
     let gains = Gains::design(settings.pll_order, settings.pll_bandwidth_hz * t_s);
@@ -83,12 +84,12 @@ pub fn answer(settings: &TrackingSettings, (period_s, wavelength_m): (f64, f64),
     }
 }
 
-/// Where all roots of the loop lie.
+/// Common root of the loop's characteristic polynomial.
 fn root(order: u32, gains: &Gains) -> f64 {
     controlled_root(order, [gains.phase, gains.rate, gains.acceleration])
 }
 
-/// What a loop leaves of a sinusoid that turns `cycles` within an update: |(z−1)/(z−p)|^N on the unit circle.
+/// Remaining share of a sinusoid that turns `cycles` within an update: |(z−1)/(z−p)|^N on the unit circle.
 fn error_gain(order: u32, gains: &Gains, cycles: f64) -> f64 {
     let root = root(order, gains);
     let cos = libm::cos(TAU * cycles);

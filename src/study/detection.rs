@@ -1,11 +1,11 @@
-//! How often the receiver's search finds a satellite that is there, and one that is not, counted in samples.
+//! Detection and false-alarm rates of the receiver's search, counted in samples.
 //!
-//! A scene of one satellite is generated once for a C/N0 and cut into stretches, one trial each; the search
-//! is given a centre frequency that puts the satellite's Doppler where the trial wants it between two bins.
-//! Expected are [`search`](super::search) for detections and the designed probability for false alarms, of
-//! which Dopplers that are left before all sums are made take a part: at most as large as if cells were
-//! independent ([`leaving`](super::leaving)).
-//! Limits: trials of one C/N0 share a satellite and its message.
+//! A scene of one satellite is generated once for a C/N0 and cut into segments, one trial each. The search
+//! gets a centre frequency that puts the satellite's Doppler at the wanted position between two bins. The
+//! expected rate of detections comes from [`search`](super::search), and that of false alarms is the designed
+//! probability. Dopplers that are left before all sums are made take a part of it. That part is at most as
+//! large as if cells were independent ([`leaving`](super::leaving)). Limits: trials of one C/N0 share a
+//! satellite and its message.
 
 use std::fmt::Write as _;
 use std::io;
@@ -58,7 +58,7 @@ pub enum DetectionError {
 pub struct DetectionRow {
     /// `detection`, or `false alarm` where nothing is there to be found.
     pub what: &'static str,
-    /// Of the signal, dB-Hz; absent of noise alone.
+    /// C/N0 of the signal, dB-Hz; absent for noise alone.
     pub cn0_dbhz: Option<f64>,
     /// Searches.
     pub trials: u32,
@@ -81,7 +81,7 @@ impl DetectionRow {
         Self { what, cn0_dbhz, trials, found, measured, expected, low, high }
     }
 
-    /// Whether the count is within its interval.
+    /// True if the count is within its interval.
     pub fn holds(&self) -> bool {
         (self.low..=self.high).contains(&self.measured)
     }
@@ -123,7 +123,7 @@ pub struct Joint {
 }
 
 impl Joint {
-    /// Of the detections among `rows` of which at least five are expected to be found and five not.
+    /// Joint test of the detections among `rows`, for rows that expect at least five hits and five misses.
     pub fn of(rows: &[DetectionRow]) -> Self {
         let mut joint = Self { rows: 0, chi_square: 0.0, exceeded: 1.0, bias_sigma: 0.0 };
         let (mut sum, mut variances) = (0.0, 0.0);

@@ -1,9 +1,8 @@
-//! What theory predicts for a simulated channel: the plain description of the receiver's loops, and its
-//! thermal jitter.
+//! Theory of a simulated channel: the plain description of the receiver's loops, and their thermal jitter.
 //!
-//! Gains are those that the receiver's settings lead to; everything else is `analysis::expect::theory`, which
-//! does not know the receiver. Half-cycle wraps of the frequency discriminator count as white noise of their
-//! own. Limits: small errors, noise as the squaring-loss formulas have it, no dynamics and no oscillator.
+//! Gains are those of the receiver's settings. Everything else is `analysis::expect::theory`, which does not
+//! know the receiver. Half-cycle wraps of the frequency discriminator count as white noise of their own.
+//! Limits: small errors, noise by the squaring-loss formulas, no dynamics and no oscillator.
 
 use std::f64::consts::TAU;
 

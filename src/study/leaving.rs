@@ -15,14 +15,14 @@ const ALARMS: u32 = 5000;
 /// Bars of a search, and what noise makes of them.
 #[derive(Clone, Debug)]
 pub struct Leaving {
-    /// What the largest cell has to exceed after each sum; zero where nothing is left.
+    /// Value that the largest cell has to exceed after each sum; zero where no Doppler is left.
     bars: Vec<f64>,
-    /// Of every Doppler of noise, after which sums its largest cell exceeds the bar.
+    /// Columns of noise: for each Doppler, true for each sum after which its largest cell exceeds the bar.
     noise: Vec<Vec<bool>>,
 }
 
 impl Leaving {
-    /// Of a search with these bars and so many independent cells at a Doppler.
+    /// Draws noise for a search with these bars and `lags` independent cells at a Doppler.
     pub fn new(bars: Vec<f64>, lags: usize, seed: u64) -> Self {
         let columns = if bars.iter().any(|bar| *bar > 0.0) { COLUMNS } else { 1 };
         let mut normals = Normals::new(seed, Purpose::Columns);
@@ -41,7 +41,7 @@ impl Leaving {
         Self { bars, noise }
     }
 
-    /// Whether a Doppler stays to the end whose cell has these powers after each sum, in noise of that
+    /// True if a Doppler stays to the end whose cell has these powers after each sum, in the noise of that
     /// number.
     pub fn stays(&self, powers: impl IntoIterator<Item = f64>, number: usize) -> bool {
         let noise = &self.noise[number % self.noise.len()];

@@ -1,9 +1,9 @@
-//! What given loops do against the rules of thumb: jitter over C/N0 beside 15°, d/6 and 1/(12T), and error
-//! under jerk.
+//! Given loops against the rules of thumb: jitter over C/N0 beside 15°, d/6 and 1/(12T), and error under
+//! jerk.
 //!
 //! The rules are those of Kaplan and Hegarty, Understanding GPS 2nd ed., 5.6: 3σ and dynamic error within
-//! 45°, d/2 and 1/(4T). They are conservative, not the point of loss, which the simulation shows beside them.
-//! Limits: one run a level.
+//! 45°, d/2 and 1/(4T). They are conservative. They do not mark the point of loss, which the simulation shows
+//! beside them. Limits: one run a level.
 
 use super::correlation::Correlation;
 use super::correlator::{Case, Loss, run, simulate};

@@ -31,7 +31,7 @@ pub struct Motion {
     pub steps: Vec<Step>,
 }
 
-/// What the carrier does in one code period.
+/// Motion of the carrier in one code period.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Advance {
     /// Phase at the end and its mean over the period, both from that at the start.

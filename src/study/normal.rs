@@ -6,7 +6,7 @@ use num_complex::Complex64;
 
 use generator::synth::noise::{BLOCK_SAMPLES, add_block};
 
-/// What a stream is drawn for, so that one seed gives independent streams.
+/// Purpose of a stream, so that one seed gives independent streams.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Purpose {
     Thermal = 1,

@@ -16,7 +16,7 @@ use gnss::gps::l1ca;
 use receiver::track::closed::Mode;
 use receiver::track::{CodeDiscriminator, TrackingSettings};
 
-/// What a cell measures.
+/// Quantity that a cell measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
@@ -31,7 +31,7 @@ pub enum Quantity {
 /// One cell of the grid.
 #[derive(Clone, Debug)]
 pub struct Cell {
-    /// What is compared.
+    /// Quantity that is compared.
     pub quantity: Quantity,
     /// The channel that is simulated.
     pub case: Case,
@@ -40,7 +40,7 @@ pub struct Cell {
 /// A cell measured; sigmas in the unit of its quantity.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ProofRow {
-    /// What is compared.
+    /// Quantity that is compared.
     pub quantity: Quantity,
     /// Which loops run, by name.
     pub mode: String,
@@ -74,9 +74,9 @@ pub struct ProofRow {
     pub simulated_s: f64,
     /// Slips of the phase.
     pub slips: u64,
-    /// Whether the signal was lost.
+    /// True if the signal was lost.
     pub lost: bool,
-    /// Whether the linear theory claims to hold.
+    /// True if the linear theory is claimed to hold.
     pub in_region: bool,
     /// Largest departure of the ratio from one that is allowed in the region.
     pub bar: f64,
@@ -199,7 +199,7 @@ pub fn grid() -> Vec<Cell> {
     cells
 }
 
-/// What theory predicts for a cell, in the unit of its quantity.
+/// Jitter that theory predicts for a cell, in the unit of its quantity.
 fn predict(cell: &Cell) -> Option<Jitter> {
     match cell.quantity {
         Quantity::Phase => expect::phase_cycles(&cell.case),
@@ -209,7 +209,7 @@ fn predict(cell: &Cell) -> Option<Jitter> {
 }
 
 impl Quantity {
-    /// What was measured of it, and the factor to its unit.
+    /// Moments of the quantity in an outcome, and the factor to its unit.
     fn of(self, outcome: &Outcome) -> (Moments, f64) {
         match self {
             Self::Phase => (outcome.phase_cycles, 360.0),
@@ -231,7 +231,7 @@ impl Cell {
         (update_s * cn0_hz, update_s * bandwidth_hz)
     }
 
-    /// Whether theory must hold here.
+    /// True if theory must hold for this cell.
     pub fn in_region(&self) -> bool {
         predict(self).is_some_and(|jitter| {
             let (snr, bandwidth_time) = self.place(&jitter);
@@ -301,7 +301,7 @@ fn row(cell: &Cell, jitter: &Jitter, outcome: &Outcome) -> ProofRow {
 }
 
 impl ProofRow {
-    /// Whether the ratio is within its bar, over the whole run.
+    /// True if the ratio is within its bar, over the whole run.
     pub fn holds(&self) -> bool {
         !self.lost && (self.ratio - 1.0).abs() <= self.bar
     }

@@ -37,7 +37,7 @@ pub struct Model {
     pub sums: u32,
     /// Coherent integration, seconds.
     pub coherent_s: f64,
-    /// What the largest Σ|S|², in units of the noise of one component, has to exceed.
+    /// Threshold of the largest Σ|S|², in units of the noise of one component.
     pub threshold: f64,
     /// Distance of lags, chips. Between any two there is another cell, the sum of both.
     pub lag_chips: f64,
@@ -61,7 +61,7 @@ pub struct Model {
 struct Folded {
     /// Frequency in turns a sample, and weight, from zero up: what was not folded, one side.
     own: Vec<(f64, f64)>,
-    /// The same of the first image above, for all frequencies of the band.
+    /// Frequency and weight of the first image above, for all frequencies of the band.
     image: Vec<(f64, f64)>,
     /// Share of the signal's power within the band.
     share: f64,
@@ -223,7 +223,7 @@ fn sidelobe(code: &Waveform) -> f64 {
 struct Symbols {
     seed: u64,
     first: u64,
-    /// Where the second symbol begins.
+    /// Time at which the second symbol begins, in seconds.
     edge_s: f64,
     symbol_s: f64,
 }

@@ -57,12 +57,12 @@ pub enum TwinError {
     Receive(#[from] ReceiveError),
 }
 
-/// What a run of the twin did.
+/// Results of a run of the twin.
 #[derive(Clone, Debug)]
 pub struct Done {
-    /// By the generator, for each front end.
+    /// Results of the generator, for each front end.
     pub generated: Vec<Generated>,
-    /// By the receiver.
+    /// Outcome of the receiver.
     pub outcome: Outcome,
 }
 
@@ -96,10 +96,10 @@ pub fn settings_for(scenes: &[Scene], settings: &Settings) -> Settings {
 /// Takes a batch of samples of a front end by its place.
 pub type Listen<'a, E> = dyn FnMut(usize, &[u8]) -> Result<(), E> + Send + 'a;
 
-/// What [`feed`] did.
+/// Results of [`feed`].
 #[derive(Clone, Debug)]
 pub struct Fed {
-    /// By the generator, for each front end.
+    /// Results of the generator, for each front end.
     pub generated: Vec<Generated>,
     /// Wall-clock time for which the generator was at work.
     pub busy: Duration,

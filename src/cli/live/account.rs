@@ -1,4 +1,4 @@
-//! What a live run did: counts, ages and rates, once a second as a line of JSON and at the end.
+//! Statistics of a live run: counts, ages and rates, once a second as a line of JSON and at the end.
 
 use std::time::{Duration, Instant};
 
@@ -10,7 +10,7 @@ use crate::gnss::time::Rate;
 /// Width of a bin of ages, and how many there are; older ones count in the last.
 const BIN: Duration = Duration::from_micros(100);
 const BINS: usize = 5000;
-/// How long the sink's rate is measured at least.
+/// Least time over which the sink's rate is measured, seconds.
 const SETTLED_S: f64 = 5.0;
 
 /// Ages in bins.
@@ -59,7 +59,7 @@ impl Ages {
     }
 }
 
-/// What the thread of the first sink counts.
+/// Counts of the first sink's thread.
 #[derive(Default)]
 pub struct Handed {
     /// Samples handed over, since when, and until when.
@@ -75,7 +75,7 @@ pub struct Handed {
     pub ages: Ages,
 }
 
-/// What came in and was not used.
+/// Inputs that were received but not used.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Intake {
     pub messages: u64,
@@ -88,7 +88,7 @@ pub struct Intake {
     pub dropped: u64,
 }
 
-/// What the generator's side counts.
+/// Counts of the generator's side.
 #[derive(Default)]
 pub struct Made {
     pub samples: u64,
@@ -99,7 +99,7 @@ pub struct Made {
     /// First sample of the last snap.
     pub last_snap: Option<u64>,
     pub worst_gap_m: f64,
-    /// Of ticks that are no snaps.
+    /// Largest jerk over ticks that are not snaps, m/s³.
     pub worst_jerk_mps3: f64,
     /// Pushes that were taken, and those whose time had been sent by more than the joining time before.
     pub taken: u64,
@@ -107,7 +107,7 @@ pub struct Made {
     /// States with an attitude that turns the body, and with one that the scene does not use.
     pub attitudes: u64,
     pub attitudes_not_used: u64,
-    /// What was added to the times of states.
+    /// Offset that was added to the times of states, seconds.
     pub offset_s: Option<f64>,
     /// Refused by what they say, and the last reason.
     pub duplicates: u64,
@@ -201,7 +201,7 @@ impl Made {
     }
 }
 
-/// By how much the sink takes samples faster than the host's clock says; `None` until that is measured.
+/// Excess of the sink's rate over the host's clock in parts per million; `None` until it is measured.
 fn drift_ppm(rate: Rate, handed: &Handed) -> Option<f64> {
     let elapsed_s = handed.until?.duration_since(handed.since?).as_secs_f64();
     (elapsed_s >= SETTLED_S).then(|| (rate.elapsed_s(handed.samples) / elapsed_s - 1.0) * 1e6)

@@ -24,7 +24,7 @@ const SHOWN_BYTES: usize = 82;
 /// Stack of the thread.
 const STACK_BYTES: usize = 1 << 18;
 
-/// Where motion comes from, as the command line names it.
+/// Origin of the motion on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
     Stdin,

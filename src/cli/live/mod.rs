@@ -41,9 +41,9 @@ use ring::{Block, Put};
 
 /// Seconds from the Unix epoch to that of GPS time, leap seconds left out.
 const GPS_UNIX_S: i64 = 315_964_800;
-/// How long a wait lasts before signals are looked for.
+/// Polling interval for signals during a wait.
 const LOOK: Duration = Duration::from_millis(20);
-/// How long sinks may take for the rest after a signal.
+/// Time limit of the sinks for the rest after a signal.
 const PARTING: Duration = Duration::from_millis(500);
 /// Pushes whose arrival is remembered until a tick shows them.
 const REMEMBERED: usize = 8192;
@@ -135,7 +135,7 @@ struct Live<'a> {
     pace: Pace,
     scene: &'a Scene,
     made: Made,
-    /// Whether the first state says what time it is.
+    /// True if the first state defines the time.
     first_is_now: bool,
 }
 

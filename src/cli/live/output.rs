@@ -16,7 +16,7 @@ use crate::gnss::time::Rate;
 const MOST_BLOCKS: usize = 4096;
 /// A write that takes so much longer than its samples is a stall.
 const STALL: Duration = Duration::from_millis(100);
-/// How much earlier the first tick is made: tables are filled with it. It counts in no age.
+/// Time by which the first tick is made earlier, to fill tables. It does not count in any age.
 const WARM_UP: Duration = Duration::from_millis(250);
 /// Stack of the thread.
 const STACK_BYTES: usize = 1 << 19;
@@ -32,7 +32,7 @@ pub struct Pace {
 }
 
 impl Pace {
-    /// As the arguments say; sample 0 at `at`, where that is given.
+    /// Pace by the arguments; sample 0 is at `at`, where that is given.
     pub fn new(arguments: &args::Live, rate: Rate, at: Option<SystemTime>) -> Self {
         let ahead = Duration::from_secs_f64(arguments.latency * 1e-3);
         let now = Instant::now();
@@ -47,7 +47,7 @@ impl Pace {
         self.start + Duration::from_secs_f64(self.rate.elapsed_s(sample))
     }
 
-    /// How long it is until the tick that begins with a sample is to be made.
+    /// Time until the tick that begins with a sample has to be made.
     pub fn until_made(&self, first: u64) -> Duration {
         let at = match (first, self.clock) {
             (0, _) => self.start - self.ahead - WARM_UP,
@@ -89,7 +89,7 @@ impl Output {
         Ok(Self { ring, name: spec.to_string(), handed, thread })
     }
 
-    /// Whether it takes nothing any more: it has everything, or failed.
+    /// True if the output is complete or failed, and takes nothing any more.
     pub fn is_done(&self) -> bool {
         self.thread.is_finished()
     }
@@ -99,7 +99,7 @@ impl Output {
         look(&self.handed.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// What went wrong with it; nothing of one that is still at work.
+    /// Error of the output; `None` while it is still at work.
     pub fn failure(self) -> Option<CliError> {
         if !self.thread.is_finished() {
             return None;

@@ -20,18 +20,18 @@ use crate::generator::vehicle::joining::Push;
 use crate::generator::vehicle::log;
 use crate::live::drive::Made;
 
-/// What cannot be written.
+/// Error of a record that cannot be written.
 fn failed(error: &std::io::Error) -> CliError {
     CliError::output("the record", error)
 }
 
-/// What is run, and what the command line changed in it.
+/// Scene of a run, with the changes of the command line.
 #[derive(Clone, Copy)]
 pub struct Run<'a> {
     pub named: &'a Named,
     pub scene: &'a Scene,
     pub overrides: &'a Overrides,
-    /// Whether the scene starts at another time than it says.
+    /// True if the scene starts at another time than it says.
     pub restarted: bool,
 }
 

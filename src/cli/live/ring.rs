@@ -28,7 +28,7 @@ struct Inside {
     gone: bool,
 }
 
-/// What became of a block that was to be put.
+/// Result of adding a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Put {
     Done,
@@ -45,7 +45,7 @@ impl Ring {
         self.blocks.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether there is room, or none will be needed, after a wait of at most `patience`.
+    /// True if there is room, or none will be needed, after a wait of at most `patience`.
     pub fn has_room(&self, patience: Duration) -> bool {
         let full = |inside: &mut Inside| !inside.gone && inside.blocks.len() >= self.capacity;
         let waited = self.changed.wait_timeout_while(self.inside(), patience, full);

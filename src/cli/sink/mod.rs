@@ -1,8 +1,8 @@
-//! Where samples go while they are made: standard output, a FIFO, a TCP client, a client of rtl_tcp, a file.
+//! Sinks of samples while they are made: standard output, a FIFO, a TCP client, a client of rtl_tcp, a file.
 //!
-//! A write blocks until the reader has taken the block: the reader's pace is the stream's. Listeners take one
-//! client, the first, send later ones away by name, and are on loopback unless another address is named.
-//! Limits: a FIFO is not made here; who leaves does not come back.
+//! A write blocks until the reader has taken the block, so that the reader sets the pace. A listener takes
+//! the first client and disconnects later ones by name. It is on loopback unless another address is named.
+//! Limits: a FIFO is not made here, and a client that leaves cannot come back.
 
 mod plain;
 mod rtl_tcp;
@@ -76,7 +76,7 @@ impl FromStr for Spec {
     }
 }
 
-/// As it is written.
+/// Form of the specification on the command line.
 impl fmt::Display for Spec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -15,14 +15,14 @@ use crate::cli::error::{CliError, shown};
 use crate::cli::scenario;
 use crate::cli::staging::Staging;
 
-/// How long a client may take to close its side when the stream has ended: who closes a connection on words
-/// that were not read takes the last samples away.
+/// Time limit for a client to close its side when the stream has ended. Closing a connection with unread data
+/// would discard the last samples.
 pub(super) const PARTING: Duration = Duration::from_secs(2);
 /// Clients sent away that are named.
 const MOST_SAID: u32 = 5;
 /// Stack of the thread that sends them away.
 const STACK_BYTES: usize = 1 << 17;
-/// How often that is looked at.
+/// Polling interval for that.
 pub(super) const LOOK: Duration = Duration::from_millis(100);
 
 /// A pipe: standard output or a FIFO, without a buffer of its own.
@@ -169,7 +169,7 @@ impl Sink for Tcp {
     }
 }
 
-/// Whether a read ended because nothing came for a while.
+/// True if a read ended because no data came for a while.
 pub(super) fn is_silence(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut | io::ErrorKind::Interrupted)
 }

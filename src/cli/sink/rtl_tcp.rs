@@ -84,7 +84,7 @@ fn offset_binary(format: Format, block: &[u8], out: &mut Vec<u8>) {
     }
 }
 
-/// What a client cannot change, as it would ask for it: whole hertz.
+/// Values that a client cannot change, in its own units: whole hertz.
 struct Fixed {
     rate_hz: f64,
     center_hz: f64,
@@ -96,7 +96,7 @@ impl Fixed {
         Self { rate_hz: stream.rate.hz(), center_hz: stream.center_hz, reported: BTreeSet::new() }
     }
 
-    /// What there is to report of a command, if anything.
+    /// Report on a command, if it contradicts the stream.
     fn contradicted(&mut self, command: u8, value: u32) -> Option<String> {
         let (what, own) = match command {
             SET_FREQUENCY => ("centre frequency", self.center_hz),

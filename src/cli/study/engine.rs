@@ -69,7 +69,7 @@ fn script(plan: &Plan, engine: args::Engine, missing: &[u32], terms: &args::Term
     export::script(plan, engine, program, missing, most, &terms).map_err(study_error)
 }
 
-/// What there is. A file that its server has just replaced is looked at once more.
+/// Status of the shards. A file that its server has just replaced is read a second time.
 fn looked(plan: &Plan) -> Result<Status, CliError> {
     status(plan).or_else(|_| status(plan)).map_err(study_error)
 }
@@ -196,7 +196,7 @@ fn parallel(plan: &Plan, script: &Path, mut missing: Vec<u32>, progress: &Progre
     }
 }
 
-/// Those among the missing that are missing still. Whole ones are not looked at again.
+/// Missing shards that are still missing. Complete ones are not read again.
 fn left(plan: &Plan, missing: &[u32], progress: &Progress) -> Result<Vec<u32>, CliError> {
     let is_whole = |number: u32| -> Result<bool, CliError> {
         let found = shard::find(plan, number).or_else(|_| shard::find(plan, number));

@@ -1,9 +1,8 @@
-//! What Slurm has of a job that was submitted: asked by its own programs, `sbatch`, `squeue`, `scancel` and
-//! `scontrol`.
+//! State of a submitted job in Slurm, from its own programs `sbatch`, `squeue`, `scancel` and `scontrol`.
 //!
-//! Which shards there are is asked of their files and of nothing else: accounting knows neither a task whose
-//! node died after its last write, nor one that was preempted and came back (`sacct` shows PREEMPTED). The
-//! queue says only whether it is worth waiting.
+//! The shards themselves are the only evidence of what is done. Accounting knows neither a task whose node
+//! died after its last write, nor one that was preempted and came back (`sacct` shows PREEMPTED). The queue
+//! decides only whether waiting is worthwhile.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -11,7 +10,7 @@ use std::process::{Command, Stdio};
 use crate::cli::error::CliError;
 use crate::study::sweep::export::MOST_TASKS;
 
-/// What a queue says of a job.
+/// State of a job in a queue.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Queued {
     /// Tasks that run or will run by themselves.
@@ -70,12 +69,12 @@ pub fn submit(script: &Path) -> Result<String, CliError> {
     }
 }
 
-/// Whether this is a job's number.
+/// True if the text is a job's number.
 pub fn is_number(text: &str) -> bool {
     !text.is_empty() && text.len() <= 18 && text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
-/// What the queue has of a job.
+/// State of a job in the queue.
 pub fn look(job: &str) -> Result<Queued, CliError> {
     let answer = ask("squeue", &["--noheader", "--array", "--jobs", job, "--format", "%T|%r"])?;
     Ok(match answer {

@@ -19,11 +19,11 @@ pub struct Reader {
     start: Epoch,
     /// The last height, and when it was.
     height: (Option<f64>, f64),
-    /// What the height gains, by the last two.
+    /// Vertical speed from the last two heights, in metres per second.
     up_mps: f64,
     /// The newest half.
     half: Option<Half>,
-    /// Whether halves come in pairs, and how many in a row have not.
+    /// True if halves come in pairs; `alone` counts consecutive halves without a partner.
     paired: bool,
     alone: u32,
 }

@@ -22,13 +22,13 @@ const MOST_VALUES: usize = 100_000;
 pub struct Axis {
     /// Key of the scene, the settings or the channel that it sets.
     pub key: String,
-    /// Its values in order.
+    /// Values of the axis in order.
     pub values: Vec<Value>,
     /// Axes with the same word step together.
     pub zip: Option<String>,
-    /// What plots call it in place of the key.
+    /// Label in plots in place of the key.
     pub label: Option<String>,
-    /// Where the file names it.
+    /// Position in the file at which the axis is named.
     pub place: Place,
 }
 
@@ -63,18 +63,18 @@ impl Axis {
         Ok(Self { key, values, zip, label: table.text("label")?.map(str::to_owned), place: table.place("key") })
     }
 
-    /// What plots and tables call it.
+    /// Label in plots and tables.
     pub fn label(&self) -> &str {
         self.label.as_deref().unwrap_or(&self.key)
     }
 
-    /// Whether every value is a number.
+    /// True if every value is a number.
     pub fn is_of_numbers(&self) -> bool {
         self.values.iter().all(|value| number_of(value).is_some())
     }
 
-    /// What plots call its value of this rank: a scene goes by its file's name alone where no other has the
-    /// same.
+    /// Words for the value of this rank in plots. A scene goes by its file's name alone where no other has
+    /// the same.
     pub fn words_of(&self, rank: usize) -> String {
         let text = self.values.get(rank).map_or_else(String::new, text_of);
         let stem = |text: &str| Path::new(text).file_stem().map(|stem| stem.to_string_lossy().into_owned());
@@ -148,7 +148,7 @@ pub fn number_of(value: &Value) -> Option<f64> {
 pub struct Digit {
     /// Numbers of the axes in the study's list.
     pub axes: Vec<usize>,
-    /// How many values it has.
+    /// Number of values.
     pub length: usize,
 }
 
@@ -163,7 +163,7 @@ pub struct Grid {
     pub receiver: Vec<Digit>,
 }
 
-/// Where a case is.
+/// Position of a case in the grid.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Case {
     /// Counted from 0 over the whole study.

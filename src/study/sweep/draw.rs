@@ -27,7 +27,7 @@ pub struct Picture {
     pub stem: String,
     /// Words above all charts.
     pub title: String,
-    /// Its charts.
+    /// Charts of the picture.
     pub charts: Vec<Chart>,
     /// Series that are named below them.
     pub legend: Vec<Series>,
@@ -57,7 +57,7 @@ impl Picture {
         compose((WIDTH_PX, 300 * rows as u32 + 40), columns, &self.charts, &self.legend)
     }
 
-    /// Its crossings as a table in Markdown; nothing for other pictures.
+    /// Table of the crossings in Markdown; empty for other pictures.
     pub fn table(&self) -> String {
         let Some((heads, rows)) = &self.crossings else { return String::new() };
         let mut text = format!("\n| {} |\n|{}\n", heads.join(" | "), " --- |".repeat(heads.len()));
@@ -88,7 +88,7 @@ const MOST_TICKS: usize = 10;
 /// From one series to the next where names are on the axis, in steps of the names.
 const NAMED_STEP: f64 = 0.12;
 
-/// What of the results a plot shows.
+/// Part of the results that a plot shows.
 struct View<'r> {
     results: &'r Results,
     plot: &'r Plot,
@@ -138,7 +138,7 @@ impl View<'_> {
         self.results.study.axes.get(number)
     }
 
-    /// Whether `where` lets this value of an axis through.
+    /// True if `where` admits this value of an axis.
     fn allows(&self, axis: usize, value: usize) -> bool {
         let Some(axis) = self.axis(axis) else { return false };
         let text = axis.values.get(value).map(axis::text_of);
@@ -162,7 +162,8 @@ impl View<'_> {
         cell.estimates.get(self.figure).copied().flatten()
     }
 
-    /// Where a cell is on an axis: its number, or its rank where values are none; logarithms if asked for.
+    /// Coordinate of a cell on an axis: its number, or its rank where values are not numbers. It is a
+    /// logarithm if `log` is true.
     fn place(&self, cell: &Cell, key: &str, log: bool) -> Option<f64> {
         let axis = self.results.axis(key)?;
         let numbers = self.axis(axis)?.is_of_numbers();
@@ -321,7 +322,7 @@ impl View<'_> {
         picture.charts.push(chart);
     }
 
-    /// Where along an axis the mean, and the ends of its interval, cross a level, over x.
+    /// Draws the crossing of a level along an axis by the mean and by the ends of its interval, over x.
     fn crossing(&self, picture: &mut Picture, title: String, cells: &[&Cell], (along, level): (&str, f64)) {
         let first = picture.legend.is_empty();
         let (mut series, mut rows) = (Vec::new(), Vec::new());
@@ -405,7 +406,7 @@ fn most(ends: [Option<f64>; 2]) -> Option<f64> {
     ends.into_iter().flatten().reduce(f64::max)
 }
 
-/// Where a line through points first meets a level.
+/// First crossing of a level by a line through points.
 pub(super) fn crossed(points: &[(f64, f64)], level: f64) -> Option<f64> {
     let pairs = points.windows(2).find_map(|pair| match pair {
         [(x0, y0), (x1, y1)] if (y0 - level) * (y1 - level) <= 0.0 && y0 != y1 => {

@@ -15,7 +15,7 @@ use super::shard::{self, CaseFigures, Found};
 use super::spec::Level;
 use super::{StudyError, plan, sampled, temporary};
 
-/// What there is of a study.
+/// State of a study's shards.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Status {
     /// Numbers of shards that are there and whole.
@@ -46,7 +46,7 @@ pub fn status(plan: &Plan) -> Result<Status, StudyError> {
     Ok(status)
 }
 
-/// What a run came to.
+/// Result of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Ran {
     /// Shards that were made.

@@ -10,7 +10,7 @@ use super::publish::{Rows, short};
 use super::result::Results;
 use analysis::statistics::{median, percentile};
 
-/// How one figure is distributed.
+/// Distribution of one figure.
 #[derive(Clone, Debug)]
 pub struct Spread {
     /// Mean and its 95 % interval, of the cases that have the figure.
@@ -24,7 +24,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Of the values that there are; `None` of none.
+    /// Distribution of the values; `None` without values.
     pub fn of(values: &[f64]) -> Option<Self> {
         Some(Self {
             estimate: Estimate::of(values)?,
@@ -38,11 +38,11 @@ impl Spread {
 /// Cases that share their values of the axes named.
 #[derive(Clone, Debug)]
 pub struct Ensemble {
-    /// Of each axis named, the number of its value.
+    /// Index of the value on each named axis.
     pub at: Vec<usize>,
     /// Cases of the ensemble.
     pub cases: u64,
-    /// Of each kept figure.
+    /// Distribution of each kept figure.
     pub spreads: Vec<Option<Spread>>,
 }
 
@@ -72,7 +72,7 @@ impl Collector {
         lists.iter_mut().zip(values).for_each(|(list, value)| list.extend(value));
     }
 
-    /// What came together.
+    /// Ensembles that were collected.
     pub fn finish(self) -> Vec<Ensemble> {
         let spreads = |lists: Vec<Vec<f64>>| lists.iter().map(|list| Spread::of(list)).collect();
         self.found.into_iter().map(|(at, cases, lists)| Ensemble { at, cases, spreads: spreads(lists) }).collect()

@@ -1,7 +1,7 @@
-//! What repetitions say: a mean and the interval that contains the true one with 95 % confidence.
+//! Estimates from repetitions: a mean, and the interval that contains the true one with 95 % confidence.
 //!
-//! Numbers: Student's t. Of figures that are 0 or 1 in every repetition (held, detected), Wilson's score
-//! interval (1927), whose coverage does not collapse at 0 and 1 as that of the normal approximation does.
+//! Numbers use Student's t. Figures that are 0 or 1 in every repetition (held, detected) use Wilson's score
+//! interval (1927). Its coverage does not collapse at 0 and 1, as that of the normal approximation does.
 //! Repetitions are independent by their seeds.
 
 /// Mean and 95 % interval of a figure over the repetitions of a cell.
@@ -32,7 +32,7 @@ fn t95(freedom: usize) -> f64 {
 }
 
 impl Estimate {
-    /// Of the values that there are, in their order; `None` of none.
+    /// Estimate from the values, in their order; `None` without values.
     pub fn of(values: &[f64]) -> Option<Self> {
         let n = values.len() as f64;
         if values.is_empty() {

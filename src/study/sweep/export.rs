@@ -12,7 +12,7 @@ use super::part::Part;
 use super::plan::Plan;
 use super::shard::ranges;
 
-/// What runs shards.
+/// Engine that runs shards.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Engine {
     /// A job array of Slurm.
@@ -21,7 +21,7 @@ pub enum Engine {
     Parallel,
 }
 
-/// What a site asks of a script.
+/// Requirements of a site on a script.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Terms {
     /// Tasks that share the plan's shards; absent for one a shard, as far as `most_tasks` allows.
@@ -30,7 +30,7 @@ pub struct Terms {
     pub at_once: Option<u32>,
     /// Time limit of a task in minutes; absent for one that follows from the plan.
     pub minutes: Option<u32>,
-    /// What else Slurm is told.
+    /// Further directives for Slurm.
     pub directives: Vec<Directive>,
 }
 
@@ -117,8 +117,8 @@ fn directives(plan: &Plan, directory: &str, numbers: &[u32], tasks: u32, terms: 
     head
 }
 
-/// Where logs go, as Slurm reads it. A backslash ends its reading of `%A`, a line break its line: then they
-/// go where the site sends them.
+/// Directory of the logs in Slurm's notation. `None` where the path has a backslash or a control character: a
+/// backslash ends Slurm's reading of `%A`, a line break its line. The site then chooses the directory.
 fn logs(directory: &str) -> Option<String> {
     let fits = !directory.contains(|c: char| c == '\\' || c.is_control());
     fits.then(|| format!("{}/log", directory.replace('"', "\\\"").replace('%', "%%")))

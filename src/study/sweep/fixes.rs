@@ -14,8 +14,8 @@ use analysis::read::Run;
 use analysis::statistics::percentile;
 use gnss::record::{Fix, IonosphereModel};
 
-/// What a study may keep of them. `nees` is of a single fix; of a consistent receiver its mean over
-/// independent runs is 3 with a variance of 6 over their number.
+/// Figures of the fixes that a study may keep. `nees` is that of a single fix. For a consistent receiver its
+/// mean over independent runs is 3 with a variance of 6 over their number.
 pub const FIGURES: &[&str] = &[
     "message.ready_s",
     "message.in_time",

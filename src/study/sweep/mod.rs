@@ -53,7 +53,7 @@ pub enum StudyError {
     /// A value of an axis is not one that its key can have.
     #[error("{place}: axis {key} = {value}: {reason}")]
     Axis {
-        /// Where the file names it.
+        /// Position in the file at which the value is named.
         place: Place,
         /// The key.
         key: String,
@@ -87,7 +87,7 @@ pub enum StudyError {
     Read {
         /// The file or directory.
         path: PathBuf,
-        /// What the system or the parser reports.
+        /// Error of the operating system or of the parser.
         source: io::Error,
     },
     /// A file or directory cannot be made.
@@ -95,7 +95,7 @@ pub enum StudyError {
     Create {
         /// The file or directory.
         path: PathBuf,
-        /// What the system or the parser reports.
+        /// Error of the operating system or of the parser.
         source: io::Error,
     },
     /// A file cannot be written.
@@ -103,7 +103,7 @@ pub enum StudyError {
     Write {
         /// The file or directory.
         path: PathBuf,
-        /// What the system or the parser reports.
+        /// Error of the operating system or of the parser.
         source: io::Error,
     },
     /// The directory holds something else.
@@ -127,9 +127,9 @@ pub enum StudyError {
     /// Shards are missing.
     #[error("{missing} of {shards} shards are missing: {list}")]
     Incomplete {
-        /// How many.
+        /// Number of missing shards.
         missing: usize,
-        /// How many there are in all.
+        /// Number of all shards.
         shards: u32,
         /// Numbers of the missing ones.
         list: String,
@@ -142,7 +142,7 @@ pub enum StudyError {
         /// The largest number.
         last: u32,
     },
-    /// As another case had failed.
+    /// Stopped, because another case had failed.
     #[error("stopped")]
     Stopped,
     /// The generator failed.

@@ -48,7 +48,7 @@ pub struct Model {
     tracking: TrackingSettings,
 }
 
-/// Whether a key changes what arrives, and not only what the receiver makes of it.
+/// True if a key changes the received signal, and not only its processing in the receiver.
 pub fn changes_signal(key: &str) -> bool {
     !["receiver.", "loop.", "measure."].iter().any(|start| key.starts_with(start))
 }
@@ -206,7 +206,7 @@ fn law(table: &Table<'_>) -> Result<Option<PowerLaw>, ScenarioError> {
 /// A figure of a case.
 #[derive(Clone, Copy)]
 pub struct Figure {
-    /// Its name in a study.
+    /// Name of the figure in a study.
     pub name: &'static str,
     of: fn(&Case, &Outcome) -> Option<f64>,
 }
@@ -245,9 +245,9 @@ fn phase_theory_deg(case: &Case) -> Option<f64> {
 /// T·C/N0: what the theory of loops in noise wants at least [`LEAST_SNR`](crate::proof::LEAST_SNR) of.
 pub const SNR: &str = "theory.snr";
 
-/// What a study may keep. Spreads are of truth minus oscillator, mean over an integration, about their mean;
-/// `raw_…` are of discriminator values. `theory.…` is what `analysis::expect::theory` predicts for the loop
-/// as it is closed.
+/// Figures that a study may keep. Spreads are of truth minus oscillator, mean over an integration, about
+/// their mean; `raw_…` are of discriminator values. `theory.…` are the predictions of
+/// `analysis::expect::theory` for the closed loop.
 pub const FIGURES: &[Figure] = &[
     figure("held", |_, outcome| Some(f64::from(u8::from(outcome.lost.is_none())))),
     figure("slip_free", |_, outcome| Some(f64::from(u8::from(outcome.lost.is_none() && outcome.slips == 0)))),

@@ -76,8 +76,8 @@ pub(super) fn pdf(plan: &Plan, results: &Results, pictures: &[Picture]) -> Resul
 /// Most columns that a page holds without breaking words.
 const MOST_COLUMNS: usize = 7;
 
-/// The same with a row for each figure, where a column for each would be too narrow; the first `fixed`
-/// columns stay.
+/// Table with a row for each figure, where a column for each would be too narrow. The first `fixed` columns
+/// stay.
 fn narrow((heads, rows): Rows, fixed: usize) -> Rows {
     if heads.len() <= MOST_COLUMNS {
         return (heads, rows);

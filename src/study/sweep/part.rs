@@ -22,7 +22,7 @@ impl Part {
         (number < of).then_some(Self { number, of })
     }
 
-    /// Its shards, of so many.
+    /// Shards of the part, out of `all`.
     pub fn shards(self, all: u32) -> Range<u32> {
         let first = |number: u32| (u64::from(number) * u64::from(all) / u64::from(self.of)) as u32;
         first(self.number)..first(self.number + 1)

@@ -26,19 +26,19 @@ const SCHEMA: u32 = 1;
 const TOOL: &str = concat!("gnss-twin ", env!("CARGO_PKG_VERSION"));
 /// Most shards unless set otherwise: clusters take arrays of a thousand tasks by default.
 const MOST_SHARDS: u64 = 1000;
-/// As many at least where there are as many cases, so that a kill costs little.
+/// Least number of shards where there are enough cases, so that a kill costs little.
 const LEAST_SHARDS: u64 = 50;
 /// Length of a shard unless set otherwise.
 const SHARD_MINUTES: f64 = 1.0;
 
-/// How to cut a study into shards.
+/// Rule that cuts a study into shards.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cut {
     /// About a minute of one core each at most, 50 to 1000.
     Default,
     /// Into so many shards.
     Shards(u64),
-    /// Of one core.
+    /// Time of a shard on one core, in minutes.
     Minutes(f64),
 }
 
@@ -96,7 +96,7 @@ pub struct AxisEntry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Column {
-    /// Its heading.
+    /// Heading of the column.
     pub name: String,
     /// Unit of the value.
     pub unit: String,
@@ -105,19 +105,19 @@ pub struct Column {
 /// A study with its directory.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// Where the plan lies.
+    /// Directory of the plan.
     pub directory: PathBuf,
     /// The study as described.
     pub study: Study,
-    /// What the results are bound to.
+    /// Manifest to which the results are bound.
     pub manifest: Manifest,
-    /// Of the manifest's bytes.
+    /// Hash of the manifest's bytes.
     pub hash: String,
     /// At samples level: the scenes.
     pub bases: Vec<Base>,
 }
 
-/// What a study is made of, from where its author has it.
+/// Files of a study, at their original paths.
 struct Sources {
     files: Vec<(Input, Vec<u8>)>,
     bases: Vec<Base>,
@@ -234,12 +234,12 @@ impl Plan {
         self.bases.iter().find(|base| base.written == written)
     }
 
-    /// Where shards are.
+    /// Directory of the shards.
     pub fn shard_directory(&self) -> PathBuf {
         self.directory.join("shards")
     }
 
-    /// Whether another program planned.
+    /// True if the program of this build made the plan.
     pub fn is_of(&self, build: &str) -> bool {
         self.manifest.build == build
     }
@@ -494,7 +494,7 @@ fn cost_s(study: &Study, bases: &[Base], case: &axis::Case) -> f64 {
     }
 }
 
-/// The same of a case in the middle.
+/// Seconds of one core that a case in the middle takes, roughly.
 fn case_s(study: &Study, bases: &[Base]) -> f64 {
     let grid = &study.grid;
     let ends = [0, grid.cases().saturating_sub(1)].map(|case| cost_s(study, bases, &grid.case(case)));

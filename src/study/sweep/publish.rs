@@ -41,7 +41,7 @@ pub fn write(plan: &Plan, lines: &[String], results: &Results) -> Result<(), Stu
     plan::write(&directory.join("report.md"), text(plan, results, &pictures).as_bytes())
 }
 
-/// What a terminal shows of a finished study: theory beside measurement.
+/// Summary of a finished study for a terminal: theory beside measurement.
 pub fn in_short(results: &Results) -> String {
     results.agreement().iter().map(|agreement| in_words(results, agreement) + "\n").collect()
 }
@@ -211,7 +211,7 @@ pub(super) fn level(results: &Results) -> &'static str {
     }
 }
 
-/// What the axes vary.
+/// Text of the base that the axes vary.
 pub(super) fn base(plan: &Plan, results: &Results) -> String {
     match results.study.level {
         Level::Correlator => toml::to_string(&results.study.base).unwrap_or_default().trim().to_owned(),

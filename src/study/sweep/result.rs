@@ -66,7 +66,7 @@ pub struct Results {
 pub struct Cell {
     /// For each axis, the number of its value.
     pub at: Vec<usize>,
-    /// Of each figure; `None` where no case gave one.
+    /// Estimate of each figure; `None` where no case gave one.
     pub estimates: Vec<Option<Estimate>>,
 }
 
@@ -123,7 +123,7 @@ impl Results {
         self.value(cell, axis).map_or_else(String::new, axis::text_of)
     }
 
-    /// The same as plots and reports call it.
+    /// Label of a cell's value on an axis, for plots and reports.
     pub fn words(&self, cell: &Cell, axis: usize) -> String {
         let rank = cell.at.get(axis).copied();
         rank.zip(self.study.axes.get(axis)).map_or_else(String::new, |(rank, axis)| axis.words_of(rank))
@@ -207,12 +207,12 @@ pub struct Compared {
 }
 
 impl Compared {
-    /// Whether theory must hold here.
+    /// True if theory must hold here.
     pub fn in_region(&self) -> bool {
         self.snr.is_none_or(|snr| snr >= LEAST_SNR)
     }
 
-    /// Whether the ratio is one within its bar.
+    /// True if the ratio is one within its bar.
     pub fn holds(&self) -> bool {
         (self.ratio - 1.0).abs() <= self.bar
     }

@@ -40,9 +40,9 @@ use twin;
 /// A scene that a study is based on.
 #[derive(Clone, Debug)]
 pub struct Base {
-    /// As the study writes it.
+    /// Path of the scene in the study's text.
     pub written: PathBuf,
-    /// Where its files are.
+    /// Directory of the scene's files.
     pub directory: PathBuf,
     /// Name of the file without its ending.
     pub name: String,
@@ -50,13 +50,13 @@ pub struct Base {
     pub document: toml::Table,
 }
 
-/// Whether a key changes what arrives, and not only what the receiver makes of it.
+/// True if a key changes the received signal, and not only its processing in the receiver.
 pub fn changes_signal(key: &str) -> bool {
     !key.starts_with("receiver.")
 }
 
-/// What a study may keep. `acquisition.…` count the first search alone; `theory.…` predict for thermal noise
-/// alone, the mean C/N0 of the run and the loop as it is closed.
+/// Figures that a study may keep. `acquisition.…` count the first search alone. `theory.…` predict for
+/// thermal noise alone, the mean C/N0 of the run and the closed loop.
 pub const FIGURES: &[&str] = &[
     "acquisition.detected_share",
     "acquisition.false",

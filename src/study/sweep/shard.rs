@@ -18,12 +18,12 @@ use analysis::show::staged::{Staged, present};
 /// Figures of one case.
 pub type CaseFigures = Vec<Option<f64>>;
 
-/// What is under a shard's name.
+/// State of a shard's file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Found {
     /// There is no such file.
     Nothing,
-    /// Its lines of data.
+    /// Complete shard, with its lines of data.
     Whole(Vec<String>),
     /// Why it cannot be used.
     Bad(String),

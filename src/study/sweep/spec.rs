@@ -15,7 +15,7 @@ use generator::scenario::ScenarioError;
 use generator::scenario::read::{Source, Table, nearest};
 use receiver::settings::Settings;
 
-/// What a case is run on.
+/// Level of the simulation that a case runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {
     /// The receiver's loops on modelled correlations.
@@ -25,7 +25,7 @@ pub enum Level {
 }
 
 impl Level {
-    /// As a study writes it.
+    /// Name of the level in a study's text.
     pub fn name(self) -> &'static str {
         match self {
             Self::Correlator => "correlator",
@@ -37,21 +37,21 @@ impl Level {
 /// A study as written.
 #[derive(Clone, Debug)]
 pub struct Study {
-    /// What errors call it.
+    /// Name of the study in errors.
     pub origin: String,
     /// Name of its results.
     pub name: String,
     /// Words above its report.
     pub title: String,
-    /// What the report says first.
+    /// Text at the beginning of the report.
     pub about: String,
     /// Correlations or samples.
     pub level: Level,
     /// Seed from which every case's seed follows.
     pub seed: u64,
-    /// What is varied.
+    /// Axes of the variation.
     pub axes: Vec<Axis>,
-    /// How the axes make cases.
+    /// Combination of the axes into cases.
     pub grid: Grid,
     /// At correlator level: the tables of the study that make its base.
     pub base: toml::Table,
@@ -68,7 +68,7 @@ pub struct Study {
 /// A picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plot {
-    /// What kind of picture.
+    /// Kind of the picture.
     pub kind: PlotKind,
     /// Words above it.
     pub title: String,
@@ -82,13 +82,13 @@ pub struct Plot {
     pub panel: Option<String>,
     /// Values of other axes.
     pub fixed: Vec<(String, Value)>,
-    /// Whether the axis across is logarithmic.
+    /// True if the horizontal axis is logarithmic.
     pub log_x: bool,
-    /// Whether the axis upward is logarithmic.
+    /// True if the vertical axis is logarithmic.
     pub log_y: bool,
 }
 
-/// How a figure is drawn.
+/// Form of a figure's plot.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PlotKind {
     /// The figure over x, a band of 95 % about its mean.
@@ -98,7 +98,7 @@ pub enum PlotKind {
         /// The axis upward.
         y: String,
     },
-    /// Where along this axis the figure crosses a level, over x.
+    /// Value on this axis at which the figure crosses a level, over x.
     Crossing {
         /// The axis along which it is sought.
         along: String,
