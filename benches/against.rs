@@ -77,7 +77,7 @@ fn compare(other: &Path, rounds: usize) -> Result<String, String> {
     Ok(table)
 }
 
-/// What both do; samples to be received are made here.
+/// Work of both programs; samples to be received are made here.
 fn work(own: &Path, room: &Path) -> Result<Vec<Work>, String> {
     let text = |path: &Path| path.display().to_string();
     let scene = std::fs::read_to_string(STATIC).map_err(|error| format!("{STATIC}: {error}"))?;

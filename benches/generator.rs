@@ -68,7 +68,7 @@ impl Case {
         Self::at("08:05:58", name, tables, (grade, rate_hz), seconds, satellites)
     }
 
-    /// As [`Case::new`], from that time of 2010-07-01 on.
+    /// A case as in [`Case::new`], from that time of 2010-07-01 on.
     fn at(
         time: &str,
         name: &str,
@@ -237,8 +237,8 @@ fn nanoseconds(mut call: impl FnMut()) -> f64 {
     median(&(0..9).map(&mut turn).collect::<Vec<_>>()).unwrap()
 }
 
-/// Where the time of a satellite's sample goes at 2.6 Msps, and the least that the processor's arithmetic
-/// allows.
+/// Profile of the time of a satellite's sample at 2.6 Msps, and the least time that the processor's
+/// arithmetic allows.
 fn profile() -> Vec<Line> {
     const SATELLITES: usize = 11;
     let level = Level::detect();
@@ -343,7 +343,7 @@ fn jammer(kind: &str, keys: &str) -> String {
     format!("[[interference]]\nkind = \"{kind}\"\npower_dbw = -130\n{keys}")
 }
 
-/// What each thing costs when it enters.
+/// Cost of each effect when it enters.
 fn required(lines: &mut Vec<Line>) {
     let scenes = [
         ("bare", String::new()),

@@ -193,7 +193,8 @@ fn cold_search(threads: usize) -> Box<dyn FnMut() -> f64> {
     })
 }
 
-/// As [`tracking`] of the pilot of Galileo E1 with five taps, and of the data beside it with one, at 10 Msps.
+/// Benchmark as in [`tracking`] of the pilot of Galileo E1 with five taps, and of the data beside it with
+/// one, at 10 Msps.
 fn tracking_pairs(arithmetic: Arithmetic) -> Box<dyn FnMut() -> f64> {
     let (rate_hz, block, period) = (10e6, 1 << 17, 40_000);
     let bytes = noise(2 * block);
@@ -232,7 +233,7 @@ fn unpacking() -> Box<dyn FnMut() -> f64> {
     })
 }
 
-/// What an arithmetic errs against `f64`: code in metres and carrier in cycles, largest mean of a satellite
+/// Errors of an arithmetic against `f64`: code in metres and carrier in cycles, largest mean of a satellite
 /// and root mean square of a millisecond, and lost C/N0 in decibels.
 struct Errors {
     code_mean_m: f64,
@@ -366,7 +367,7 @@ impl Row {
     }
 }
 
-/// What bounds the correlator in 16 bits, from the medians at 2.6 and 10 Msps.
+/// Bounds of the correlator in 16 bits, from the medians at 2.6 and 10 Msps.
 fn limits(rows: &[Row]) -> String {
     let ghz = clock_ghz();
     let [slow, fast] = [0, 1].map(|n| rows.get(n).map_or(f64::NAN, Row::median));

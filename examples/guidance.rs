@@ -47,13 +47,13 @@ longitude_deg = 11.6
 height_m = 520
 "#;
 
-/// What the vehicle can do, and how the air treats it.
+/// Limits of the vehicle, and the disturbance by the air.
 const MOST_MPS2: f64 = 30.0;
 const GUST_MPS2: f64 = 0.3;
 const GUST_S: f64 = 2.0;
 /// Standard deviation of its first velocity about the aim.
 const AIM_MPS: f64 = 3.0;
-/// What a good flight misses by, and how many are good at least.
+/// Largest miss of a good flight in metres, and least share of good flights.
 const BAR_M: f64 = 5.0;
 const BAR_SHARE: f64 = 0.95;
 
@@ -156,7 +156,7 @@ fn nearest_m(from_m: Vector3<f64>, to_m: Vector3<f64>) -> f64 {
     (from_m + way * share).norm()
 }
 
-/// What the vehicle believes: the last fix, carried on by its own commands.
+/// State that the vehicle believes: the last fix, carried on by its own commands.
 struct Guide {
     place_m: Vector3<f64>,
     velocity_mps: Vector3<f64>,

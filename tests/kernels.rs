@@ -210,11 +210,12 @@ fn harmonic(x: &[f64], k: usize) -> (f64, f64) {
     })
 }
 
-/// Where the code best matches one period of samples, in metres behind the true place: the zero of early
-/// minus late, half a chip apart, of the continuous correlation with the code below half the sample rate.
+/// Distance in metres of the best match of the code with one period of samples behind the true position. It
+/// is the zero of early minus late, half a chip apart, of the continuous correlation with the code below half
+/// the sample rate.
 ///
-/// By Fourier series: the code's harmonics `k` kHz, from its chips and the pulse's sinc, times those of the
-/// samples.
+/// Computed by Fourier series: the code's harmonics `k` kHz, from its chips and the pulse's sinc, times those
+/// of the samples.
 fn code_bias_m(edge: Edge<'_>, rate_khz: usize, start_chips: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
     let spreading = plain(&L1_CA, 11).unwrap();

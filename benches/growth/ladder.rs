@@ -22,12 +22,12 @@ pub struct Ladder {
     pub x: &'static str,
     /// The cost's unit.
     pub unit: &'static str,
-    /// What the work should be.
+    /// Expected amount of work.
     pub expected: &'static str,
     pub steps: Vec<Step>,
     /// From where on costs should be on a straight line; `None` where no line is expected.
     pub line_from: Option<f64>,
-    /// Whether the quantity is drawn by its logarithm.
+    /// True if the quantity is drawn by its logarithm.
     pub is_log: bool,
 }
 

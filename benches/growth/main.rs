@@ -1,11 +1,10 @@
-//! How cost and memory grow: `cargo bench --bench growth` prints tables of whole processes against
-//! satellites, signals, rate, duration, rays, rows of motion and taps, each beside the straight line that it
-//! should be. With `-- --write` they go into `reports/performance.md`, and the curves into
-//! `reports/growth.png`.
+//! Growth of cost and memory: `cargo bench --bench growth` prints tables of whole processes against
+//! satellites, signals, rate, duration, rays, rows of motion and taps. Each is beside its expected straight
+//! line. With `-- --write` they go into `reports/performance.md`, and the curves into `reports/growth.png`.
 //!
-//! Cost is processor time of the whole process on one thread, all of its files in, per second of signal (the
-//! kernel counts it in hundredths of a second); memory is the process's largest resident set, asked for every
-//! few milliseconds. `--only WORDS` measures the ladders whose title holds these words.
+//! Cost is processor time of the whole process on one thread, with all of its files, per second of signal.
+//! The kernel counts it in hundredths of a second. Memory is the process's largest resident set, sampled
+//! every few milliseconds. `--only WORDS` measures the ladders whose title holds these words.
 
 mod ladder;
 #[path = "../shared/machine.rs"]

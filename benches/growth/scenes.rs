@@ -15,7 +15,7 @@ const SATELLITES: [&str; 12] = ["G23", "G13", "G03", "G19", "G06", "G07", "G20",
 /// Signals about L1 in the order in which they join.
 const SIGNALS: [&str; 7] = ["GPS L1 C/A", "Galileo E1", "QZSS L1 C/A", "GPS L1C", "BeiDou B1C", "QZSS L1C", "NavIC L1"];
 
-/// What a process does with a scene.
+/// Work of a process with a scene.
 #[derive(Clone, Copy)]
 enum Work {
     /// Samples into nothing.

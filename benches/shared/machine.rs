@@ -1,4 +1,4 @@
-//! What figures were measured on.
+//! Machine on which figures were measured.
 
 use std::process::Command;
 

@@ -9,7 +9,7 @@ const TICKS: f64 = 100.0;
 /// From one look at the memory to the next.
 const LOOK: Duration = Duration::from_millis(2);
 
-/// What a process took.
+/// Resources that a process used.
 #[derive(Clone, Copy, Debug)]
 pub struct Spent {
     /// Processor time, the kernel's share in.

@@ -55,7 +55,7 @@ impl Effect for Moved {
     }
 }
 
-/// Where and how long a setting is measured.
+/// Scene, start and duration of a setting's measurement.
 #[derive(Clone, Copy)]
 struct Site {
     scene: &'static str,
@@ -67,7 +67,7 @@ struct Site {
     time_s: f64,
     /// Replacements in the text.
     change: (&'static str, &'static str),
-    /// What comes after it.
+    /// Tables after the replacements.
     tables: &'static str,
 }
 

@@ -154,7 +154,7 @@ fn signals(text: &mut String, rows: &[SignalRow], dopplers: &[DopplerRow]) {
     models(text, rows);
 }
 
-/// What `plan` states against what was measured.
+/// Adds the comparison of `plan`'s statements with the measurements.
 fn models(text: &mut String, rows: &[SignalRow]) {
     text.push_str(
         "\n### What `plan` states against what is measured\n\n\
@@ -360,7 +360,7 @@ fn table<T: serde::Serialize>(path: &Path, rows: &[T]) {
     file.flush().unwrap();
 }
 
-/// What `plan` reads: nanoseconds of each edge in both arithmetics.
+/// Writes the file that `plan` reads: nanoseconds of each edge in both arithmetics.
 pub fn write_costs(path: &Path, rows: &[SignalRow]) {
     let mut text = String::from("signal,sample_rate_msps");
     for (edge, _) in CodeEdge::NAMES {

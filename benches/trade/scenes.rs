@@ -62,7 +62,7 @@ const KNOBS: [&str; 25] = [
 /// Knobs of signals with layers, in the scene of two systems.
 const LAYERS: [&str; 2] = ["fidelity.waveform = \"strongest\"", "receiver.tracking.waveform = \"strongest\""];
 
-/// What a setting of a scene costs and errs.
+/// Cost and errors of a setting of a scene.
 #[derive(Clone, Debug, Serialize)]
 pub struct SceneRow {
     pub scene: String,

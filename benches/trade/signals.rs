@@ -1,6 +1,6 @@
-//! What a sample of a satellite costs in the kernels and what its code errs, for every signal, rate, edge and
-//! arithmetic. Costs are medians of interleaved runs of six satellites, strips included; errors are those of
-//! `tests/common/lines.rs`, over satellites and places of the code on the sampling grid.
+//! Cost of a satellite's sample in the kernels, and its code errors, for every signal, rate, edge and
+//! arithmetic. Costs are medians of interleaved runs of six satellites, strips included. Errors are those of
+//! `tests/common/lines.rs`, over satellites and positions of the code on the sampling grid.
 
 use std::time::Instant;
 
@@ -37,7 +37,8 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// Of the median of some runs: ranks `n/2 ± 0.98·√n`, by the binomial distribution of how many lie below.
+    /// Interval of the median of some runs: ranks `n/2 ± 0.98·√n`, by the binomial distribution of the number
+    /// of runs below.
     fn of_median(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
         let (count, last) = (values.len() as f64, values.len().saturating_sub(1));
@@ -65,12 +66,12 @@ pub struct SignalRow {
     pub code_rms_m: f64,
     /// Satellites and places.
     pub draws: usize,
-    /// What the plan states for it.
+    /// Error that the plan states for it, in metres.
     pub stated_m: f64,
     /// The largest error of all, and where it was met.
     pub code_largest_m: f64,
     pub largest_at: String,
-    /// What single precision adds to the code (rms) and to the carrier over a period (largest).
+    /// Errors of single precision: code in metres (rms), and carrier over a period in cycles (largest).
     pub f32_code_m: f64,
     pub carrier_cycles: f64,
     /// Power of the samples that the exact code within the band does not correlate with.
@@ -86,7 +87,7 @@ impl SignalRow {
         }
     }
 
-    /// What the plan states over what is measured.
+    /// Ratio of the stated error to the measured one.
     pub fn ratio(&self) -> f64 {
         self.stated_m / self.code_rms_m
     }
@@ -252,7 +253,7 @@ fn moving(code: &Code, kernel: Kernel<'_>, rate_hz: f64, drift: f64) -> Option<f
     Some(rms(found.into_iter()))
 }
 
-/// What was found of one component of a satellite at a place, in both arithmetics.
+/// Errors of one component of a satellite at a position, in both arithmetics.
 struct Draw {
     component: usize,
     number: u8,

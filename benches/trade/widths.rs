@@ -1,8 +1,8 @@
-//! What the width of samples and the quality of noise cost and lose.
+//! Cost and losses of the width of samples and of the quality of noise.
 //!
-//! One satellite in the noise of a second at 2.6 Msps, as `cf32` with noise in f64 and then in each narrower
-//! form of the same seed: what differs is the rounding. C/N0 is the correlated amplitude's square over the
-//! mean power of the samples; the code is a discriminator over 20 ms.
+//! One satellite in the noise of a second at 2.6 Msps is made as `cf32` with noise in f64, and then in each
+//! narrower form of the same seed. The difference is the rounding. C/N0 is the correlated amplitude's square
+//! over the mean power of the samples; the code is a discriminator over 20 ms.
 
 use gnss_twin::analysis::show::trade::Width;
 use gnss_twin::analysis::statistics::{mean, median};

@@ -1,9 +1,9 @@
-//! What samples do to a code, from its spectral lines.
+//! Effect of sampling on a code, from its spectral lines.
 //!
-//! A code that repeats is lines a period apart, whose amplitudes follow from its chips and the waveform of
-//! a chip without any filter or sampling: the truth. The samples of one period are the same lines, with
-//! what the edges changed and folded back. Their delay is that of an early-minus-late correlator with the
-//! exact lines below half the rate. Nothing here is the generator's but the samples that are judged.
+//! A periodic code consists of lines a period apart, whose amplitudes follow from its chips and the waveform
+//! of a chip without any filter or sampling. These lines are the truth. The samples of one period are the
+//! same lines, with the changes of the edges and with aliases. Their delay is that of an early-minus-late
+//! correlator with the exact lines below half the rate. Only the judged samples come from the generator.
 //! Limits: codes without data and secondary code, whose period is whole samples.
 
 use std::f64::consts::{PI, TAU};
@@ -24,18 +24,18 @@ pub struct Code {
     bare: &'static Signal,
     number: u8,
     pub period_s: f64,
-    /// Of the correlator: half a step of the waveform.
+    /// Early-late spacing of the correlator in seconds: half a step of the waveform.
     spacing_s: f64,
     /// Steps of the waveform in a period, transformed.
     lines: Vec<Complex<f64>>,
 }
 
-/// What the samples of a period are against the exact code.
+/// Errors of a period's samples against the exact code.
 #[derive(Clone, Copy, Debug)]
 pub struct Found {
-    /// How late the code is.
+    /// Delay of the code, in metres.
     pub code_m: f64,
-    /// How far ahead the carrier is.
+    /// Lead of the carrier, in cycles.
     pub carrier_cycles: f64,
     /// Share of the samples' power that the exact code, within the band, does not correlate with.
     pub lost: f64,

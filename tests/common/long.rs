@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-/// Whether the long part of the running test is asked for. Where it is not, that is noted under the test's
-/// name.
+/// True if the long part of the running test is requested. If it is not, that is noted under the test's name.
 pub fn is_asked_for() -> bool {
     let is_long = std::env::var_os("GNSS_TWIN_LONG").is_some();
     let thread = std::thread::current();

@@ -1,4 +1,4 @@
-//! What a front end takes from the signals is what integrals say.
+//! Losses of the signals in a front end, against integrals.
 
 use std::f64::consts::PI;
 

@@ -30,7 +30,7 @@ pub(super) fn scene(rate_hz: f64, interference: &str) -> Scene {
     scene_in(Path::new("."), rate_hz, "", &format!("[[interference]]\n{interference}\n")).0
 }
 
-/// What the first source alone adds to samples from `start` on, in units of its amplitude.
+/// Samples of the first source alone from `start` on, in units of its amplitude.
 pub(super) fn alone(scene: &Scene, start: u64, samples: usize) -> Vec<(f64, f64)> {
     let (mut i, mut q) = (vec![0.0_f32; samples], vec![0.0_f32; samples]);
     for (k, (i, q)) in (0_u64..).zip(i.chunks_mut(1 << 15).zip(q.chunks_mut(1 << 15))) {

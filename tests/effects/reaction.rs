@@ -1,4 +1,4 @@
-//! What the receiver makes of the hardware and the channel, against what theory says of its own loops.
+//! Response of the receiver to the hardware and the channel, against the theory of its own loops.
 
 use std::f64::consts::TAU;
 use std::io::Write;

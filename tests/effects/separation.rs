@@ -1,4 +1,4 @@
-//! What a correlator keeps of C/N0 under interference, against spectral separation and the code's own lines.
+//! Loss of C/N0 in a correlator under interference, against spectral separation and the code's own lines.
 
 use std::f64::consts::{PI, TAU};
 use std::process::Command;

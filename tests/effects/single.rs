@@ -76,7 +76,7 @@ pub fn follow(scene: &Scene, settings: &TrackingSettings) -> (Vec<Observation>, 
     (truth, report, directory)
 }
 
-/// How much longer the measured pseudorange is than the true one, within a code period.
+/// Measured pseudorange less the true one in metres, within a code period.
 pub fn code_error_m(truth: &Observation, measured: &Measurement) -> f64 {
     let periods = truth.sent_fraction_s * 1e3 - measured.code_fraction;
     (periods - periods.round()) * 299_792.458

@@ -214,7 +214,7 @@ struct Definition {
     component: &'static Component,
     code: Vec<i8>,
     secondary_code: Vec<i8>,
-    /// Of the amplitude.
+    /// Factor of the amplitude.
     gain: f64,
 }
 
@@ -258,8 +258,8 @@ impl Definition {
 /// Samples on either side of the end of a code: half a millisecond, no code is shorter.
 const HALF: u64 = 32_500;
 
-/// What each component of a signal brings to samples from `first` on, carrier and all, without data and of a
-/// power of one, and whether an edge of chips is nearer to them than two sides agree on.
+/// Replicas of a signal's components in samples from `first` on, carrier included, without data and of unit
+/// power. The flags are true where an edge of chips is nearer to a sample than two computations agree on.
 pub fn replica(
     (scene, sv, signal): (&Scene, Sv, &'static Signal),
     (first, samples): (u64, u64),

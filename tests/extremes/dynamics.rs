@@ -28,7 +28,7 @@ fn along(way: Vector3<f64>, knots: &[[f64; 4]], breaks_s: Vec<f64>) -> Trajector
     along_from(Geodetic::from_degrees(26.5123, 80.2329, 130.0).to_ecef(), way, knots, breaks_s)
 }
 
-/// The same from a place.
+/// A motion along `way` from `place`.
 fn along_from(place: Vector3<f64>, way: Vector3<f64>, knots: &[[f64; 4]], breaks_s: Vec<f64>) -> Trajectory {
     let knot = |&[t_s, s, v, a]: &[f64; 4]| Knot {
         t_s,

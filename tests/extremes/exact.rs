@@ -60,7 +60,7 @@ impl<'a> Exact<'a> {
         self.rate_hz * SAMPLE
     }
 
-    /// By how much the satellite's clock was behind the receiver's reading of sample `n` when it sent, in
+    /// Difference between the receiver's reading of sample `n` and the satellite's clock at transmission, in
     /// units.
     pub fn delay(&self, n: u64) -> i128 {
         let (second, elapsed) = (self.second(), i128::from(n) * SAMPLE);

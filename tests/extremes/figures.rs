@@ -19,11 +19,11 @@ pub const fn case(number: u32, subject: &'static str, signals: &'static str) -> 
     Case { number, subject, signals }
 }
 
-/// What a case ran on that walks the catalogue.
+/// Signals of a case that covers the catalogue.
 pub const ALL: &str = "all 25";
-/// What a case ran on that has GPS L1 C/A alone.
+/// Signal of a case with GPS L1 C/A alone.
 pub const CA: &str = "GPS L1 C/A";
-/// What a case ran on that looks at places, orbits, loops or sums, which know no signal.
+/// Signals of a case about positions, orbits, loops or sums, which know no signal.
 pub const NONE: &str = "none";
 
 /// Families by the number of their first case.
@@ -91,9 +91,9 @@ impl<T: Into<String>> From<(f64, T)> for Worst {
     }
 }
 
-/// Where a row stands: its case, the line of the test that tells it, and how often that line has.
+/// Position of a row: its case, the line of the test that adds it, and the number of calls of that line.
 type Place = (u32, &'static str, u32, usize);
-/// What a row says: subject and signals of its case, figure, value, input, bar.
+/// Cells of a row: subject and signals of its case, figure, value, input, bar.
 type Row = [String; 6];
 
 static ROWS: Mutex<BTreeMap<Place, Row>> = Mutex::new(BTreeMap::new());
@@ -133,7 +133,7 @@ impl Case {
         assert!(held == of && of > 0, "case {}, {figure}: {held} of {of}", self.number);
     }
 
-    /// What may not happen at all did so often.
+    /// Adds a row for an event that may not happen at all.
     #[track_caller]
     pub fn none(self, figure: &str, count: usize) {
         self.row(figure, &count.to_string(), "", "0");
@@ -159,17 +159,17 @@ pub fn section(title: &'static str, text: String) {
     write(&ROWS.lock().unwrap_or_else(|broken| broken.into_inner()));
 }
 
-/// Where the report goes, if it is asked for.
+/// Path of the report, if it is requested.
 pub fn report() -> Option<PathBuf> {
     std::env::var_os("GNSS_TWIN_WRITE_STABILITY").map(PathBuf::from)
 }
 
-/// Whether the run may take minutes.
+/// True if the run may take minutes.
 pub fn long() -> bool {
     std::env::var_os("GNSS_TWIN_LONG").is_some()
 }
 
-/// How many random cases a run draws.
+/// Number of random cases that a run draws.
 pub fn cases(short: u32, long_run: u32) -> u32 {
     if long() { long_run } else { short }
 }

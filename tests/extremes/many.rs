@@ -123,7 +123,7 @@ fn double_differences(of: [&Scene; 2], signal: &'static Signal, step_s: u64) -> 
     (worst, kept)
 }
 
-/// The same place without a clock's error, and one ten kilometres from it with one.
+/// Two scenes: one without a clock's error, and one ten kilometres away with one.
 fn pair(mut make: impl FnMut(&str) -> Scene) -> [Scene; 2] {
     let (base, mut rover) = (make(""), make(CLOCK));
     let place = base.trajectory.at(0.0).position_m;

@@ -35,7 +35,7 @@ pub fn try_scene(text: &str) -> Result<Scene, String> {
     try_scene_in(&folder(), text)
 }
 
-/// The same whose files are in a directory.
+/// Reads a scene whose files are in a directory.
 pub fn try_scene_in(directory: &Path, text: &str) -> Result<Scene, String> {
     let scenario = Scenario::parse(text, "extreme").map_err(|e| e.to_string())?;
     scenario.compose(directory, &Overrides::default()).map(|(scene, _)| scene).map_err(|e| e.to_string())
@@ -77,7 +77,7 @@ pub fn part(scene: &Scene, part: Range<u64>, directory: &Path) -> Vec<u8> {
     part_with(scene, part, directory, &Options::default())
 }
 
-/// The same with a cut of the work and an instruction set of choice.
+/// A part of a scene's samples, made with the given division of the work and instruction set.
 pub fn part_with(scene: &Scene, part: Range<u64>, directory: &Path, options: &Options) -> Vec<u8> {
     let mut bytes = Vec::new();
     std::fs::create_dir_all(directory).unwrap();
@@ -147,7 +147,7 @@ impl Received {
         rows(&self.directory.path().join("truth"), "observations.csv")
     }
 
-    /// Whether every number in every table that the receiver wrote is finite.
+    /// True if every number in every table that the receiver wrote is finite.
     pub fn finite(&self) -> bool {
         ["observations", "fixes", "acquisition", "tracking"].iter().all(|name| {
             let path = self.directory.path().join("rx").join(format!("{name}.csv"));
@@ -191,7 +191,7 @@ pub fn track(scene: &Scene, bytes: &[u8], hit: &Acquired, settings: &TrackingSet
     (channel, report)
 }
 
-/// What a perfect search would give of `sv` at sample 0, with errors added.
+/// Hit of a perfect search for `sv` at sample 0, with errors added.
 pub fn hit(scene: &Scene, sv: Sv, chips: f64, doppler_hz: f64) -> Acquired {
     let signal = scene.signals[0];
     let (row, ..) = truth::observe(scene, &gnss_twin::generator::spoof::Constellation::authentic(), sv, signal, 0, 0.0)

@@ -37,7 +37,7 @@ fn period(rate_khz: usize, edge: Edge<'_>, start: f64) -> Vec<f32> {
     waves.into_iter().next().unwrap()
 }
 
-/// The same made by one instruction set.
+/// Samples of one code period of PRN 7, made by one instruction set.
 fn period_on(level: Level, rate_khz: usize, edge: Edge<'_>, start: f64) -> Vec<f32> {
     let spreading = plain(&L1_CA, 7).unwrap();
     let one = 281_474_976_710_656.0;
@@ -72,8 +72,8 @@ fn places() -> impl Iterator<Item = f64> {
     (0..24).map(|place| 11.0 + (f64::from(place) + 0.5) / 24.0)
 }
 
-/// Where the receiver's own correlators, half a chip apart, see one period of samples of `edge` that stand
-/// still on the grid, in metres off the true place, rms over places.
+/// Code error in metres of the receiver's own correlators, half a chip apart, rms over positions. The samples
+/// of `edge` are at rest on the grid.
 fn received_bias_m(rate_khz: usize, edge: Edge<'_>, replica: correlate::Edge) -> f64 {
     let replica = correlate::Replica::new(l1ca::code(7).unwrap(), replica).unwrap();
     let of = |start: f64| {
@@ -96,9 +96,9 @@ fn received_bias_m(rate_khz: usize, edge: Edge<'_>, replica: correlate::Edge) ->
     (places().map(of).sum::<f64>() / 24.0).sqrt()
 }
 
-/// Where the code best matches one period of samples of `edge`, in metres behind the true place, rms over
-/// places: the zero of early minus late, half a chip apart, of the continuous correlation below half the
-/// rate, by Fourier series.
+/// Code error in metres of the best match with one period of samples of `edge`, rms over positions. It is the
+/// zero of early minus late, half a chip apart, of the continuous correlation below half the rate, by Fourier
+/// series.
 fn bias_m(rate_khz: usize, edge: Edge<'_>) -> f64 {
     let transform = |x: Vec<f64>| {
         let mut x: Vec<Complex64> = x.into_iter().map(Complex64::from).collect();

@@ -59,22 +59,22 @@ fn gpst_of_utc(date: [i128; 3]) -> i128 {
     reading(date) + LEAPS.iter().filter(|leap| **leap <= date).count() as i128
 }
 
-/// What UTC reads at a second of GPS time, as seconds of its calendar; in an inserted second that after it.
+/// UTC at a second of GPS time, as seconds of its calendar; during an inserted second the one after it.
 fn utc_of_gpst(seconds: i128) -> i128 {
     // A second is inserted before its date: by then the old count has run a second over.
     let passed = |leap: &&[i128; 3]| seconds >= gpst_of_utc(**leap);
     seconds - LEAPS.iter().filter(passed).count() as i128
 }
 
-/// How a system's documents number time.
+/// Time numbering of a system's documents.
 struct Numbers {
     /// GPS seconds at which its week 0, or its first day, begins.
     begins: i128,
-    /// What its calendar reads then.
+    /// Calendar time at that beginning.
     reads: i128,
 }
 
-/// Where each scale begins.
+/// Beginning of each scale.
 fn numbers(system: System) -> Numbers {
     match system {
         // IS-GPS-200N, 3.3.4, IS-QZSS-PNT-005, 3.1.4 and DO-229, A.4.4.15: midnight of 1980-01-05/06 of UTC.
@@ -91,7 +91,7 @@ fn numbers(system: System) -> Numbers {
     }
 }
 
-/// What a system's calendar reads at a second of GPS time.
+/// Calendar time of a system at a second of GPS time.
 pub fn reads(system: System, seconds: i128) -> i128 {
     match system {
         System::Glonass => utc_of_gpst(seconds) + 10_800,
@@ -193,7 +193,7 @@ fn messages() -> Vec<(&'static Signal, &'static Message, Ephemeris)> {
     found.into_values().collect()
 }
 
-/// What comes of a message around an instant.
+/// Results of a message around an instant.
 #[derive(Default)]
 struct Heard {
     /// Units with a number of the week or of the day, and those whose number is the calendar's.
@@ -206,7 +206,7 @@ struct Heard {
     times: [usize; 3],
 }
 
-/// What comes of many.
+/// Sums over many messages.
 #[derive(Default)]
 struct Sum {
     heard: Heard,

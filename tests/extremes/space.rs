@@ -73,8 +73,8 @@ fn dopplers(scene: &Scene, step_s: f64) -> [Worst; 4] {
     most
 }
 
-/// How many of the satellites in view at the start with at least `least_dbhz` a search finds where truth
-/// says, of how many, and how many it finds that are not there.
+/// Number of satellites that a search finds at their true position, number of those in view with at least
+/// `least_dbhz`, and number of false hits. The satellites are those at the start.
 fn found(name: &str, scene: &Scene, least_dbhz: f64) -> (usize, usize, usize) {
     let settings = run::settings(&text(name));
     let bytes = run::part(scene, 0..200_000, tempfile::tempdir().unwrap().path());

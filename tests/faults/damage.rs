@@ -121,14 +121,14 @@ pub fn find(bytes: &[u8], word: &[u8]) -> Option<usize> {
     bytes.windows(word.len()).position(|window| window == word)
 }
 
-/// Where the numbers' fields of 19 columns begin.
+/// Offsets of the numbers' fields of 19 columns.
 fn fields(bytes: &[u8], head: usize) -> Vec<usize> {
     // A number of twelve digits ends four columns after its exponent's letter.
     let ends = (head..bytes.len() - 3).filter(|i| b"De".contains(&bytes[*i]) && b"+-".contains(&bytes[*i + 1]));
     ends.map(|letter| letter + 4 - 19).collect()
 }
 
-/// Where the lines begin that name a satellite and an epoch.
+/// Offsets of the lines that name a satellite and an epoch.
 fn titles(bytes: &[u8], head: usize) -> Vec<usize> {
     let starts = (head..bytes.len() - 4).filter(|i| bytes[*i] == b'\n').map(|i| i + 1);
     let named = |at: &usize| bytes[*at] == b'G' || (bytes[*at] != b'>' && bytes[at + 1].is_ascii_digit());

@@ -1,4 +1,4 @@
-//! The same bytes on any threads, in any pieces, on any processor, under any locale, and from two runs at
+//! Identical bytes on any threads, in any pieces, on any processor, under any locale, and from two runs at
 //! once.
 
 use std::fs;

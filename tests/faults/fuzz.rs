@@ -40,7 +40,7 @@ use crate::sizes::{memory_kib, reset_peak};
 use crate::tally::{End, Tally, cases};
 
 const FAMILY: &str = "Fuzzing";
-/// What a parser may take beyond what there was: P1's bound.
+/// Memory in KiB that a parser may take beyond the earlier use: P1's bound.
 const ROOM_KIB: u64 = 64 << 10;
 /// Executions timed together.
 const BATCH: usize = 250;
@@ -140,13 +140,13 @@ fn word(bytes: &[u8], at: usize) -> (usize, usize) {
     (from, to.max(from))
 }
 
-/// What a parser makes of bytes: the same number for the same content, or its refusal.
+/// Parser of bytes. It returns an equal number for equal content, or its refusal.
 type Read<'a> = Box<dyn Fn(&[u8]) -> Result<u64, String> + 'a>;
 
 struct Target<'a> {
     name: &'static str,
     corpus: Vec<Vec<u8>>,
-    /// How refusals begin.
+    /// Beginning of the refusals.
     prefix: String,
     /// Executions in the long run and in the short one.
     runs: (usize, usize),
@@ -183,7 +183,7 @@ fn text(error: impl ToString) -> String {
     error.to_string()
 }
 
-/// Whether a motion is where bodies are, all along.
+/// Checks that a motion is within the region of real bodies, all along.
 fn moves(trajectory: &Trajectory) -> Result<u64, String> {
     // A motion that rests at an end is known for ever there; another one only within its span, wherever that
     // lies.

@@ -1,7 +1,7 @@
-//! What numbers physics and the meaning of a key allow, key by key: an oracle that knows nothing of the
-//! product's ranges.
+//! Legal numbers by physics and by the meaning of a key, key by key. This oracle does not know the product's
+//! ranges.
 
-/// Whether a value can stand there.
+/// Legality of a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Legal {
     Yes,
@@ -134,10 +134,11 @@ const WHOLE: &[Row] = &[
 const PATHS: [&str; 10] =
     ["file", "sp3", "antenna_file", "gpt3_file", "vmf_file", "scenario", "title", "about", "label", "reason"];
 
-/// Where any finite number is a bound.
+/// Keys whose bound may be any finite number.
 const BOUNDS: [&str; 2] = ["min", "max"];
 
-/// Whether `bad` can stand at `table.key`, where `was` stands; `None` if the tables do not know the key.
+/// Legality of `bad` at `table.key`, where `was` is the present value; `None` if the tables do not know the
+/// key.
 pub fn legal(table: &str, key: &str, was: &str, bad: &str) -> Option<Legal> {
     let table = table.trim_start_matches("receiver.").trim_start_matches("front_end.");
     let last = key.rsplit('.').next().unwrap_or(key);

@@ -43,10 +43,10 @@ pub struct Task {
     pub arguments: Vec<String>,
     /// The directory that it starts from.
     pub before: PathBuf,
-    /// What stands there before, and after.
+    /// Files in the directory before the task and after it.
     pub old: Files,
     pub new: Files,
-    /// What it prints on standard output, if that is its result.
+    /// Output on standard output, if that is the task's result.
     pub printed: Option<Vec<u8>>,
     /// A directory of results that replaces another one as a whole.
     pub whole: Option<&'static str>,
@@ -81,7 +81,7 @@ fn ends(code: i32, text: &str, directory: &Path) {
 }
 
 impl Bench {
-    /// Those of the named tasks.
+    /// A bench with the named tasks.
     pub fn new(names: &[&'static str]) -> Self {
         let place = tempfile::tempdir().unwrap();
         let mut bench = Self { place, tasks: Vec::new() };
@@ -182,9 +182,9 @@ impl Bench {
     }
 }
 
-/// How a run of a task ended.
+/// End of a task's run.
 pub struct Ended {
-    /// Its exit code, or 128 and the signal.
+    /// Exit code, or 128 and the signal.
     pub code: i32,
     pub stdout: Vec<u8>,
     pub message: String,
@@ -209,13 +209,13 @@ impl Task {
         self.ended(twin(&self.arguments, place).output().unwrap())
     }
 
-    /// How a run of it ended, with 0 as the code of one that has done its work.
+    /// End of a run of the task, with 0 as the code of a run that has done its work.
     pub fn ended(&self, output: Output) -> Ended {
         let ended = Ended::from(output);
         Ended { code: if ended.code == self.done { 0 } else { ended.code }, ..ended }
     }
 
-    /// Whether everything is there and right.
+    /// Checks that all files are complete and right.
     pub fn complete(&self, place: &Path, ended: &Ended) -> Result<(), String> {
         let found = files(place);
         if let Some(name) = self.new.keys().find(|name| !found.contains_key(*name)) {
@@ -231,7 +231,7 @@ impl Task {
         }
     }
 
-    /// Whether every file that has its final name is the old or the new one, and nothing was mixed.
+    /// Checks that every file with its final name is the old or the new one, and that nothing was mixed.
     pub fn sound(&self, found: &Files) -> Result<(), String> {
         for (name, bytes) in found.iter().filter(|(name, _)| !is_left_over(name)) {
             if self.new.get(name) != Some(bytes) && self.old.get(name) != Some(bytes) {
@@ -255,7 +255,7 @@ impl Task {
     }
 }
 
-/// Whether a path is that of something in the making.
+/// True if a path is that of an unfinished output.
 pub fn is_left_over(name: &str) -> bool {
     name.split('/').any(|part| part.ends_with(".part") || part.ends_with(".old") || part.starts_with(".tmp"))
 }
@@ -265,8 +265,7 @@ pub fn left_over(found: &Files) -> Vec<String> {
     found.keys().filter(|name| is_left_over(name)).cloned().collect()
 }
 
-/// What stands below a directory; empty directories end with a slash. Left out is what tells how fast a run
-/// was.
+/// Files below a directory; empty directories end with a slash. Files about the speed of a run are left out.
 pub fn files(directory: &Path) -> Files {
     let mut found = Files::new();
     gather(directory, "", &mut found);

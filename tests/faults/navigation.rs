@@ -151,8 +151,7 @@ fn elements(set: &Ephemeris) -> [(usize, f64, f64, f64); 25] {
     ]
 }
 
-/// Whether a set is what stands there; an optional field that is blank, and a week that begins meanwhile, are
-/// as good.
+/// True if a set equals the record. A blank optional field and a week that begins meanwhile are accepted.
 fn same(set: &Ephemeris, record: &Written) -> bool {
     set.sv.number == record.number
         && Epoch::parse(&record.toc).is_ok_and(|toc| toc == set.toc)
@@ -167,14 +166,14 @@ fn same(set: &Ephemeris, record: &Written) -> bool {
         })
 }
 
-/// Whether every value that is read from a file lies in its range.
+/// Checks that every value read from a file lies in its range.
 fn within(bytes: &[u8]) -> Result<End, String> {
     let Ok(found) = read(bytes, "damaged") else { return Ok(End::Refused) };
     ranges(&found)?;
     Ok(if found.skipped.is_empty() { End::Accepted } else { End::Reported })
 }
 
-/// Whether every element lies in its range.
+/// Checks that every element lies in its range.
 pub fn ranges(found: &Navigation) -> Result<(), String> {
     for set in &found.ephemerides {
         for (place, value, low, high) in elements(set) {
@@ -186,7 +185,7 @@ pub fn ranges(found: &Navigation) -> Result<(), String> {
     Ok(())
 }
 
-/// What must hold of a file that was `whole` before its damage.
+/// Conditions on a file that was `whole` before its damage.
 fn check(version: u8, whole: &[Written], bytes: &[u8]) -> Result<End, String> {
     let Navigation { ephemerides, skipped, .. } = match read(bytes, "damaged") {
         Err(error) if error.to_string().starts_with("damaged: ") => return Ok(End::Refused),

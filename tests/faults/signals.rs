@@ -43,7 +43,7 @@ fn send(signal: &str, child: &Child) {
     let _ = sent.unwrap();
 }
 
-/// How a child ends, and how long that takes from now on.
+/// Output of a child, and its run time from now on.
 fn end(child: Child) -> (Output, Duration) {
     let begun = Instant::now();
     let ended = child.wait_with_output().unwrap();

@@ -20,7 +20,7 @@ const BEGIN: &str = "socketpair(";
 /// A process that takes so long hangs.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// What each call may answer.
+/// Errors that each call may return.
 const ERRORS: [(&str, &[&str]); 22] = [
     ("openat", &["EACCES", "EMFILE", "EIO", "ENOMEM", "EPERM", "EINTR", "ENOSPC"]),
     ("read", &["EIO", "EINTR", "EAGAIN", "ENOMEM"]),
@@ -61,7 +61,7 @@ struct Fault {
     when: u32,
 }
 
-/// What became of it.
+/// Result of a fault.
 enum Became {
     Held(End),
     NotReached,
@@ -86,8 +86,8 @@ fn strace(options: &[&str], log: &Path, task: &Task, place: &Path) -> Ended {
     task.ended(output)
 }
 
-/// How often each call is made: by the first thread before its own code begins, and by the thread that makes
-/// most of them.
+/// Number of each call. The first number is that of the first thread before its own code begins, and the
+/// second that of the thread with most calls.
 fn counts(task: &Task) -> Option<BTreeMap<&'static str, (u32, u32)>> {
     let (place, log) = (task.workplace(), tempfile::NamedTempFile::new().unwrap());
     let ended = strace(&[], log.path(), task, place.path());
@@ -230,7 +230,7 @@ fn injected<'a>(task: &Task, faults: &'a [Fault]) -> Vec<(&'a Fault, Became)> {
     ends.into_inner().unwrap()
 }
 
-/// Whether calls can be traced here.
+/// True if calls can be traced on this machine.
 fn can_trace() -> bool {
     let tried = Command::new("strace").args(["-o", "/dev/null", "-e", "inject=fsync:error=EIO", "true"]).output();
     tried.is_ok_and(|output| output.status.success())

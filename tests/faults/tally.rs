@@ -16,7 +16,7 @@ type Rows = BTreeMap<(String, String), String>;
 
 static ROWS: Mutex<Rows> = Mutex::new(Rows::new());
 
-/// Whether all cases are asked for.
+/// True if all cases are requested.
 pub fn long() -> bool {
     std::env::var_os("GNSS_TWIN_LONG").is_some()
 }
@@ -26,7 +26,7 @@ pub fn cases(short: usize, long_run: usize) -> usize {
     if long() { long_run } else { short }
 }
 
-/// What became of a case that held.
+/// Result of a case that held.
 pub enum End {
     Refused,
     /// Accepted with part of it left out and named.
@@ -53,7 +53,7 @@ impl Tally {
         Self { family, fault, begun, patience, cases: 0, refused: 0, reported: 0, accepted: 0, failures: Vec::new() }
     }
 
-    /// The same for cases that start a process.
+    /// A tally for cases that start a process.
     pub fn of_processes(family: &'static str, fault: impl Into<String>) -> Self {
         Self { patience: PROCESS_PATIENCE, ..Self::new(family, fault) }
     }

@@ -7,16 +7,16 @@ use std::path::Path;
 pub struct Source {
     /// From the package's root, with slashes.
     pub path: String,
-    /// Its modules from `src`: `["gnss", "time"]`.
+    /// Modules of the file from `src`: `["gnss", "time"]`.
     pub module: Vec<String>,
-    /// How many of them lead to the root of its crate: one where that folder is a crate of its own.
+    /// Number of modules to the root of its crate: one where that folder is a crate of its own.
     pub root: usize,
     /// Comments, texts and test modules blanked; lines stay where they are.
     pub code: String,
 }
 
 impl Source {
-    /// Of a file `path` below `src`.
+    /// Source of a file `path` below `src`.
     pub fn new(path: &str, text: &str) -> Self {
         let inner = path.trim_start_matches("src/").trim_end_matches(".rs");
         let module: Vec<String> =

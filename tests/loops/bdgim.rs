@@ -55,7 +55,8 @@ fn truth(scene: &Scene) -> (TrajectoryRow, Vec<Observation>) {
     (place, rows)
 }
 
-/// What a receiver reads of the messages of the satellites that are observed: their sets and the ionosphere.
+/// Ephemerides and ionospheric coefficients that a receiver reads from the messages of the observed
+/// satellites.
 fn heard(scene: &Scene, signal: &'static Signal, rows: &[Observation]) -> (Sets, Option<Coefficients>) {
     let message = signal.components.iter().find_map(|component| component.message).unwrap();
     let sender = scene.messages.of(message).unwrap();

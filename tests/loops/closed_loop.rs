@@ -14,7 +14,7 @@ fn run(scene: &str) -> Value {
     run_file(&scenarios().join(format!("{scene}.toml")))
 }
 
-/// The same for a scene that keeps the shipped example of limits.
+/// Runs a scene that keeps the shipped example of limits.
 fn run_within_limits(scene: &str) -> Value {
     let limits = scenarios().join("limits.toml");
     run_with(&scenarios().join(format!("{scene}.toml")), &["--check".as_ref(), limits.as_os_str()])
@@ -33,7 +33,7 @@ fn run_with(scenario: &Path, more: &[&OsStr]) -> Value {
     run_to(&out.path().join("run"), scenario, more)
 }
 
-/// The same with its files in `target`.
+/// Runs a scene with its files in `target`.
 fn run_to(target: &Path, scenario: &Path, more: &[&OsStr]) -> Value {
     let run = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
         .args(["run".as_ref(), scenario.as_os_str(), "--out".as_ref(), target.as_os_str()])
@@ -519,7 +519,7 @@ fn in_phase_alone(signal: &str, front_end: &str, duration_s: u32) -> Value {
     summary
 }
 
-/// How many independent errors of a loop all satellites of a run have together.
+/// Number of independent errors of a loop, all satellites of a run together.
 fn independent(run: &Path, which: &str) -> f64 {
     let mut table = csv::Reader::from_path(run.join("jitter.csv")).unwrap();
     let place = |name: &str, head: &csv::StringRecord| head.iter().position(|one| one == name).unwrap();
@@ -567,8 +567,8 @@ fn b2b_alone_finds_its_place_by_b_cnav3() {
     assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
 }
 
-/// The same under the ionosphere that satellites broadcast by BDGIM: the same bars, by its coefficients,
-/// which message 30 brings within the four seconds of a set.
+/// Runs B2b under the ionosphere that satellites broadcast by BDGIM, with equal bars, by its coefficients.
+/// Message 30 brings them within the four seconds of a set.
 #[test]
 fn b2b_alone_finds_its_place_under_the_ionosphere_that_b_cnav3_brings() {
     if !crate::long::is_asked_for() {

@@ -35,7 +35,7 @@ use gnss_twin::receiver::settings::Settings;
 const SIGNALS: &str = "signals = [\"GPS L1 C/A\", \"synthetic A\"]\n";
 const TABLES: &str = "[front_end]\nsample_rate_hz = 4.3e6\n[power]\ncn0_dbhz = 45\n[noise]\n\
     [receiver_clock]\nbias_s = 1.3e-4\ndrift_sps = 5e-8\n";
-/// What the second system's time is ahead of GPS time, whole seconds apart.
+/// Offset of the second system's time from GPS time in seconds, without whole seconds.
 const AHEAD_S: f64 = 40e-9;
 
 /// A satellite of the second system on a GPS satellite's orbit with its node turned.
@@ -48,7 +48,7 @@ fn second(set: &Ephemeris) -> Ephemeris {
     }
 }
 
-/// Where, when and with which seed.
+/// Place, time and seed of a case.
 struct Case {
     start: &'static str,
     duration_s: u32,
@@ -275,8 +275,8 @@ fn holds(case: &Case) {
     assert!(flat_m[2] <= flat_m[0].max(flat_m[1]), "{flat_m:?}");
 }
 
-/// Of a signal whose chips are ten times as long as those of Galileo's E5: four satellites, by I/NAV of the
-/// upper side and the pilots of both.
+/// Checks a signal whose chips are ten times as long as those of Galileo's E5: four satellites, by I/NAV of
+/// the upper sideband and the pilots of both.
 #[test]
 fn four_satellites_whose_signals_have_two_sides_give_a_position_to_decimetres_by_both() {
     register(&SIDES).unwrap();

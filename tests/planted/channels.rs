@@ -16,7 +16,7 @@ const CARRIER_HZ: f64 = 1_598.062_5e6;
 const CHIP_HZ: f64 = 0.511e6;
 const CHIPS: f64 = 511.0;
 const IF_HZ: f64 = 213e3;
-/// That of an orbiter: the error of a wrong aid grows with it.
+/// Doppler of an orbiter: the error of a wrong aid grows with it.
 const DOPPLER_HZ: f64 = 40e3;
 
 #[test]

@@ -2,7 +2,7 @@
 
 /// One fault.
 pub struct Fault {
-    /// As `planted!` has it: world, place, fault.
+    /// Name as in `planted!`: world, place, fault.
     pub name: &'static str,
     pub what: &'static str,
     /// The path of a test in this target.

@@ -10,7 +10,8 @@ use tempfile::TempDir;
 
 use crate::loops::{OPEN_SKY, failures, judged, run};
 
-/// Where a faultless run lies already: the judge is then the only one that can be wrong.
+/// Variable with the directory of an existing faultless run. The judge is then the only part that can be
+/// wrong.
 pub const RUN: &str = "GNSS_TWIN_PLANTED_RUN";
 /// No limits but those of the verdict; a file of limits must set one.
 const NONE: &str = "\"position.fixes\" = { min = 1 }";

@@ -40,7 +40,7 @@ const RATE_HZ: f64 = 1e6;
 /// The sample of the epoch under test.
 pub const SAMPLE: u64 = 3_000_000;
 
-/// What an ideal receiver observes: geometry, atmosphere and clocks by the generator, no noise.
+/// Observations of an ideal receiver: geometry, atmosphere and clocks by the generator, no noise.
 pub struct Ideal {
     pub catalogue: Catalogue,
     klobuchar: Klobuchar,
@@ -130,7 +130,7 @@ impl Ideal {
         self.catalogue.satellites().filter_map(|sv| self.catalogue.sent_at(sv, at).cloned()).collect()
     }
 
-    /// What a receiver with such noise makes of observations without knowing the ionosphere.
+    /// Solution of a receiver with such noise, which does not know the ionosphere.
     pub fn solved(&self, noises: Noises, observations: &[Observation]) -> Solved {
         let mut solver = Solver::new(&PositionSettings::default(), noises, self.clock.rate);
         solver.solve(SAMPLE, self.clock, observations, &self.ephemerides(), None).unwrap()
@@ -141,7 +141,7 @@ impl Ideal {
     }
 }
 
-/// By how much the time of [`OTHER`] is ahead.
+/// Offset of the time of [`OTHER`] in seconds, ahead of GPS time.
 const AHEAD_S: f64 = 40e-9;
 
 impl Ideal {

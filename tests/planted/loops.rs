@@ -32,7 +32,7 @@ pub fn run(scene: &str, directory: &Path) {
     make(scene, directory, |_| ());
 }
 
-/// The same, with the samples beside them.
+/// Makes `truth/` and `rx/` of a scene, and keeps the samples beside them.
 pub fn run_and_keep(scene: &str, directory: &Path) {
     let mut file = File::create(directory.join(SAMPLES)).unwrap();
     make(scene, directory, |bytes| file.write_all(bytes).unwrap());

@@ -15,7 +15,7 @@ use crate::{judge, loops};
 /// A child that takes longer hangs; the slowest check takes seconds.
 const LONGEST: Duration = Duration::from_secs(600);
 
-/// What became of a fault.
+/// Result of a fault.
 struct Outcome {
     fault: &'static Fault,
     /// The first line of what failed.

@@ -18,7 +18,7 @@ const CHIP_HZ: f64 = 1.023e6;
 const CHIPS: usize = 2046;
 /// Steps of the pulses in a chip.
 const STEPS: usize = 12;
-/// Where the carrier is in the samples.
+/// Intermediate frequency of the carrier in the samples, in hertz.
 const IF_HZ: f64 = 213e3;
 const DOPPLER_HZ: f64 = 731.0;
 const CN0_DBHZ: f64 = 55.0;

@@ -67,8 +67,8 @@ fn usage_errors_exit_with_two() {
     assert!(stderr(&missing).contains("nosuch.bin: No such file"), "{}", stderr(&missing));
 }
 
-/// What `receive` searches for is what the flag says, a name that it does not know is refused as the flag's,
-/// and without either the samples' band decides: GLONASS G1 where GPS is far away.
+/// Checks the signals that `receive` searches for. The flag selects them, and an unknown name is refused as
+/// the flag's. Without either the samples' band decides: GLONASS G1 where GPS is far away.
 #[test]
 fn signals_are_those_of_the_flag_or_of_the_band() {
     let here = workplace();

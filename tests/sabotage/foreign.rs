@@ -16,7 +16,7 @@ use crate::rinex::{Observations, Sentences};
 use crate::run;
 use crate::table::normal;
 
-/// What is done to a file.
+/// Change of a file.
 #[derive(Clone, Copy)]
 enum Change {
     Rinex(fn(&mut Observations)),
@@ -621,7 +621,7 @@ fn failed(variant: &Variant) -> Result<Vec<String>, String> {
     Ok(failed.map(|(figure, text)| if variant.row == Some(figure.as_str()) { figure } else { text }).collect())
 }
 
-/// What is wrong with the judgement of a variant, if anything is.
+/// Fault of a variant's judgement, if there is one.
 fn wrong(variant: &Variant) -> Option<String> {
     let found = match (failed(variant), variant.row) {
         (Err(error), _) => error,

@@ -70,7 +70,7 @@ fn failed(kind: &Kind, size: f64) -> Result<BTreeSet<String>, JudgeError> {
     Ok(rows.into_iter().filter(|row| row.status.word() == "FAIL").map(|row| row.figure).collect())
 }
 
-/// What came of a kind: its line of the table, and what is wrong.
+/// Line of the table for a kind, and its fault, if there is one.
 fn outcome(kind: &Kind) -> (String, Option<String>) {
     let listed = |rows: &BTreeSet<String>| rows.iter().cloned().collect::<Vec<_>>().join(", ");
     let mut wrong = Vec::new();

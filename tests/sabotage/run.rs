@@ -113,8 +113,7 @@ pub struct Rx {
     receiver: Option<serde_json::Value>,
     psd: Option<Table>,
     texts: BTreeMap<&'static str, String>,
-    /// Whether files that say the tables' values once more are left out: what is tolerable of a table is far
-    /// from them.
+    /// True if files that repeat the tables' values are left out. The tolerances of a table do not fit them.
     alone: bool,
 }
 

@@ -46,7 +46,7 @@ impl Table {
         self.map_where(name, |_, _| true, of);
     }
 
-    /// The same of the rows chosen.
+    /// Replaces a number of the chosen rows by a function of the row's index and its value.
     pub fn map_where(&mut self, name: &str, chosen: impl Fn(&Self, usize) -> bool, of: impl Fn(usize, f64) -> f64) {
         for row in 0..self.rows.len() {
             if chosen(self, row) {

@@ -22,7 +22,7 @@ fn linear_power() -> f64 {
     (2.0 + 2_f64.sqrt()) / 4.0
 }
 
-/// What the table says of each code state in each eighth.
+/// Phasors of each code state in each eighth, from the printed table.
 fn phases() -> BTreeMap<[i8; 4], Vec<Complex64>> {
     let row = |line: &str| {
         let values: Vec<i8> = line.split(',').map(|value| value.parse().unwrap()).collect();

@@ -77,8 +77,8 @@ fn gpt3_gives_what_the_authors_program_prints_for_graz() {
 /// factors printed.
 type Printed = ([f64; 8], [f64; 2]);
 
-/// What vmf3_ht.m of TU Wien gave in Octave for ten random places from 1982 to 2023, as the tests of iers2010
-/// (github.com/xanthospap/iers2010) print it; the tenth is at 0.2° of elevation, where this program stops at
+/// Output of vmf3_ht.m of TU Wien in Octave for ten random places from 1982 to 2023, as the tests of iers2010
+/// (github.com/xanthospap/iers2010) print it. The tenth is at 0.2° of elevation, where this program stops at
 /// 1°.
 #[rustfmt::skip]
 const VMF3_HT: [Printed; 9] = [

@@ -120,7 +120,7 @@ pub fn hex_bits(hex: &str, count: usize) -> Vec<bool> {
     digits.flat_map(|digit| (0..4).rev().map(move |bit| digit >> bit & 1 == 1)).take(count).collect()
 }
 
-/// What the maker's receiver decoded of a satellite, and the bits of its subframes.
+/// Compares values that the maker's receiver decoded of a satellite with the bits of its subframes.
 #[test]
 fn subframes_that_a_receiver_printed_are_what_it_decoded_and_are_sent_by_us_bit_by_bit() {
     let Some(path) = external("navbits/receiver_manual_examples.csv") else { return };
@@ -235,7 +235,8 @@ fn values(page: u128, name: &str, three: &Vec<bool>) -> Vec<f64> {
     fields.into_iter().filter(|field| field.name == name).map(|field| field.value(field.read(three))).collect()
 }
 
-/// Where a satellite is by radius, argument of latitude, inclination, and node against Greenwich.
+/// Position of a satellite in metres, from radius, argument of latitude, inclination, and node against
+/// Greenwich.
 fn placed_m([radius_m, latitude, inclination, node]: [f64; 4]) -> [f64; 3] {
     let [latitude, inclination, node] = [latitude, inclination, node].map(libm::sincos);
     let (x, y) = (radius_m * latitude.1, radius_m * latitude.0);

@@ -189,7 +189,8 @@ fn value(tables: &[(&'static str, Vec<&'static Field>)], message: &str, name: &s
     field.value(field.read(bits))
 }
 
-/// Whether a value is a printed one to one of the last digit, which the maker's receiver cuts at times.
+/// True if a value is a printed one to one unit of the last digit, which the maker's receiver truncates at
+/// times.
 fn is_printed(own: f64, printed: &str) -> bool {
     let (mantissa, exponent) = printed.split_once('e').unwrap_or((printed, "0"));
     let digits = mantissa.split_once('.').map_or(0, |(_, behind)| behind.len()) as i32;
@@ -294,7 +295,7 @@ const MERGED: [(&str, &str); 2] = [
     ("multi-gnss/BRD400DLR_S_20260680000_01D_MN.rnx.gz", "2026-03-09T12:00:00"),
 ];
 
-/// Where a record has the fields of all three messages (RINEX 4.02, tables A12, A14 and A15).
+/// Positions of the fields of all three messages in a record (RINEX 4.02, tables A12, A14 and A15).
 const PLACES: [(&str, usize); 19] = [
     ("af0_s", 0),
     ("af1_sps", 1),
@@ -317,7 +318,8 @@ const PLACES: [(&str, usize); 19] = [
     ("delta_n_rate_radps2", 20),
 ];
 
-/// Whether a value is a whole step of a field that holds it, to what thirteen printed digits leave open.
+/// Checks that a value is a whole step of a field that holds it, within the rounding of thirteen printed
+/// digits.
 fn is_whole(field: &Field, value: f64, what: &str) {
     let raw = field.raw(value).unwrap_or_else(|error| panic!("{what}: {error}"));
     let step = field.value(1);

@@ -25,7 +25,7 @@ use super::orbit::outside;
 /// content as functions of the authors' program give them.
 const AUTHORS: &str = include_str!("../../data/witness/bdgim.csv");
 
-/// What satellites broadcast in the first hours of 2026-03-09 and of 2023-03-12.
+/// Coefficients that satellites broadcast in the first hours of 2026-03-09 and of 2023-03-12.
 const SENT_2026: [f64; 9] = [30.875, 0.25, 11.625, 10.375, -12.5, 0.75, 0.0, 3.125, 1.875];
 const SENT_2023: [f64; 9] = [35.5, 2.0, 12.0, 13.375, -17.25, 1.125, 1.0, 3.0, 0.375];
 
@@ -134,7 +134,7 @@ fn units(message: &Message, set: &Ephemeris, common: &Common) -> Vec<Vec<bool>> 
     starts.map(|s| sender.unit(&carried, Epoch::new(begin + s, 0.0)).unwrap()).collect()
 }
 
-/// What is read of units.
+/// Content that a reader finds in units.
 fn read(message: &Message, set: &Ephemeris, units: &[Vec<bool>]) -> Vec<Read> {
     let mut reader = (message.reader)(set.sv);
     let near = BDT.label(set.toe);

@@ -55,7 +55,7 @@ fn shipped(messages: &str) -> Vec<Sent> {
     messages.lines().skip(1).map(parse).collect()
 }
 
-/// Those of a signal in a file, by satellite and time.
+/// Messages of a signal in a file, by satellite and time.
 pub fn real(name: &str, (signal, message): (&str, &Message)) -> Option<Vec<Sent>> {
     let packed = std::fs::read(external(name)?).unwrap();
     let text = String::from_utf8(inflate::inflate(&packed, 1 << 26).unwrap()).unwrap();
@@ -77,7 +77,7 @@ pub fn soft(one: bool) -> f32 {
     if one { -1.0 } else { 1.0 }
 }
 
-/// What a reader says of a satellite's messages, whose code runs on.
+/// Content that a reader finds in a satellite's messages, whose code runs on.
 pub fn read(message: &Message, all: &[Sent], inverted: bool) -> Vec<Read> {
     let mut reader = (message.reader)(all[0].sv);
     let (mut memory, mut next) = (Vec::new(), all[0].start);
@@ -117,8 +117,8 @@ fn holds(message: &Message, sent: &Sent) {
     assert_eq!(cnav::type_at(message, *start), kind, "{sv} {start}");
 }
 
-/// Whether a message of a set is what we send of it: all but times of prediction, accuracies, flags and what
-/// all satellites say alike.
+/// Checks that a message of a set equals our own of it. Exceptions are times of prediction, accuracies, flags
+/// and data common to all satellites.
 fn is_sent(message: &Message, set: &Ephemeris, sent: &Sent) {
     let sender = (message.sender)(&Common::default()).unwrap();
     let symbols = sender.unit(set, sent.start).unwrap();
@@ -220,8 +220,8 @@ fn every_real_message_of_l5_and_l2c_holds_and_its_sets_are_the_records_of_the_ho
     }
 }
 
-/// How many records that we write of decoded sets have every number of another converter's, prediction and
-/// accuracies too.
+/// Number of our records of decoded sets that have every number of another converter's, prediction and
+/// accuracies included.
 fn printed_alike(written: &NavigationSets, (signal, _): (&str, &Message), near: Epoch, theirs: &[Record]) -> usize {
     let signal: &Signal = if signal == "L5" { &L5 } else { &L2C };
     let mut text = Vec::new();
@@ -264,7 +264,7 @@ pub fn records(path: &std::path::Path, system: char) -> Vec<Record> {
     records_in(&String::from_utf8_lossy(&whole), system)
 }
 
-/// The same of a text.
+/// Records of CNAV of one system in a text.
 fn records_in(text: &str, system: char) -> Vec<Record> {
     let lines: Vec<&str> = text.lines().collect();
     let head = format!("> EPH {system}");
@@ -283,13 +283,13 @@ fn records_in(text: &str, system: char) -> Vec<Record> {
         .collect()
 }
 
-/// Whether a value is the record's, to half a step.
+/// Checks that a value is the record's, to half a step.
 fn close(record: &Record, name: &str, [one, other]: [f64; 2], exponent: i32) {
     let step = libm::exp2(f64::from(exponent)) * GPS_PI;
     assert!((one - other).abs() <= 0.5 * step + 1e-12 * one.abs(), "{} {name}: {one} {other}", record.sv);
 }
 
-/// Whether there is a set of a record's time; its values are then the record's.
+/// True if there is a set of a record's time; its values are then checked against the record's.
 fn agrees(record: &Record, sets: &BTreeMap<(Sv, i64), Ephemeris>) -> bool {
     let Some(set) = sets.get(&(record.sv, record.toc.seconds())) else { return false };
     close(record, "tgd", [set.tgd_s, record.rows[6][2]], -37);
@@ -302,7 +302,7 @@ fn agrees(record: &Record, sets: &BTreeMap<(Sv, i64), Ephemeris>) -> bool {
     agrees_in_orbit_and_clock(record, sets)
 }
 
-/// The same but for group delays.
+/// True if there is a set of a record's time; its orbit and clock are then checked, without group delays.
 pub fn agrees_in_orbit_and_clock(record: &Record, sets: &BTreeMap<(Sv, i64), Ephemeris>) -> bool {
     let Some(set) = sets.get(&(record.sv, record.toc.seconds())) else { return false };
     let v = |row: usize, place: usize| record.rows[row][place];

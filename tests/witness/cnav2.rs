@@ -32,7 +32,7 @@ fn bits(hex: &str, count: usize) -> Vec<bool> {
     digits.flat_map(|digit| (0..4).rev().map(move |bit| digit >> bit & 1 == 1)).take(count).collect()
 }
 
-/// Of a number of the code, the week and the second at which the frame ends.
+/// A frame, from the number of the code, the week and the second at which the frame ends.
 fn sent(prn: u8, [week, end_s]: [&str; 2], hex: &str) -> Sent {
     let start = Epoch::from_week(week.parse().unwrap(), end_s.parse::<f64>().unwrap() - 18.0);
     Sent { sv: Sv { system: System::Qzss, number: prn - 192 }, start, symbols: bits(hex, 1800) }
@@ -77,7 +77,7 @@ fn message(sv: Sv) -> &'static Message {
     if sv.system == System::Qzss { &civil::CNAV2 } else { &CNAV2 }
 }
 
-/// What a reader says of a satellite's frames.
+/// Content that a reader finds in a satellite's frames.
 fn read(all: &[&Sent], inverted: bool) -> Vec<Read> {
     let mut reader = (message(all[0].sv).reader)(all[0].sv);
     let mut news = Vec::new();
@@ -95,7 +95,7 @@ fn read(all: &[&Sent], inverted: bool) -> Vec<Read> {
     news
 }
 
-/// Whether subframe 2 is what we send of a set: all but time of prediction, accuracies and flags.
+/// Checks that subframe 2 equals our own of a set, except for time of prediction, accuracies and flags.
 fn is_sent(set: &Ephemeris, start: Epoch, two: &[bool]) {
     let symbols = (message(set.sv).sender)(&Common::default()).unwrap().unit(set, start).unwrap();
     let ours = cnav2::decode(&soft(&symbols, false)).unwrap();
@@ -138,7 +138,7 @@ fn shipped_frames_are_coded_again_symbol_by_symbol_read_either_way_up_and_sent_a
     assert_eq!((satellites, all.len()), (3, 8));
 }
 
-/// What subframe 2 says; of page 1, which is not there, zeros.
+/// Ephemeris from subframe 2. Values of page 1, which is not there, are zeros.
 fn orbit_and_clock(sv: Sv, two: &Vec<bool>, start: Epoch) -> Ephemeris {
     let (_, fields) = cnav2::tables().into_iter().find(|(table, _)| *table == "subframe 2").unwrap();
     let raw = |name: &str| Some(fields.iter().find(|field| field.name == name).map_or(0, |field| field.read(two)));

@@ -44,7 +44,8 @@ fn all_chips_of_all_memory_codes_are_those_of_another_program() {
     assert_eq!(codes, 100);
 }
 
-/// The same, and the secondary codes of 100 chips as `CS100`.
+/// Code, number, ones, first and last 24 chips and SHA-256 of the register codes; the secondary codes of 100
+/// chips are named `CS100`.
 const REGISTER_CODES: &str = include_str!("../../data/witness/e5_codes.csv");
 
 #[test]
@@ -79,7 +80,7 @@ fn all_chips_of_all_codes_and_secondary_codes_of_e5_are_those_of_another_program
     assert_eq!(word(chips(&e5::E5B.components[0].secondary_code, 1)), 0xE);
 }
 
-/// The same of E6-B and E6-C.
+/// Code, number, ones, first and last 24 chips and SHA-256 of E6-B and E6-C.
 const E6_CODES: &str = include_str!("../../data/witness/e6_codes.csv");
 
 #[test]
@@ -100,7 +101,7 @@ fn all_chips_of_all_codes_of_e6_are_those_of_another_program() {
     assert_eq!(e6::E6.components[1].secondary_code.of(17), e5::secondary_code(17));
 }
 
-/// The same of I5 and Q5.
+/// Code, number, ones, first and last 24 chips and SHA-256 of I5 and Q5.
 const L5_CODES: &str = include_str!("../../data/witness/l5_codes.csv");
 
 #[test]
@@ -124,7 +125,7 @@ fn all_chips_of_all_codes_of_l5_are_those_of_another_program() {
     assert_eq!(word(&l5::L5.components[1].secondary_code), 0b0000_0100_1101_0100_1110);
 }
 
-/// The same of CM and CL.
+/// Code, number, ones, first and last 24 chips and SHA-256 of CM and CL.
 const L2C_CODES: &str = include_str!("../../data/witness/l2c_codes.csv");
 
 #[test]
@@ -148,7 +149,8 @@ fn all_chips_of_all_codes_of_l2c_are_those_of_another_program_and_take_turns() {
     assert!([0, 64, 158, 211].iter().all(|number| l2c::code(l2c::Code::Long, *number).is_none()));
 }
 
-/// The same of L1C-D and L1C-P, and the secondary codes of 1800 chips as `L1CO`.
+/// Code, number, ones, first and last 24 chips and SHA-256 of L1C-D and L1C-P; the secondary codes of 1800
+/// chips are named `L1CO`.
 const L1C_CODES: &str = include_str!("../../data/witness/l1c_codes.csv");
 
 #[test]

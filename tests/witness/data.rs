@@ -1,4 +1,4 @@
-//! Where the outside data are, and which tests missed them.
+//! Location of the external data, and the tests that missed them.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

@@ -83,8 +83,8 @@ fn told(pages: &[Page], mut take: impl FnMut(&Page, Vec<Read>)) {
     }
 }
 
-/// What holds for every real page: its check and tail, its bits through our code and interleaver and through
-/// our tables, its time, and its place. Returns whether its time was read.
+/// Checks every real page: its check and tail, its bits through our code and interleaver and through our
+/// tables, its time, and its position. Returns true if its time was read.
 fn holds(page: &Page, reads: &[Read]) -> bool {
     let Page { sv, start, bits } = page;
     let (head, check) = (&bits[..214], &bits[214..238]);
@@ -122,7 +122,7 @@ fn holds(page: &Page, reads: &[Read]) -> bool {
     dated.is_some()
 }
 
-/// Whether a page of a set is what we send of it: all but what other parts of the page say.
+/// Checks that a page of a set equals our own of it, except for other parts of the page.
 fn is_sent(set: &Ephemeris, page: &Page) {
     let sender = (FNAV.sender)(&Common::default()).unwrap();
     let (ours, _) = fnav::decode_soft(&soft(&sender.unit(set, page.start).unwrap())).unwrap();

@@ -190,7 +190,7 @@ fn opposite(sv: Sv) -> Sv {
     G1.satellites().find(|other| *other != sv && G1.link(sv).is_alike(G1.link(*other))).unwrap()
 }
 
-/// What a reader makes of the real strings of a satellite, as they were sent.
+/// Content that a reader finds in the real strings of a satellite, as they were sent.
 fn read(sv: Sv, assumed: Sv, from_symbol: usize, upside_down: bool) -> Vec<(Epoch, Read)> {
     let mut reader: Box<dyn Reader> = (GNAV.reader)(assumed);
     let mut news = Vec::new();

@@ -17,7 +17,7 @@ use super::data::external;
 /// A day's records of five satellites with all their messages' forms.
 const SHIPPED: &str = include_str!("../../data/witness/group_delays.rnx");
 
-/// What a record says: satellite, message, time of its clock, and the numbers of its lines.
+/// Content of a record: satellite, message, time of its clock, and the numbers of its lines.
 struct Record {
     satellite: String,
     message: String,

@@ -121,7 +121,7 @@ fn every_field_of_navic_s_message_on_l1_has_the_place_sign_and_scale_that_decode
     assert_eq!((of("subframe 2"), of("subframe 3, message 10")), (576 - 3, 250 - 138 - 2));
 }
 
-/// What RINEX 4.02 prints of NVS-01, in its tables A32 and A41.
+/// Record of NVS-01 as printed in RINEX 4.02, tables A32 and A41.
 const RECORD: &str = "\
 I10 2023 06 24 00 05 00 1.527369022369e-07 1.364242052659e-12 0.000000000000e+00
      0.000000000000e+00-2.593125000000e+02 7.028864208979e-09 2.300305834983e+00

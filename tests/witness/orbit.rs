@@ -85,7 +85,7 @@ fn elements(set: &Ephemeris) -> [(&'static str, f64); 15] {
     ]
 }
 
-/// The same of a state vector.
+/// Elements of a state vector, by the names of the `rinex` crate.
 fn axes(vector: &StateVector) -> Vec<(&'static str, f64)> {
     const NAMES: [[&str; 3]; 3] =
         [["satPosX", "satPosY", "satPosZ"], ["velX", "velY", "velZ"], ["accelX", "accelY", "accelZ"]];

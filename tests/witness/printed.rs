@@ -1,5 +1,5 @@
-//! What IS-GPS-200N and Galileo's document print, typed again from their tables: places and scales of the
-//! messages' fields, checks, codes, and times.
+//! Tables of IS-GPS-200N and of Galileo's document, typed again: positions and scales of the messages'
+//! fields, checks, codes, and times.
 
 use std::fmt::Debug;
 

@@ -79,7 +79,7 @@ fn station(bytes: &[u8]) -> Station {
     Station { approximate_m, epochs }
 }
 
-/// What the solution leaves out, and what it holds fixed.
+/// Effects that the solution leaves out, and values that it holds fixed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Model {
     ionosphere: bool,

@@ -167,8 +167,8 @@ fn satellites_send_the_signals_that_they_broadcast() {
 const CIVIL: [&str; 2] = ["navbits/046r_qzscnav.csv.gz", "navbits/233h_qzscnav.csv.gz"];
 const RECORDS: [&str; 2] = ["lnav/046r_rnx.nav", HOUR];
 
-/// Whether a message of a set is what we send of it at a time when its type has its turn: all but counts
-/// of time, times of prediction, accuracies, flags and what all satellites say alike.
+/// Checks that a message of a set equals our own at a time when its type has its turn. Exceptions are counts
+/// of time, times of prediction, accuracies, flags and data common to all satellites.
 fn is_sent(message: &Message, set: &Ephemeris, sent: &cnav::Sent) -> bool {
     let kind = message_type(&sent.bits);
     let in_week = |turn: i64| Epoch::new(sent.start.seconds() + turn * message.unit_s, 0.0);

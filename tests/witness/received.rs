@@ -111,8 +111,8 @@ fn one_bit_samples_of_l5_hold_three_systems_as_listed_and_nothing_of_a_fourth() 
 /// Two bits, real, four samples a byte.
 const MUNICH: [&str; 6] = ["--bits", "2", "--encoding", "twos-complement", "--lowest-first", "--real"];
 
-/// Of the list G24 is left out: by sums of 1, 2, 4 and 8 ms over the whole recording no cell of it exceeds
-/// those of noise. Beyond it are G12 and G14, in both halves of the recording at one Doppler to 5 Hz, and
+/// Checks the listed satellites without G24. By sums of 1, 2, 4 and 8 ms over the whole recording no cell of
+/// G24 exceeds those of noise. The recording also has G12 and G14, in both halves at one Doppler to 5 Hz, and
 /// E20, which `recording.rs` knows.
 #[test]
 fn two_bit_samples_of_l1_hold_gps_and_galileo_as_listed_and_none_else() {
@@ -162,7 +162,7 @@ fn both_bands_of_glonass_hold_the_channels_listed_and_none_else() {
 const POCKET: &str = "if/pocket_l1_2021-12-02_4msps_ci8.bin";
 const POCKET_FLAGS: [&str; 5] = ["--format", "ci8", "--rate-hz", "4e6", "--inverted"];
 
-/// By 60 ms of the half second, as G04 is below the threshold of 20 ms (`GNSS_TWIN_LONG=1`).
+/// Checks the list by 60 ms of the half second, as G04 is below the threshold of 20 ms (`GNSS_TWIN_LONG=1`).
 #[test]
 fn half_a_second_holds_gps_and_galileo_as_listed_and_none_else() {
     let Some(file) = external(POCKET).filter(|_| crate::long::is_asked_for()) else { return };

@@ -211,9 +211,9 @@ fn one_bit_snapshots_hold_only_satellites_that_were_up() {
     assert!([5, 7, 13, 20, 30].iter().all(|&prn| times_found[prn] >= 5), "{times_found:?}");
 }
 
-/// Where secondary codes begin in a recording of mirrored spectrum: of the pilot that was found, by its own
-/// code and secondary code, the seconds after the first sample, modulo 18; and by how much their best place
-/// is better than the next.
+/// Beginning of a pilot's secondary code in a recording of inverted spectrum, and the lead of its best
+/// position over the next. The pilot is found by its own code and secondary code. The time is in seconds
+/// after the first sample, modulo 18.
 pub fn secondary_code_begins_s(
     hit: &Acquired,
     [i, q]: [&[f32]; 2],
@@ -302,7 +302,7 @@ fn l1c_of_gps_and_qzss_has_the_phase_against_l1_ca_that_an_antenna_recorded() {
     }
 }
 
-/// By how much one time of 18 s is after another, as near to zero as possible.
+/// Difference of two times modulo 18 s, as near to zero as possible.
 pub fn after_s(one_s: f64, other_s: f64) -> f64 {
     (one_s - other_s + 9.0).rem_euclid(18.0) - 9.0
 }

@@ -107,8 +107,7 @@ fn periods(i: &[f32], hit: &Acquired, [code_a, code_b]: [&[i8]; 2]) -> Vec<[[Com
     all
 }
 
-/// Where a secondary code begins among code periods, and by how much the sum that finds it is larger than the
-/// next.
+/// Position of a secondary code among code periods, and the ratio of the sum that finds it to the next.
 pub fn secondary_code_place(prompts: &[Complex64], secondary_code: &[i8]) -> (usize, f64) {
     let sum = |first: usize, hz: f64| -> Complex64 {
         let one = |(k, prompt): (usize, &Complex64)| {

@@ -61,8 +61,9 @@ fn reduced(news: Vec<Read>) -> Option<Ephemeris> {
     news.into_iter().find_map(|read| if let Read::Reduced { set, .. } = read { Some(*set) } else { None })
 }
 
-/// What we send in short for a set in the sub-frame that begins at `begin`, as a receiver reads it from two
-/// pages: that with word 16, and the next one, which says the time. `None` where the set does not fit.
+/// Reduced elements that we send for a set in the sub-frame that begins at `begin`, as a receiver reads them
+/// from two pages. The first page has word 16, and the next one states the time. `None` where the set does
+/// not fit.
 fn sent(set: &Ephemeris, begin: Epoch) -> Option<Ephemeris> {
     let sender = (INAV.sender)(&Common::default()).unwrap();
     let mut reader = InavReader::new(set.sv);

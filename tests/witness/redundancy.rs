@@ -70,7 +70,7 @@ fn every_real_word_17_to_20_of_two_days_is_reproduced_bit_by_bit() {
     }
 }
 
-/// What a reader makes of some words of a satellite, each in a page of its own.
+/// Ephemerides that a reader finds in some words of a satellite, each in a page of its own.
 fn read(sv: Sv, words: impl Iterator<Item = u128>) -> Vec<Ephemeris> {
     let mut reader = InavReader::new(sv);
     let near = Epoch::from_week(2353, 579_600.0);

@@ -15,7 +15,7 @@ use super::orbit::outside;
 
 /// The merged records of a day.
 const DAY: &str = "multi-gnss/BRD400DLR_S_20260680000_01D_MN.rnx.gz";
-/// Those of three satellites that the program's scene uses.
+/// Records of three satellites that the program's scene uses.
 const SHIPPED: &[u8] = include_bytes!("../../scenarios/gps_sbas_2026-03-09_11h.rnx");
 
 fn of_sbas(all: Vec<Ephemeris>) -> Vec<Ephemeris> {
@@ -26,7 +26,7 @@ fn day() -> Option<Vec<Ephemeris>> {
     Some(of_sbas(rinex::read(&outside(DAY)?, DAY).unwrap().ephemerides))
 }
 
-/// Whether a set is whole steps of type 9: numbers of records have twelve digits.
+/// Checks that a set is whole steps of type 9: numbers of records have twelve digits.
 fn is_whole_steps(set: &Ephemeris) {
     let sent = (SBAS.quantised)(set).unwrap();
     let (ours, theirs) = (sent.vector.unwrap(), set.vector.unwrap());
@@ -164,7 +164,7 @@ fn printed(digits: &str) -> Vec<bool> {
     bits
 }
 
-/// What a block says; and that it is written in the bits that it was read from.
+/// Content of a block. Writing it gives the bits that it was read from.
 fn read_and_written(kind: u8, bits: &Vec<bool>) -> Content {
     let content = Content::read(kind, bits).unwrap();
     let mut again = vec![false; 226];
@@ -186,9 +186,10 @@ fn blocks_of_a_mask_and_of_ageing_are_the_printed_ones() {
     assert_eq!(indicators[6..], [5; 45]);
 }
 
-/// The same manual, H.1.2.12: points of bands 2 and 3, chosen alike on both sides of the equator but for
-/// two; and a mask of MSAS that a receiver has decoded (ComNav, OEM board reference manual
-/// CNT-OEM-RM001 1.8, 4.2.10.11), whose points of a meridian leave none out between 5° and 50° north.
+/// Source: Spirent, GSS6100 and SimCHAN user manual (DGP000814AAA 12-01), H.1.2.12, with points of bands 2
+/// and 3. They are chosen alike on both sides of the equator except for two. A mask of MSAS was decoded by a
+/// receiver (ComNav, OEM board reference manual CNT-OEM-RM001 1.8, 4.2.10.11). Its points of a meridian are
+/// complete between 5° and 50° north.
 #[test]
 fn points_of_printed_masks_of_the_grid_lie_where_the_bands_have_them() {
     let [second, third] = [

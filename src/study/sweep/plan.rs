@@ -74,7 +74,7 @@ pub struct Manifest {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Input {
-    /// As the study writes it; empty for the study itself.
+    /// Name in the study's text; empty for the study itself.
     pub written: String,
     /// Below the study's directory.
     pub path: String,

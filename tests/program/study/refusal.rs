@@ -1,4 +1,4 @@
-//! What is refused, with which exit code and which words.
+//! Refused studies, with their exit codes and messages.
 
 use super::*;
 
