@@ -31,7 +31,7 @@ pub struct Settings {
 }
 
 described! {
-/// What the main loop does when.
+/// Settings of the main loop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct OperationSettings {

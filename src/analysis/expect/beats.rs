@@ -93,7 +93,7 @@ fn place(time_s: f64, step_s: f64) -> u64 {
     (time_s / step_s).max(0.0) as u64
 }
 
-/// Whether the same chips come again in each period, symbols apart.
+/// True if the chips are equal in each period, apart from the symbols.
 fn repeats(component: &Component) -> bool {
     !matches!(component.secondary_code, SecondaryCode::PerSatellite { .. })
 }
@@ -108,7 +108,7 @@ fn like(component: &Component, other: Link) -> Option<f64> {
     (share > 0.0).then_some(share / component.power_share)
 }
 
-/// Of a difference of carriers what turns from one code period to the next.
+/// Rotation of a difference of carriers from one code period to the next, as a frequency in hertz.
 fn folded_hz(apart_hz: f64, period_s: f64) -> f64 {
     let turns = apart_hz * period_s;
     (turns - turns.round()) / period_s

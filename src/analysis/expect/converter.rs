@@ -1,11 +1,11 @@
-//! What a converter and an integer format make of the spectrum of Gaussian samples.
+//! Spectrum of Gaussian samples after a converter and an integer format.
 //!
-//! A staircase Q of Gaussian x has the Hermite series Q(σz) = Σ c_n·He_n(z)/√n!, with
-//! c_n = Σ jump·φ(e)·He_(n−1)(e)/√(n!) over its edges e, in σ. Then the autocorrelation of what comes out is
-//! Σ c_n²·ρⁿ for that ρ of what goes in (Price 1958, Bussgang 1952): n = 1 is the signal with the gain c_1/σ,
-//! the rest is what quantisation adds, coloured as powers of ρ are. Of complex samples with a circular
-//! spectrum ρ is that of one component and of the cross term in turn. Orders beyond 32 count as
-//! white. Limits: samples are Gaussian, so that a strong line through a coarse converter is not described.
+//! A staircase Q of Gaussian x has the Hermite series Q(σz) = Σ c_n·He_n(z)/√n!, with c_n = Σ
+//! jump·φ(e)·He_(n−1)(e)/√(n!) over its edges e, in σ. The autocorrelation of the output is then Σ c_n²·ρⁿ,
+//! with ρ that of the input (Price 1958, Bussgang 1952). The term n = 1 is the signal with the gain c_1/σ.
+//! The rest is quantisation noise, with the spectrum of powers of ρ. For complex samples with a circular
+//! spectrum ρ is that of one component and of the cross term in turn. Orders beyond 32 count as white.
+//! Limits: samples are Gaussian, so that a strong line through a coarse converter is not described.
 
 use num_complex::Complex;
 use statrs::function::erf::erf;
@@ -17,22 +17,22 @@ const ORDERS: usize = 32;
 /// Edges beyond so many σ are passed once in 1e12 samples.
 const FAR: f64 = 7.5;
 
-/// How a component's levels follow from its value.
+/// Staircase from a component's value to its level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Staircase {
     /// Distance of its edges, LSB before it.
     step_lsb: f64,
     /// Distance of its levels.
     jump: f64,
-    /// Whether there is an edge at zero.
+    /// True if there is an edge at zero.
     rises: bool,
     /// Edges to each side of zero.
     edges: f64,
 }
 
 impl Staircase {
-    /// Of a converter, if there is one, and of a format with that largest magnitude, for samples of
-    /// `sigma_lsb`. `None` where numbers stay as they are.
+    /// Staircase of a converter, if there is one, and of a format with that largest magnitude, for samples of
+    /// `sigma_lsb`. `None` where numbers are not rounded.
     pub fn of(adc: Option<&ConverterSpec>, full_scale_lsb: Option<f32>, sigma_lsb: f64) -> Option<Self> {
         let step_lsb =
             adc.map_or(1.0, |adc| adc.step_sigma * if adc.gain_control { sigma_lsb } else { adc.nominal_lsb });
@@ -52,7 +52,7 @@ impl Staircase {
         }
     }
 
-    /// Its edges above zero as multiples of a step; one at zero apart.
+    /// Edges above zero as multiples of a step, without one at zero.
     fn above(&self) -> impl Iterator<Item = f64> {
         let first = if self.rises { 1.0 } else { 0.5 };
         (0..self.edges as u32).map(move |k| first + f64::from(k))

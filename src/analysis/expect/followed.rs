@@ -1,5 +1,4 @@
-//! What of a signal a receiver follows, as it says itself: which component, by a replica of which layer, and
-//! with which loops.
+//! Tracking of a signal as the receiver states it: its component, the layer of the replica, and the loops.
 
 use serde::Deserialize;
 use serde_json::Value;
@@ -8,18 +7,18 @@ use crate::read::Run;
 use crate::waveform::{Waveform, leading};
 use gnss::signal::{Component, Layer, Layers, Link, Signal, Tone};
 
-/// What `receiver.json` says of a signal.
+/// Entry of `receiver.json` about a signal.
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct Entry {
     signal: String,
     component: usize,
     /// None where the replica has all.
     layer: Option<usize>,
-    /// Of both sides of a sub-carrier the other.
+    /// Index of the other sideband of a sub-carrier.
     other_side: Option<usize>,
     spacing_chips: f64,
     pub integration_s: f64,
-    /// Of satellites whose bits are shorter.
+    /// Update time in seconds for satellites whose bits are shorter.
     least_integration_s: Option<f64>,
     pub pll_bandwidth_hz: f64,
     dll_bandwidth_hz: f64,
@@ -37,7 +36,7 @@ pub(crate) struct Searched {
 }
 
 impl Entry {
-    /// What `receiver.json` says of a signal, if it does.
+    /// Entry of `receiver.json` for a signal, if there is one.
     pub fn of(receiver: &Value, signal: &Signal) -> Option<Self> {
         let stated = receiver.get("followed").and_then(Value::as_array);
         let mut entries = stated.into_iter().flatten().filter_map(|entry| Self::deserialize(entry).ok());
@@ -77,19 +76,19 @@ pub(crate) fn efficiency(component: &Component) -> f64 {
     })
 }
 
-/// What a receiver follows of a signal.
+/// Tracking of a signal by a receiver.
 #[derive(Clone, Debug)]
 pub(crate) struct Followed {
     /// The component, and the layer of it that the replica has; none where it has all.
     pub component: &'static Component,
     pub made: Option<&'static Layer>,
-    /// Of what is sent with the replica.
+    /// Cross-correlation of the sent layers with the replica.
     pub found: Waveform,
-    /// Of the whole waveform with the replica: what the discriminator is made for.
+    /// Cross-correlation of the whole waveform with the replica, for which the discriminator is made.
     pub assumed: Waveform,
-    /// Of the replica with itself.
+    /// Autocorrelation of the replica.
     pub own: Waveform,
-    /// Of the whole waveform with itself.
+    /// Autocorrelation of the whole waveform.
     pub whole: Waveform,
     /// The sub-carrier, of which both sides are followed: what is found, assumed and the replica's own are
     /// those of the chips then.

@@ -8,10 +8,10 @@ use gnss::facts::{BalanceSpec, FilterSpec, StageSpec, converter, filters};
 use gnss::samples::Format;
 use gnss::signal::Signal;
 
-/// What is known of a front end.
+/// Facts of a front end.
 #[derive(Clone, Debug)]
 pub struct FrontEnd<'r> {
-    /// Its name, of one of several.
+    /// Name of the front end, if there are several.
     pub name: Option<&'r str>,
     /// Number of samples.
     pub samples: u64,
@@ -19,21 +19,21 @@ pub struct FrontEnd<'r> {
     pub rate_hz: f64,
     /// Frequency on the air that lies at 0 in the samples, Hz.
     pub center_hz: Option<f64>,
-    /// Whether the samples' spectrum is mirrored.
+    /// True if the samples' spectrum is inverted.
     pub inverted: bool,
-    /// How samples are written, where it is known.
+    /// Format of the samples, where it is known.
     pub format: Option<Format>,
-    /// What makes samples of waveforms.
+    /// Sampler of the waveforms.
     pub sampler: Sampler,
     /// Deviation of the noise per component, LSB, where the truth states it.
     pub noise_lsb: Option<f64>,
-    /// Its stages, in order.
+    /// Stages of the front end, in order.
     pub stages: &'r [StageSpec],
     signals: Option<&'r [String]>,
 }
 
 impl<'r> FrontEnd<'r> {
-    /// By its place among several, 0 of a single one.
+    /// Front end by its index among several, 0 for a single one.
     pub fn of(run: &'r Run, place: usize) -> Self {
         let (scene, sampler) = (&run.scene, run.sampler(place));
         match scene.front_ends.get(place) {
@@ -64,35 +64,36 @@ impl<'r> FrontEnd<'r> {
         }
     }
 
-    /// Whether a signal is in its samples.
+    /// True if a signal is in the samples.
     pub fn has(&self, signal: &Signal) -> bool {
         self.signals.is_none_or(|signals| signals.iter().any(|name| name == signal.name))
     }
 
-    /// Whether samples have one component.
+    /// True if samples have one component.
     pub fn is_real(&self) -> bool {
         self.format.is_some_and(|format| !format.is_complex())
     }
 
-    /// Where in the samples a frequency on the air lies.
+    /// Frequency in the samples of a frequency on the air, Hz.
     pub fn place_hz(&self, on_air_hz: f64) -> f64 {
         let offset_hz = on_air_hz - self.center_hz.unwrap_or(on_air_hz);
         if self.inverted { -offset_hz } else { offset_hz }
     }
 
-    /// Whether its converter has levels of its own instead of the format's.
+    /// True if the converter has levels of its own instead of the format's.
     pub fn is_coarse(&self) -> bool {
         converter(self.stages).is_some_and(|converter| !converter.whole)
     }
 
-    /// Whether the level behind it is that of the truth: of mixers out of balance the truth has the image and
-    /// not the gain, which gain control takes away again.
+    /// True if the level behind the front end is that of the truth. The truth has the image of mixers out of
+    /// balance, but not their gain, which gain control removes again.
     pub fn keeps_level(&self) -> bool {
         let unbalanced = self.balance().is_some_and(|balance| balance.image_db.is_some());
         !unbalanced || converter(self.stages).is_some_and(|converter| converter.gain_control)
     }
 
-    /// Whether samples of that power, LSB², lack so many deviations of a component to its format's end.
+    /// True if samples of that power, LSB², have fewer than so many deviations of a component to the end of
+    /// their format.
     pub fn clips(&self, power_lsb2: f64, deviations: f64) -> bool {
         let components = if self.is_real() { 1.0 } else { 2.0 };
         let full_scale_lsb = self.format.and_then(Format::full_scale_lsb);
@@ -112,7 +113,7 @@ impl<'r> FrontEnd<'r> {
 }
 
 impl FrontEnd<'_> {
-    /// Its filter, about the carrier of its first signal if the truth does not state the middle.
+    /// Filter of the front end, about the carrier of its first signal if the truth does not state the middle.
     pub fn filter_at(&self, first_hz: f64) -> Option<Placed> {
         let filter: &FilterSpec = filters(self.stages).next()?;
         let middle_hz = filter.middle_hz.unwrap_or_else(|| self.place_hz(first_hz));
@@ -140,7 +141,7 @@ impl Placed {
         }
     }
 
-    /// The same squared.
+    /// Power response at a frequency in the samples: the square of the amplitude.
     pub fn power(&self, f_hz: f64) -> f64 {
         let amplitude = self.amplitude(f_hz);
         amplitude * amplitude

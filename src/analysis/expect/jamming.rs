@@ -36,7 +36,7 @@ enum Density {
     Chips {
         rate_hz: f64,
     },
-    /// What a pulse train's jitter takes from its lines.
+    /// Reduction of a pulse train's lines by its jitter.
     Pulses {
         width_s: f64,
         late_s: f64,
@@ -44,7 +44,7 @@ enum Density {
 }
 
 impl Spectrum {
-    /// That of a shape.
+    /// Spectrum of a source's shape.
     pub fn of(source: &Interference) -> Self {
         let flat =
             |width_hz: f64| Self { lines: Vec::new(), density: Some(Density::Flat { width_hz: width_hz.abs() }) };
@@ -126,7 +126,7 @@ impl Spectrum {
     }
 }
 
-/// What a run's interference was on average, in the samples.
+/// Interference of a run on average, in the samples.
 #[derive(Clone, Debug)]
 pub struct Source {
     /// Shape of the spectrum at unit power.

@@ -24,11 +24,11 @@ use gnss::signal::{Component, Link, Signal, sinc_squared};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Loop {
-    /// Of the code.
+    /// Code loop.
     Dll,
-    /// Of the carrier's phase.
+    /// Phase loop of the carrier.
     Pll,
-    /// Of the carrier's frequency.
+    /// Frequency loop of the carrier.
     Fll,
 }
 
@@ -46,12 +46,12 @@ pub struct Settings {
     pub dll_bandwidth_hz: f64,
     /// Distance of early and late, chips.
     pub spacing_chips: f64,
-    /// Whether the replica's samples are means over their intervals.
+    /// True if the replica's samples are means over their intervals.
     pub averaged_replica: bool,
 }
 
 impl Settings {
-    /// As `receiver.json` has them; `None` where it names no bandwidths.
+    /// Settings that `receiver.json` states; `None` where it names no bandwidths.
     pub fn of(run: &Run) -> Option<Self> {
         let number = |key| run.tracking_setting(key);
         let settings = run.receiver.get("settings").unwrap_or(&run.receiver);
@@ -93,12 +93,12 @@ pub(crate) struct Carrier {
     update_s: f64,
     /// Power that is followed, over the signal's.
     share: f64,
-    /// What the scene's oscillator leaves.
+    /// Standard deviation of the phase that the scene's oscillator causes, radians.
     oscillator_rad: f64,
 }
 
 impl Carrier {
-    /// Of a signal that the receiver states so, or else by its settings.
+    /// Carrier of a signal as the receiver states it, or else by its settings.
     pub fn of(
         signal: &Signal,
         entry: Option<&Entry>,
@@ -116,7 +116,7 @@ impl Carrier {
         Self { bandwidth_hz, update_s, share, oscillator_rad }
     }
 
-    /// Of a signal in a run, with its oscillator.
+    /// Carrier of a signal in a run, with its oscillator.
     pub fn in_run(run: &Run, signal: &Signal) -> Self {
         let oscillator = run.scene.oscillator.map(|noise| PowerLaw { h: noise.h });
         let number = |key: &str, default| run.tracking_setting(key).unwrap_or(default);
@@ -156,7 +156,7 @@ pub fn exact_loop(order: u32, bandwidth_time: f64) -> Option<PhaseLoop> {
     Some(of(0.5 * (low + high)))
 }
 
-/// What a loop makes of unit noise of its discriminator, from its response to one value.
+/// Response of a loop to unit noise of its discriminator, computed from its response to one value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Response {
     /// Variances of the estimate of an interval's mean phase, of what the discriminator puts out, of that
@@ -234,7 +234,7 @@ impl<'a> Follower<'a> {
         Self { closed, first: None, last: None, state: None, running_in: (1.0 / update_s) as usize }
     }
 
-    /// Its error on the next phase; `None` while it runs in. It begins with the rate of the first two.
+    /// Error on the next phase; `None` while the loop settles. It begins with the rate of the first two.
     fn error(&mut self, phase: f64) -> Option<f64> {
         Some(self.errors(phase)?[0])
     }
@@ -254,9 +254,10 @@ impl<'a> Follower<'a> {
     }
 }
 
-/// Where in the loops' intervals a satellite's observations fall, counted in intervals from the middle.
+/// Positions of a satellite's observations in the loops' intervals, counted in intervals from the middle.
 ///
-/// An interval is of whole code periods, so a place stays while the range does: in 10 ms it is not anywhere.
+/// An interval is a number of whole code periods. A position is therefore constant while the range is. In 10
+/// ms not every position occurs.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Places {
     count: usize,
@@ -293,13 +294,13 @@ pub(crate) struct Theory {
     share: f64,
     pll: (PhaseLoop, Response),
     dll: (PhaseLoop, Response),
-    /// What the code discriminator puts out over the error, which is one for the waveform it is made for.
+    /// Gain of the code discriminator, which is one for the waveform it is made for.
     dll_gain: f64,
-    /// Of the signal with the replica, and of the noise.
+    /// Correlation peaks of the signal with the replica, and of the noise.
     peaks: (Peak, Peak),
-    /// Of the code without any average.
+    /// Correlation of the code without any average.
     pub code: Code,
-    /// What is followed.
+    /// Component that is tracked.
     pub component: &'static Component,
     /// Mean square that another satellite's code may add before the loop, chips²
     /// ([`Beats`](super::beats::Beats)).
@@ -435,7 +436,7 @@ impl Theory {
     }
 }
 
-/// What a loop's error without noise comes to, in its unit.
+/// Error of a loop without noise, in its unit.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Stress {
     sum: Sum,
@@ -495,7 +496,7 @@ impl Stresses {
         }
     }
 
-    /// That of one loop.
+    /// Stress of one loop.
     pub fn of(&self, which: Loop) -> Stress {
         self.of.get(&which).copied().unwrap_or_default()
     }

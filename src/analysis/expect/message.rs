@@ -15,10 +15,10 @@ use gnss::satellite::Sv;
 use gnss::signal::Link;
 use gnss::time::{Epoch, TimeScale};
 
-/// What all satellites sent.
+/// Messages that the satellites sent.
 #[derive(Clone, Debug, Default)]
 pub struct Message {
-    /// Of each satellite those of each message, with their issues.
+    /// Ephemerides of each satellite and message, with their issues.
     sets: BTreeMap<(Sv, &'static str), Vec<(u32, Ephemeris)>>,
     /// From which sample on the receiver had which issue, ascending.
     read: BTreeMap<(Sv, &'static str), Vec<(u64, u32)>>,
@@ -27,7 +27,7 @@ pub struct Message {
 }
 
 impl Message {
-    /// Of a run's truth.
+    /// Messages from a run's truth.
     pub fn of(run: &Run) -> Self {
         let Some(near) = run.trajectory.first().map(|row| row.time()) else { return Self::default() };
         let mut groups: BTreeMap<(Sv, &str, u32), Vec<&NavigationRow>> = BTreeMap::new();
@@ -58,19 +58,20 @@ impl Message {
         self.ionospheres.iter().find(|sent| sent.model() == model)
     }
 
-    /// Whether a satellite sends more than one set of a message.
+    /// True if a satellite sends more than one ephemeris in a message.
     pub fn renews(&self, sv: Sv) -> bool {
         self.sets.iter().any(|((own, _), sets)| *own == sv && sets.len() > 1)
     }
 
-    /// Whether no set of a satellite says that a signal must not be used.
+    /// True if no ephemeris of a satellite marks the signal as unhealthy.
     pub fn says_healthy(&self, link: Link) -> bool {
         let mut own = self.sets.iter().filter(|((sv, _), _)| *sv == link.sv).flat_map(|(_, sets)| sets);
         own.all(|(_, set)| set.is_healthy_on(link.signal) != Some(false))
     }
 
-    /// Of the sets of a satellite that serve a signal, those of a message that it carries first, the one that
-    /// the receiver had read last at `sample`, or else the one whose reference time is nearest to `at`.
+    /// Ephemeris of a satellite that serves a signal. It comes from the message that the signal carries
+    /// first. It is the one that the receiver had read last at `sample`, or else the one whose reference time
+    /// is nearest to `at`.
     pub fn ephemeris(&self, link: Link, (sample, at): (u64, Epoch)) -> Option<&Ephemeris> {
         let serves = |(_, set): &(u32, Ephemeris)| (set.form.serves)(link.signal);
         let carried = |name: &str| link.signal.components.iter().any(|c| c.message.is_some_and(|m| m.name == name));
@@ -128,7 +129,7 @@ fn messages(run: &Run, sv: Sv) -> impl Iterator<Item = (&'static Form, &'static 
     own.flat_map(|signal| signal.components.iter().filter_map(|c| Some((c.message?, signal.time))))
 }
 
-/// What those rows say of the ionosphere, by the message of that name.
+/// Ionospheric coefficients in those rows, by the message of that name.
 fn ionosphere(run: &Run, (sv, name): (Sv, &str), rows: &[&NavigationRow]) -> Option<Coefficients> {
     let raw = |name: &str| rows.iter().find(|row| row.parameter == name).map(|row| row.raw);
     let (message, _) = messages(run, sv).find(|(message, _)| message.name == name)?;

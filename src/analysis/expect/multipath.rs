@@ -14,7 +14,7 @@ use crate::read::spill_store::Cursor;
 use gnss::record::RayRow;
 use gnss::signal::Link;
 
-/// Where the loop rests, in chips late of the direct ray, for rays of (excess in chips, amplitude, phase in
+/// Code error of the loop in chips late of the direct ray, for rays of (excess in chips, amplitude, phase in
 /// cycles).
 pub(crate) fn error_chips(code: &Code, rays: &[(f64, f64, f64)], spacing_chips: f64) -> f64 {
     if rays.iter().all(|ray| ray.1 == 0.0) {
@@ -53,9 +53,10 @@ pub(crate) struct Rays<'r> {
 }
 
 impl<'r> Rays<'r> {
-    /// Those of a run's satellite whose chips have that length.
+    /// Rays of a run's satellite whose chips have that length.
     ///
     /// # Errors
+    ///
     /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn of(run: &'r Run, link: Link, chip_m: f64) -> Result<Self, JudgeError> {
         let cursor = run.rays.cursor(link).peekable();
@@ -72,10 +73,11 @@ impl<'r> Rays<'r> {
         (row.excess_m / self.chip_m, row.amplitude_ratio, row.phase_cycles)
     }
 
-    /// Those at a sample; samples are asked for in their order.
+    /// Rays at a sample; samples are requested in their order.
     ///
     /// # Errors
-    /// As [`Self::of`].
+    ///
+    /// Same as [`Self::of`].
     pub fn at(&mut self, sample: u64) -> Result<&[Ray], JudgeError> {
         if let Some(all) = &self.all {
             return Ok(all.get(&sample).map_or(&[], Vec::as_slice));

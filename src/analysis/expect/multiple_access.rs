@@ -28,7 +28,7 @@ pub struct MultipleAccess<'r> {
     jammed: Jammed,
 }
 
-/// What interference adds to the noise density at a sample, in units of the thermal one: the samples with
+/// Noise density that interference adds at a sample, in units of the thermal one. It holds the samples with
 /// interference in their order, and a number for each of them and each emission.
 #[derive(Default)]
 struct Jammed {

@@ -16,25 +16,25 @@ pub(super) struct Peak {
     corners: Vec<(f64, f64)>,
     width_chips: f64,
     averages: u32,
-    /// Of both sides of a sub-carrier together, whose chips those are. Averages leave the sub-carrier as it
-    /// is.
+    /// Sub-carrier whose sidebands are tracked together; the corners are then those of its chips. Averages do
+    /// not change the sub-carrier.
     sides: Option<Tone>,
 }
 
 impl Peak {
-    /// Of a signal's waveform, averaged so many times over `width_chips`.
+    /// Peak of a signal's waveform, averaged so many times over `width_chips`.
     pub fn new(waveform: &Waveform, width_chips: f64, averages: u32) -> Self {
         let chip_s = 1.0 / waveform.chip_rate_hz();
         let corners = waveform.corners().into_iter().map(|(at_s, bend)| (at_s / chip_s, bend * chip_s)).collect();
         Self { corners, width_chips, averages, sides: None }
     }
 
-    /// The same of chips that a sub-carrier turns, where its sides are followed together.
+    /// Peak of chips that a sub-carrier turns, where its sidebands are tracked together.
     pub fn between(self, sides: Option<Tone>) -> Self {
         Self { sides, ..self }
     }
 
-    /// The same `gain` times as high.
+    /// Peak with `gain` times the height.
     pub fn times(mut self, gain: f64) -> Self {
         self.corners.iter_mut().for_each(|(_, bend)| *bend *= gain);
         self
@@ -56,7 +56,7 @@ impl Peak {
         }
     }
 
-    /// What early less late changes by over their sum, for a distance of `spacing_chips`.
+    /// Slope of early less late over their sum, per chip, for a distance of `spacing_chips`.
     pub fn steepness(&self, spacing_chips: f64) -> f64 {
         let half = 0.5 * spacing_chips;
         self.slope(half) / self.value(half)
@@ -78,12 +78,12 @@ pub(crate) struct Code {
 }
 
 impl Code {
-    /// That of a signal's waveform.
+    /// Code of a signal's waveform.
     pub fn of(waveform: &Waveform) -> Self {
         Self { peak: Peak::new(waveform, 0.0, 0), reach_chips: waveform.reach_s() * waveform.chip_rate_hz() }
     }
 
-    /// That of what is followed of a signal.
+    /// Code of the tracked part of a signal.
     pub(super) fn found(followed: &Followed) -> Self {
         let code = Self::of(&followed.found);
         let Some(tone) = followed.sides else { return code };

@@ -48,9 +48,10 @@ pub struct Sent {
 }
 
 impl Sent {
-    /// Those in the samples of a front end.
+    /// Signals in the samples of a front end.
     ///
     /// # Errors
+    ///
     /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn of(run: &Run, front_end: &FrontEnd<'_>) -> Result<Vec<Self>, JudgeError> {
         let looks = front_end.looks(run);
@@ -88,7 +89,8 @@ impl Sent {
         Ok(all)
     }
 
-    /// What echoes make of its power at a frequency from its carrier: the mean of |1 + Σ a·e^(2πi(φ − fτ))|².
+    /// Factor of the power that echoes cause at a frequency from the carrier: the mean of |1 + Σ a·e^(2πi(φ −
+    /// fτ))|².
     fn ripple(&self, from_carrier_hz: f64) -> f64 {
         if self.echoes.is_empty() {
             return 1.0;
@@ -120,7 +122,7 @@ fn echoes(run: &Run, link: Link, until: u64) -> Result<Vec<Vec<RayRow>>, JudgeEr
     Ok(found.into_values().collect())
 }
 
-/// What is expected of a spectrum at the frequencies of its estimate.
+/// Expected spectrum at the frequencies of its estimate.
 #[derive(Clone, Debug)]
 pub struct Expected {
     /// LSB²/Hz.
@@ -131,11 +133,11 @@ pub struct Expected {
     pub unsteady: Vec<f64>,
     /// Relative variance that the number of pulses in the looks makes.
     pub pulses: Vec<f64>,
-    /// Whether a line fills the bin.
+    /// True if a line fills the bin.
     pub line: Vec<bool>,
-    /// Whether the level is that of the truth and not fitted.
+    /// True if the level is that of the truth, false if it is fitted.
     pub absolute: bool,
-    /// Whether nothing but steady noise and satellites is in it.
+    /// True if the spectrum holds only steady noise and satellites.
     pub steady: bool,
 }
 

@@ -1,10 +1,9 @@
-//! What Hatch's filter makes of a satellite's code: bias of what parts code and carrier, and the noise that
-//! is left.
+//! Hatch's filter on a satellite's code: bias by code-carrier divergence, and the remaining noise.
 //!
-//! Written from the settings, not from the receiver's code: the weight of a new code value falls from one to
-//! interval over window, a break of lock or a gap begins anew. Noise of a first-order code loop is correlated
-//! as exp(−4Bt); its variance is carried along with its covariance (`smoothing_s` and `dll_bandwidth_hz`).
-//! Limits: loops of other orders have other correlations.
+//! Written from the settings, not from the receiver's code. The weight of a new code value falls from one to
+//! interval over window, and a break of lock or a gap begins anew. Noise of a first-order code loop is
+//! correlated as exp(−4Bt). Its variance is propagated with its covariance (`smoothing_s` and
+//! `dll_bandwidth_hz`). Limits: loops of other orders have other correlations.
 
 /// A gap longer than this breaks the carrier.
 const LONGEST_GAP_S: f64 = 1.05;
@@ -27,14 +26,14 @@ struct State {
     covariance: f64,
 }
 
-/// What comes out.
+/// Output of the filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Smoothed {
     /// Smoothed difference of code and carrier.
     pub value_m: f64,
     /// Variance of its noise over that of one code value.
     pub variance_ratio: f64,
-    /// How long it remembers: twice the mean age of what it holds.
+    /// Memory of the filter in seconds: twice the mean age of the values that it holds.
     pub memory_s: f64,
 }
 

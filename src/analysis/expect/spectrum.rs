@@ -31,9 +31,9 @@ pub struct Spectrum {
     pub null_low_hz: Option<f64>,
     /// Null above the carrier as measured, Hz from the carrier.
     pub null_high_hz: Option<f64>,
-    /// Where the same search finds the lower one in the expected spectrum: Doppler moves it.
+    /// Lower null that the search finds in the expected spectrum, Hz from the carrier: Doppler moves it.
     pub null_low_expected_hz: Option<f64>,
-    /// Where it finds the upper one.
+    /// Upper null that the search finds in the expected spectrum, Hz from the carrier.
     pub null_high_expected_hz: Option<f64>,
     /// Why a null is not reported.
     pub null_reason: Option<&'static str>,
@@ -47,7 +47,7 @@ const BOTTOM_BINS: f64 = 4.0;
 /// The spectrum must rise by this factor on both sides for a null to be visible.
 const RISE: f64 = 2.0;
 
-/// What the section says of a run and of what [`theory_db`] expects there.
+/// Figures of the spectrum section, from a run and from the expected [`theory_db`].
 pub fn judge(run: &Run, theory_db: &[f64]) -> Spectrum {
     let mut found = Spectrum::default();
     if theory_db.is_empty() {
@@ -134,8 +134,8 @@ pub fn edge_cost_db(run: &Run, signal: &'static Signal) -> f64 {
 /// Steps of those integrals over the samples' band.
 const STEPS: i32 = 1000;
 
-/// What a replica finds of a signal behind sampler and, where wanted, filter, over what the receiver takes it
-/// for.
+/// Power that a replica finds of a signal behind sampler and, where wanted, filter, over the receiver's
+/// assumption.
 fn found(run: &Run, signal: &'static Signal, filtered: bool) -> Option<f64> {
     let place = run.front_end(signal);
     let sampler = run.sampler(place);
@@ -325,7 +325,7 @@ mod tests {
         let hidden = judge(&run, &without_doppler(&run));
         assert!(hidden.null_low_hz.is_none() && hidden.null_reason.unwrap().starts_with("hidden"), "{hidden:?}");
     }
-    /// What is expected of the samples were all carriers at rest.
+    /// Expected spectrum of the samples if all carriers were at rest.
     fn without_doppler(run: &Run) -> Vec<f64> {
         let front_end = FrontEnd::of(run, 0);
         let mut sent = Sent::of(run, &front_end).unwrap();
@@ -352,9 +352,9 @@ mod tests {
         run
     }
 
-    /// What a replica of BOC(1,1) by means over samples finds of a pilot of CBOC whose samples are means too,
-    /// or are taken behind a filter of 0.45 cycles a sample, over what it takes the whole for: by samples
-    /// made step by step.
+    /// Gain of a replica of BOC(1,1) by means over samples, over its assumption for the whole signal, by
+    /// samples made step by step. The signal is a pilot of CBOC whose samples are means too, or are taken
+    /// behind a filter of 0.45 cycles a sample.
     fn made(limited: bool, rate_hz: f64) -> f64 {
         const FINE: usize = 120; // steps a chip
         let fine_hz = FINE as f64 * 1.023e6;
@@ -413,8 +413,9 @@ mod tests {
         found * found / (power * noise) / (strong * strong)
     }
 
-    /// What a replica of BOC(1,1), zero where chips are BOC(6,1), finds by means over samples of such a pilot
-    /// whose samples are means too, over what it takes it for: by samples made step by step.
+    /// Gain of a replica of BOC(1,1), zero where chips are BOC(6,1), by means over samples, over its
+    /// assumption, by samples made step by step. The signal is a pilot of that form whose samples are means
+    /// too.
     fn made_in_turn(rate_hz: f64) -> f64 {
         const STEPS: usize = 12; // a chip
         let mut draw = Draw(7);

@@ -1,12 +1,13 @@
-//! What the C/N0 that a receiver states lacks of the true one, beside noise and other satellites.
+//! Losses of the C/N0 that a receiver states, besides noise and other satellites.
 //!
-//! Filter and converter ([`costs_db`]). Edges between samples ([`edge_cost_db`]), and data that are in phase
-//! with the pilot beside them. Codes of the pair correlate at no delay by a number ρ of the satellite's own,
-//! 0.03 for E1 of E11 and 0.001 for that of E27, with the sign of the data's symbol: prompts of a period T
-//! scatter by ρ²·2T·C/N0 of the data in units of their noise, along the carrier alone. A receiver that takes
-//! its noise along the mean prompt, as phase jitter lies across it, takes that for noise; its loops do not
-//! see it, as nothing lies across and early and late have the same. Limits: ρ is that of the codes as sent,
-//! without what edges leave of it; symbols are a period long, so that they are noise from prompt to prompt.
+//! Filter and converter cause one loss ([`costs_db`]), and edges between samples another ([`edge_cost_db`]).
+//! A third is due to data in phase with the pilot. Codes of the pair correlate at no delay by a number ρ of
+//! the satellite's own, 0.03 for E1 of E11 and 0.001 for that of E27, with the sign of the data's symbol.
+//! Prompts of a period T scatter by ρ²·2T·C/N0 of the data in units of their noise, along the carrier alone.
+//! A receiver that measures its noise along the mean prompt, as phase jitter lies across it, counts that as
+//! noise. Its loops are not affected, because the part across is zero, and early and late have equal parts.
+//! Limits: ρ is that of the codes as sent, without the effect of edges. Symbols are a period long, so that
+//! they are noise from prompt to prompt.
 
 use std::collections::BTreeMap;
 
@@ -15,17 +16,17 @@ use crate::expect::spectrum::{costs_db, edge_cost_db};
 use crate::read::Run;
 use gnss::signal::{Component, Layer, Link, Signal};
 
-/// Those losses.
+/// Losses of the stated C/N0.
 #[derive(Clone, Debug, Default)]
 pub struct Stated {
     front_ends_db: BTreeMap<&'static Signal, f64>,
     edges_db: BTreeMap<&'static Signal, f64>,
-    /// Of each satellite's signal the noise density of its own data over its C/N0, seconds.
+    /// Noise density of the own data of each satellite's signal over its C/N0, seconds.
     data_s: BTreeMap<Link, f64>,
 }
 
 impl Stated {
-    /// Of a run.
+    /// Losses of a run.
     pub fn of(run: &Run) -> Self {
         let edges_db = run.signals.iter().map(|&signal| (signal, edge_cost_db(run, signal))).collect();
         let data_s = |link: Link| {

@@ -44,7 +44,7 @@ struct Ray {
     doppler_hz: f64,
 }
 
-/// How strong and how high it is, as in [`State`].
+/// Strength and elevation of a satellite, as in [`State`].
 #[derive(Clone, Copy, Debug)]
 struct Seen {
     cn0_dbhz: f64,
@@ -76,14 +76,14 @@ pub struct Place {
     pub clock_drift: f64,
 }
 
-/// What interpolation leaves, at most.
+/// Largest errors of the interpolation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Interpolation {
-    /// Of a range, metres.
+    /// Error of a range, metres.
     pub range_m: f64,
-    /// Of a carrier, cycles.
+    /// Error of a carrier, cycles.
     pub carrier_cycles: f64,
-    /// Of a Doppler, Hz.
+    /// Error of a Doppler, Hz.
     pub doppler_hz: f64,
 }
 
@@ -125,10 +125,11 @@ impl Timeline {
         Ok(Some(timeline))
     }
 
-    /// That of one satellite's range and carrier alone; how well it is interpolated is not looked at.
+    /// Timeline of one satellite's range and carrier alone, without the errors of its interpolation.
     ///
     /// # Errors
-    /// As [`Self::new`].
+    ///
+    /// Same as [`Self::new`].
     pub fn of(run: &Run, link: Link) -> Result<Option<Self>, JudgeError> {
         Self::of_links(run, None, std::iter::once(link))
     }
@@ -182,7 +183,7 @@ impl Timeline {
         (self.places.first().map_or(0.0, |p| p.0), self.places.last().map_or(0.0, |p| p.0))
     }
 
-    /// Whether a time is less than a row before the first one or after the last one: samples go on there.
+    /// True if a time is less than a row before the first one or after the last one: samples continue there.
     pub fn is_at_edge(&self, t_s: f64) -> bool {
         let (from_s, to_s) = self.span_s();
         let near = |beyond_s: f64| (0.0..=1.01 * self.interval_s).contains(&beyond_s);
@@ -273,7 +274,7 @@ impl Timeline {
 /// Something at a time.
 type At<T> = (f64, T);
 
-/// Where the row before a time is that has one after it.
+/// Index of the row before a time, if it has one after it.
 fn before<T>(nodes: &[At<T>], t_s: f64) -> Option<usize> {
     let after = nodes.partition_point(|node| node.0 <= t_s);
     let after = if after == nodes.len() && nodes.last().is_some_and(|last| last.0 == t_s) { after - 1 } else { after };

@@ -1,15 +1,15 @@
-//! What Welch's estimate shows of a spectrum, how far it scatters, and which samples it looks at.
+//! Welch's estimate of a spectrum: its expectation, its scatter, and the samples it uses.
 //!
-//! Segments of N samples under a periodic Hann window w, half overlapped (Welch 1967). What is expected of it
-//! is the spectrum convolved with the window's: in lags, the autocorrelation times the window's own,
-//! a(τ) = Σ w(n)·w(n − τ).
+//! Segments of N samples under a periodic Hann window w overlap by half (Welch 1967). The expectation is the
+//! spectrum convolved with the window's. In lags it is the autocorrelation times the window's own, a(τ) = Σ
+//! w(n)·w(n − τ).
 //!
 //! **Scatter** of Gaussian samples whose spectrum is smooth over a bin. Bins l apart in segments D samples
 //! apart have the correlation |Σ w(n)·w(n − D)·e^(2πi·l·n/N)|²/(Σ w²)². The same bin of two neighbouring
 //! segments has (1/6)² = 1/36, so that the mean of K segments has the relative variance 19/18/K. Over all l
 //! these sum to N·Σ w²(n)·w²(n − D)/(Σ w²)² (Parseval): 35/18 in a segment, 1/12 with each neighbour. The
-//! mean of n bins has (35/18 + 2/12)/(nK) = 19/9/(nK), less for what its ends lack. Limits: segments further
-//! apart do not overlap; a sum over few bins is taken as one over many, which is at most 2 % too large.
+//! mean of n bins has (35/18 + 2/12)/(nK) = 19/9/(nK), less at its ends. Limits: segments further apart do
+//! not overlap. A sum over few bins is taken as one over many, which is at most 2 % too large.
 
 use std::ops::Range;
 
@@ -30,7 +30,7 @@ pub struct Looks {
     pub length: u64,
     /// From the start of one to that of the next, samples.
     pub stride: u64,
-    /// How many there are.
+    /// Number of the segments.
     pub pieces: u64,
 }
 

@@ -1,11 +1,11 @@
-//! What a scene allows of its receiver, epoch by epoch: which satellites must be found, observed and used,
-//! and when there must be fixes.
+//! Requirements of a scene on its receiver, epoch by epoch: satellites to find, observe and use, and times of
+//! fixes.
 //!
-//! It follows from the truth (who is in view, how strong, how well placed), the receiver's settings
-//! ([`receiver`]), the message's timetable ([`timetable`]) and what the scene itself expects
-//! ([`gnss::facts`]); [`satellite`] has the rules. Nothing that nature or the scene took away is the
-//! receiver's fault. Limits: searches are those of a cold start with worst losses, so a receiver may be
-//! earlier than required; geometry counts the satellites that must be used, not those that might be.
+//! They follow from the truth (satellites in view, their strength and geometry), the receiver's settings
+//! ([`receiver`]), the message's timetable ([`timetable`]) and the scene's own expectations
+//! ([`gnss::facts`]); [`satellite`] has the rules. Outages that the scene causes are excluded. Limits:
+//! searches are those of a cold start with worst losses, so a receiver may be earlier than required. Geometry
+//! counts the satellites that must be used, not those that might be.
 
 pub mod receiver;
 pub mod satellite;
@@ -40,7 +40,7 @@ const SPACE_M: f64 = 100e3;
 /// Time that a solution may take once all is there.
 const SOLVE_S: f64 = 1.0;
 
-/// What is required at one epoch.
+/// Requirements at one epoch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Due {
     /// Number of the sample, counted from the first one.
@@ -88,7 +88,7 @@ impl Due {
     }
 }
 
-/// What is required of one satellite over the run, in epochs of the truth.
+/// Requirements on one satellite over the run, in epochs of the truth.
 #[derive(Clone, Debug, Default)]
 pub struct Satellite {
     /// Epochs in which the truth has it.
@@ -99,7 +99,7 @@ pub struct Satellite {
     pub acquired_by_s: Option<f64>,
     /// Epochs at which it must be observed.
     pub due: usize,
-    /// Those of them at which it was.
+    /// Number of those epochs at which it was observed.
     pub observed: usize,
     /// The latest of those at which it was not, and the first.
     pub missing_s: Option<(f64, f64)>,
@@ -131,9 +131,9 @@ impl Observed for Run {
 /// The whole of what a scene allows.
 #[derive(Clone, Debug)]
 pub struct Expectations {
-    /// What its settings let one expect.
+    /// Expectations from the receiver's settings.
     pub receiver: Receiver,
-    /// What each satellite's signal must give, and gave.
+    /// Required and achieved observations of each satellite's signal.
     pub satellites: BTreeMap<Link, Satellite>,
     /// Epochs of the truth at which the receiver measures.
     pub epochs: Vec<Due>,
@@ -141,7 +141,7 @@ pub struct Expectations {
     pub first_fix_s: Option<f64>,
     /// When satellites and geometry would have allowed it, the ionosphere left aside.
     pub four_by_s: Option<f64>,
-    /// What the satellites sent.
+    /// Messages that the satellites sent.
     message: Message,
 }
 
@@ -271,7 +271,7 @@ impl Expectations {
         self.first_fix_s = self.epochs.iter().find(excused).map(|due| due.time_s);
     }
 
-    /// Whether there must be a fix at an epoch of a receiver whose first one came at `first_s`.
+    /// True if there must be a fix at an epoch of a receiver whose first one came at `first_s`.
     pub fn fix_due(&self, expect: &Expect, due: &Due, first_s: Option<f64>) -> bool {
         match expect.fix(due.time_s) {
             Some(Fixes::None | Fixes::Any) => return false,
@@ -282,7 +282,7 @@ impl Expectations {
             || (first_s.is_some_and(|first_s| due.time_s > first_s) && !on_time && due.held >= ENOUGH)
     }
 
-    /// Whether the receiver measures at an epoch of the truth.
+    /// True if the receiver measures at an epoch of the truth.
     pub fn measures(&self, due: &Due) -> bool {
         self.measured().at(due.time_s)
     }
@@ -313,7 +313,7 @@ impl Counted {
         }
     }
 
-    /// Whether an epoch was not counted before; it is from now on.
+    /// Counts an epoch; returns true if it was not counted before.
     fn is_first(counted: &mut [bool], at: usize) -> bool {
         counted.get_mut(at).is_some_and(|counted| !std::mem::replace(counted, true))
     }

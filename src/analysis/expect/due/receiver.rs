@@ -1,7 +1,7 @@
-//! What a receiver's settings let one expect of it: how weak a signal it finds, how soon, how weak a one it
+//! Expectations from a receiver's settings: sensitivity and speed of its search, and the weakest signal it
 //! holds.
 //!
-//! Search and loops are those of theory as `rx/receiver.json` states them of each signal: a receiver that
+//! Search and loops are those of theory as `rx/receiver.json` states them for each signal. A receiver that
 //! states none is taken to have the defaults of a common one. Losses of the search are its worst: half a cell
 //! of code, half a step of Doppler, and signs that turn within its sums.
 
@@ -33,11 +33,11 @@ const SUREST: f64 = 1.0 - 1e-7;
 /// The expectations that settings justify.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Receiver {
-    /// What `rx/receiver.json` states.
+    /// Content of `rx/receiver.json`.
     stated: Value,
     /// Noise of the scene's oscillator.
     oscillator: Option<PowerLaw>,
-    /// Of the first search and of later ones: threshold of a cell's statistic.
+    /// Threshold of a cell's statistic, for the first search and for later ones.
     thresholds: [f64; 2],
     search: Search,
     step_cycles: f64,
@@ -51,24 +51,25 @@ pub struct Receiver {
     pub interval_s: f64,
     /// Elevation below which it uses no satellite, degrees.
     pub mask_deg: f64,
-    /// Whether fixes need the ionosphere's page, and else how long the first one waits for it.
+    /// True if fixes need the ionosphere's page.
     pub requires_ionosphere: bool,
-    /// How long it waits for the ionosphere's parameters before a fix, seconds.
+    /// Time that the first fix waits for the ionosphere's parameters, seconds.
     pub ionosphere_wait_s: f64,
-    /// Whether it uses satellites by their elements in short.
+    /// True if the receiver uses satellites by their reduced elements.
     pub reduced_elements: bool,
-    /// What its front end takes from every signal.
+    /// Loss of every signal in the front end, dB.
     pub cost_db: f64,
 }
 
 impl Receiver {
-    /// Of the receiver whose settings a run kept; what depends on the signal is of the truth's first one.
+    /// Expectations on the receiver whose settings a run kept. Values that depend on the signal are those of
+    /// the truth's first one.
     pub fn of(run: &Run) -> Self {
         let oscillator = run.scene.oscillator.map(|noise| PowerLaw { h: noise.h });
         Self { cost_db: front_end_cost_db(run), ..Self::new(&run.receiver, oscillator, run.signals.first().copied()) }
     }
 
-    /// The same for another signal.
+    /// Expectations for another signal.
     pub fn of_signal(&self, signal: &'static Signal) -> Self {
         Self { cost_db: self.cost_db, ..Self::new(&self.stated, self.oscillator, Some(signal)) }
     }
@@ -225,7 +226,7 @@ fn turns(signal: &'static Signal, component: &Component, coherent_s: f64) -> (f6
     }
 }
 
-/// What a converter of few bits takes from every signal (Van Vleck; optimal steps, white noise), in dB.
+/// Loss of every signal in a converter of few bits (Van Vleck; optimal steps, white noise), in dB.
 fn front_end_cost_db(run: &Run) -> f64 {
     let bits = run.scene.converter().map(|converter| converter.bits);
     match bits {

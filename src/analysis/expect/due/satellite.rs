@@ -29,13 +29,13 @@ const HEALTH_S: f64 = 36.0;
 /// Loops, their symbols and smoothed ranges move to a clock that has jumped within so long.
 const STEP_S: f64 = 5.0;
 
-/// Those of the faults that concern a satellite and are of these kinds.
+/// Faults of a satellite that are of these kinds.
 fn concerning<'f>(faults: &'f [Fault], sv: Sv, kinds: &'f [FaultKind]) -> impl Iterator<Item = &'f Fault> {
     let concerns = move |fault: &&Fault| fault.satellites.as_ref().is_none_or(|list| list.contains(&sv));
     faults.iter().filter(concerns).filter(move |fault| kinds.contains(&fault.kind))
 }
 
-/// Whether a satellite's clock has jumped so lately, or is about to, that a receiver is between both times.
+/// True if a satellite's clock has jumped so lately, or is about to, that a receiver is between both times.
 pub fn is_stepping(faults: &[Fault], sv: Sv, time_s: f64) -> bool {
     concerning(faults, sv, &[FaultKind::ClockStep])
         .flat_map(|fault| [Some(fault.from_s), fault.to_s])
@@ -56,7 +56,7 @@ pub struct SatelliteEpoch {
     pub strongest_dbhz: f64,
     /// True Doppler, Hz.
     pub doppler_hz: f64,
-    /// Whether the receiver's mask lets it into fixes.
+    /// True if the receiver's mask admits the satellite to fixes.
     pub above_mask: bool,
 }
 
@@ -94,29 +94,29 @@ impl Excuse {
     }
 }
 
-/// What is required of a satellite at one row.
+/// Requirements on a satellite at one row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Required {
     /// The signal can be held here, so that fixes that have begun can go on.
     pub held: bool,
-    /// Whether it must be found by now.
+    /// True if the satellite must be found by now.
     pub acquired: bool,
-    /// Whether it must be observed.
+    /// True if the satellite must be observed.
     pub observed: bool,
-    /// Whether a fix must use it.
+    /// True if a fix must use the satellite.
     pub used: bool,
 }
 
 /// Everything about the scene that is not in the rows.
 #[derive(Clone, Copy)]
 pub struct Scene<'s> {
-    /// What the settings let one expect.
+    /// Expectations from the receiver's settings.
     pub receiver: &'s Receiver,
     /// When its message says what.
     pub timetable: Timetable,
-    /// What the scene expects.
+    /// Expectations that the scene states.
     pub expect: &'s Expect,
-    /// What is wrong with satellites.
+    /// Faults of the satellites.
     pub faults: &'s [Fault],
     /// Interval of the truth's rows.
     pub interval_s: f64,
@@ -127,13 +127,13 @@ impl Scene<'_> {
         concerning(self.faults, sv, kinds)
     }
 
-    /// Whether the message cannot be read without errors.
+    /// True if the message cannot be read without errors.
     fn garbled(&self, sv: Sv, time_s: f64) -> bool {
         self.of(sv, &[FaultKind::BitErrors, FaultKind::Bit, FaultKind::Alert])
             .any(|fault| during(fault, time_s, HEALTH_S))
     }
 
-    /// Whether the satellite must not, or need not, be used.
+    /// True if the satellite must not, or need not, be used.
     fn unfit(&self, sv: Sv, time_s: f64) -> bool {
         let wrong =
             [FaultKind::ClockStep, FaultKind::ClockRamp, FaultKind::ClockNoise, FaultKind::Orbit, FaultKind::Parameter];
@@ -170,7 +170,7 @@ impl Scene<'_> {
         }
     }
 
-    /// What is required at each row; `healthy` is what the message says without faults.
+    /// Requirements at each row; `healthy` is the message's statement without faults.
     pub fn required(&self, sv: Sv, rows: &[SatelliteEpoch], usual_dbhz: f64, healthy: bool) -> Vec<Required> {
         let mut state = State::default();
         let mut last_s = f64::NEG_INFINITY;
@@ -209,12 +209,12 @@ impl Scene<'_> {
     }
 }
 
-/// Whether a fault is on, or was until `after_s` before.
+/// True if a fault is active, or was until `after_s` before.
 fn during(fault: &Fault, time_s: f64, after_s: f64) -> bool {
     time_s >= fault.from_s && fault.to_s.is_none_or(|to_s| time_s < to_s + after_s)
 }
 
-/// How far a lock has come.
+/// Progress of a lock.
 #[derive(Clone, Copy, Debug, Default)]
 struct State {
     /// Since when it could be found.

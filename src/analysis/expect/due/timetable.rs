@@ -10,8 +10,8 @@ use gnss::message::Message;
 use gnss::signal::Signal;
 use gnss::time::Epoch;
 
-/// What shows where a unit begins when its time is not known yet: the two words at the beginning of the next
-/// subframe.
+/// Time in seconds that shows the beginning of a unit while its time is unknown: the two words at the
+/// beginning of the next subframe.
 const HEADER_S: f64 = 1.2;
 /// Times of arrival of satellites around the Earth, at most: a geostationary user across the Earth.
 const LIGHT_S: f64 = 0.25;
@@ -25,22 +25,22 @@ const LARGEST_UNITS: i64 = 250;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timetable {
     message: Option<&'static Message>,
-    /// Of another signal of the satellite, where this one's says neither its time nor its orbit.
+    /// Message of another signal of the satellite, where this one's states neither its time nor its orbit.
     dating: Option<&'static Message>,
     /// The first sample, by the clock of the system that sends.
     start: Epoch,
-    /// Whether a new set comes during the scene.
+    /// True if a new ephemeris comes during the scene.
     renewed: bool,
 }
 
 impl Timetable {
-    /// Of a signal in a scene whose first sample was taken then.
+    /// Timetable of a signal in a scene whose first sample was taken at `start`.
     pub fn new(signal: &Signal, start: Epoch) -> Self {
         let message = signal.components.iter().find_map(|component| component.message);
         Self { message, dating: None, start: signal.time.label(start), renewed: false }
     }
 
-    /// The same beside other signals, of which one may have to give time and orbit.
+    /// Timetable beside other signals, of which one may have to give time and orbit.
     pub fn beside(signal: &'static Signal, signals: &BTreeSet<&'static Signal>, start: Epoch) -> Self {
         let undated = !signal.is_dated();
         let dating =
@@ -48,12 +48,12 @@ impl Timetable {
         Self { dating: dating.filter(|_| undated), ..Self::new(signal, start) }
     }
 
-    /// The same where satellites may send a new set during the scene.
+    /// Timetable for satellites that send a new ephemeris during the scene, if `renewed` is true.
     pub fn renewed(self, renewed: bool) -> Self {
         Self { renewed, ..self }
     }
 
-    /// That of the message which says when it is and where the satellite is.
+    /// Timetable of the message that states its time and the satellite's orbit.
     fn dated(&self) -> Self {
         Self { message: self.dating.or(self.message), dating: None, ..*self }
     }

@@ -1,10 +1,8 @@
-//! What theory says of a clock's stability: Allan variance of power-law noise, and of white noise in its
-//! readings.
+//! Theory of a clock's stability: Allan variance of power-law noise, and of white noise in its readings.
 //!
-//! Source: IEEE Std 1139-2008 and W. J. Riley, NIST Special Publication 1065 (2008).
-//! S_y(f) = Σ h_α f^α is one-sided and ends at a cutoff, which only the two phase noises feel. Limit: the
-//! flicker-phase form needs 2π × cutoff × τ well above 1, which sampled phase (cutoff at half the rate) keeps
-//! at every τ.
+//! Source: IEEE Std 1139-2008 and W. J. Riley, NIST Special Publication 1065 (2008). S_y(f) = Σ h_α f^α is
+//! one-sided and ends at a cutoff, which affects only the two phase noises. Limit: the flicker-phase form
+//! needs 2π × cutoff × τ well above 1. Sampled phase (cutoff at half the rate) meets that at every τ.
 
 use std::f64::consts::{LN_2, PI};
 
@@ -31,7 +29,7 @@ impl Deviation {
     /// All of them, in the order of `allan.csv`.
     pub const ALL: [Self; 7] = [Self::Adev, Self::Oadev, Self::Mdev, Self::Tdev, Self::Hdev, Self::Ohdev, Self::Totdev];
 
-    /// Its common abbreviation, in lower case.
+    /// Common abbreviation of the deviation, in lower case.
     pub fn name(self) -> &'static str {
         match self {
             Self::Adev => "adev",

@@ -34,10 +34,10 @@ pub fn raw_chips(discriminator: Discriminator, d: f64, t_s: f64, cn0_hz: f64) ->
     (d / (planted!("analysis.theory.dll", 4.0, 2.0) * snr) * (1.0 + squaring(discriminator, d, snr))).sqrt()
 }
 
-/// What a code's correlation is at early and late, of 1 at the prompt.
+/// Correlation of a code at early and late, relative to 1 at the prompt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Taps {
-    /// Its value there, and how much it falls a chip.
+    /// Height of the correlation there.
     pub height: f64,
     /// Slope of early minus late at zero error, per chip.
     pub slope: f64,
@@ -173,7 +173,7 @@ pub fn threshold_chips(d: f64) -> f64 {
     d / 6.0
 }
 
-/// Whether 3σ and the dynamic error stay within the discriminator's linear range, ±d/2 (Kaplan and Hegarty,
+/// True if 3σ and the dynamic error stay within the discriminator's linear range, ±d/2 (Kaplan and Hegarty,
 /// eq. 5.24).
 pub fn holds(jitter_chips: f64, stress_chips: f64, d: f64) -> bool {
     3.0 * jitter_chips + stress_chips.abs() <= 0.5 * d

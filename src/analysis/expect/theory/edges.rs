@@ -1,10 +1,10 @@
-//! What chip edges that are averaged over a sample's interval cost a code at rest.
+//! Code error at rest by chip edges that are averaged over a sample's interval.
 //!
-//! Averaging is a filter sinc(f/fs) before sampling; what it leaves above half the rate folds back as a code
-//! of its own, with phases that do not follow the code's. An early-minus-late correlator weighs a line of the
-//! code at f = m/period by 2 sin(π f d) and the folded lines, of random phase, add up by power. Limits:
-//! random codes, spacing of half a chip, no filter of the front end; near a multiple of the chip rate it is a
-//! bound (0.33 m at 2.048 Msps, where 0.20 m were measured).
+//! Averaging is a filter sinc(f/fs) before sampling. Aliases above half the rate form a code of their own,
+//! with phases that do not follow the code's. An early-minus-late correlator weighs a line of the code at f =
+//! m/period by 2 sin(π f d). The aliased lines, of random phase, add up by power. Limits: random codes,
+//! spacing of half a chip, no filter of the front end. Near a multiple of the chip rate it is a bound (0.33 m
+//! at 2.048 Msps, where 0.20 m were measured).
 
 use std::f64::consts::PI;
 
@@ -55,8 +55,9 @@ fn folded_m(waveform: &Waveform, chips: f64, rate_hz: f64) -> f64 {
     SPEED_OF_LIGHT_MPS / chip_rate_hz * (square * LINES / chips).sqrt() / slope
 }
 
-/// Where every chip meets the same few places between samples phases are not random: 1.6 m at four samples a
-/// chip of C/A, and as the square of samples times places; longer and shorter chips in proportion.
+/// Code error in metres where every chip meets the same few positions between samples, so that phases are not
+/// random. It is 1.6 m at four samples a chip of C/A, and grows as the square of samples times positions.
+/// Longer and shorter chips are in proportion.
 fn locked_m(chip_rate_hz: f64, chips: f64, rate_hz: f64) -> f64 {
     let samples = |places: u32| f64::from(places) * rate_hz / chip_rate_hz;
     // Within a code the places drift apart otherwise.

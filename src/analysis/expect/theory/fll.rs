@@ -27,8 +27,8 @@ pub fn jitter_of_loop_hz(frequency_loop: &FrequencyLoop, t_s: f64, cn0_hz: f64) 
     Some((frequency_loop.linear().noise_gain()? * prompts).sqrt() * phase_cycles / t_s)
 }
 
-/// The same in closed form for order 1 and gain `k` on overlapping pairs, if the discriminator saw the rate
-/// of the last interval alone: √(2k²/(2−k))·σ/(2πT).
+/// Jitter in hertz for order 1 and gain `k` on overlapping pairs, in closed form, if the discriminator saw
+/// the rate of the last interval alone: √(2k²/(2−k))·σ/(2πT).
 pub fn jitter_overlapping_first_order_hz(k: f64, t_s: f64, cn0_hz: f64) -> f64 {
     (2.0 * k * k / (2.0 - k)).sqrt() * pll::raw_rad(t_s, cn0_hz) / (TAU * t_s)
 }
@@ -47,7 +47,7 @@ pub fn threshold_hz(t_s: f64) -> f64 {
     1.0 / (12.0 * t_s)
 }
 
-/// Whether 3σ and the dynamic error stay within ±1/(4T), eq. 5.20.
+/// True if 3σ and the dynamic error stay within ±1/(4T), eq. 5.20.
 pub fn holds(jitter_hz: f64, stress_hz: f64, t_s: f64) -> bool {
     3.0 * jitter_hz + stress_hz.abs() <= 0.25 / t_s
 }

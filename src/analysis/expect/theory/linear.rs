@@ -9,7 +9,7 @@
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
-/// How a rate-only loop filter integrates.
+/// Integration of a rate-only loop filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Integrator {
     /// The state before the update.
@@ -20,7 +20,7 @@ pub enum Integrator {
     Bilinear,
 }
 
-/// What a loop does with its corrections.
+/// Feedback of a loop's corrections.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Feedback {
     /// The oscillator's phase and rate are both set at each update: gains correct the mean phase of the
@@ -30,11 +30,11 @@ pub enum Feedback {
     /// discriminator sees the mean phase of an interval (a correlator does) or that at its start; `delay` is
     /// one more epoch.
     Rate {
-        /// How the filter integrates.
+        /// Integration of the filter.
         integrator: Integrator,
-        /// Whether the phase compared is the interval's mean.
+        /// True if the phase compared is the interval's mean.
         interval_mean: bool,
-        /// Whether the output acts one update later.
+        /// True if the output acts one update later.
         delay: bool,
     },
 }
@@ -47,7 +47,7 @@ pub enum Feedback {
 pub struct PhaseLoop {
     /// Gains of phase, rate and acceleration per update.
     pub gains: [f64; 3],
-    /// What reaches the oscillator.
+    /// Corrections that reach the oscillator.
     pub feedback: Feedback,
 }
 
@@ -198,7 +198,7 @@ impl Linear {
         Some(state.iter().zip(self.c.iter()).map(|(x, c)| x * c).sum())
     }
 
-    /// Whether every mode dies away.
+    /// True if every mode decays.
     pub fn is_stable(&self) -> bool {
         self.noise_gain().is_some()
     }
@@ -239,7 +239,7 @@ impl PhaseLoop {
         self.linear().noise_gain().map(|gain| 0.5 * gain)
     }
 
-    /// The same loop with a discriminator whose gain is `gain` instead of 1.
+    /// Loop with a discriminator whose gain is `gain` instead of 1.
     pub fn with_gain(&self, gain: f64) -> Self {
         Self { gains: self.gains.map(|k| k * gain), ..*self }
     }
@@ -253,8 +253,8 @@ impl FrequencyLoop {
         self.driven(|noise, before| noise - before)
     }
 
-    /// The same, driven by noise that the discriminator's values have beyond the difference of phases, in
-    /// cycles.
+    /// Loop as a linear system, driven by noise that the discriminator's values have beyond the difference of
+    /// phases, in cycles.
     pub fn linear_of_discriminator(&self) -> Linear {
         self.driven(|noise, _| noise)
     }
@@ -285,18 +285,19 @@ impl AssistedLoop {
         self.stepped(|phase, _| phase, |noise| [noise, 0.0])
     }
 
-    /// The same, driven by noise that the frequency discriminator has beyond the difference of phases, in
-    /// cycles.
+    /// Loop as a linear system, driven by noise that the frequency discriminator has beyond the difference of
+    /// phases, in cycles.
     pub fn linear_of_discriminator(&self) -> Linear {
         self.stepped(|phase, _| phase, |noise| [0.0, noise])
     }
 
-    /// The same; the error is that of the rate, in cycles an update.
+    /// Loop as a linear system whose error is that of the rate, in cycles an update.
     pub fn linear_rate(&self) -> Linear {
         self.stepped(|_, rate| rate, |noise| [noise, 0.0])
     }
 
-    /// The same; the error is that of the phase at a `place` from 0, the start of an interval, to 1, its end.
+    /// Loop as a linear system whose error is that of the phase at a `place` from 0, the start of an
+    /// interval, to 1, its end.
     pub fn linear_at(&self, place: f64) -> Linear {
         self.stepped(|phase, rate| phase + (place - 0.5) * rate, |noise| [noise, 0.0])
     }

@@ -1,8 +1,8 @@
-//! What theory says of acquisition and tracking, beside its source: the judge's yardstick.
+//! Theory of acquisition and tracking, with its sources: the judge's reference.
 //!
-//! [`linear`] solves a discrete loop as it is really closed; [`dll`], [`pll`] and [`fll`] give jitter, stress
-//! and thresholds in closed form, [`edges`] what the chips' edges cost; [`oscillator`] adds the receiver's
-//! clock, of which [`clock`] has the stability, and [`detection`] the search. Everything takes a plain
+//! [`linear`] solves a discrete loop with its real closure. [`dll`], [`pll`] and [`fll`] give jitter, stress
+//! and thresholds in closed form, and [`edges`] the errors by chip edges. [`oscillator`] adds the receiver's
+//! clock, of which [`clock`] has the stability, and [`detection`] has the search. Everything takes a plain
 //! description (gains, times, C/N0): no receiver is imported. Noise convention: a correlation over T has unit
 //! noise variance per component and the amplitude √(2·T·C/N0).
 

@@ -35,7 +35,7 @@ pub fn stress(order: u32, bandwidth_hz: f64, derivative: f64) -> f64 {
     (0..order.clamp(1, 3)).fold(derivative, |error, _| error / w)
 }
 
-/// The same, exact for a discrete loop with phase-and-rate feedback: derivative·T^n over the last gain.
+/// Steady error, exact for a discrete loop with phase-and-rate feedback: derivative·T^n over the last gain.
 pub fn stress_discrete(order: u32, last_gain: f64, t_s: f64, derivative: f64) -> f64 {
     (0..order.clamp(1, 3)).fold(derivative, |error, _| error * t_s) / last_gain
 }

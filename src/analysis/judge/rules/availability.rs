@@ -1,4 +1,4 @@
-//! Whether fixes came when the scene allows them: the first one in time, no epoch and no stretch without.
+//! Rules of availability: the first fix in time, no required epoch and no long segment without a fix.
 
 use crate::error::JudgeError;
 use crate::expect::due::{Due, Expectations};
@@ -20,9 +20,10 @@ pub(crate) struct Came {
 }
 
 impl Came {
-    /// Those of a run's table.
+    /// Fixes of a run's table.
     ///
     /// # Errors
+    ///
     /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub(super) fn of(run: &Run) -> Result<Self, JudgeError> {
         let mut samples = run.fixes.map(|fix| fix.sample)?;
@@ -43,7 +44,7 @@ impl Verdict {
         self.coming(duration_s, expect, expected, came);
     }
 
-    /// Whether fixes go on once they have begun or are due.
+    /// Judges the continuity of fixes once they have begun or are due.
     pub(super) fn coming(&mut self, duration_s: f64, expect: &Expect, expected: &Expectations, came: &Came) {
         self.unwanted(duration_s, expect, expected, came);
         let due = |due: &&Due| expected.measures(due) && expected.fix_due(expect, due, came.first_s);

@@ -23,7 +23,7 @@ pub(super) struct Case {
     pub drift_mps: f64,
 }
 
-/// What a fix says of itself.
+/// Statements of a fix about its own accuracy.
 #[derive(Clone, Copy)]
 pub(super) struct Stated {
     satellites: u32,
@@ -31,9 +31,9 @@ pub(super) struct Stated {
     pub sigma_north_m: f64,
     pub sigma_up_m: f64,
     pub sigma_clock_m: f64,
-    /// Of east and north, east and up, north and up.
+    /// Correlations of east and north, east and up, north and up.
     correlations: [f64; 3],
-    /// Of all, of the place, of its horizontal and vertical parts, of the clock.
+    /// Dilutions of all unknowns, of the position, of its horizontal and vertical parts, and of the clock.
     dilutions: [f64; 5],
     condition: f64,
 }
@@ -114,7 +114,7 @@ pub(super) fn cases(scene: &Scene<'_>, errors: &Errors) -> Result<(Table<Case>, 
 }
 
 impl Case {
-    /// Whether the satellites of the fix are those that were expected, all of them sure.
+    /// True if the satellites of the fix are the expected ones, all of them certain.
     pub fn is_whole(&self) -> bool {
         self.expected.is_whole(self.fix.satellites)
     }
@@ -171,7 +171,7 @@ impl Case {
 }
 
 impl Stated {
-    /// Of east, north and up, m².
+    /// Covariance of east, north and up, m².
     fn covariance(&self) -> Matrix3<f64> {
         let [e, n, u] = [self.sigma_east_m, self.sigma_north_m, self.sigma_up_m];
         let [en, eu, nu] = self.correlations;
@@ -184,7 +184,8 @@ pub(super) struct Normalised {
     pub square: f64,
     /// The mean that theory expects, biases at their largest.
     pub most: f64,
-    /// The same without any bias, and without what a run draws once: an ionosphere may be as the nominal one.
+    /// Expected mean without any bias, and without values that a run draws once: an ionosphere may equal the
+    /// nominal one.
     pub least: f64,
     /// Degrees of freedom of a chi-square with the spread that theory expects: fewer than three where most of
     /// the noise lies along one axis (Satterthwaite).

@@ -43,7 +43,7 @@ impl SpillRow<()> for Case {
     }
 }
 
-/// What a run's rows come to.
+/// Measurements of a run's rows.
 struct Measured {
     cases: Table<Case>,
     satellites: usize,

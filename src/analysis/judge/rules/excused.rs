@@ -1,9 +1,9 @@
-//! What stays judged where a scene expects errors of any size.
+//! Rules that remain where a scene expects errors of any size.
 //!
-//! Reflections shift a code by their excess and half a chip at the most, and a carrier by what the user moves
-//! towards their mirrors; a spoofer moves both to the place that it claims. Nothing turns a Doppler's sign.
-//! The 95th percentile of each satellite's errors stays below that. Limits: satellites with a fault of their
-//! own are left out, as their ranges may go anywhere.
+//! Reflections shift a code by their excess and half a chip at the most, and a carrier by the user's motion
+//! towards their mirrors. A spoofer moves both to the position that it claims. Nothing turns a Doppler's
+//! sign. The 95th percentile of each satellite's errors stays below that. Limits: satellites with a fault of
+//! their own are left out, as their ranges may have any error.
 
 use crate::error::JudgeError;
 use crate::judge::judgement::Bound;
@@ -13,12 +13,12 @@ use crate::read::{Numbers, Run};
 use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::signal::Link;
 
-/// What noise, fades and the pull-in of a loop leave of a Doppler.
+/// Doppler error in hertz by noise, fades and the pull-in of a loop.
 pub(super) const LOOP_HZ: f64 = 50.0;
-/// The same of a velocity: a fifth of a metre a second for each hertz.
+/// Velocity error in metres per second by the same causes: a fifth of a metre a second for each hertz.
 pub(super) const LOOP_MPS: f64 = 10.0;
 
-/// How far the scene lets a receiver's signals lie from the true ones.
+/// Largest shift of a receiver's signals from the true ones that the scene allows.
 #[derive(Default)]
 struct Reach {
     /// Most that a mirror or a spoofer changes a range's rate by.

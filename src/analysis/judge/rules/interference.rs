@@ -1,4 +1,4 @@
-//! What the receiver reported of continuous waves, and whether it followed a spoofer.
+//! Rules for reported continuous waves and for a receiver that a spoofer captures.
 
 use crate::error::JudgeError;
 use crate::judge::judgement::Bound;

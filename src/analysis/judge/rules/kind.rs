@@ -13,8 +13,8 @@ use crate::judge::verdict::Verdict;
 use crate::read::spill_store::SpillRow;
 use crate::read::{Numbers, Table};
 
-/// By how much theory's σ may be too small: 1 dB of C/N0 (1.12), and 7 % between the linear loop and a real
-/// one.
+/// Factor by which theory's σ may be too small: 1 dB of C/N0 (1.12), and 7 % between the linear loop and a
+/// real one.
 pub(super) const THEORY: f64 = 1.2;
 /// Factor within which a stated sigma lies about the expected one: 1 dB of C/N0 (1.12) and 12 % of theory and
 /// smoothing.
@@ -33,7 +33,7 @@ pub(super) struct Kind<'a, C> {
     pub axes: u32,
     /// Independent values among them.
     pub independent: f64,
-    /// Whether it is of noise that must be there: what is smaller than theory was not measured.
+    /// True if the error has noise that must be there: an error smaller than theory was not measured.
     pub must_scatter: bool,
     /// Value of a row, where it counts.
     pub of: &'a dyn Fn(&C) -> Option<Value>,

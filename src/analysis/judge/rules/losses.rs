@@ -76,7 +76,7 @@ fn reasons(own: &[&(&Slip, Option<Excuse>)]) -> String {
     counts.collect::<Vec<_>>().join(", ")
 }
 
-/// What the truth says of one satellite.
+/// Truth about one satellite.
 struct Witness {
     rows: Vec<SatelliteEpoch>,
     usual_dbhz: f64,

@@ -1,5 +1,5 @@
-//! What the antenna's motion leaves in a velocity: a rate lags by a part of an update, and a change of
-//! acceleration leaves a transient.
+//! Velocity errors by the antenna's motion: a rate lags by a part of an update, and a change of acceleration
+//! causes a transient.
 //!
 //! Limits: acceleration and jerk are differences of the truth's velocities, at least a truth's interval wide.
 
@@ -23,7 +23,7 @@ const WIND_UP_SHARE: f64 = 0.1;
 /// Rows before an epoch whose motion is still in the loop: half a second at ten a second, several of a loop's
 /// time constants.
 const ROWS: usize = 5;
-/// What light time, orbit and rounding leave in a receiver at rest: orbits as sent err by 1 mm/s.
+/// Velocity error of a receiver at rest by light time, orbit and rounding, m/s: orbits as sent err by 1 mm/s.
 const REST_MPS: f64 = 2e-3;
 
 /// Bounds of a run's epochs.
@@ -80,13 +80,13 @@ impl Motion {
         Ok(Self { at })
     }
 
-    /// What may come on top of noise, sample by sample.
+    /// Allowed error besides noise in metres per second, sample by sample.
     pub fn allowed_mps(&self) -> impl Fn(u64) -> f64 + '_ {
         let found = RefCell::new(self.at.finder());
         move |sample| found.borrow_mut().get(sample, ()).unwrap_or(REST_MPS)
     }
 
-    /// That every bound could be read which was looked for.
+    /// Checks that every bound that was looked up could be read.
     pub fn sound(&self) -> Result<(), JudgeError> {
         self.at.sound()
     }

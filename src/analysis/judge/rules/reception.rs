@@ -22,7 +22,7 @@ const OBSERVED_SHARE: f64 = 0.95;
 const UNUSED_PERCENT: f64 = 5.0;
 
 impl Verdict {
-    /// Whether fixes say of the ionosphere what the settings and the decoded parameters allow.
+    /// Judges the ionospheric model of the fixes against the settings and the decoded parameters.
     pub(super) fn ionosphere_of_fixes(&mut self, run: &Run) -> Result<(), JudgeError> {
         let setting = |key: &str| run.receiver.pointer(&format!("/settings/position/{key}"));
         let corrected = setting("ionosphere").and_then(serde_json::Value::as_str);
@@ -160,7 +160,7 @@ impl Verdict {
 const FRAME: u8 = 1;
 const SYMBOLS: u8 = 2;
 
-/// What the receiver's tables say of its satellites.
+/// Reception of the satellites by the receiver's tables.
 #[derive(Default)]
 struct Seen {
     acquired_s: BTreeMap<Link, f64>,
@@ -224,7 +224,7 @@ fn never_found(link: &Link, one: &Satellite, expected: &Expectations) -> String 
     text
 }
 
-/// Whether an augmentation system sent corrections, and the receiver has decoded some and may use them.
+/// True if an augmentation system sent corrections, and the receiver has decoded some and may use them.
 pub(super) fn is_augmented(run: &Run) -> bool {
     let choice = run.receiver.pointer("/settings/position/sbas").and_then(serde_json::Value::as_str);
     let corrects = |rows: &[NavigationRow]| rows.iter().any(|row| row.parameter == "prc_1_m");

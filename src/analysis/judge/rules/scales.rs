@@ -18,7 +18,7 @@ use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::record::{ClockRow, Fix};
 use gnss::time::GPST;
 
-/// What a fix's clock says against one more time scale.
+/// Clock of a fix against one more time scale.
 #[derive(Clone, Copy)]
 struct ScaleCase {
     sample: u64,
@@ -51,7 +51,7 @@ impl SpillRow<()> for ScaleCase {
 pub(super) struct Clocks<'r>(Vec<(&'static str, Finder<'r, &'static str, ClockRow>)>);
 
 impl<'r> Clocks<'r> {
-    /// Those of a run.
+    /// Clocks of a run.
     pub(super) fn of(run: &'r Run) -> Result<Self, JudgeError> {
         let finder = |scale| Ok((scale, run.clocks.finder(scale)?));
         Ok(Self(run.clocks.keys().map(finder).collect::<Result<_, JudgeError>>()?))
@@ -66,10 +66,10 @@ impl<'r> Clocks<'r> {
     }
 }
 
-/// What `clocks.csv` says of a run's fixes.
+/// Time scales of a run's fixes, from `clocks.csv`.
 #[derive(Default)]
 pub(super) struct Scales {
-    /// By the names of time scales other than the fix's own.
+    /// Cases by the names of time scales other than the fix's own.
     cases: BTreeMap<&'static str, Table<ScaleCase>>,
     /// Fixes whose rows are not all there, and the first of them.
     missing: usize,

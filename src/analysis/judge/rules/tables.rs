@@ -1,5 +1,4 @@
-//! Whether the receiver's tables are whole and agree with one another
-//! ([`crate::judge::integrity`]).
+//! Rules for the completeness and consistency of the receiver's tables ([`crate::judge::integrity`]).
 
 use crate::error::JudgeError;
 use crate::judge::integrity;

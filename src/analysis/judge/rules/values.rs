@@ -29,7 +29,8 @@ use crate::statistics::{Sum, larger};
 use gnss::record::{Event, EventRow, Fix};
 use gnss::signal::Link;
 
-/// How far dilutions and condition may be from the true geometry's: elevations seen from a fix metres away.
+/// Largest relative error of dilutions and condition against the true geometry: elevations seen from a fix
+/// metres away.
 const GEOMETRY: f64 = 2e-3;
 /// Weights of 1 dB of C/N0, as a factor.
 const DECIBEL: f64 = 1.259;
@@ -158,7 +159,7 @@ impl Verdict {
         Ok(())
     }
 
-    /// Whether fixes use the satellites that are observed, know their ionosphere, and pass their own test.
+    /// Judges the satellites of fixes, their ionosphere, and their own test.
     fn satellites_of_fixes(
         &mut self,
         cases: &Table<Case>,
@@ -322,7 +323,7 @@ impl Breaks {
         }
     }
 
-    /// Whether one follows a sample so soon that the loop may have been letting go there.
+    /// True if a break follows a sample so soon that the loop may have been losing lock there.
     fn follow(&self, sample: u64) -> bool {
         self.samples.range(sample..=sample + self.noticed).next().is_some()
     }
@@ -341,13 +342,14 @@ pub(super) struct Bounded<'a> {
 }
 
 impl Bounded<'_> {
-    /// Whether errors are judged at a time.
+    /// True if errors are judged at a time.
     pub(super) fn holds(&self, time_s: f64) -> bool {
         self.run.scene.expect.bounded_since(time_s, self.memory_s)
     }
 }
 
-/// What the scene's oscillator leaves between the rate that a phase loop follows and the truth's drift.
+/// Rate error in metres per second by the scene's oscillator, between a phase loop's rate and the truth's
+/// drift.
 fn oscillator_mps(run: &Run, choices: &Choices) -> f64 {
     // Of all carriers the one that it moves most.
     let mut links: BTreeMap<Emission, Link> = BTreeMap::new();

@@ -62,7 +62,7 @@ pub fn font(pixels: i32) -> TextStyle<'static> {
     ("sans-serif", pixels * FINE).into_font().color(&RGBColor(30, 30, 30))
 }
 
-/// That font, anchored to its point as given.
+/// Font of that many pixels, anchored to its point as given.
 pub fn anchored(pixels: i32, horizontal: HPos, vertical: VPos) -> TextStyle<'static> {
     font(pixels).pos(Pos::new(horizontal, vertical))
 }
@@ -212,8 +212,8 @@ const LEGEND_ROW_PX: i32 = 20;
 const MARK_PX: i32 = 24;
 const GAP_PX: i32 = 18;
 
-/// Where each named series of a legend is: its left end, its row, itself. Rows are as long as the picture is
-/// wide.
+/// Positions of the named series of a legend: its left end, its row, itself. Rows are as long as the picture
+/// is wide.
 fn placed<'a>(area: &Area<'_>, legend: &'a [Series], width_px: i32) -> Result<Vec<(i32, i32, &'a Series)>, Failure> {
     let (mut x, mut row) = (LEFT_PX + EDGE_PX, 0);
     let mut entries = Vec::new();

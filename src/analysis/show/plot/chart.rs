@@ -21,11 +21,11 @@ pub const BLUE: RGBColor = COLOURS[0];
 pub const ORANGE: RGBColor = COLOURS[1];
 /// The third colour, of the truth and of theory.
 pub const GREEN: RGBColor = COLOURS[2];
-/// Of what is in the background.
+/// Colour of the background's elements.
 pub const GREY: RGBColor = RGBColor(120, 120, 120);
 pub(super) const LIGHT: RGBColor = RGBColor(225, 225, 225);
 
-/// How a series is drawn.
+/// Form of a series' points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mark {
     /// A solid line through the points.
@@ -53,9 +53,9 @@ pub enum Mark {
 pub struct Series {
     /// Words of the legend.
     pub name: String,
-    /// Of its marks.
+    /// Colour of the marks.
     pub colour: RGBColor,
-    /// How its points are drawn.
+    /// Form of the points.
     pub mark: Mark,
     /// In data units.
     pub points: Vec<(f64, f64)>,
@@ -132,7 +132,7 @@ pub struct Chart {
     pub x: Axis,
     /// Upward.
     pub y: Axis,
-    /// What is drawn, the first below the others.
+    /// Series of the chart, the first below the others.
     pub series: Vec<Series>,
     /// One metre is as long up as across.
     pub equal: bool,
@@ -160,7 +160,7 @@ impl Series {
         }
     }
 
-    /// Whether its points are separate marks.
+    /// True if the points are separate marks.
     pub(super) fn is_cloud(&self) -> bool {
         self.mark.is_cloud()
     }
@@ -185,7 +185,7 @@ pub(super) struct Ends {
 }
 
 impl Ends {
-    /// Of no number.
+    /// Ends of an empty range.
     pub fn none() -> Self {
         Self { low: f64::INFINITY, high: f64::NEG_INFINITY }
     }
@@ -213,24 +213,25 @@ pub(super) struct Shown {
     pub points: Vec<(f64, f64)>,
     pub x: Ends,
     pub y: Ends,
-    /// How many of all are finite.
+    /// Number of all points that are finite.
     pub count: usize,
 }
 
 impl Shown {
-    /// Of the points that `each` shows whenever it is asked, which are drawn with that mark where one series
-    /// of marks is in the chart.
+    /// Points of `each`, which is called whenever they are needed, for one series of marks in the chart.
     ///
     /// # Errors
-    /// Those of `each`.
+    ///
+    /// Errors of `each`.
     pub fn of<E>(mark: Mark, each: impl Fn(&mut dyn FnMut(f64, f64)) -> Result<(), E>) -> Result<Self, E> {
         Self::among(1, mark, each)
     }
 
-    /// The same where so many series of marks are in the chart.
+    /// Points of `each` for a chart with `clouds` series of marks.
     ///
     /// # Errors
-    /// Those of `each`.
+    ///
+    /// Errors of `each`.
     pub fn among<E>(
         clouds: usize,
         mark: Mark,

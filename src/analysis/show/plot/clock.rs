@@ -105,7 +105,7 @@ impl Curves<'_> {
         self.judged.clock.series(of).map_or(&[], |series| series.curve(self.deviation))
     }
 
-    /// What was estimated from a series: a line through the points, and a bar for each interval.
+    /// Series of an estimate: a line through the points, and a bar for each interval.
     fn measured(&self, of: Of, name: &str, colour: RGBColor) -> Vec<Series> {
         let points = self.points(of);
         let middle: Points = points.iter().map(|point| log((point.tau_s, point.deviation))).collect();

@@ -1,4 +1,4 @@
-//! What the atmosphere truly adds to each satellite's code.
+//! True atmospheric delays of each satellite's code.
 
 use crate::error::JudgeError;
 use crate::read::Emission;

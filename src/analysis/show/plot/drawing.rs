@@ -162,7 +162,7 @@ fn join(run: &[(Circle<'_>, &str)], svg: &mut String) {
     svg.push_str("\"/>\n");
 }
 
-/// What circles must share to be one path.
+/// Style that circles must share to be one path.
 #[derive(Clone, Copy, PartialEq)]
 struct Look<'a> {
     radius: u32,

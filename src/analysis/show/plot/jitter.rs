@@ -1,4 +1,4 @@
-//! How the closed loops' errors are distributed, with the rules of thumb for their spread.
+//! Distribution of the closed loops' errors, with the rules of thumb for their spread.
 
 use std::f64::consts::TAU;
 

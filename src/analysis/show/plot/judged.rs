@@ -1,4 +1,4 @@
-//! What pictures and reports are made from.
+//! Data from which pictures and reports are made.
 
 use crate::judge::summary::Summary;
 use crate::measure::clock::Clock;

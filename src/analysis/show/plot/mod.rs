@@ -176,7 +176,7 @@ pub(crate) const PICTURES: [Picture; 17] = [
 /// Pixels of a PNG in one pixel of a picture.
 const PNG_SCALE: f32 = 2.0;
 
-/// What each picture that a run has will show.
+/// Content of each picture that a run has.
 pub(crate) fn sketches(judged: &Judged<'_>) -> Result<Vec<(&'static Picture, Sketch)>, JudgeError> {
     let one = |picture: &'static Picture| (picture.sketch)(judged).map(|sketch| Some((picture, sketch?)));
     PICTURES.iter().filter_map(|picture| one(picture).transpose()).collect()

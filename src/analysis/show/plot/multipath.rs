@@ -1,4 +1,4 @@
-//! What reflected rays do: the code errors that follow them, and the fading of their sum.
+//! Effects of reflected rays: the code errors that follow them, and the fading of their sum.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;

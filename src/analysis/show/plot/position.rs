@@ -1,4 +1,4 @@
-//! Where the fixes fell: about the truth, over time, and along the way.
+//! Errors of the fixes: about the truth, over time, and along the way.
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 
@@ -168,7 +168,7 @@ fn pass(see: &mut dyn FnMut(f64, f64), (x, y): (f64, f64)) {
     see(x, y);
 }
 
-/// Where the fixes went between the truth and what a spoofer claims; nothing without one.
+/// Distances of the fixes from the truth and from a spoofer's claim; `None` without a spoofer.
 pub fn spoofing(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let run = judged.run;
     let (Some(origin), false) = (run.trajectory.first(), run.claimed.is_empty()) else { return Ok(None) };

@@ -9,10 +9,10 @@ use crate::show::plot::sketch::Sketch;
 use crate::statistics::ranked;
 use gnss::record::TrackingRow;
 
-/// What points are shown to, one after the other.
+/// Function that takes points one after the other.
 pub(super) type See<'a> = &'a mut dyn FnMut(f64, f64);
 
-/// What a chart of one kind of value is called, and the least span of its axis.
+/// Labels of a chart of one kind of value, and the least span of its axis.
 pub(super) struct Frame<'a> {
     pub title: &'a str,
     pub y_label: &'a str,

@@ -1,4 +1,4 @@
-//! What pictures show before they are drawn: charts with no more points than the eye can resolve.
+//! Content of pictures before they are drawn: charts with no more points than the eye can resolve.
 
 use super::canvas::compose;
 use super::chart::{Chart, Series};
@@ -7,7 +7,8 @@ use super::drawing::{Area, Drawing, Failure};
 /// Draws on a surface whatever it holds.
 pub type Drawer = dyn Fn(&Area<'_>) -> Result<(), Failure> + Send + Sync;
 
-/// What a picture shows, with no more points than are drawn: what it was made from can go before it is drawn.
+/// Content of a picture, with no more points than are drawn. Its source data can be released before it is
+/// drawn.
 pub enum Sketch {
     /// Charts, so many a row, with one legend below all of them.
     Charts { size: (u32, u32), columns: usize, charts: Vec<Chart>, legend: Vec<Series> },

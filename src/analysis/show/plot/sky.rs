@@ -1,4 +1,4 @@
-//! Where the satellites were and how strong they were received.
+//! Directions of the satellites and their received strength.
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
@@ -17,7 +17,7 @@ const RADIUS: f64 = (195 * FINE) as f64;
 /// A satellite's way over the sky.
 struct Track {
     sv: Sv,
-    /// Where it was, in virtual pixels; places that follow each other differ.
+    /// Positions in virtual pixels; successive ones differ.
     places: Vec<(i32, i32)>,
     cn0_dbhz: Option<f64>,
     observed: bool,

@@ -1,9 +1,9 @@
-//! How far the atmosphere may move a foreign receiver's positions.
+//! Largest shift of a foreign receiver's positions by the atmosphere.
 //!
-//! A receiver corrects the troposphere by a model, the ionosphere by the broadcast one once its page has
-//! come. So what a scene lacks, or what no page corrects, moves its positions: delays go through least
-//! squares with equal weights. Limits: a receiver with another model than the broadcast one is held against
-//! that one.
+//! A receiver corrects the troposphere by a model, and the ionosphere by the broadcast one once its page has
+//! come. Delays that a scene lacks, or that no page corrects, move its positions. They go through least
+//! squares with equal weights. Limits: a receiver with another model than the broadcast one is judged by that
+//! one.
 
 use nalgebra::{Matrix4, Vector3, Vector4};
 
@@ -28,7 +28,7 @@ const USE_S: f64 = 5.0;
 /// Lowest elevation of satellites that count, degrees.
 const MASK_DEG: f64 = 5.0;
 
-/// How far positions may be moved, metres.
+/// Largest shift of positions, metres.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Moved {
     pub horizontal_m: f64,
@@ -39,7 +39,7 @@ pub(super) struct Moved {
 }
 
 impl Moved {
-    /// Of an error upwards or downwards as much as may be there.
+    /// Allowed vertical shift in the direction of an error, upwards or downwards.
     pub fn vertical_m(&self, error_up_m: f64) -> f64 {
         if error_up_m < 0.0 { self.down_m } else { self.up_m }
     }
@@ -84,9 +84,10 @@ impl<'r> Atmosphere<'r> {
         Ok(Self { run, sent, page_s: start.map_or(f64::INFINITY, page), last: None })
     }
 
-    /// By how much positions at a sample may be moved.
+    /// Allowed shift of positions at a sample.
     ///
     /// # Errors
+    ///
     /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn moves_m(&mut self, sample: u64) -> Result<Moved, JudgeError> {
         // The sky moves slowly: one answer for ten seconds.

@@ -1,9 +1,9 @@
-//! What a foreign receiver's satellites have in common: signs, labels, clocks by signal, and code, carrier
-//! and Doppler of one clock.
+//! Common errors of a foreign receiver's satellites: signs, labels, clocks by signal, and code, carrier and
+//! Doppler of one clock.
 //!
-//! The clock itself is no error. Its readings by the signals agree, though, and so do its rates by code,
-//! carrier and Doppler: observations are those of one instant (RINEX 3.05, 4.1.1). A clock that is set by
-//! whole milliseconds has steps, which are no drift.
+//! The clock itself is not an error. Its offsets by the signals agree, and so do its rates by code, carrier
+//! and Doppler: observations are those of one instant (RINEX 3.05, 4.1.1). A clock that is set by whole
+//! milliseconds has steps, which are not drift.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -53,8 +53,8 @@ fn drift_of(measured: &Measured) -> f64 {
 /// A satellite's signal, the speed along its line of sight in m/s, and its code error in metres.
 type Point = (Link, f64, f64);
 
-/// By how much labels are late by the rows that are judged: what the truth was moved by already, and the
-/// slope of pseudoranges over Doppler that is left.
+/// Delay of the labels by the judged rows: the shift that the truth already had, and the remaining slope of
+/// pseudoranges over Doppler.
 fn judged_late(measured: &Measured, scene: &Scene<'_>) -> Option<Estimate> {
     let mut epochs: BTreeMap<(u64, &'static Signal), Vec<Point>> = BTreeMap::new();
     for row in measured.rows.iter().filter(|row| scene.judges(row)) {

@@ -1,8 +1,8 @@
-//! What stays judged of a foreign receiver where a spoofer sends or the scene expects errors of any size.
+//! Rules for a foreign receiver that remain where a spoofer sends or the scene expects errors of any size.
 //!
-//! Codes lie between the true place and the one that a spoofer claims, half a chip and reflections added;
-//! Dopplers within a loop's pull-in and the motion of mirrors and spoofer. The 95th percentile of each
-//! satellite stays below that, as for our own receiver.
+//! Codes lie between the true position and the one that a spoofer claims, with half a chip and reflections
+//! added. Dopplers lie within a loop's pull-in and the motion of mirrors and spoofer. The 95th percentile of
+//! each satellite stays below that, as for our own receiver.
 
 use std::collections::BTreeMap;
 

@@ -108,7 +108,7 @@ impl Verdict {
         Ok(verdict)
     }
 
-    /// Whether the file is of this scene, and its signals the ones that it names.
+    /// Judges the match of the file with this scene, and of its signals with those that it names.
     fn observations(&mut self, scene: &Scene<'_>, measured: &Measured, summary: &ForeignSummary) {
         let percent = |without: usize, of: usize| 100.0 * without as f64 / of.max(1) as f64;
         let source = "the scene's truth has every epoch of its samples, and every satellite in view";

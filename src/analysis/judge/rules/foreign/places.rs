@@ -19,7 +19,7 @@ use crate::judge::rules::kind::THEORY;
 use crate::judge::verdict::Verdict;
 use crate::statistics::{mean, median, percentile, rms};
 
-/// What two models of troposphere and ionosphere may differ by on a range, one sigma: a metre at 5 degrees.
+/// Difference of two models of troposphere and ionosphere on a range, one sigma: a metre at 5 degrees.
 const MODEL_M: f64 = 1.0;
 /// Dilution up to which positions are judged.
 const MOST_PDOP: f64 = 10.0;
@@ -44,7 +44,7 @@ struct Judged<'p> {
 }
 
 impl Judged<'_> {
-    /// What the atmosphere may add to its error.
+    /// Error that the atmosphere may add.
     fn air_m(&self) -> f64 {
         libm::hypot(self.air.horizontal_m, self.air.vertical_m(self.row.up_m))
     }
@@ -122,7 +122,7 @@ impl Verdict {
         }
     }
 
-    /// Whether positions are those of the time on their labels.
+    /// Judges the time labels of the positions.
     fn age(&mut self, rows: &[Judged<'_>], places: &Places, lasting_m: f64) {
         let speeds: Vec<f64> = rows.iter().map(|one| one.row.true_velocity_enu_mps.norm()).collect();
         let Some(speed_mps) = rms(&speeds).filter(|speed_mps| *speed_mps > SLOWEST_MPS) else {

@@ -1,9 +1,8 @@
-//! What a plain receiver's errors are, and how far a scene's reflections and spoofers can move them.
+//! Errors of a plain receiver, and their limits under a scene's reflections and spoofers.
 //!
-//! How a foreign receiver makes its observations is not known. Random errors are held against those of a
-//! plain one: early minus late power a chip apart, a code loop of two hertz, a phase loop of 18 Hz, no
-//! smoothing. Limits: reflections are bounded and not predicted, since phases and spacing decide about the
-//! sign of their error.
+//! The methods of a foreign receiver are unknown. Random errors are judged by those of a plain one: early
+//! minus late power a chip apart, a code loop of two hertz, a phase loop of 18 Hz, no smoothing. Limits:
+//! reflections are bounded and not predicted, since phases and spacing decide about the sign of their error.
 
 use std::collections::BTreeMap;
 
@@ -50,7 +49,7 @@ pub(super) fn doppler_hz() -> f64 {
     PHASE_CYCLES * NATURAL * PHASE_HZ
 }
 
-/// What the age of a Doppler makes of its rate.
+/// Doppler error in hertz by its age, for a rate of the Doppler.
 pub(super) fn aged_hz(rate_hzps: f64) -> f64 {
     AGE_S * rate_hzps.abs()
 }
@@ -60,21 +59,22 @@ pub(super) fn independent(count: usize, span_s: f64, bandwidth_hz: f64) -> f64 {
     (count as f64).min(2.0 * bandwidth_hz * span_s).max(1.0)
 }
 
-/// How far reflections can move one satellite's signal.
+/// Largest shift of one satellite's signal by reflections.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Reach {
-    /// Of its code, metres.
+    /// Shift of the code, metres.
     pub code_m: f64,
-    /// Of its carrier, cycles.
+    /// Shift of the carrier, cycles.
     pub carrier_cycles: f64,
-    /// Of its strength on average, dB, and by how much that scatters.
+    /// Mean change of the strength, dB, and its standard deviation.
     pub cn0_db: f64,
     pub cn0_sigma_db: f64,
 }
 
 impl Reach {
-    /// Of the rays that the truth has: each moves a code by at most half its amplitude in spacings, and by
-    /// its excess over what is left of the direct ray; a carrier by the arc sine of all amplitudes.
+    /// Shift by the rays of the truth. Each moves a code by at most half its amplitude in spacings, and by
+    /// its excess relative to the rest of the direct ray. It moves a carrier by the arc sine of all
+    /// amplitudes.
     fn of(run: &Run, link: Link) -> Result<Self, JudgeError> {
         let Some(component) = leading(link.signal) else { return Ok(Self::default()) };
         let chip_m = SPEED_OF_LIGHT_MPS / component.chip_rate_hz;
@@ -103,7 +103,7 @@ impl Reach {
     }
 }
 
-/// What the scene does to whom, and when.
+/// Effects of the scene on the satellites over time.
 pub(super) struct Scene<'r> {
     pub run: &'r Run,
     reach: BTreeMap<Link, Reach>,
@@ -158,35 +158,35 @@ impl<'r> Scene<'r> {
         label_s + self.offset_s
     }
 
-    /// How far reflections move a signal.
+    /// Shift of a signal by reflections.
     pub fn reach(&self, link: &Link) -> Reach {
         self.reach.get(link).copied().unwrap_or_default()
     }
 
-    /// How far codes are moved, as a standard deviation over satellites and times.
+    /// Shift of codes by reflections, as a standard deviation over satellites and times, metres.
     pub fn reach_m(&self) -> f64 {
         let all: Vec<f64> = self.reach.values().map(|reach| reach.code_m / BOUND_SIGMAS).collect();
         rms(&all).unwrap_or(0.0)
     }
 
-    /// What mirrors change a range's rate by, as a standard deviation.
+    /// Change of a range's rate by mirrors, as a standard deviation, m/s.
     pub fn mirrors_mps(&self) -> f64 {
         self.rate_mps / BOUND_SIGMAS
     }
 
-    /// What code edges between samples cost a signal's code, rms: of averaged ones what folds back, but not
-    /// less than a replica of whole chips has.
+    /// Code error of a signal by edges between samples, rms in metres. For averaged edges it is that of the
+    /// aliases, but not less than for a replica of whole chips.
     pub fn edges_m(&self, signal: &Signal) -> f64 {
         self.edges_m.get(signal.name).copied().unwrap_or(EDGES_M)
     }
 
-    /// The same of all signals.
+    /// Largest code error by edges over all signals, metres.
     pub fn usual_edges_m(&self) -> f64 {
         self.edges_m.values().copied().fold(EDGES_M, f64::max)
     }
 
-    /// Whether errors at a label follow from noise and reflections: not where a spoofer sends, and not where
-    /// the scene expects any and has no reflections that would explain them.
+    /// True if errors at a label follow from noise and reflections. It is false where a spoofer sends. It is
+    /// also false where the scene expects errors and has no reflections that would explain them.
     pub fn is_bounded(&self, label_s: f64) -> bool {
         let time_s = self.time_s(label_s);
         let spoofed = self.spoofed_s.is_some_and(|(from_s, to_s)| (from_s..to_s + RETURN_S).contains(&time_s));
@@ -194,13 +194,14 @@ impl<'r> Scene<'r> {
         expected && !spoofed
     }
 
-    /// Whether all observations are judged by noise and reflections, so that figures of the whole file are.
+    /// True if noise and reflections are the measure for all observations. Then they are also the measure for
+    /// figures of the whole file.
     pub fn is_always_bounded(&self) -> bool {
         let expected = self.run.scene.expect.always_bounded() || !self.reach.is_empty();
         expected && self.spoofed_s.is_none() && self.run.scene.faults.is_empty()
     }
 
-    /// Whether a satellite sends right ranges at a label.
+    /// True if a satellite sends right ranges at a label.
     pub fn is_sound(&self, link: &Link, label_s: f64) -> bool {
         let time_s = self.time_s(label_s);
         let ranges = [FaultKind::ClockStep, FaultKind::ClockRamp, FaultKind::ClockNoise];
@@ -210,12 +211,12 @@ impl<'r> Scene<'r> {
         })
     }
 
-    /// Whether any satellite has a fault that moves positions at a label.
+    /// True if any satellite has a fault that moves positions at a label.
     pub fn is_faulty(&self, label_s: f64) -> bool {
         self.run.scene.faults.iter().any(|fault| self.time_s(label_s) >= fault.from_s)
     }
 
-    /// Whether an observation is judged by noise and reflections.
+    /// True if an observation is judged by noise and reflections.
     pub fn judges(&self, row: &ObservationError) -> bool {
         self.is_bounded(row.label_s) && self.is_sound(&row.link, row.label_s)
     }

@@ -22,11 +22,11 @@ use gnss::signal::{Link, Signal};
 const ENOUGH: usize = 20;
 /// Length of the stretches whose means are judged beside the whole.
 const STRETCH_S: f64 = 5.0;
-/// By how much estimates of C/N0 of two satellites may differ: a factor of two in power.
+/// Allowed difference between estimates of C/N0 of two satellites in decibels: a factor of two in power.
 const CN0_DB: f64 = 3.0;
 /// Least time over which a carrier's drift says something.
 const DRIFT_S: f64 = 5.0;
-/// What the truth's own rounding and steps of a common clock leave of a carrier's rate.
+/// Error of a carrier's rate in hertz by the truth's own rounding and by steps of a common clock.
 const RATE_HZ: f64 = 0.01;
 
 /// A value of one satellite against its limit.
@@ -46,7 +46,7 @@ pub(super) struct One<'m> {
     doppler_hz: Vec<(f64, f64)>,
     /// Largest rate of its true Doppler, without sign.
     pub rate_hzps: f64,
-    /// Its rate over all, with sign.
+    /// Mean rate of the true Doppler, with sign.
     pub mean_rate_hzps: f64,
     /// A plain receiver's jitter.
     pub plain_m: f64,

@@ -46,7 +46,7 @@ pub(super) struct Labels {
     pub of_links: BTreeMap<Link, Vec<f64>>,
     /// First and last label of an observation.
     span_s: Option<(f64, f64)>,
-    /// By when each signal's satellites may begin.
+    /// Latest beginning of each signal's satellites, seconds.
     late_s: BTreeMap<&'static Signal, f64>,
 }
 
@@ -56,7 +56,7 @@ fn interval_s(labels: &[f64]) -> Option<f64> {
 }
 
 impl Labels {
-    /// Of a receiver's epochs, and of each satellite's.
+    /// Labels of a receiver's epochs, and of each satellite's.
     pub fn new(run: &Run, all: &[f64], of_links: BTreeMap<Link, Vec<f64>>, truth_s: f64) -> Result<Self, JudgeError> {
         let interval_s = interval_s(all).unwrap_or(0.0).max(truth_s);
         // Labels count from the second that is nearest to the truth's first row.
@@ -88,7 +88,7 @@ impl Labels {
         samples
     }
 
-    /// Whether a satellite that is never observed may still be in time when the file ends.
+    /// True if a satellite that is never observed may still be in time when the file ends.
     pub fn may_come(&self, link: &Link) -> bool {
         let in_time_s = self.late_s.get(link.signal).copied().unwrap_or(0.0);
         !self.of_links.contains_key(link) && self.span_s.is_some_and(|(_, to_s)| in_time_s > to_s)
@@ -102,8 +102,8 @@ impl Labels {
 }
 
 impl Observed for Labels {
-    /// Those of the file. Before it begins and after it ends nothing is due, nor before a satellite's own
-    /// first one where that is in time.
+    /// Samples of the file. Before it begins and after it ends nothing is due. Nothing is due either before a
+    /// satellite's own first one where that is in time.
     fn samples(&self, link: Link) -> Result<Vec<u64>, JudgeError> {
         let Some((from_s, to_s)) = self.span_s else { return Ok(Vec::new()) };
         let labels = self.of_links.get(&link).map_or(&[][..], Vec::as_slice);
@@ -161,12 +161,12 @@ impl Begin {
     }
 }
 
-/// By how much the usual interval of epochs may differ from the header's, as a share: clocks that are set by
-/// milliseconds, and labels that are rounded.
+/// Relative difference that the usual interval of epochs may have from the header's. Causes are clocks that
+/// are set by milliseconds, and labels that are rounded.
 const INTERVAL: f64 = 0.02;
 
 impl Verdict {
-    /// Whether epochs come as often as the file's header says.
+    /// Judges the interval of epochs against the file's header.
     pub(super) fn stated_interval(&mut self, stated_s: Option<f64>, labels: &[f64]) {
         let (Some(stated_s), Some(found_s)) = (stated_s, interval_s(labels)) else { return };
         let source = "the header states the interval of the epochs";
