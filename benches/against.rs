@@ -1,10 +1,11 @@
-//! This program against another build of it: `cargo bench --bench against -- --against PATH [--rounds N]`.
+//! Comparison of this program with another build of it: `cargo bench --bench against -- --against PATH
+//! [--rounds N]`.
 //!
-//! Both take turns at the same work, so that a disturbance of the machine meets both: `generate` and `run` of
-//! the static scene, `receive` of its samples at 2.6 and 20 Msps and of 50 ms alone, which is a search from
-//! cold. Times are those of the processor, of the whole process and all its threads, as the kernel counts
-//! them in hundredths of a second; the table has medians, their ratio, the range of the ratios round by
-//! round, and the largest memory of either.
+//! Both take turns at equal work, so that a disturbance of the machine affects both. The work is `generate`
+//! and `run` of the static scene, and `receive` of its samples at 2.6 and 20 Msps. It is also `receive` of 50
+//! ms alone, which is a cold search. Times are those of the processor, of the whole process and all its
+//! threads, as the kernel counts them in hundredths of a second. The table has medians, their ratio, the
+//! range of the ratios round by round, and the largest memory of either.
 
 #[path = "shared/process.rs"]
 mod process;

@@ -35,7 +35,8 @@ const TAPS: [f64; 3] = [0.25, 0.0, -0.25];
 /// Vector operations of 512 bits for 32 samples and three taps with area edges in 16 bits, counted in the
 /// source: 8 to make integers, 6 to turn them, 14 a tap.
 const OPERATIONS: f64 = 8.0 + 6.0 + 3.0 * 14.0;
-/// Such operations a cycle at most, on Zen 4 (two halves each on four ports) as on two ports of Intel's.
+/// Largest number of such operations a cycle, on Zen 4 (two halves each on four ports) as on two ports of
+/// Intel's.
 const OPERATIONS_A_CYCLE: f64 = 2.0;
 
 struct Row {

@@ -36,7 +36,7 @@ height_m = 2000
 join_s = 0.01
 "#;
 
-/// Beside the target; 15 dB over a satellite at the start, 60 dB at 30 m.
+/// Jammer beside the target; 15 dB over a satellite at the start, 60 dB at 30 m.
 const JAMMER: &str = r#"
 [[interference]]
 kind = "noise"

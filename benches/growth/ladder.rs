@@ -25,7 +25,7 @@ pub struct Ladder {
     /// Expected amount of work.
     pub expected: &'static str,
     pub steps: Vec<Step>,
-    /// From where on costs should be on a straight line; `None` where no line is expected.
+    /// Least quantity from which on costs should be on a straight line; `None` where no line is expected.
     pub line_from: Option<f64>,
     /// True if the quantity is drawn by its logarithm.
     pub is_log: bool,

@@ -22,7 +22,7 @@ enum Work {
     Generate,
     /// Samples from a file.
     Receive,
-    /// Both, the judge and its pictures.
+    /// Generator, receiver, the judge and its pictures.
     Run,
 }
 

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 /// Ticks a second of `/proc/self/stat`, whatever the machine.
 const TICKS: f64 = 100.0;
-/// From one look at the memory to the next.
+/// Time between two readings of the memory.
 const LOOK: Duration = Duration::from_millis(2);
 
 /// Resources that a process used.

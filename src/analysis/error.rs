@@ -1,11 +1,11 @@
-//! Why a run cannot be judged.
+//! Errors that prevent the judgement of a run.
 
 use std::io;
 use std::path::PathBuf;
 
 use thiserror::Error;
 
-/// Why a run cannot be judged.
+/// Error that prevents the judgement of a run.
 #[derive(Debug, Error)]
 pub enum JudgeError {
     /// A file that is needed is not there; the remedy says who writes it.
@@ -13,7 +13,7 @@ pub enum JudgeError {
     Missing {
         /// The file or directory.
         path: PathBuf,
-        /// Who writes it.
+        /// Command or program that writes it.
         remedy: &'static str,
     },
     /// A file cannot be created or written.
@@ -92,7 +92,7 @@ pub enum JudgeError {
     Plot {
         /// The file or directory.
         path: PathBuf,
-        /// Why, in words.
+        /// Reason in words.
         reason: String,
     },
 }

@@ -24,7 +24,8 @@ pub(crate) const FIRST_TICK: u64 = 300;
 pub(crate) const PRNS: [u8; 9] = [2, 5, 7, 12, 15, 18, 21, 26, 29];
 pub(crate) const CHIP_M: f64 = SPEED_OF_LIGHT_MPS / 1.023e6;
 
-/// Near normal with unit variance: the sum of twelve uniforms minus six, from Knuth's congruential generator.
+/// Generator of nearly normal numbers with unit variance: the sum of twelve uniforms minus six, from Knuth's
+/// congruential generator.
 pub(crate) struct Draw(pub u64);
 
 impl Draw {

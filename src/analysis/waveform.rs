@@ -85,7 +85,7 @@ pub struct Sampler {
 }
 
 impl Sampler {
-    /// At `rate_hz`, band-limited edges cut off at [`CUTOFF_CPS`].
+    /// A sampler at `rate_hz`, whose band-limited edges are cut off at [`CUTOFF_CPS`].
     pub fn new(edge: Edge, rate_hz: f64) -> Self {
         Self::with_cutoff(edge, rate_hz, CUTOFF_CPS)
     }

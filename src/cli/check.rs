@@ -21,7 +21,7 @@ pub enum Gate {
 }
 
 impl Gate {
-    /// From `--check` as written: absent, alone, or with a file of limits for those figures.
+    /// Reads `--check` as written: absent, alone, or with a file of limits for those figures.
     pub fn read(argument: Option<&Option<PathBuf>>, figures: &'static Figures) -> Result<Self, CliError> {
         let path = match argument {
             None => return Ok(Self::Open),

@@ -69,7 +69,7 @@ impl CliError {
         Self { code: 75, message: message.to_string() }
     }
 
-    /// Whoever sent something did not send all of it; what came is kept.
+    /// Error of a sender that broke off; the data that came is kept.
     pub fn broken(message: impl Display) -> Self {
         Self { code: 74, message: message.to_string() }
     }

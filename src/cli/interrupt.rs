@@ -83,7 +83,7 @@ fn wait(mut reader: UnixStream) {
     signal_hook::low_level::exit(128 + signal);
 }
 
-/// From here on the first signal is left to who does the work, and looks for it with [`ending`].
+/// Leaves the first signal from here on to the worker, which looks for it with [`ending`].
 pub fn ends_work() {
     ENDS_WORK.store(true, Ordering::Relaxed);
 }

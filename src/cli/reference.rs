@@ -68,7 +68,7 @@ fn declared(tables: Vec<Listed>, top: &str, above: &str) -> Vec<Section> {
     tables.iter().map(|table| Section { name: name(table), text: table.markdown(3) }).collect()
 }
 
-/// In a scenario below `[receiver]`, in a file of settings at the top.
+/// Sections of the receiver's keys: in a scenario below `[receiver]`, in a file of settings at the top.
 fn of_receiver() -> Vec<Section> {
     let section = |(table, keys): (String, Vec<receiver::Described>)| {
         let mut text = format!(

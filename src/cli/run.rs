@@ -196,7 +196,7 @@ struct Tap {
 }
 
 impl Tap {
-    /// For one of so many front ends.
+    /// A tap for one of `front_ends` front ends.
     fn new(scene: &Scene, run: &Path, (keep, changing): (bool, bool), front_ends: usize) -> Result<Self, CliError> {
         let own = scene.front_end_name.as_ref().filter(|_| front_ends > 1);
         let name = own.map_or_else(|| "if".to_owned(), Clone::clone);

@@ -196,7 +196,7 @@ impl Ahead {
     }
 }
 
-/// Until the end, an error, or nobody takes it any more.
+/// Reads until the end, an error, or the end of the receiver.
 fn read_on(mut inner: Box<dyn Read + Send>, sender: &SyncSender<io::Result<Vec<u8>>>) {
     loop {
         let mut block = vec![0; BLOCK_BYTES];

@@ -15,8 +15,8 @@ pub struct Speed {
 }
 
 impl Speed {
-    /// From the scene's duration, the time spent in each stage, and the whole. The stages share the cores:
-    /// what one does for the other meanwhile counts for both.
+    /// Speed from the scene's duration, the time spent in each stage, and the whole. The stages share the
+    /// cores. Work of one for the other meanwhile counts for both.
     pub fn new(scene_s: f64, generate: Duration, receive: Duration, whole: Duration) -> Self {
         let ratio = |busy: Duration| scene_s / busy.as_secs_f64().max(1e-9);
         Self {

@@ -18,7 +18,7 @@ use receiver::settings::Settings;
 use receiver::{Outcome, ReceiveError, Receiver};
 use twin::settings_for;
 
-/// Why a step is not made.
+/// Error that prevents a step.
 #[derive(Debug, Error)]
 pub enum StepError {
     /// The scene's motion is not pushed.

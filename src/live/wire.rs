@@ -43,7 +43,7 @@ pub enum Message {
     Bye,
 }
 
-/// Why bytes are no message.
+/// Reason why bytes are not a message.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum WireError {
     /// Too long for any message.
@@ -65,7 +65,7 @@ pub enum WireError {
     /// A line with a count of numbers that makes no state.
     #[error("{0} numbers: expected t x y z, then velocity, acceleration and jerk as far as known: 4, 7, 10 or 13")]
     Count(usize),
-    /// Another count of angles behind their word.
+    /// Wrong number of angles after their word.
     #[error("{TURNED} and {0} numbers: expected yaw, pitch and roll in radians, then their rates where known: 3 or 6")]
     Angles(usize),
     /// A word of a line that is no number.

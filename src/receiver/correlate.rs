@@ -164,8 +164,8 @@ impl Replica {
         self
     }
 
-    /// Both sides of a sub-carrier with equal parts and the noise of one: every tap has the tones' phases at
-    /// its own place. `None` unless either is one.
+    /// A replica of both sidebands of a sub-carrier with equal parts and the noise of one. Every tap has the
+    /// tones' phases at its own position. `None` unless each is one sideband.
     pub fn joined(first: &Self, second: &Self) -> Option<Self> {
         let [first_pattern] = first.patterns.as_slice() else { return None };
         let [second_pattern] = second.patterns.as_slice() else { return None };
@@ -206,8 +206,8 @@ impl Replica {
         self.wave.share
     }
 
-    /// Up to `places` delays at which the code's correlation with itself is smallest, a chip to either side
-    /// included, spread over the period: what a correlator shows there is noise.
+    /// Delays at which the code's correlation with itself is smallest, up to `places` of them, spread over
+    /// the period. A chip to either side is included. A correlator at such a delay measures noise.
     pub fn quiet_taps(&self, places: usize) -> Vec<i64> {
         let (steps, each) = (&self.wave.values, self.wave.steps_per_chip);
         let length = steps.len();

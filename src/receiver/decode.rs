@@ -1,9 +1,9 @@
-//! From symbols to messages: the satellite's time in code periods, and what its message says.
+//! Decoding of symbols into messages: the satellite's time in code periods, and the content of its message.
 //!
-//! A [`Decoder`] belongs to one channel. It gives the symbols to the reader of the signal's message, ties the
-//! channel's code period number to the satellite's time of week, and brings the times of messages to GPS
-//! time. A time that contradicts the one before drops both. Of a message that does not say its time the
-//! beginnings of units are known, and another signal of the satellite shows which ones they are.
+//! A [`Decoder`] belongs to one channel. It gives the symbols to the reader of the signal's message. It ties
+//! the channel's code period number to the satellite's time of week, and converts the times of messages to
+//! GPS time. A time that contradicts the one before drops both. A message may not state its time. The
+//! beginnings of its units are then known, and another signal of the satellite identifies them.
 
 use crate::track::Symbol;
 use gnss::augmentation::Content;
@@ -51,7 +51,7 @@ pub enum News {
     Sender(Sv),
     /// Statement of an augmentation system about other satellites.
     Augmentation {
-        /// When its block began, GPS time.
+        /// Beginning of the block, GPS time.
         sent: Epoch,
         /// Content of the block.
         content: Box<Content>,

@@ -1,4 +1,4 @@
-//! Why there was no fix, by the stage at which the chain broke, and what to check.
+//! Diagnosis of a reception without a fix: the stage at which the chain broke, and checks to make.
 
 use std::fmt;
 
@@ -18,7 +18,7 @@ const PAGE_EVERY_MIN: f64 = 12.5;
 /// The first stage that failed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Stage {
-    /// There were not enough samples for a search.
+    /// Search that did not happen, because there were not enough samples.
     NothingSearched {
         /// Samples that there were.
         samples: u64,
@@ -42,7 +42,7 @@ pub enum Stage {
     },
     /// Frames came whose checks were right, and none was used.
     Refused {
-        /// Why.
+        /// Refusals, with their reasons.
         refused: Vec<Refusal>,
     },
     /// Too few satellites have an ephemeris: of each with a frame, the subframes that are missing.
@@ -64,7 +64,7 @@ pub enum Stage {
 /// Units of messages that passed their checks and were not used.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Refusal {
-    /// Why.
+    /// Reason of the refusal.
     pub why: String,
     /// Satellites that sent them.
     pub svs: Vec<Sv>,
@@ -80,7 +80,7 @@ impl fmt::Display for Refusal {
     }
 }
 
-/// Why there was no fix.
+/// Diagnosis of a reception without a fix.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Diagnosis {
     /// Stage at which the processing chain broke.

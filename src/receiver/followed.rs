@@ -15,10 +15,10 @@ use gnss::signal::{Component, Layer, Layers, Signal};
 pub struct Followed {
     /// Name of the signal.
     pub signal: &'static str,
-    /// Place of the component among the signal's …
+    /// Index of the component among the signal's.
     pub component: usize,
-    /// … and of the layer that the replica has among that component's; `None` where it has them all, or the
-    /// tone of a side.
+    /// Index of the replica's layer among the component's. `None` where the replica has all layers, or the
+    /// tone of a sideband.
     pub layer: Option<usize>,
     /// Place of the component on the other side of the sub-carrier, where both are followed together.
     #[serde(skip_serializing_if = "Option::is_none")]

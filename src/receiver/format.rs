@@ -45,7 +45,7 @@ pub enum Look {
     Float32,
     /// Samples of few bits, several in a byte.
     Packed,
-    /// Most significant byte first, which cannot be received.
+    /// Integers of 16 bits, most significant byte first, which cannot be received.
     Signed16BigEndian,
     /// IEEE 754 of 32 bits, big-endian.
     Float32BigEndian,

@@ -121,8 +121,9 @@ impl Timebase {
         self.stated_by_message.get_or_insert(time);
     }
 
-    /// So many samples are missing before those that come now, or came twice if negative: samples count time
-    /// no more, and what the clock reads at those that come is right with another start.
+    /// Takes a gap of `samples` missing samples before those that come now, or a repetition if negative.
+    /// Samples then no longer measure time. The clock's reading at the samples that come is corrected by
+    /// another start.
     pub fn step(&mut self, samples: i64) {
         let (whole, fraction) = self.rate.elapsed(samples.unsigned_abs());
         let sign = samples.signum();

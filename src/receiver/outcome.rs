@@ -15,7 +15,7 @@ use crate::track::LoopMargin;
 use gnss::record::LineRow;
 use gnss::satellite::Sv;
 
-/// Why a reception was broken off.
+/// Error that ends a reception.
 #[derive(Debug, Error)]
 pub enum ReceiveError {
     /// No samples at all.
@@ -34,7 +34,7 @@ pub enum ReceiveError {
     Unsupported {
         /// Name of the signal.
         signal: &'static str,
-        /// Why.
+        /// Reason in words.
         reason: String,
     },
     /// Settings that are refused.
@@ -77,7 +77,7 @@ pub struct Outcome {
     pub cut_bytes: usize,
     /// Encoding that the bytes resemble, if it is not the format that was assumed.
     pub format_warning: Option<String>,
-    /// Why there was no fix, when there was none.
+    /// Diagnosis, if there was no fix.
     pub diagnosis: Option<Diagnosis>,
     /// Continuous waves that were met; the rows are in `interference.csv`.
     pub interfered: Option<Interfered>,

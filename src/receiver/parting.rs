@@ -39,11 +39,11 @@ const AGREEING_SHARE: f64 = 0.66;
 /// (multipath).
 const AGREEING_SIGMAS: f64 = 5.0;
 const AGREEING_HZ: f64 = 3.0;
-/// An offset is believed beyond so many deviations: 1e-9 a look, with a look each 50 ms of which few are
-/// independent …
+/// Standard deviations beyond which an offset is accepted: 1e-9 a look, with a look each 50 ms of which few
+/// are independent.
 const BELIEVED_SIGMAS: f64 = 6.0;
-/// … and beyond this: an ionosphere whose delay changes by 5 mm/s everywhere parts code and carrier by 0.05
-/// Hz.
+/// Least offset in hertz that is accepted. An ionosphere whose delay changes by 5 mm/s everywhere makes a
+/// code-carrier divergence of 0.05 Hz.
 pub const LEAST_HZ: f64 = 0.1;
 /// A change of the offset by more moves the code loops by more than their noise (0.5 m).
 const RESTART_HZ: f64 = 5.0;
@@ -173,7 +173,7 @@ pub enum Change {
     None,
     /// The offset is known better.
     Refined,
-    /// It is another: loops that ran with the old one have to be moved.
+    /// The offset is a new one: loops that ran with the old one have to be moved.
     Moved,
 }
 
@@ -223,9 +223,9 @@ pub struct Parted {
     /// Offset as an error of the sample rate, in parts per million: the true rate over the stated one, less
     /// one.
     pub rate_error_ppm: f64,
-    /// The carrier's frequency without it, if it is the mixer's …
+    /// Intermediate frequency without the offset, if the mixer causes it, in hertz.
     pub if_hz: f64,
-    /// … and the rate without it, if it is the samples'.
+    /// Sample rate without the offset, if the sampler causes it, in hertz.
     pub rate_hz: f64,
     /// Gain of the clock behind the samples, by the latest fix.
     pub code_drift: Option<f64>,
@@ -234,7 +234,7 @@ pub struct Parted {
 /// One of two explanations is taken for the likely one when the clock's gain by the other is so many times as
 /// large.
 const LIKELIER: f64 = 3.0;
-/// … and is more than an oscillator's usual part in a million.
+/// Relative clock error that is more than the usual part in a million of an oscillator.
 const UNUSUAL: f64 = 1e-6;
 
 impl fmt::Display for Parted {

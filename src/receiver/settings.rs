@@ -69,7 +69,7 @@ impl Default for OperationSettings {
     }
 }
 
-/// Why settings are refused. `origin` is the file's name, with line and column where they are known.
+/// Error of refused settings. `origin` is the file's name, with line and column where they are known.
 #[derive(Debug, Error)]
 pub enum SettingsError {
     /// A text that is no TOML, or a value of the wrong type.

@@ -115,7 +115,7 @@ pub(crate) struct Gathered {
 }
 
 impl Gathered {
-    /// None yet of those that begin with a block.
+    /// A collection that begins with a block, still empty.
     pub fn from(block: &Packed) -> Self {
         Self { first: block.first, format: block.format, bytes: Vec::new() }
     }
@@ -238,8 +238,8 @@ impl Source {
         Some(Packed { first, format: self.format, bytes: &self.kept })
     }
 
-    /// At the end of the stream: the whole samples of a block that was not filled, if there are any, and the
-    /// bytes of a sample that was cut off. More than none of the latter usually means a wrong format.
+    /// Remainder at the end of the stream: the whole samples of a block that was not filled, if there are
+    /// any, and the bytes of an incomplete sample. Such bytes usually mean a wrong format.
     pub fn rest(&mut self) -> (Option<Packed<'_>>, usize) {
         if self.kept.len() == self.block_bytes {
             self.kept.clear();

@@ -25,8 +25,8 @@ pub enum Correlation {
         /// The replica with itself.
         own: Waveform,
     },
-    /// Behind a front end of `band` chip rates: values and slopes (times the step) at multiples of the
-    /// table's step.
+    /// Correlation behind a front end of `band` chip rates: values and slopes (times the step) at multiples
+    /// of the table's step.
     BandLimited {
         /// Bandwidth of the front end, chip rates.
         band: f64,
@@ -66,7 +66,7 @@ impl Correlation {
         }
     }
 
-    /// Behind a front end of `band` chip rates (two-sided), rectangular chips.
+    /// Correlation of rectangular chips behind a front end of `band` chip rates (two-sided).
     pub fn band_limited(band: f64) -> Self {
         Self::behind(None, band)
     }

@@ -33,7 +33,7 @@ pub struct Case {
     pub component: &'static Component,
     /// Settings of the channel, validated and fitted to the component.
     pub settings: TrackingSettings,
-    /// Which loops run.
+    /// Set of loops that run.
     pub mode: Mode,
     /// C/N0 of the whole signal in dB-Hz; `None` for no noise.
     pub cn0_dbhz: Option<f64>,
@@ -95,7 +95,7 @@ impl Case {
     }
 }
 
-/// Why a run ended early.
+/// Reason why a run ended early.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Loss {
     /// The replica left the correlation peak.
@@ -113,7 +113,7 @@ pub struct Epoch {
     pub time_s: f64,
     /// Mean errors over the integration, truth minus oscillator.
     pub code_chips: f64,
-    /// Since the start, without regard to slips.
+    /// Phase error since the start in cycles, without regard to slips.
     pub phase_cycles: f64,
     /// Mean error of the frequency, Hz.
     pub frequency_hz: f64,
@@ -128,7 +128,7 @@ pub struct Outcome {
     pub update_s: f64,
     /// Truth minus oscillator, means over an integration.
     pub code_chips: Moments,
-    /// From the point of lock nearest in time; empty in [`Mode::Frequency`].
+    /// Phase error in cycles from the point of lock nearest in time; empty in [`Mode::Frequency`].
     pub phase_cycles: Moments,
     /// Largest of those.
     pub phase_peak_cycles: f64,
@@ -144,7 +144,7 @@ pub struct Outcome {
     pub slips: u64,
     /// Breaks of the carrier that the receiver's detectors declared, from the start on.
     pub interruptions: u64,
-    /// When the signal was lost, and why.
+    /// Time of the signal's loss in seconds, and its reason.
     pub lost: Option<(f64, Loss)>,
     /// Last time at which the code was off the main peak, from the start on.
     pub off_main_s: f64,

@@ -21,7 +21,7 @@ pub struct Demand {
     pub acceleration_mps2: f64,
     /// Along the line of sight, m/s³.
     pub jerk_mps3: f64,
-    /// From the least to the largest acceleration.
+    /// Difference from the least to the largest acceleration, m/s².
     pub swing_mps2: f64,
     /// Radius of a circle that the antenna describes besides, and turns a second.
     pub circle: Option<(f64, f64)>,

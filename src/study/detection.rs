@@ -42,7 +42,7 @@ const ABSENT_DBHZ: f64 = 0.0;
 /// Draws of the expected probability: a standard error below 0.004.
 const DRAWS: u32 = 20_000;
 
-/// Why trials could not be made.
+/// Error that prevents trials.
 #[derive(Debug, Error)]
 pub enum DetectionError {
     /// A scene of the study cannot be composed.

@@ -17,7 +17,7 @@ use receiver::track::{CodeDiscriminator, TrackingSettings};
 /// A jitter and how much of a run counts as one value of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Jitter {
-    /// In the unit that the function names.
+    /// Standard deviation in the unit that the function names.
     pub sigma: f64,
     /// One-sided noise bandwidth of the loop as it is closed; for a frequency loop, half its noise gain over
     /// T.

@@ -34,7 +34,8 @@ pub struct Level {
     pub frequency_hz: (f64, Option<f64>),
     /// Per hour, thermal noise alone.
     pub slips_per_hour: f64,
-    /// After how long the signal was lost, with the oscillator and under the receiver's detectors, and why.
+    /// Time to the signal's loss in seconds, with the oscillator and under the receiver's detectors, and its
+    /// reason.
     pub lost: Option<(f64, Loss)>,
 }
 

@@ -27,7 +27,7 @@ pub struct Motion {
     pub doppler_hz: f64,
     /// Rate of the Doppler at the start, Hz/s.
     pub rate_hz_s: f64,
-    /// In the order of time.
+    /// Steps in the order of time.
     pub steps: Vec<Step>,
 }
 

@@ -42,7 +42,7 @@ pub struct Cell {
 pub struct ProofRow {
     /// Quantity that is compared.
     pub quantity: Quantity,
-    /// Which loops run, by name.
+    /// Name of the set of loops that run.
     pub mode: String,
     /// Integrators of the loop.
     pub order: u32,
@@ -80,7 +80,7 @@ pub struct ProofRow {
     pub in_region: bool,
     /// Largest departure of the ratio from one that is allowed in the region.
     pub bar: f64,
-    /// Why the ratio departs by more than the bar; empty where it does not.
+    /// Reason why the ratio deviates by more than the bar; empty where it does not.
     pub cause: String,
 }
 
@@ -307,7 +307,7 @@ impl ProofRow {
     }
 }
 
-/// Why a cell departs from linear theory.
+/// Reason why a cell deviates from linear theory.
 fn cause(row: &ProofRow, lost: Option<Loss>) -> &'static str {
     match (lost, row.quantity) {
         (Some(Loss::Declared), _) => "given up by the receiver's detectors",

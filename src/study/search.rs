@@ -31,7 +31,7 @@ const STEPS: u32 = 40;
 /// A search and the signal that it meets.
 #[derive(Clone, Copy, Debug)]
 pub struct Model {
-    /// Whose code is searched.
+    /// Signal whose code is searched.
     pub signal: &'static Signal,
     /// Coherent sums whose powers are added, and the length of one.
     pub sums: u32,
@@ -73,7 +73,7 @@ const NODES: u32 = 64;
 const IMAGES: i32 = 8;
 
 impl Folded {
-    /// For samples of `sample` chips and lags of `lag` samples.
+    /// Densities for samples of `sample` chips and lags of `lag` samples.
     fn new(code: &Waveform, sample: f64, lag: f64) -> Self {
         let density = |turns: f64| {
             let chips = code.density(turns / sample * code.chip_rate_hz()) * code.chip_rate_hz();

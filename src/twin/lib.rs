@@ -46,7 +46,7 @@ use receiver::output;
 use receiver::settings::Settings;
 use receiver::{Outcome, ReceiveError, Reception};
 
-/// Why a run of the twin ended early.
+/// Error that ends a run of the twin early.
 #[derive(Debug, Error)]
 pub enum TwinError {
     /// The scene cannot be generated, or its truth is not taken.

@@ -1,9 +1,9 @@
-//! Not a test: the last lines of `cargo test`, which say what was skipped.
+//! Last lines of `cargo test`, which list skipped tests; this is not a test itself.
 //!
-//! Reads the notes that tests leave about data outside of the repository (`tests/witness/data.rs`) and about
-//! parts that take minutes (`tests/common/long.rs`). Cargo runs packages in the order of their names, so this
-//! belongs to the last of them, and it has no harness that would capture what it prints. Limits: notes are
-//! those of each test's latest run; tests that run one at a time, on the main thread, leave none.
+//! It reads the notes that tests leave about data outside of the repository (`tests/witness/data.rs`) and
+//! about parts that take minutes (`tests/common/long.rs`). Cargo runs packages in the order of their names,
+//! so this belongs to the last of them. It has no harness that would capture its output. Limits: notes are
+//! those of each test's latest run. Tests that run one at a time, on the main thread, leave none.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -126,7 +126,7 @@ impl Case {
         assert!(apart <= room, "case {}, {figure}: {value} {unit} at {at}, {theory} ± {room}", self.number);
     }
 
-    /// So many of so many kept to the law.
+    /// Adds a row that `held` of `of` cases kept the law; all have to.
     #[track_caller]
     pub fn all(self, figure: &str, held: usize, of: usize) {
         self.row(figure, &format!("{held} of {of}"), "", &format!("{of} of {of}"));

@@ -6,7 +6,7 @@
 pub enum Legal {
     Yes,
     No,
-    /// It means something, but more than this program promises, or only beside certain other values.
+    /// Value with a meaning, but beyond this program's promises, or legal only beside certain other values.
     Perhaps,
 }
 

@@ -39,9 +39,9 @@ fn peak_kib(words: &str, place: &Path) -> Result<f64, String> {
     }
 }
 
-/// Most that the judge may hold of an epoch of a tenth of a second, in bytes. It keeps the gains of carriers
-/// (24), phases of the clock (24) and what is due (64), in turn lists of a measurement (some 50), and of one
-/// satellite at a time what its signal is judged by (some 130); lists grow by doubling. Five satellites took
+/// Largest memory of the judge for an epoch of a tenth of a second, in bytes. It keeps the gains of carriers
+/// (24), phases of the clock (24) and requirements (64). It keeps in turn lists of a measurement (some 50),
+/// and the data of one satellite's signal at a time (some 130). Lists grow by doubling. Five satellites took
 /// 2400 when sums and expectations of every fix were held.
 const EPOCH_BYTES: f64 = 400.0;
 

@@ -210,7 +210,7 @@ fn judge(task: &Task, place: &Path, ended: &Ended, fault: &Fault, library: bool,
     Ok(if code == 0 { End::Accepted } else { End::Refused })
 }
 
-/// All of them, on as many threads as keep two cores at work.
+/// Results of all faults, on as many threads as keep two cores busy.
 fn injected<'a>(task: &Task, faults: &'a [Fault]) -> Vec<(&'a Fault, Became)> {
     let (next, ends) = (Mutex::new(faults.iter()), Mutex::new(Vec::new()));
     std::thread::scope(|scope| {

@@ -5,7 +5,7 @@ use std::path::Path;
 
 /// One file of the library.
 pub struct Source {
-    /// From the package's root, with slashes.
+    /// Path from the package's root, with slashes.
     pub path: String,
     /// Modules of the file from `src`: `["gnss", "time"]`.
     pub module: Vec<String>,
@@ -121,7 +121,7 @@ fn blanked(text: &str) -> String {
     out
 }
 
-/// Behind a string that begins at `i`.
+/// Index behind a string that begins at `i`.
 fn string_end(chars: &[char], i: usize) -> usize {
     let mut k = i + 1;
     while k < chars.len() {
@@ -134,7 +134,7 @@ fn string_end(chars: &[char], i: usize) -> usize {
     chars.len()
 }
 
-/// Behind a raw string that begins at `i`; `None` where it is a raw identifier.
+/// Index behind a raw string that begins at `i`; `None` where it is a raw identifier.
 fn raw_end(chars: &[char], i: usize) -> Option<usize> {
     let hashes = chars[i + 1..].iter().take_while(|c| **c == '#').count();
     let open = i + 1 + hashes;

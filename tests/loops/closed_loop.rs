@@ -355,7 +355,7 @@ fn l1c_of_qzss_alone_finds_its_place_by_cnav_2() {
     at_most(&summary, "/position/first_fix_s", 38.0);
 }
 
-/// On three bands: the combination of L1 and L5 has 2.6 times the noise of one at first, 1.2 m
+/// Runs QZSS on three bands. The combination of L1 and L5 has 2.6 times the noise of one at first, 1.2 m
 /// horizontally, and averages it (`GNSS_TWIN_LONG=1`: 70 s of 30 million samples a second).
 #[test]
 fn qzss_on_three_bands_finds_its_place_through_an_ionosphere_of_maps() {

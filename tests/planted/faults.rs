@@ -133,7 +133,7 @@ const fn fault(name: &'static str, what: &'static str, check: &'static str) -> F
     Fault { name, what, check }
 }
 
-/// All of them, by world.
+/// List of all faults, by world.
 #[rustfmt::skip]
 pub const FAULTS: &[Fault] = &[
     fault("gnss.code.g2_taps", "one feedback tap of G2 is missing", CODES),

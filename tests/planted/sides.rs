@@ -1,5 +1,5 @@
-//! Both sides of a sub-carrier in a channel: samples by the definition of the signal, loops on the peak that
-//! the sides make together.
+//! Tests of both sidebands of a sub-carrier in a channel. Samples follow the definition of the signal, and
+//! loops are on the peak of both sidebands together.
 
 use std::f64::consts::TAU;
 

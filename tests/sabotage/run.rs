@@ -10,18 +10,18 @@ use tempfile::TempDir;
 
 use crate::table::Table;
 
-/// Which run.
+/// Scene of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scene {
     AtRest,
     InMotion,
-    /// At rest; the scene says that errors may have any size up to a bound.
+    /// Receiver at rest; the scene says that errors may have any size up to a bound.
     Bounded,
-    /// At rest, GPS and Galileo.
+    /// Receiver at rest, GPS and Galileo.
     TwoSystems,
-    /// At rest, NavIC on L5 and L1.
+    /// Receiver at rest, NavIC on L5 and L1.
     TwoBands,
-    /// At rest elsewhere, before the ionosphere's parameters come.
+    /// Receiver at rest elsewhere, before the ionosphere's parameters come.
     Early,
 }
 
@@ -93,7 +93,7 @@ pub fn urban() -> &'static Path {
     make(&RUN, "urban", include_str!("../../scenarios/urban.toml"))
 }
 
-/// Another place, seed and start, without page 18 in time.
+/// Run at another place, seed and start, without page 18 in time.
 pub fn elsewhere() -> &'static Path {
     static RUN: OnceLock<Made> = OnceLock::new();
     let scene = STATIC

@@ -114,7 +114,7 @@ pub fn printed_rows(text: &str) -> Vec<Vec<String>> {
     text.lines().map(|line| line.split(',').map(str::to_owned).collect()).collect()
 }
 
-/// So many bits of hexadecimal digits.
+/// Bits of hexadecimal digits, `count` of them.
 pub fn hex_bits(hex: &str, count: usize) -> Vec<bool> {
     let digits = hex.chars().map(|digit| digit.to_digit(16).unwrap());
     digits.flat_map(|digit| (0..4).rev().map(move |bit| digit >> bit & 1 == 1)).take(count).collect()

@@ -28,7 +28,7 @@ const MESSAGES: &str = include_str!("../../data/witness/gps_cnav.csv");
 /// Seven of L2C, 2025-08-21: two satellites of Block IIR-M and one of IIF.
 const MESSAGES_L2C: &str = include_str!("../../data/witness/gps_cnav_l2c.csv");
 
-/// Another converter's records of their sets.
+/// Records of another converter for their ephemerides.
 const RECORDS_L2C: &str = include_str!("../../data/witness/gps_cnav_records.rnx");
 
 /// The message of each signal as the files name it.

@@ -136,7 +136,8 @@ fn sets_of_lnav_carried_to_cnav_say_the_health_that_satellites_send_there() {
     }
 }
 
-/// Who broadcast what: L1 C/A by the health of LNAV of five days, L2C by messages of two.
+/// Checks the broadcast signals of satellites: L1 C/A by the health of LNAV of five days, L2C by messages of
+/// two.
 #[test]
 fn satellites_send_the_signals_that_they_broadcast() {
     for (date, with, without) in [

@@ -71,9 +71,9 @@ fn hanoi(place: &Path) -> Option<PathBuf> {
     Some(metadata)
 }
 
-/// Beyond the list are six of GPS. Each is found in both halves of the recording, which share no sample, at
-/// one Doppler to 6 Hz (by chance, in steps of 250 Hz over ±5 kHz: once in 800), and three of them on another
-/// carrier.
+/// Checks the list and six more satellites of GPS. Each is found in both halves of the recording, which share
+/// no sample, at one Doppler to 6 Hz. The chance of that is one in 800, in steps of 250 Hz over ±5 kHz. Three
+/// of them are also found on another carrier.
 #[test]
 fn one_bit_samples_of_l1_hold_gps_and_galileo_as_listed_and_none_else() {
     let place = tempfile::tempdir().unwrap();

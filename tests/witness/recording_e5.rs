@@ -1,5 +1,5 @@
-//! Both sides of Galileo's E5 and GPS L5 in one band of 50 MHz, as an antenna received them in
-//! January 2016, and what makes the two sides of E5 one signal.
+//! Tests of both sidebands of Galileo's E5 and GPS L5 in one band of 50 MHz, as an antenna received them in
+//! January 2016, and of the relation that makes the two sidebands of E5 one signal.
 
 use std::f64::consts::TAU;
 

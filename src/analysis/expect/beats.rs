@@ -43,9 +43,10 @@ struct Node {
 }
 
 impl Beats {
-    /// From the truth of a run.
+    /// Beats from the truth of a run.
     ///
     /// # Errors
+    ///
     /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn new(run: &Run) -> Result<Self, JudgeError> {
         let last = run.trajectory.last().map_or(0, |row| row.sample);

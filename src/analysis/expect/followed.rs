@@ -12,7 +12,7 @@ use gnss::signal::{Component, Layer, Layers, Link, Signal, Tone};
 pub(crate) struct Entry {
     signal: String,
     component: usize,
-    /// None where the replica has all.
+    /// Index of the replica's layer; `None` where the replica has all layers.
     layer: Option<usize>,
     /// Index of the other sideband of a sub-carrier.
     other_side: Option<usize>,
@@ -103,8 +103,8 @@ pub(crate) struct Followed {
 }
 
 impl Followed {
-    /// In a run. A receiver that does not say it follows the leading component by a replica of all its
-    /// layers.
+    /// Tracking of a signal in a run. A receiver that does not state it is taken to track the leading
+    /// component by a replica of all its layers.
     pub fn of(run: &Run, signal: &Signal) -> Option<Self> {
         let entry = Entry::of(&run.receiver, signal);
         let component = match &entry {

@@ -20,7 +20,7 @@ use crate::waveform::{Edge, Waveform, leading};
 use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::signal::{Component, Link, Signal, sinc_squared};
 
-/// Which loop a row is about.
+/// Loop of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Loop {
@@ -67,7 +67,7 @@ impl Settings {
 }
 
 impl Settings {
-    /// These as the receiver fits them to a signal.
+    /// Settings as the receiver fits them to a signal.
     pub(crate) fn fitted(self, followed: &Followed) -> Self {
         Self {
             spacing_chips: followed.spacing_chips.unwrap_or(self.spacing_chips),
@@ -176,8 +176,8 @@ pub(crate) fn natural_radps(closed: &PhaseLoop, order: u32, update_s: f64) -> f6
     -libm::log(controlled_root(order, closed.gains)) / update_s
 }
 
-/// Up to here the truth's drift follows the oscillator: a spline over 0.8 s has 80 % of that rate's variance
-/// left.
+/// Frequency in hertz up to which the truth's drift follows the oscillator. A spline over 0.8 s has 80 % of
+/// that rate's variance left.
 const NODES_HZ: f64 = 0.5;
 
 /// Intervals after which nothing is left of a value in any loop that can be set: bandwidth times time is 1e-4

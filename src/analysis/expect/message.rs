@@ -20,7 +20,7 @@ use gnss::time::{Epoch, TimeScale};
 pub struct Message {
     /// Ephemerides of each satellite and message, with their issues.
     sets: BTreeMap<(Sv, &'static str), Vec<(u32, Ephemeris)>>,
-    /// From which sample on the receiver had which issue, ascending.
+    /// Issues that the receiver had, each with the sample from which it had it, ascending.
     read: BTreeMap<(Sv, &'static str), Vec<(u64, u32)>>,
     /// The ionosphere's coefficients, where they were sent: one of a model.
     ionospheres: Vec<Coefficients>,
@@ -84,8 +84,8 @@ impl Message {
     }
 }
 
-/// When the receiver completed the sets of a satellite's message, with their issues in the order in which it
-/// wrote them down. A set that it read again after a loss comes before a new one.
+/// Times at which the receiver completed the ephemerides of a satellite's message, with their issues in its
+/// own order. An ephemeris that it read again after a loss comes before a new one.
 fn read(run: &Run, (sv, name): (Sv, &str)) -> Vec<(u64, u32)> {
     let mut issues: Vec<u32> = Vec::new();
     // One that every set has.

@@ -44,7 +44,7 @@ impl Jammed {
 }
 
 impl<'r> MultipleAccess<'r> {
-    /// From the truth of a run.
+    /// Multiple access from the truth of a run.
     pub fn new(run: &'r Run) -> Self {
         let emissions = Emission::all(run.truth.keys());
         let signals: BTreeSet<&'static Signal> = emissions.iter().map(|one| one.signal).collect();

@@ -73,7 +73,7 @@ impl Peak {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Code {
     peak: Peak,
-    /// Up to where it falls without rising again.
+    /// Delay in chips up to which the correlation falls without rising again.
     pub reach_chips: f64,
 }
 

@@ -152,7 +152,8 @@ struct Jammer<'a> {
 }
 
 impl Expected {
-    /// For the frequencies of an estimate; `None` without one, or without anything in the samples.
+    /// Expected spectrum for the frequencies of an estimate; `None` without one, or without anything in the
+    /// samples.
     pub fn of(run: &Run, front_end: &FrontEnd<'_>, sent: &[Sent], rows: &[PsdRow]) -> Option<Self> {
         front_end.center_hz?;
         if rows.len() < 8 || (sent.is_empty() && !run.scene.noise) {
@@ -231,7 +232,7 @@ impl Expected {
         self.density.iter_mut().for_each(|value| *value *= scale);
     }
 
-    /// In decibels of LSB²/Hz.
+    /// Density in decibels of LSB²/Hz.
     pub fn density_db(&self) -> Vec<f64> {
         self.density.iter().map(|value| 10.0 * libm::log10(value.max(1e-30))).collect()
     }
@@ -318,7 +319,7 @@ struct Shown {
 }
 
 impl Shown {
-    /// At a row of the estimate.
+    /// Density at a row of the estimate.
     fn at(&self, row: usize, one_sided: bool) -> f64 {
         let bins = self.density.len();
         let index = if one_sided { row } else { (row + bins / 2) % bins };

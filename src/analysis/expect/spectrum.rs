@@ -35,7 +35,7 @@ pub struct Spectrum {
     pub null_low_expected_hz: Option<f64>,
     /// Upper null that the search finds in the expected spectrum, Hz from the carrier.
     pub null_high_expected_hz: Option<f64>,
-    /// Why a null is not reported.
+    /// Reason why a null is not reported.
     pub null_reason: Option<&'static str>,
 }
 

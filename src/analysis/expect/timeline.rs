@@ -30,7 +30,7 @@ pub struct State {
     pub doppler_hz: f64,
     /// True C/N0, dB-Hz.
     pub cn0_dbhz: f64,
-    /// With the other satellites and interference counted as noise.
+    /// C/N0 with the other satellites and interference counted as noise, dB-Hz.
     pub effective_dbhz: f64,
     /// Elevation of the satellite, degrees.
     pub elevation_deg: f64,
@@ -93,7 +93,7 @@ pub struct Timeline {
     pub origin: Epoch,
     interval_s: f64,
     tracks: BTreeMap<Link, Track>,
-    /// None of a single satellite's.
+    /// Positions by time; empty for a timeline of a single satellite.
     places: Vec<(f64, Place)>,
     /// Largest errors of interpolation between rows.
     pub interpolation: Interpolation,
@@ -103,9 +103,10 @@ pub struct Timeline {
 const GAP: f64 = 1.5;
 
 impl Timeline {
-    /// From a run's truth; `None` without a trajectory.
+    /// Timeline of a run's truth; `None` without a trajectory.
     ///
     /// # Errors
+    ///
     /// [`JudgeError::Read`] where spilled rows cannot be read.
     pub fn new(run: &Run) -> Result<Option<Self>, JudgeError> {
         let Some(mut timeline) = Self::of_links(run, Some(&MultipleAccess::new(run)), run.truth.keys())? else {

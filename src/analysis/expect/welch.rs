@@ -23,19 +23,19 @@ const PIECES: u64 = 60;
 const ONE: f64 = 19.0 / 18.0;
 const MANY: f64 = 19.0 / 9.0;
 
-/// Which samples are looked at: the signal's start, or pieces all over a scene whose spectrum changes.
+/// Samples of the estimate: the signal's start, or pieces spread over a scene whose spectrum changes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Looks {
     /// Samples of a piece.
     pub length: u64,
-    /// From the start of one to that of the next, samples.
+    /// Distance from the start of one piece to that of the next, samples.
     pub stride: u64,
     /// Number of the segments.
     pub pieces: u64,
 }
 
 impl Looks {
-    /// At so many samples of that rate.
+    /// Pieces of `samples` samples at the rate `rate_hz`.
     pub fn at(samples: u64, rate_hz: f64, changing: bool) -> Self {
         let pieces = if changing { PIECES } else { 1 };
         let length = (LOOKED_S * rate_hz) as u64 / pieces;

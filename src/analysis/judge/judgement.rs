@@ -31,16 +31,16 @@ impl std::fmt::Display for Bound {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
-    /// Within its limit.
+    /// Figure within its limit.
     Pass,
-    /// Within its limit, by less than the marginal share of it.
+    /// Figure within its limit, by less than the marginal share of it.
     Marginal,
-    /// Beyond its limit, or missing.
+    /// Figure beyond its limit, or missing.
     Fail,
 }
 
 impl Status {
-    /// In one word.
+    /// Status in one word.
     pub fn word(self) -> &'static str {
         match self {
             Self::Pass => "pass",
@@ -53,7 +53,7 @@ impl Status {
 /// One figure judged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judgement {
-    /// In words, or its path in `summary.json` where a user named it so.
+    /// Name of the figure in words, or its path in `summary.json` where a user named it so.
     pub figure: String,
     /// Path of the figure in `summary.json`, if it has one.
     pub path: Option<String>,

@@ -18,7 +18,7 @@ use crate::judge::judgement::{Bound, Judgement, MARGINAL_SHARE};
 use crate::judge::schema::{self, Figures};
 use gnss::place::Keys;
 
-/// Why a file of limits cannot be used. `name` is the file's, with line and column where they are known.
+/// Error of a file of limits. `name` is the file's, with line and column where they are known.
 #[derive(Debug, Error, PartialEq)]
 pub enum LimitsError {
     /// The file is not TOML.

@@ -78,7 +78,7 @@ pub struct Figures {
     pub file: &'static str,
     /// File in which a user finds all paths.
     pub listed: &'static str,
-    /// All of them.
+    /// Function that lists all figures.
     pub leaves: fn() -> &'static [Leaf],
 }
 

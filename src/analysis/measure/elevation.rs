@@ -27,7 +27,8 @@ pub struct Point {
     pub time_s: f64,
     /// Elevation of the satellite, degrees.
     pub elevation_deg: f64,
-    /// Without the epoch's common part of its signal; none of the only satellite of an epoch.
+    /// Code error in metres without the epoch's common part of its signal; `None` for the only satellite of
+    /// an epoch.
     pub code_m: Option<f64>,
     /// Error of the carrier without its arc's constant, cycles.
     pub carrier_cycles: f64,

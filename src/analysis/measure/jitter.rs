@@ -32,7 +32,7 @@ pub struct LinkJitter {
     pub sv: String,
     /// Name of the signal.
     pub signal: &'static str,
-    /// Which loop.
+    /// Loop of the row.
     #[serde(rename = "loop")]
     pub which: Loop,
     /// Unit of sigmas and limits: chips, degrees or hertz.
@@ -50,9 +50,9 @@ pub struct LinkJitter {
     pub values: usize,
     /// Number of independent values that they are worth.
     pub independent: f64,
-    /// Their mean.
+    /// Mean of the values.
     pub mean: f64,
-    /// Their standard deviation.
+    /// Standard deviation of the values.
     pub sigma: f64,
     /// Half width of the 95 % interval of `sigma`, relative.
     pub sigma_interval: f64,

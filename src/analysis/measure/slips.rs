@@ -48,7 +48,7 @@ pub enum Kind {
     LossOfLock,
 }
 
-/// Why it happened.
+/// Cause of a break.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Cause {

@@ -188,7 +188,7 @@ impl Departures {
     }
 }
 
-/// Why a spectrum has no expectation that it can be judged by.
+/// Reason why a spectrum has no expectation that it can be judged by.
 pub fn excuse(run: &Run, front_end: &FrontEnd<'_>) -> Option<&'static str> {
     let scene = &run.scene;
     if !scene.spoofers.is_empty() {

@@ -56,7 +56,7 @@ pub struct Common {
 }
 
 impl Common {
-    /// Before any row of the truth.
+    /// Common errors before any row of the truth.
     pub(super) fn new(rate_hz: f64) -> Self {
         Self { rate_hz, ..Self::default() }
     }

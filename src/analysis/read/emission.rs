@@ -29,7 +29,7 @@ impl Emission {
         f64::from_bits(self.carrier)
     }
 
-    /// All of some satellites.
+    /// Emissions of some satellites.
     pub fn all(links: impl Iterator<Item = Link>) -> BTreeSet<Self> {
         links.map(Self::of).collect()
     }

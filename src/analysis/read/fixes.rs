@@ -142,7 +142,7 @@ impl SpillRow<()> for Row {
 }
 
 impl Fixes {
-    /// None yet; they spill to a file in that directory.
+    /// An empty list, which spills to a file in that directory.
     pub fn new(directory: &Path) -> Self {
         Self {
             table: Table::new(directory),
@@ -192,7 +192,7 @@ impl Fixes {
         self.earliest
     }
 
-    /// Most satellites that one has.
+    /// Largest number of satellites in a fix.
     pub fn most_satellites(&self) -> usize {
         self.most_satellites as usize
     }
@@ -282,7 +282,7 @@ impl FixFinder<'_> {
 /// Fixes in the order of their samples.
 pub struct InOrder<'f> {
     fixes: &'f Fixes,
-    /// None where the table is not in order.
+    /// Cursor of the table; `None` where the table is not in order.
     cursor: Option<Cursor<'f, (), Row>>,
     sorted: std::vec::IntoIter<Fix>,
 }

@@ -39,7 +39,7 @@ pub struct Levels<K> {
 }
 
 impl<K: Copy + Ord + Hash> Levels<K> {
-    /// None yet; they spill to a file in that directory.
+    /// An empty list, which spills to a file in that directory.
     pub(crate) fn new(directory: &Path) -> Self {
         Self { store: SpillStore::new(directory), sample: 0, open: BTreeMap::new(), all: None }
     }

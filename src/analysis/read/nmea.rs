@@ -31,7 +31,7 @@ pub struct PlaceFix {
 /// A file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Places {
-    /// In the order of the file.
+    /// Fixes in the order of the file.
     pub fixes: Vec<PlaceFix>,
     /// Sentences that say that there is no fix, and fixes that RMC's status V takes back.
     pub without_fix: usize,

@@ -53,7 +53,7 @@ pub struct ObservedEpoch {
 pub struct Observations {
     /// `PGM` and `REC # / TYPE / VERS`, to say whose file it is.
     pub receiver: String,
-    /// In the order of the file.
+    /// Epochs in the order of the file.
     pub epochs: Vec<ObservedEpoch>,
     /// Event records passed over.
     pub events: usize,

@@ -18,7 +18,7 @@ pub(super) struct WordFile {
 }
 
 impl WordFile {
-    /// None yet; it will be made in that directory.
+    /// An empty list, whose file will be made in that directory.
     pub fn new(directory: &Path) -> Self {
         Self { directory: directory.to_owned(), file: None, words: 0 }
     }

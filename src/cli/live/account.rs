@@ -71,7 +71,7 @@ pub struct Handed {
     /// Writes that took longer than the sink's samples in the ring last.
     pub stalls: u64,
     pub longest_write: Duration,
-    /// From a push's arrival until its first sample was handed over.
+    /// Ages from a push's arrival until its first sample was handed over.
     pub ages: Ages,
 }
 
@@ -82,7 +82,7 @@ pub struct Intake {
     /// No message, by its length or contents, and what the first of them was.
     pub malformed: u64,
     pub first_malformed: Option<String>,
-    /// From another sender than the first.
+    /// Messages from another sender than the first.
     pub strangers: u64,
     /// Too many at once.
     pub dropped: u64,

@@ -139,7 +139,7 @@ struct Live<'a> {
     first_is_now: bool,
 }
 
-/// Why a run ended.
+/// Reason why a run ended.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum End {
     Scene,
@@ -385,7 +385,7 @@ impl Live<'_> {
     }
 }
 
-/// When the push arrived that a tick is the first to show; earlier ones are forgotten.
+/// Arrival of the push that a tick is the first to show; earlier ones are forgotten.
 fn shown(tick: &Tick, arrivals: &mut VecDeque<(u64, Instant)>) -> Option<Instant> {
     let news = tick.tick.as_ref()?.news?;
     while arrivals.front().is_some_and(|(number, _)| *number < news) {

@@ -21,12 +21,12 @@ const WARM_UP: Duration = Duration::from_millis(250);
 /// Stack of the thread.
 const STACK_BYTES: usize = 1 << 19;
 
-/// When samples are made and handed over.
+/// Times at which samples are made and handed over.
 #[derive(Clone, Copy)]
 pub struct Pace {
     clock: Clock,
     rate: Rate,
-    /// When sample 0 is handed over, at the earliest.
+    /// Earliest time at which sample 0 is handed over.
     start: Instant,
     ahead: Duration,
 }
@@ -42,7 +42,7 @@ impl Pace {
         Self { clock: arguments.clock, rate, start, ahead }
     }
 
-    /// When a sample is due by the machine's clock.
+    /// Time at which a sample is due by the machine's clock.
     fn due(&self, sample: u64) -> Instant {
         self.start + Duration::from_secs_f64(self.rate.elapsed_s(sample))
     }

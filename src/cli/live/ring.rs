@@ -9,7 +9,7 @@ pub struct Block {
     pub bytes: Vec<u8>,
     /// Number of its first sample in the scene.
     pub first: u64,
-    /// When the push arrived that it is the first to show.
+    /// Arrival of the push that the block is the first to show.
     pub shows: Option<Instant>,
 }
 

@@ -124,7 +124,7 @@ struct Commands {
 }
 
 impl Commands {
-    /// Until the client closes its side, or for a while after the stream has ended.
+    /// Reads commands until the client closes its side, or for a while after the stream has ended.
     fn read(mut self, mut stream: TcpStream) {
         let (mut words, mut have) = ([0_u8; 5], 0);
         let mut parting: Option<Instant> = None;

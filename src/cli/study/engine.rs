@@ -25,7 +25,7 @@ use crate::study::sweep::shard;
 
 /// Arrays of GNU parallel have no size of their own; a script has a line a task.
 const MOST_LINES: u32 = 100_000;
-/// From one look at the shards to the next: at least that long, and this many times what a look takes.
+/// Least time between two inspections of the shards, and its least ratio to the duration of an inspection.
 const LOOK: Duration = Duration::from_secs(1);
 const REST: u32 = 10;
 /// A file system of several machines may show a file some seconds after it was made.

@@ -17,7 +17,7 @@ pub enum Queued {
     Waiting {
         /// Running now.
         running: usize,
-        /// Why the first of the others waits, in Slurm's word.
+        /// Reason why the first of the others waits, in Slurm's word.
         reason: Option<String>,
     },
     /// Tasks are there, and none will ever run by itself.

@@ -10,7 +10,7 @@ use gnss::time::Epoch;
 
 /// Heights further apart say nothing of the speed upwards.
 const CLIMB_S: f64 = 2.0;
-/// So many halves in a row without the other one are states of their own again.
+/// Number of consecutive halves without the other one after which they are states of their own again.
 const ALONE: u32 = 3;
 
 /// Reads the sentences of one sender.

@@ -1,12 +1,12 @@
-//! Which Doppler of a satellite counts, what its largest cell has to exceed there, and which columns need all
-//! sums before that is known.
+//! Choice of a satellite's Doppler, of its threshold there, and of the columns that need all sums before both
+//! are known.
 //!
-//! Where a search leaves Dopplers early ([`super::dwells`]), the law of a crowded one is not known: it needs
-//! the largest cells of all codes ([`super::multiple_access`]). There the threshold to begin with is seven
-//! tenths of what the codes' first dwells let expect of it, and not below what nine of them in ten reach. A
-//! satellite that passes it by less than what makes it sure has its column filled, and all are chosen anew,
-//! until none is left that does; but for columns whose first dwells show noise. So no satellite is found by
-//! less than a search without leaving asks for.
+//! A search may leave Dopplers early ([`super::dwells`]). The law of a crowded Doppler is then unknown,
+//! because it needs the largest cells of all codes ([`super::multiple_access`]). The first threshold is seven
+//! tenths of the value expected from the codes' first dwells, and not below the value that nine codes in ten
+//! stay below. A satellite that passes it without being sure has its column filled. All choices are then made
+//! anew, until no such satellite is left. Columns whose first dwells show noise are excepted. So no satellite
+//! is found below the threshold of a search without leaving.
 
 use std::collections::BTreeSet;
 

@@ -47,7 +47,7 @@ const MANY: f64 = 0.4;
 /// Conjugate spectra of a satellite's codes: of one that is alone the same twice.
 pub(super) type Spectra<'a> = [&'a Spectrum; 2];
 
-/// When the dwells of a search begin, and where a Doppler is left.
+/// Times of a search's dwells, and the rule for leaving a Doppler.
 pub(super) struct Dwells {
     /// Code periods from the first sample to each, in the order in which they are looked at.
     begins: Vec<f64>,
@@ -300,7 +300,7 @@ impl Grid {
         (if floor > 0.0 { peak / floor } else { 0.0 }, total)
     }
 
-    /// With all dwells.
+    /// Strip of a Doppler with all dwells.
     fn strip(&self, powers: &Powers) -> Strip {
         powers.strip(self.near_cells(), self.sums)
     }

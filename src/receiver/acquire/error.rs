@@ -1,10 +1,10 @@
-//! Why a search cannot be made.
+//! Errors of a search.
 
 use thiserror::Error;
 
 use gnss::satellite::Sv;
 
-/// Why a search could not be made.
+/// Error of a search that cannot be made.
 #[derive(Debug, Error, PartialEq)]
 pub enum AcquireError {
     /// A setting out of its range.

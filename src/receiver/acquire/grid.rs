@@ -45,7 +45,7 @@ pub(super) struct Grid {
     /// Intermediate frequency of the carrier in hertz. For one sideband of a sub-carrier it is the middle of
     /// that sideband.
     if_hz: f64,
-    /// In the samples, for each hertz of the carrier: negative in an inverted spectrum.
+    /// Frequency in the samples for each hertz of the carrier: negative in an inverted spectrum.
     doppler_sign: f64,
     pub(super) carrier_hz: f64,
     /// Code periods in a coherent sum.
@@ -57,7 +57,7 @@ pub(super) struct Grid {
     /// True if data and pilot are searched for together.
     pub(super) is_pair: bool,
     pub dopplers_hz: Vec<f64>,
-    /// From one of them to the next.
+    /// Step between Dopplers, in hertz.
     pub step_hz: f64,
     /// Cells in one code period, and the samples from one to the next. There is another between any two.
     pub lags: usize,
@@ -79,14 +79,14 @@ pub(super) struct Grid {
 /// The outcome for one satellite.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Peak {
-    /// In units in which noise alone is chi-square with 2K degrees of freedom.
+    /// Statistic of the largest cell, in units in which noise alone is chi-square with 2K degrees of freedom.
     pub statistic: f64,
     /// Threshold of the statistic at this Doppler.
     pub threshold: f64,
     /// True if no law of this Doppler would make the peak cross-correlation.
     pub is_sure: bool,
     pub doppler_hz: f64,
-    /// In halves of a cell.
+    /// Delay in halves of a cell.
     pub half_lag: usize,
 }
 
@@ -115,7 +115,8 @@ pub(super) struct Again<'a> {
     pub before: &'a Map,
     /// Numbers of the Dopplers for all satellites.
     pub dopplers: &'a [usize],
-    /// Which of the satellites of before these are, and whether one is looked at everywhere.
+    /// Indices of the satellites in the earlier search. The flag is true for a satellite that is searched at
+    /// all Dopplers.
     pub satellites: &'a [(usize, bool)],
 }
 
@@ -137,7 +138,7 @@ impl Map {
 #[derive(Clone, Copy)]
 pub(super) struct Strip {
     pub peak: f32,
-    /// In halves of a cell.
+    /// Delay in halves of a cell.
     pub half_lag: usize,
     pub total: f64,
     pub near: f64,

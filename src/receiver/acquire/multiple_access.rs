@@ -24,9 +24,8 @@ use crate::threshold::{of_one_cell, threshold};
 pub(super) const LEAST_CODES: usize = 12;
 /// A bin is crowded when its median is so many standard deviations above that of noise.
 const CROWDED: f64 = 5.0;
-/// After the first half of its sums a bin that shows no more than this of them is none: of one that is to be
-/// crowded by all sums the median is raised by half of [`CROWDED`] then, and shows so little in one case of
-/// 40.
+/// Share of the rise below which a bin counts as quiet after the first half of its sums. The median of a bin
+/// that is crowded by all sums is raised by half of [`CROWDED`] then. It shows as little in one case of 40.
 const QUIET: f64 = 0.5;
 /// Standard deviation of a Gumbel sample's median over scale, times √n: 1 / (2 × density there, ½ ln 2) =
 /// 1/ln 2.

@@ -1,10 +1,10 @@
-//! From a cell of the search to a start for tracking: Doppler to some hertz, code phase to a few hundredths
-//! of a chip, C/N0.
+//! Refinement of a cell of the search to a start for tracking: Doppler to some hertz, code phase to a few
+//! hundredths of a chip, C/N0.
 //!
-//! Prompt sums over single code periods are squared, which removes data signs (Costas), and the
-//! frequency of the squares is read from a padded FFT. Then an early-minus-late comparison of
-//! amplitudes, half a chip to either side, centres the code phase. The noise power comes from
-//! correlators at code phases where the code's own autocorrelation is small.
+//! Prompt sums over single code periods are squared, which removes data signs (Costas). The frequency of the
+//! squares is read from a padded FFT. Then an early-minus-late comparison of amplitudes, half a chip to
+//! either side, centres the code phase. The noise power comes from correlators at code phases where the
+//! code's own autocorrelation is small.
 
 use fft::Planner;
 use num_complex::Complex;
@@ -23,7 +23,7 @@ const PADDING: usize = 8;
 /// A satellite's place after refinement.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Refined {
-    /// At the first sample of the block, in [0, code length).
+    /// Code phase at the first sample of the block, in [0, code length).
     pub code_phase_chips: f64,
     pub doppler_hz: f64,
     pub cn0_hz: f64,

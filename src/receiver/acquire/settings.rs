@@ -43,7 +43,7 @@ pub struct AcquisitionSettings {
 pub(crate) const MOST_DOPPLER_HZ: f64 = 1e6;
 pub(crate) const MOST_SUMS: u32 = 100_000;
 
-/// In place of names: all that the bands hold.
+/// Word in place of names, for all signals that the bands hold.
 pub const ALL: &str = "all";
 
 /// Code periods of a symbol that are too few to sum more than one coherently before its edges are known.

@@ -95,7 +95,7 @@ pub(super) struct Job<'a> {
     pub i: &'a [f32],
     pub q: &'a [f32],
     pub nco: Nco,
-    /// In 16 bits, if asked for and possible.
+    /// Motion of the code in 16 bits, if requested and possible.
     short: Option<short::Steps>,
 }
 

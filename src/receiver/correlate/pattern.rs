@@ -37,9 +37,10 @@ pub(super) struct Pattern {
     pub(super) floats: OnceLock<Table<f32>>,
     #[cfg(target_arch = "x86_64")]
     pub(super) shorts: OnceLock<Table<i16>>,
-    /// Half cycles that its sub-carrier makes in a chip, of a component that is one side of one …
+    /// Half cycles of the sub-carrier in a chip, for a component that is one sideband.
     pub half_cycles: i32,
-    /// … and whether taps beside the prompt have the sub-carrier's phase there, or the prompt's.
+    /// True if taps beside the prompt have the sub-carrier's phase at the tap, false if they have the
+    /// prompt's.
     pub turns_at_taps: bool,
     /// True if the pattern's part enters with the opposite sign.
     pub is_inverted: bool,

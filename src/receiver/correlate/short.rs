@@ -90,7 +90,7 @@ impl Steps {
     }
 }
 
-/// Up to [`GROUPS`] groups and their phasors.
+/// Chunk of up to [`GROUPS`] groups and their phasors.
 pub(super) struct Chunk<'a> {
     pub replica: &'a Pattern,
     pub steps: &'a Steps,

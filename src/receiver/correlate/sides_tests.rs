@@ -1,4 +1,4 @@
-//! Both sides of a sub-carrier in one replica, against their definition sample by sample.
+//! Tests of both sidebands of a sub-carrier in one replica, against their definition sample by sample.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 

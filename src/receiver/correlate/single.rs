@@ -16,7 +16,7 @@ pub(super) const CHUNK: usize = LANES * VECTORS;
 pub(super) const FINE: u32 = 27;
 pub(super) const FINE_MASK: u32 = (1 << FINE) - 1;
 
-/// Up to [`CHUNK`] samples, and what is needed to correlate them.
+/// Chunk of up to [`CHUNK`] samples, with the data to correlate them.
 pub(super) struct Chunk<'a> {
     pub replica: &'a Pattern,
     pub steps: &'a Steps,

@@ -8,8 +8,8 @@
 
 use gnss::signal::{Component, Layer, Layers, Signal};
 
-/// Why samples at `rate_hz` do not do for replicas of these layers, if they do not: area edges want a sample
-/// in each step.
+/// Reason why samples at `rate_hz` do not suffice for replicas of these layers, if they do not. Area edges
+/// need a sample in each step.
 pub fn layers_refusal(made: Layers, signal: &Signal, rate_hz: f64) -> Option<String> {
     let several = signal.components.iter().filter(|one| one.layers.len() > 1 && one.tone().is_none());
     let steps_hz = several.map(|component| component.chip_rate_hz * component.steps_per_chip() as f64);

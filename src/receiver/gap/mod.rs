@@ -34,9 +34,9 @@ const AGREEING_SHARE: f64 = 0.66;
 /// Channels agree when they are this many deviations apart, and this much for what is no noise (multipath).
 const AGREEING_SIGMAS: f64 = 5.0;
 const AGREEING_CHIPS: f64 = 0.03;
-/// A common step is suspicious beyond so many deviations …
+/// Standard deviations beyond which a common step is suspicious.
 const SUSPICIOUS_SIGMAS: f64 = 6.0;
-/// … and beyond this share of a sample.
+/// Share of a sample beyond which a common step is suspicious.
 const SUSPICIOUS_SAMPLES: f64 = 0.3;
 /// Seconds of Doppler are suspicious beyond as many deviations and this.
 const SUSPICIOUS_S: f64 = 5e-3;
@@ -162,7 +162,7 @@ pub struct Fit {
     pub sigma_chips: f64,
     /// Seconds of Doppler.
     pub seconds: f64,
-    /// Their standard deviation.
+    /// Standard deviation of the seconds of Doppler, in seconds.
     pub sigma_s: f64,
 }
 
@@ -222,13 +222,13 @@ pub struct Edges {
 }
 
 impl Edges {
-    /// For symbols of so many code periods.
+    /// Edges for symbols of `periods` code periods.
     pub fn new(periods: u32) -> Self {
         Self { products: vec![0.0; periods.max(1) as usize], count: 0, signs: None }
     }
 
-    /// For a secondary code whose chips, one a code period by its number, are these: they have been taken off
-    /// the prompts.
+    /// Edges for a secondary code with these chips, one a code period by its number. They have been removed
+    /// from the prompts.
     pub fn of_secondary_code(chips: &[f64]) -> Self {
         let before = chips.iter().skip(chips.len().saturating_sub(1)).chain(chips);
         let signs = before.zip(chips).map(|(before, chip)| before * chip).collect();
@@ -250,7 +250,7 @@ impl Edges {
         self.count
     }
 
-    /// These products and those of a later time, of the same symbols or secondary code.
+    /// Sum of these products and those of a later time, of the same symbols or secondary code.
     pub fn and(mut self, later: &Self) -> Self {
         self.products.iter_mut().zip(&later.products).for_each(|(sum, product)| *sum += product);
         self.count += later.count;
@@ -332,9 +332,10 @@ fn secondary_code_turned_by(channels: &[(&Edges, u64)], length: usize) -> Option
 /// A place at which samples are missing or came twice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Jump {
-    /// Near which sample of the recording, of several front ends the first one's: 0.1 s at most after it.
+    /// Sample of the recording near the jump, 0.1 s at most after it. With several front ends it is the first
+    /// one's.
     pub sample: u64,
-    /// So many are missing; negative where as many came twice.
+    /// Number of missing samples; negative where samples came twice.
     pub samples: i64,
     /// The place of the front end that lost its own samples, from 0 on.
     #[serde(skip_serializing_if = "is_first")]

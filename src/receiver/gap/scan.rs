@@ -18,7 +18,7 @@ const LEAST_PERIODS: u32 = 20;
 const PERIODS_A_BLOCK: usize = 20;
 /// A peak counts beyond so many deviations; with 1e6 places, noise has one in 1e7 scans.
 const PEAK_SIGMAS: f64 = 8.0;
-/// It has to lead the place where the codes were to be by so many.
+/// Standard deviations by which a peak has to exceed the value at the expected position.
 const LEAD_SIGMAS: f64 = 6.0;
 /// Longest jump that is tried, and its steps: 0.06 chip of Doppler at 5 kHz to either side.
 const LONGEST_S: f64 = 1.0;
@@ -51,7 +51,7 @@ pub struct Scan {
 }
 
 impl Scan {
-    /// For codes that repeat every `period_s`.
+    /// A scan for codes that repeat every `period_s`.
     pub fn new(period_s: f64, rate_hz: f64) -> Self {
         let length = ((period_s * rate_hz).round() as usize).max(2);
         let mut planner = Planner::<f32>::new();

@@ -18,7 +18,7 @@ pub struct JsonLines<W> {
 }
 
 impl<W: Write> JsonLines<W> {
-    /// To a writer that messages call so.
+    /// A sink to a writer that messages call `name`.
     pub fn new(name: PathBuf, writer: W) -> Self {
         Self { name, writer }
     }

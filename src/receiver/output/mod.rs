@@ -173,9 +173,9 @@ pub struct Output {
     interference: Sheet,
     /// Files of the second and later front ends; each exists once it has a line.
     interference_of: BTreeMap<usize, Sheet>,
-    /// There once a fix has another time scale than GPS time.
+    /// File of the clocks, which exists once a fix has another time scale than GPS time.
     clocks: Option<Sheet>,
-    /// There once a satellite has two bands.
+    /// File of the ionosphere, which exists once a satellite has two bands.
     ionosphere: Option<Sheet>,
     /// Parameters written so far: those of one issue are written once.
     parameters: BTreeSet<NavigationRow>,

@@ -21,7 +21,7 @@ pub struct Nmea<W> {
 }
 
 impl<W: Write> Nmea<W> {
-    /// To a writer that messages call so.
+    /// A sink to a writer that messages call `name`.
     pub fn new(name: PathBuf, writer: W) -> Self {
         Self { name, writer, sample: 0, observed: BTreeMap::new(), fix: None }
     }

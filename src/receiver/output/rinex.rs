@@ -16,14 +16,15 @@ pub struct Rinex {
     observations: ObservationFile<BufWriter<File>>,
     messages: NavigationSets,
     signals: Vec<&'static Signal>,
-    /// When the newest observation was sent.
+    /// Transmit time of the newest observation.
     near: Option<Epoch>,
 }
 
 impl Rinex {
-    /// In an existing directory, of a receiver of these signals at a place of that name.
+    /// Creates the files in an existing directory, for a receiver of these signals at a place named `marker`.
     ///
     /// # Errors
+    ///
     /// [`OutputError::Create`] with the path that cannot be made.
     pub fn create(
         directory: &Path,

@@ -13,9 +13,10 @@ pub struct Tracks {
 }
 
 impl Tracks {
-    /// In an existing directory, of a track of that name.
+    /// Creates the files in an existing directory, for a track of that name.
     ///
     /// # Errors
+    ///
     /// [`OutputError::Create`] with the path that cannot be made.
     pub fn create(directory: &Path, name: &str) -> Result<Self, OutputError> {
         let one = |(file, form): (&str, TrackForm)| {

@@ -37,11 +37,11 @@ const FASTEST: u8 = 15;
 /// Status of a satellite in an augmentation system.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Standing {
-    /// It must not be used.
+    /// Satellite that must not be used.
     DoNotUse,
     /// Nothing in force is known of it.
     Without,
-    /// It is corrected.
+    /// Satellite with corrections.
     Corrected(Correction),
 }
 

@@ -107,8 +107,8 @@ pub enum Used<'a> {
     Single(&'a Observation),
 }
 
-/// For each satellite with two carriers those that are farthest apart, of equal ones the first; for each
-/// other one all its observations. In the order in which satellites come.
+/// Pairs of the satellites with two carriers, and all observations of the other satellites, in the order of
+/// the satellites. A pair has the carriers that are farthest apart, of equal ones the first.
 pub fn paired(observations: &[Observation]) -> Vec<Used<'_>> {
     let mut used = Vec::with_capacity(observations.len());
     for (index, observation) in observations.iter().enumerate() {

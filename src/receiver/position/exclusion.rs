@@ -1,17 +1,18 @@
-//! Which ranges contradict the others: the residual test, and the search for the fewest that have to go.
+//! Exclusion of ranges that contradict the others: the residual test, and the search for the fewest to leave
+//! out.
 //!
-//! A weighted sum of squared residuals above its chi-square threshold shows a fault, not where it is. All
-//! sets of one satellite are tried, then all of two, and so on, as far as at least one degree of freedom is
-//! left to prove the rest: a set of the smallest size that leaves ranges which agree is left out. Leaving out
-//! one after another instead is deceived by two equal faults, as the first to go may be a good one. Sets are
-//! ranked by the exact change of the sum of squares in the linearised problem, wᵀS⁻¹w of the set's own
-//! normalised residuals and their covariance; only the best few are solved.
+//! A weighted sum of squared residuals above its chi-square threshold shows a fault, but not its position.
+//! All sets of one satellite are tried, then all of two, and so on, as long as one degree of freedom is left
+//! as proof. The smallest set that leaves consistent ranges is left out. Leaving out one range after another
+//! would be deceived by two equal faults, because the first to go may be a good one. Sets are ranked by the
+//! exact change of the sum of squares in the linearised problem. It is wᵀS⁻¹w of the set's own normalised
+//! residuals and their covariance. Only the best few are solved.
 //!
-//! Where two sets leave ranges that agree within themselves but on different places, nothing shows which is
-//! right: then there is no position ([`NoFix::Ambiguous`]). Places nearer than what a wrong model of the
-//! atmosphere does are no separate faults: the best fit serves. Limits: faults on so many satellites that
-//! good ones are the minority, and faults that happen to fit another position: as many directions as there
-//! are degrees of freedom are all that residuals see.
+//! Two sets may leave consistent ranges at different positions. Nothing then shows which is right, and there
+//! is no position ([`NoFix::Ambiguous`]). Positions within the effect of a wrong atmosphere model are not
+//! separate faults, and the best fit is used. Limits: faults on so many satellites that good ones are the
+//! minority, and faults that happen to fit another position. Residuals see only as many directions as there
+//! are degrees of freedom.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};

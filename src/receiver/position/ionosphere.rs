@@ -70,7 +70,7 @@ impl Delays {
 pub struct DelayError {
     /// Standard deviation of the delay's error as a share of the delay.
     pub share: f64,
-    /// … beside a constant of so many metres.
+    /// Constant part of the deviation, in metres.
     pub least_m: f64,
 }
 

@@ -71,7 +71,7 @@ pub struct Range {
 /// Knowledge about the ionosphere.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ionosphere {
-    /// There is none.
+    /// No ionosphere.
     Absent,
     /// The model is right but for what [`Corrections::model_sigma_m`] covers.
     Known(Delays),
@@ -103,7 +103,7 @@ pub struct Solution {
     pub clocks: Vec<(&'static TimeScale, f64)>,
     /// Index of each range's clock among the clocks.
     pub clock_of: Vec<usize>,
-    /// … measured minus computed, standard deviation, unit vector to the satellite, elevation.
+    /// Residual of each range in metres: measured minus computed.
     pub residuals_m: Vec<f64>,
     /// Standard deviation of each range.
     pub sigmas_m: Vec<f64>,

@@ -69,7 +69,7 @@ pub enum IonosphereChoice {
     NequickG,
     /// BDGIM only.
     Bdgim,
-    /// Not at all: recordings made without an ionosphere.
+    /// No correction: for recordings made without an ionosphere.
     None,
 }
 
@@ -220,7 +220,7 @@ impl CodeNoise {
     }
 }
 
-/// Why there is no position.
+/// Reason why there is no position.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum NoFix {
     /// Fewer ranges than unknowns.

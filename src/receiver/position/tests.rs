@@ -246,8 +246,8 @@ mod with_real_orbits {
     use gnss::broadcast::Ephemeris;
     use gnss::rinex;
 
-    /// When a satellite sent what arrives at `seconds` after `start` at a place that moves, by its clock,
-    /// relative to `start`.
+    /// Transmit time of a signal by the satellite's clock, relative to `start`. It arrives `seconds` after
+    /// `start` at a moving place.
     fn sent_s(ephemeris: &Ephemeris, start: Epoch, seconds: f64, here_m: Vector3<f64>) -> (f64, f64) {
         let mut travel_s = 0.075;
         for _ in 0..6 {

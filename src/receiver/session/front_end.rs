@@ -29,10 +29,11 @@ use gnss::record::{EventRow, LineRow};
 use gnss::samples::IfMetadata;
 use gnss::signal::{Link, Signal};
 
-/// Channels go over a block in parts of so many samples at least: 512 KiB in planar `f32` with running sums,
-/// a core's own cache …
+/// Least length of the parts of a block that channels process one after the other, in samples. It is 512 KiB
+/// in planar `f32` with running sums, a core's own cache.
 const PART_SAMPLES: usize = 1 << 15;
-/// … and of so many of the longest code period, as one that a part's end cuts is unpacked again.
+/// Least length of those parts in periods of the longest code. The code period at a part's end is unpacked
+/// again.
 const PART_PERIODS: f64 = 4.0;
 
 /// Forms of the samples that the channels of a front end need.
@@ -99,7 +100,7 @@ impl Window {
 pub(super) struct FrontEnd {
     pub step: Step,
     pub metadata: IfMetadata,
-    /// With its own signals.
+    /// Settings with the front end's own signals.
     pub settings: Settings,
     /// The signals that are received here; none where other front ends receive all.
     pub signals: Vec<&'static Signal>,
@@ -108,7 +109,7 @@ pub(super) struct FrontEnd {
     /// Dopplers that the search covers, and true if they are those after the first search.
     pub aimed: Option<(plan::Sweep, bool)>,
     pub widenings: usize,
-    /// About which Dopplers are expected while the clock is unknown.
+    /// Centre of the expected Dopplers in hertz while the clock is unknown.
     pub sky_hz: f64,
     pub looks: Looks,
     pub mirrored: Option<Estimate>,
@@ -117,7 +118,7 @@ pub(super) struct FrontEnd {
     pub needed: u64,
     pub searched: bool,
     pub next_search: u64,
-    /// When satellites that are predicted are searched for.
+    /// Sample of the next search for predicted satellites.
     pub next_foreseen: u64,
     pub window: Option<Window>,
     pub tracks: Vec<Track>,
@@ -149,8 +150,8 @@ pub(super) struct FrontEnd {
 }
 
 impl FrontEnd {
-    /// Before the first sample; `settings` name the signals of this front end, which are `signals` as far as
-    /// its samples hold them.
+    /// State before the first sample. `settings` name the signals of this front end, which are `signals` as
+    /// far as its samples hold them.
     pub fn new(
         step: Step,
         metadata: &IfMetadata,

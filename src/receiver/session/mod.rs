@@ -34,7 +34,7 @@ mod shared;
 mod step;
 mod suited;
 
-/// So many fixes in a row have to show a channel's wrong time.
+/// Number of consecutive fixes that have to show a channel's wrong time.
 const WRONG_TIME_FIXES: u32 = 10;
 
 /// Years in 1024 weeks.

@@ -13,7 +13,7 @@ use gnss::record::AcquisitionRow;
 const MOVING_S: f64 = 1.0;
 /// A rate beyond so many deviations is named beside a mirrored spectrum.
 const RATE_SIGMAS: f64 = 6.0;
-/// With so many lines two searches have nothing to add.
+/// Number of lines from which on two searches have nothing to add.
 const LINES: usize = 3;
 
 impl FrontEnd {

@@ -1,12 +1,12 @@
-//! Which Dopplers the next search looks at.
+//! Dopplers of the next search.
 //!
 //! The first search takes the settings' range around zero. Once a fix knows the clock, searches are centred
-//! on its drift: a satellite's own Doppler stays within ±5 kHz, a clock of 2.5 ppm moves all of them by 3.9
-//! kHz. Before that the middle of the Dopplers that were found counts: where it lies so far from that of the
-//! search that its edge may cut a sky of ±4 kHz, the next search follows at once and reaches as far about
-//! it. So an offset of several kHz, of the clock or of a mixer, costs a tenth of a second and not the
-//! satellites beyond the edge, or a subframe of theirs. While too few satellites are found for a fix, every
-//! search is wider than the one before, then the widths begin anew.
+//! on its drift. A satellite's own Doppler stays within ±5 kHz, and a clock of 2.5 ppm moves all of them by
+//! 3.9 kHz. Before that the middle of the found Dopplers counts. It may be so far from the search's middle
+//! that the search's edge cuts a sky of ±4 kHz. The next search then follows at once, with the same width
+//! about it. So an offset of several kHz, of the clock or of a mixer, costs a tenth of a second. It does not
+//! cost the satellites beyond the edge, or a subframe of theirs. While too few satellites are found for a
+//! fix, every search is wider than the one before. After the widest one the widths begin again.
 
 use super::FrontEnd;
 use super::shared::Shared;

@@ -23,9 +23,9 @@ use gnss::satellite::Sv;
 use gnss::signal::{Link, Signal};
 use gnss::time::Epoch;
 
-/// A Doppler may be so far from the predicted one …
+/// Largest difference of a Doppler from the predicted one, in hertz.
 const HALF_HZ: f64 = 500.0;
-/// … and so much further for each second without a fix.
+/// Growth of that difference for each second without a fix, in hertz per second.
 const GROWTH_HZ: f64 = 10.0;
 /// Predictions older than this are none.
 const OLDEST_S: f64 = 60.0;

@@ -1,4 +1,4 @@
-//! When satellites are searched for, which channels a search starts, and which channels end.
+//! Times of the searches, and the channels that a search starts or ends.
 
 use std::collections::BTreeSet;
 
@@ -30,7 +30,8 @@ const REFUSED_S: f64 = 120.0;
 /// First samples of a recording that are kept for a search at its end, if it is a short one: three times as
 /// many as the first search of C/A takes, which finds what is 3 dB weaker.
 const OPENING_S: f64 = 0.064;
-/// So many times the samples of the first search make another worth its time: they find what is 1 dB weaker.
+/// Ratio to the samples of the first search that makes another search worthwhile: it finds signals that are 1
+/// dB weaker.
 const WORTH: f64 = 1.5;
 /// Delays this near, in chips, and Dopplers this near, in cycles of a coherent sum, are equal: a search tells
 /// apart no more, and the side peaks of a sub-carrier lie half a chip from the main one.
@@ -310,8 +311,8 @@ impl FrontEnd {
             && (a.doppler_hz - b.doppler_hz).abs() * sum_s < SAME_CYCLES
     }
 
-    /// Whose signal it is that was found, of satellites that a search cannot tell apart: of one whose
-    /// elements are known, or else, until its message says more, of the one that was searched for.
+    /// Satellite of a found signal, among satellites that a search cannot tell apart. It is one whose
+    /// elements are known. Otherwise it is the one that was searched for, until its message says more.
     fn likeliest(&self, found: Link, shared: &Shared) -> Sv {
         let is_known = |link: &&Link| !shared.ephemerides.of(link.sv).is_empty();
         let alike = |link: &&Link| found.channel().is_some() && link.is_alike(found);

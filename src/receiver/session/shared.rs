@@ -35,7 +35,7 @@ pub(super) struct LastFix {
 pub(super) struct Shared {
     pub settings: Settings,
     pub week_reference: Epoch,
-    /// When the recording says that it begins.
+    /// Start time that the recording states.
     pub start: Option<Epoch>,
     pub noises: Noises,
     pub timebase: Timebase,
@@ -65,7 +65,7 @@ pub(super) struct Shared {
 }
 
 impl Shared {
-    /// Before the first sample; `rate` is that of the first front end.
+    /// State before the first sample; `rate` is that of the first front end.
     pub fn new(
         settings: &Settings,
         noises: Noises,

@@ -26,7 +26,7 @@ impl Step {
         Self { number, rate, main, behind: 0, main_behind: 0 }
     }
 
-    /// So many samples of this front end are missing; negative where they came twice.
+    /// Takes a number of missing samples of this front end; negative where they came twice.
     pub fn lose(&mut self, samples: i64) {
         self.behind += samples;
         if self.number == 0 {

@@ -125,9 +125,9 @@ pub(crate) fn held(metadata: &[IfMetadata], settings: &Settings) -> Vec<&'static
     if held.is_empty() { vec![&L1_CA] } else { held }
 }
 
-/// Which signals each of several front ends receives: every signal in the first whose band holds its main
-/// lobes, or else its carrier. Samples that hold none are searched all the same, the first front end's for
-/// the first signal: that nothing is found has a diagnosis.
+/// Signals that each of several front ends receives. A signal is received in the first one whose band holds
+/// its main lobes, or else its carrier. If the samples hold no signal, the first front end is searched for
+/// the first signal, so that there is a diagnosis.
 pub(super) fn assigned(metadata: &[IfMetadata], signals: &[&'static Signal]) -> Vec<Vec<&'static Signal>> {
     let whole = |metadata: &IfMetadata, signal: &Signal| {
         metadata.if_hz(signal.centre_hz()).abs() + signal.lobe_hz() <= 0.5 * metadata.rate.hz()

@@ -34,7 +34,7 @@ pub(super) struct BitSync {
 }
 
 impl BitSync {
-    /// For bits of symbols with these signs.
+    /// Synchronisation for bits of symbols with these signs.
     pub fn new(signs: &'static [i8]) -> Self {
         Self {
             signs,

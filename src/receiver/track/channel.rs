@@ -173,7 +173,7 @@ pub struct Channel {
     stage: Stage,
     stage_since: u64,
     update_since: u64,
-    /// When the pull-in began, and its prompts.
+    /// Code period at which the pull-in began, and its prompts.
     pull_in_since: u64,
     batch: Batch,
     /// True if the pull-in is that of a weak signal, by a batch.
@@ -345,7 +345,8 @@ impl Channel {
         self.lost
     }
 
-    /// From here on it follows `sv`, whose carrier and code are those of the satellite that was searched for.
+    /// Renames the channel's satellite to `sv`, whose carrier and code equal those of the satellite that was
+    /// searched for.
     pub fn rename(&mut self, sv: Sv) {
         self.sv = sv;
         self.hit.sv = sv;

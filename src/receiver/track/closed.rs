@@ -9,7 +9,7 @@ use num_complex::Complex64;
 use super::loops::{self, CodeGain, CodeShape, Gains, Rates};
 use super::{CodeDiscriminator, TrackingSettings};
 
-/// Which loops correct the carrier.
+/// Set of loops that correct the carrier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// The frequency loop alone, updated every code period.
@@ -41,7 +41,7 @@ pub struct Update {
     pub dll_chips: f64,
     /// Phase discriminator.
     pub pll_cycles: f64,
-    /// In mode [`Mode::Phase`] only reported: the frequency loop has done its work.
+    /// Frequency error in hertz. In mode [`Mode::Phase`] it is only reported.
     pub fll_hz: f64,
     /// Phase that the loop adds at once.
     pub carrier_jump_cycles: f64,

@@ -56,7 +56,7 @@ const LARGEST_CN0_HZ: f64 = 1e10;
 const LEAST_PERIODS: f64 = 50.0;
 
 impl Cn0 {
-    /// For symbols of `group` code periods whose edges are unknown, averaged over `average_s`.
+    /// An estimator for symbols of `group` code periods whose edges are unknown, averaged over `average_s`.
     pub fn new(group: u32, period_s: f64, average_s: f64) -> Self {
         let average_periods = (average_s / period_s).max(1.0);
         Self {
@@ -75,7 +75,7 @@ impl Cn0 {
         }
     }
 
-    /// For prompts each of which has a sign of its own.
+    /// An estimator for prompts each of which has its own sign.
     pub fn of_single_periods(period_s: f64, average_s: f64) -> Self {
         Self { single: true, ..Self::new(1, period_s, average_s) }
     }
@@ -89,7 +89,7 @@ impl Cn0 {
         wiped
     }
 
-    /// From now on the next prompt opens a symbol. Of what was seen before, the means stay.
+    /// Aligns the groups with symbols: the next prompt opens a symbol. The means so far are kept.
     pub fn know_symbols(&mut self) {
         self.open_symbol();
         if self.known || self.group < 2 {
@@ -188,7 +188,7 @@ impl Cn0 {
         Complex64::new(re, im).norm() / self.share()
     }
 
-    /// In Hz: A²/(2σ²T). `None` before enough has been seen.
+    /// C/N0 in hertz: A²/(2σ²T). `None` before enough has been seen.
     pub fn hz(&self) -> Option<f64> {
         let least = if self.known { 1.0 } else { LEAST_PERIODS };
         if self.signal.count() < least || self.noise.count() < 1.0 {

@@ -36,7 +36,8 @@ struct Start {
     off_chips: f64,
     /// Code error where the channel began.
     begin_chips: f64,
-    /// From the channel's first sample to the last one more than a quarter of a chip off the main peak.
+    /// Time from the channel's first sample to the last one more than a quarter of a chip off the main peak,
+    /// seconds.
     last_off_s: f64,
     /// Times at which the code left the main peak.
     left: u32,
@@ -331,8 +332,8 @@ fn follow(sent: Sent, settings: &TrackingSettings, duration_s: f64) -> Scatter {
     Scatter { code: scatter(&code), carrier: scatter(&carrier), values: code.len() as f64 }
 }
 
-/// After so long the carrier was locked for its first hundred prompts, symbols and secondary code are known,
-/// and nothing is left of the pull-in.
+/// Time in seconds after which a channel has settled. The carrier was locked for its first hundred prompts,
+/// symbols and secondary code are known, and the pull-in has decayed.
 fn settle_s(component: &Component) -> f64 {
     0.8 + 115.0 * component.period_s()
 }
@@ -349,7 +350,7 @@ struct Sent {
 
 /// Jitter measured on a signal, and the value that theory expects.
 struct Jitter {
-    /// Which signal and settings.
+    /// Signal and settings of the measurement.
     case: String,
     update_s: f64,
     code_m: f64,

@@ -32,7 +32,7 @@ impl Mean {
         Self { lean: 2.0, ..Self::new(terms) }
     }
 
-    /// With other terms, as if `count` of them had given `values`.
+    /// A mean with other terms, as if `count` of them had given `values`.
     pub(super) fn with(&self, terms: f64, count: f64, values: [f64; 2]) -> Self {
         let terms = terms.max(1.0);
         Self { terms, count: count.min(terms), lean: self.lean, values }
@@ -56,7 +56,7 @@ impl Mean {
         self.values
     }
 
-    /// Other values, of as many terms.
+    /// Replaces the values by others, of as many terms.
     pub(super) fn set(&mut self, values: [f64; 2]) {
         self.values = values;
     }
@@ -95,7 +95,7 @@ impl PhaseLock {
         self.mean.add([i2 - q2, i2 + q2 - noise]);
     }
 
-    /// From −1 to 1; 0 where nothing exceeds the noise.
+    /// Value of the phase lock, from −1 to 1; 0 where nothing exceeds the noise.
     pub fn value(&self) -> f64 {
         let [difference, sum] = self.mean.values();
         if sum <= 0.0 { 0.0 } else { planted!("receiver.lock.always", (difference / sum).clamp(-1.0, 1.0), 1.0) }
@@ -146,7 +146,7 @@ impl SymbolLock {
         self.last.len() >= several && sum > 0.0 && difference < SLIP_COSINE * sum
     }
 
-    /// From −1 to 1; 0 where nothing exceeds the noise.
+    /// Value of the phase lock, from −1 to 1; 0 where nothing exceeds the noise.
     pub fn value(&self) -> f64 {
         let [cosine, coherence] = self.mean.values();
         if coherence <= 0.0 { 0.0 } else { (cosine / coherence).clamp(-1.0, 1.0) }
@@ -187,7 +187,7 @@ impl LockState {
         Self { locked_since: Some(now), missing_since: None }
     }
 
-    /// Since when the carrier is locked; `None` where it is not.
+    /// Instant since which the carrier is locked; `None` where it is not.
     pub fn locked_since(&self) -> Option<u64> {
         self.locked_since
     }

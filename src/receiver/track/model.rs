@@ -9,7 +9,7 @@ use gnss::signal::{Component, Layers, Shape, Tone};
 /// The correlation of a component with the replica that is made of it.
 #[derive(Clone, Copy, Debug)]
 pub struct ReplicaModel {
-    /// At early and late.
+    /// Shape of the correlation at early and late.
     pub shape: CodeShape,
     /// Mean power of the replica's samples: below one for area edges, and where steps are zero.
     pub power: f64,
@@ -18,7 +18,7 @@ pub struct ReplicaModel {
 }
 
 impl ReplicaModel {
-    /// For samples of `rate_hz`. `None` for a component without layers.
+    /// A model for samples of `rate_hz`. `None` for a component without layers.
     pub fn new(settings: &TrackingSettings, component: &Component, rate_hz: f64) -> Option<Self> {
         Self::of(settings, component, None, rate_hz)
     }

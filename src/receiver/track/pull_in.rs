@@ -53,7 +53,7 @@ pub struct Found {
 const LEAST_CHANGE: f64 = 0.75;
 
 impl Batch {
-    /// For symbols of `group` code periods, of `wanted` prompts at least.
+    /// A batch for symbols of `group` code periods, with at least `wanted` prompts.
     pub fn new(group: u32, wanted: usize) -> Self {
         Self { group: group.max(1) as usize, prompts: Vec::new(), wanted, extended: false }
     }

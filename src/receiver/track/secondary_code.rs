@@ -9,7 +9,7 @@ pub struct SecondaryCodeSync {
     shifts: Shifts,
 }
 
-/// For every shift that a code may have against the count of its periods, the sum of what prompts say for it.
+/// Sums of the evidence for every shift of a code against the count of its periods.
 #[derive(Clone, Debug)]
 pub(super) struct Shifts {
     sums: Vec<f64>,
@@ -68,7 +68,7 @@ impl Shifts {
 }
 
 impl SecondaryCodeSync {
-    /// For that secondary code.
+    /// A search for the secondary code `code`.
     pub fn new(code: Vec<i8>) -> Self {
         Self { shifts: Shifts::new(code.len()), code }
     }

@@ -167,9 +167,9 @@ impl TrackingSettings {
         libm::exp10(0.1 * self.cn0_threshold_dbhz)
     }
 
-    /// These settings for a component. Numbers of code periods are those of 1 ms, so an update of longer
-    /// codes has fewer; the spacing is that of BPSK, so pulses of several steps have as much less; bandwidths
-    /// that an update of one code period cannot have are the largest that it can.
+    /// Settings fitted to a component. Numbers of code periods refer to periods of 1 ms, so an update of
+    /// longer codes has fewer. The spacing refers to BPSK, so it is smaller for pulses of several steps. A
+    /// bandwidth too large for an update of one code period is reduced to the largest possible one.
     pub fn fitted(&self, component: &Component) -> Self {
         let period_s = component.period_s();
         let most = (1e-3 * f64::from(self.integration) / period_s + 1e-9).floor() as u32;

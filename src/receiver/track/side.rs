@@ -32,13 +32,13 @@ const WEIGHT_SHARE: f64 = 0.5;
 /// The evidence for a main peak beside the prompt.
 #[derive(Clone, Debug)]
 pub struct SidePeaks {
-    /// From a peak to the next, in code phase units.
+    /// Distance from a peak to the next, in code phase units.
     step: i64,
     /// Correlation there over that of the main peak.
     ratio: f64,
     /// Evidence beyond which the code is moved.
     enough: f64,
-    /// For a main peak ahead of the prompt, and behind.
+    /// Evidence for a main peak ahead of the prompt, and behind.
     evidence: [f64; 2],
 }
 

@@ -1,11 +1,11 @@
-//! Both sides of a sub-carrier, followed together.
+//! Joint tracking of both sidebands of a sub-carrier.
 //!
-//! Either side alone is a code like any other: it is searched for and pulled in by itself, by the triangle of
-//! its chips, which has no side peaks. The pilot of each side has a secondary code of its own, and a sum of
-//! both has to know them: once the first one's is aligned, the replica has both, with the signs of the
-//! period, and early and late draw near to the peak that they make together. A side alone brings the code to
-//! a few hundredths of a chip; the neighbouring peak of both is a third of a chip away for AltBOC(15,10), and
-//! is left like that of any other signal ([`super::side`]).
+//! Either sideband alone is a code like any other. It is searched for and pulled in by itself, by the
+//! triangle of its chips, which has no side peaks. The pilot of each sideband has its own secondary code, and
+//! a sum of both needs them. Once the first one's is aligned, the replica has both sidebands, with the signs
+//! of the period. Early and late then move nearer to the peak of the sum. A sideband alone brings the code to
+//! a few hundredths of a chip. The neighbouring peak of the sum is a third of a chip away for AltBOC(15,10).
+//! The channel leaves it like a side peak of any other signal ([`super::side`]).
 
 use super::TrackingSettings;
 use super::loops::CodeShape;

@@ -30,7 +30,7 @@ struct Made {
     code: Vec<i8>,
     secondary_code: Vec<i8>,
     phasors: Vec<Complex64>,
-    /// For a mean power of its share.
+    /// Amplitude for the mean power of the component's share.
     amplitude: f64,
 }
 

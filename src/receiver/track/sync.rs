@@ -20,7 +20,7 @@ const MOST_SYMBOLS: u64 = 300;
 const LEAD_SIGMAS: f64 = 5.0;
 
 impl SymbolSync {
-    /// For symbols of so many periods.
+    /// Synchronisation for symbols of `periods` code periods.
     pub fn new(periods: u32) -> Self {
         let periods = periods.max(1) as usize;
         Self { last: vec![Complex64::ZERO; periods], energy: vec![0.0; periods], taken: 0 }

@@ -119,7 +119,7 @@ fn range(table: &Table<'_>) -> Result<Vec<Value>, ScenarioError> {
     Ok(numbers.into_iter().map(value).collect())
 }
 
-/// To 12 digits, so that 0.1 + 2 × 0.1 is 0.3.
+/// Number rounded to 12 digits, so that 0.1 + 2 × 0.1 is 0.3.
 fn rounded(x: f64) -> f64 {
     format!("{x:.11e}").parse().unwrap_or(x)
 }
@@ -168,9 +168,9 @@ pub struct Grid {
 pub struct Case {
     /// Counted from 0 over the whole study.
     pub number: u64,
-    /// Which of the repetitions, from 0.
+    /// Number of the repetition, from 0.
     pub repetition: u64,
-    /// For each axis of the study, the number of its value.
+    /// Index of the value on each axis of the study.
     pub at: Vec<usize>,
 }
 

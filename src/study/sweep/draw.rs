@@ -31,7 +31,7 @@ pub struct Picture {
     pub charts: Vec<Chart>,
     /// Series that are named below them.
     pub legend: Vec<Series>,
-    /// For crossings: names of the columns, and rows.
+    /// Names of the columns and rows of a table of crossings, for such pictures.
     pub crossings: Option<(Vec<String>, Vec<Vec<String>>)>,
 }
 
@@ -85,7 +85,7 @@ pub fn pictures(results: &Results) -> Vec<Picture> {
 
 /// Values of an axis that are written under it at most.
 const MOST_TICKS: usize = 10;
-/// From one series to the next where names are on the axis, in steps of the names.
+/// Distance from one series to the next where names are on the axis, in steps of the names.
 const NAMED_STEP: f64 = 0.12;
 
 /// Part of the results that a plot shows.
@@ -417,7 +417,7 @@ pub(super) fn crossed(points: &[(f64, f64)], level: f64) -> Option<f64> {
     pairs.filter(|x| x.is_finite())
 }
 
-/// From pale to dark through blue: dark letters stay readable.
+/// Colour from pale to dark through blue: dark letters stay readable.
 fn warmth(share: f64) -> RGBColor {
     const STOPS: [(f64, f64, f64); 4] =
         [(247.0, 251.0, 255.0), (198.0, 219.0, 239.0), (107.0, 174.0, 214.0), (66.0, 146.0, 198.0)];

@@ -50,12 +50,12 @@ pub struct Ensemble {
 pub struct Collector {
     axes: Vec<usize>,
     figures: usize,
-    /// In the order of their first cases: values of the axes, cases, and values of each figure.
+    /// Ensembles in the order of their first cases: values of the axes, cases, and values of each figure.
     found: Vec<(Vec<usize>, u64, Vec<Vec<f64>>)>,
 }
 
 impl Collector {
-    /// For ensembles that these axes keep apart.
+    /// A collector for ensembles that these axes distinguish.
     pub fn new(axes: &[usize], figures: usize) -> Self {
         Self { axes: axes.to_vec(), figures, found: Vec::new() }
     }

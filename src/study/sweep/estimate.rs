@@ -23,7 +23,8 @@ const T95: [f64; 30] = [
 ];
 const NORMAL95: f64 = 1.959_964;
 
-/// Beyond the table the first two terms of the expansion in 1/ν (Abramowitz and Stegun 26.7.5), within 1e-4.
+/// Quantile of Student's t. Beyond the table it is the first two terms of the expansion in 1/ν (Abramowitz
+/// and Stegun 26.7.5), within 1e-4.
 fn t95(freedom: usize) -> f64 {
     let (z, v) = (NORMAL95, freedom as f64);
     let (z3, z5) = (z * z * z, z * z * z * z * z);

@@ -96,15 +96,15 @@ impl<'r> Fixes<'r> {
         percentile(&self.with(model).map(of).collect::<Vec<_>>(), 0.95)
     }
 
-    /// From the last fix before the ionosphere's parameters to the first one after.
+    /// Step from the last fix before the ionosphere's parameters to the first one after.
     fn step(&self) -> Option<(Vector3<f64>, &Fix)> {
         let before = self.with(IonosphereModel::Nominal).next_back()?;
         let after = self.with(IonosphereModel::Broadcast).next()?;
         Some((after.enu_m - before.enu_m, &before.fix))
     }
 
-    /// When the last of subframes 1 to 3 that begins [`LOCK_S`] after the start or later has come from all
-    /// satellites.
+    /// Time in seconds at which the last of subframes 1 to 3 has come from all satellites, of those that
+    /// begin [`LOCK_S`] after the start or later.
     fn ready_s(&self) -> Option<f64> {
         let first = self.run.trajectory.first()?;
         // Of the week's 20 160 frames each begins at a multiple of 30 s of GPS time, which 1980's seconds are

@@ -44,7 +44,7 @@ use generator::scenario::ScenarioError;
 use receiver::ReceiveError;
 use receiver::output::OutputError;
 
-/// Why a study cannot be planned, run or merged.
+/// Error that prevents the planning, the run or the merge of a study.
 #[derive(Debug, Error)]
 pub enum StudyError {
     /// The study's file is not as its keys ask.
@@ -59,7 +59,7 @@ pub enum StudyError {
         key: String,
         /// The value as written.
         value: String,
-        /// Why, in words.
+        /// Reason in words.
         reason: String,
     },
     /// A case's values together make no scene or no settings.
@@ -71,7 +71,7 @@ pub enum StudyError {
         case: u64,
         /// The case's values, as written.
         values: String,
-        /// Why, in words.
+        /// Reason in words.
         reason: String,
     },
     /// Data that no repetition will mend: a file that the study names cannot be used.
@@ -79,7 +79,7 @@ pub enum StudyError {
     Input {
         /// The file or directory.
         path: PathBuf,
-        /// Why, in words.
+        /// Reason in words.
         reason: String,
     },
     /// A file cannot be read.
@@ -111,7 +111,7 @@ pub enum StudyError {
     Occupied {
         /// The file or directory.
         path: PathBuf,
-        /// Why, in words.
+        /// Reason in words.
         reason: String,
     },
     /// A shard that was made again differs from the one that is there.

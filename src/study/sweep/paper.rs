@@ -73,7 +73,7 @@ pub(super) fn pdf(plan: &Plan, results: &Results, pictures: &[Picture]) -> Resul
     report.pdf().map_err(|error| failed(error.to_string()))
 }
 
-/// Most columns that a page holds without breaking words.
+/// Largest number of columns that a page holds without breaking words.
 const MOST_COLUMNS: usize = 7;
 
 /// Table with a row for each figure, where a column for each would be too narrow. The first `fixed` columns

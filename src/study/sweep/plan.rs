@@ -24,7 +24,7 @@ use generator::scenario::{Overrides, Scenario};
 /// Version of manifest and shards.
 const SCHEMA: u32 = 1;
 const TOOL: &str = concat!("gnss-twin ", env!("CARGO_PKG_VERSION"));
-/// Most shards unless set otherwise: clusters take arrays of a thousand tasks by default.
+/// Largest number of shards unless set otherwise: clusters take arrays of a thousand tasks by default.
 const MOST_SHARDS: u64 = 1000;
 /// Least number of shards where there are enough cases, so that a kill costs little.
 const LEAST_SHARDS: u64 = 50;
@@ -34,9 +34,9 @@ const SHARD_MINUTES: f64 = 1.0;
 /// Rule that cuts a study into shards.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cut {
-    /// About a minute of one core each at most, 50 to 1000.
+    /// Shards of about a minute of one core each at most, 50 to 1000 of them.
     Default,
-    /// Into so many shards.
+    /// Fixed number of shards.
     Shards(u64),
     /// Time of a shard on one core, in minutes.
     Minutes(f64),
@@ -113,7 +113,7 @@ pub struct Plan {
     pub manifest: Manifest,
     /// Hash of the manifest's bytes.
     pub hash: String,
-    /// At samples level: the scenes.
+    /// Scenes of a study at samples level.
     pub bases: Vec<Base>,
 }
 
@@ -428,7 +428,7 @@ fn check(study: &Study, bases: &[Base]) -> Result<(), StudyError> {
     Ok(())
 }
 
-/// Why one value of one axis is refused in the base by itself.
+/// Reason why one value of one axis is refused in the base by itself.
 fn bad_alone(study: &Study, bases: &[Base], axis: &Axis, value: &Value) -> Option<String> {
     let read = |base| sampled::patched(base, &[(axis, value)]).and_then(|document| sampled::read(base, &document));
     match study.level {

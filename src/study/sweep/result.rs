@@ -64,7 +64,7 @@ pub struct Results {
 /// All repetitions of one combination of the axes' values.
 #[derive(Clone, Debug)]
 pub struct Cell {
-    /// For each axis, the number of its value.
+    /// Index of the value on each axis.
     pub at: Vec<usize>,
     /// Estimate of each figure; `None` where no case gave one.
     pub estimates: Vec<Option<Estimate>>,
@@ -163,7 +163,7 @@ impl Results {
         table.into_inner().map_err(|e| StudyError::Bug(e.to_string()))
     }
 
-    /// For each figure that theory predicts: how measurement and theory agree.
+    /// Agreement of measurement and theory for each figure that theory predicts.
     pub fn agreement(&self) -> Vec<Agreement> {
         let snr = self.figure(SNR);
         let pair = |(number, figure): (usize, &Column)| {

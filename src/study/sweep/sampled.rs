@@ -248,7 +248,7 @@ fn first_search(run: &Run) -> (Option<f64>, f64) {
     (share, strange as f64)
 }
 
-/// When within its second the signal of each true observation was sent.
+/// Transmit times of the true observations within their second, seconds.
 fn places_s(run: &Run) -> Result<Vec<f64>, JudgeError> {
     let mut places = Vec::with_capacity(run.truth.len());
     for link in run.truth.keys() {

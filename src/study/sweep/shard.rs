@@ -21,11 +21,11 @@ pub type CaseFigures = Vec<Option<f64>>;
 /// State of a shard's file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Found {
-    /// There is no such file.
+    /// Missing file.
     Nothing,
     /// Complete shard, with its lines of data.
     Whole(Vec<String>),
-    /// Why it cannot be used.
+    /// Unusable file, with the reason.
     Bad(String),
 }
 

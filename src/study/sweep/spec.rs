@@ -53,9 +53,9 @@ pub struct Study {
     pub axes: Vec<Axis>,
     /// Combination of the axes into cases.
     pub grid: Grid,
-    /// At correlator level: the tables of the study that make its base.
+    /// Tables of the study that make its base, at correlator level.
     pub base: toml::Table,
-    /// At samples level: the scene's file, as written; absent where an axis names the files.
+    /// File of the scene as written, at samples level; absent where an axis names the files.
     pub scenario: Option<PathBuf>,
     /// Figures to keep; at correlator level those of theory follow the ones that they predict.
     pub keep: Vec<String>,
@@ -175,7 +175,7 @@ impl Study {
         self.axes.iter().zip(&case.at).filter_map(at).collect()
     }
 
-    /// They in words.
+    /// Values of a case in words.
     pub fn values_text(&self, case: &axis::Case) -> String {
         let words: Vec<String> =
             self.values(case).iter().map(|(axis, value)| format!("{} = {}", axis.key, axis::text_of(value))).collect();

@@ -95,7 +95,7 @@ pub struct Satellite {
     pub epochs: usize,
     /// Median of its true C/N0, dB-Hz.
     pub usual_dbhz: f64,
-    /// When it must have been acquired.
+    /// Time by which it must have been acquired, seconds.
     pub acquired_by_s: Option<f64>,
     /// Epochs at which it must be observed.
     pub due: usize,
@@ -111,7 +111,7 @@ pub struct Satellite {
     pub doppler_hz: f64,
 }
 
-/// When things happened to a receiver's channels, however it reports them.
+/// Times of the events in a receiver's channels, in any form of report.
 pub trait Observed {
     /// Times of a satellite's observations, in the epochs of the truth: samples, sorted.
     ///
@@ -137,9 +137,10 @@ pub struct Expectations {
     pub satellites: BTreeMap<Link, Satellite>,
     /// Epochs of the truth at which the receiver measures.
     pub epochs: Vec<Due>,
-    /// When the first fix is due, if the scene allows one.
+    /// Time at which the first fix is due, if the scene allows one, seconds.
     pub first_fix_s: Option<f64>,
-    /// When satellites and geometry would have allowed it, the ionosphere left aside.
+    /// Time at which satellites and geometry would have allowed it, without regard to the ionosphere,
+    /// seconds.
     pub four_by_s: Option<f64>,
     /// Messages that the satellites sent.
     message: Message,
@@ -294,8 +295,8 @@ struct Counted {
     sv: Option<Sv>,
     held: Vec<bool>,
     used: Vec<bool>,
-    /// Since when one of its signals that say their time must be observed. They come before those that do
-    /// not, as signals are sorted.
+    /// Time since which one of its signals that state their time must be observed, seconds. They come before
+    /// the others, as signals are sorted.
     dated_s: Option<f64>,
 }
 

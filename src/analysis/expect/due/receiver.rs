@@ -25,7 +25,7 @@ const MESSAGE_DBHZ: f64 = 27.0;
 const CODE_LOSS: f64 = 0.7;
 /// Places of an edge within a sum that are looked at.
 const EDGES: u32 = 8;
-/// With one cell between any two there are so many more of the same law.
+/// Factor of the number of independent cells with one cell between any two.
 const CELLS_BETWEEN: f64 = 1.5;
 /// Detection so sure that one search counts no more.
 const SUREST: f64 = 1.0 - 1e-7;

@@ -1,9 +1,9 @@
-//! When one satellite must be found, observed and used, from the truth's rows alone.
+//! Times at which one satellite must be found, observed and used, from the truth's rows alone.
 //!
-//! A satellite must be acquired once its searches, counted at the worst phase of their interval, have missed
-//! it with a probability below one in a million; observed once lock and two headers of the message had time;
-//! used once its ephemeris had. What ends a lock for a good reason starts all of that anew: the satellite is
-//! not there, too weak, faded, or the scene expects it.
+//! A satellite must be acquired once its searches have missed it with a probability below one in a million.
+//! The searches are counted at the worst phase of their interval. It must be observed after time for lock and
+//! two headers of the message. It must be used after time for its ephemeris. An excused end of a lock starts
+//! all of that anew: the satellite is not there, too weak, faded, or the scene expects it.
 
 use super::receiver::Receiver;
 use super::timetable::Timetable;
@@ -50,7 +50,7 @@ pub struct SatelliteEpoch {
     pub time_s: f64,
     /// True C/N0, dB-Hz.
     pub cn0_dbhz: f64,
-    /// With other satellites, interference and the front end's cost counted.
+    /// C/N0 with other satellites, interference and the front end's loss counted, dB-Hz.
     pub effective_dbhz: f64,
     /// The strongest satellite's.
     pub strongest_dbhz: f64,
@@ -60,14 +60,14 @@ pub struct SatelliteEpoch {
     pub above_mask: bool,
 }
 
-/// Why a satellite is not expected at a time.
+/// Reason why a satellite is not expected at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Excuse {
     /// The truth does not have it then.
     NotThere,
-    /// It is weaker than the receiver can hold.
+    /// Signal weaker than the receiver can hold.
     Weak,
-    /// It was weaker for a moment than the receiver can hold.
+    /// Signal that was for a moment weaker than the receiver can hold.
     Faded,
     /// The receiver's loop does not follow the scene's oscillator.
     Oscillator,
@@ -80,7 +80,7 @@ pub enum Excuse {
 }
 
 impl Excuse {
-    /// In words.
+    /// Reason in words.
     pub fn word(self) -> &'static str {
         match self {
             Self::NotThere => "set or obstructed",
@@ -112,7 +112,7 @@ pub struct Required {
 pub struct Scene<'s> {
     /// Expectations from the receiver's settings.
     pub receiver: &'s Receiver,
-    /// When its message says what.
+    /// Timetable of the message.
     pub timetable: Timetable,
     /// Expectations that the scene states.
     pub expect: &'s Expect,
@@ -142,13 +142,13 @@ impl Scene<'_> {
         wrong || self.of(sv, &[FaultKind::Health]).any(|fault| during(fault, time_s, HEALTH_S))
     }
 
-    /// When its elements are known, in short where that is enough.
+    /// Time in seconds at which its elements are known, or its reduced elements where they suffice.
     fn elements_by_s(&self, locked_s: f64) -> f64 {
         let whole_s = self.timetable.ephemeris_by_s(locked_s);
         if self.receiver.reduced_elements { whole_s.min(self.timetable.reduced_by_s(locked_s)) } else { whole_s }
     }
 
-    /// Why a lock may end at a row, if it may.
+    /// Reason why a lock may end at a row, if it may.
     pub fn excuse(&self, sv: Sv, row: &SatelliteEpoch, usual_dbhz: f64) -> Option<Excuse> {
         match self.expect.losses(sv, row.time_s) {
             Some(Losses::Any) => return Some(Excuse::Scene),
@@ -217,14 +217,14 @@ fn during(fault: &Fault, time_s: f64, after_s: f64) -> bool {
 /// Progress of a lock.
 #[derive(Clone, Copy, Debug, Default)]
 struct State {
-    /// Since when it could be found.
+    /// Time since which it could be found, seconds.
     since_s: Option<f64>,
     searches: u32,
     luck_np: f64,
     acquired_s: Option<f64>,
     observed_s: Option<f64>,
     used_s: Option<f64>,
-    /// When its ephemeris was last good.
+    /// Time at which its ephemeris was last good, seconds.
     ephemeris_s: Option<f64>,
 }
 

@@ -1,8 +1,8 @@
-//! When the navigation message says what, unit by unit: subframes of LNAV, pages of I/NAV.
+//! Timetable of the navigation message, unit by unit: subframes of LNAV, pages of I/NAV.
 //!
-//! All satellites of a system send in step with its time, so the scene's start alone says how long a receiver
-//! must wait. Times are seconds from the scene's first sample; what is sent at a boundary arrives a light
-//! time later.
+//! All satellites of a system send in step with its time. The scene's start alone therefore determines how
+//! long a receiver must wait. Times are seconds from the scene's first sample. A symbol that is sent at a
+//! boundary arrives a light time later.
 
 use std::collections::BTreeSet;
 
@@ -58,8 +58,8 @@ impl Timetable {
         Self { message: self.dating.or(self.message), dating: None, ..*self }
     }
 
-    /// When the first unit of those that `wanted` picks by its start has arrived whole of those that begin
-    /// from `from_s` on; never, if there is none.
+    /// Time in seconds at which the first wanted unit is complete, among those that begin from `from_s` on.
+    /// `wanted` selects units by their start. It is infinite if there is none.
     fn whole_by_s(&self, from_s: f64, wanted: impl Fn(&Message, Epoch) -> bool) -> f64 {
         let Some(message) = self.message else { return f64::INFINITY };
         let from = self.start.plus_s(from_s);
@@ -70,7 +70,8 @@ impl Timetable {
         found.map_or(f64::INFINITY, |start| start.since(self.start) + message.unit_s as f64 + LIGHT_S)
     }
 
-    /// When a channel locked since `locked_s` knows where units begin, and their time.
+    /// Time in seconds at which a channel locked since `locked_s` knows the beginnings of units, and their
+    /// time.
     pub fn frame_by_s(&self, locked_s: f64) -> f64 {
         if self.dating.is_some() {
             let unit_s = self.whole_by_s(locked_s, |_, _| true) + HEADER_S;
@@ -81,14 +82,14 @@ impl Timetable {
         self.all_by_s(dated, locked_s).max(one_s) + HEADER_S
     }
 
-    /// When the last of some units has arrived whole, each the first of its number.
+    /// Time in seconds at which the last of some units is complete, each the first of its number.
     fn all_by_s(&self, numbers: &[u8], locked_s: f64) -> f64 {
         let whole = |number: &u8| self.whole_by_s(locked_s, |message, start| (message.number)(start) == *number);
         numbers.iter().map(whole).fold(0.0, f64::max)
     }
 
-    /// When every unit of a set of elements has arrived whole. Units of two sets make none: where a new one
-    /// comes in between, it has to come from its beginning.
+    /// Time in seconds at which every unit of an ephemeris is complete. Units of two ephemerides do not
+    /// combine: where a new one comes in between, it has to come from its beginning.
     pub fn ephemeris_by_s(&self, locked_s: f64) -> f64 {
         let dated = self.dated();
         let Some(message) = dated.message else { return f64::INFINITY };
@@ -102,12 +103,12 @@ impl Timetable {
         }
     }
 
-    /// When a set in short has arrived whole; never, where the message has none.
+    /// Time in seconds at which reduced elements are complete; infinite where the message has none.
     pub fn reduced_by_s(&self, locked_s: f64) -> f64 {
         self.dated().whole_by_s(locked_s, |message, start| message.reduced.contains(&(message.number)(start)))
     }
 
-    /// When the ionosphere has arrived whole; never, where the message does not carry it.
+    /// Time in seconds at which the ionosphere is complete; infinite where the message does not carry it.
     pub fn ionosphere_by_s(&self, locked_s: f64) -> f64 {
         self.dated().whole_by_s(locked_s, |message, start| (message.ionosphere.unit)(start))
     }

@@ -26,7 +26,7 @@ pub enum Deviation {
 }
 
 impl Deviation {
-    /// All of them, in the order of `allan.csv`.
+    /// List of all deviations, in the order of `allan.csv`.
     pub const ALL: [Self; 7] = [Self::Adev, Self::Oadev, Self::Mdev, Self::Tdev, Self::Hdev, Self::Ohdev, Self::Totdev];
 
     /// Common abbreviation of the deviation, in lower case.

@@ -96,13 +96,13 @@ pub struct BandIntegrals {
 const INTERVALS_PER_LOBE: f64 = 64.0;
 
 impl BandIntegrals {
-    /// For rectangular chips, S = sinc²(f), as [`Self::of`].
+    /// Integrals for rectangular chips, S = sinc²(f), as in [`Self::of`].
     pub fn rectangular(d: f64, band: f64) -> Self {
         Self::of(sinc_squared, d, band)
     }
 
-    /// For a spectrum of unit area over all frequencies (so C/N0 is that before the filter), whose lobes are
-    /// a chip rate wide, and `band` chip rates of two-sided bandwidth.
+    /// Integrals for a spectrum of unit area over all frequencies (so C/N0 is that before the filter). Its
+    /// lobes are a chip rate wide, and `band` is the two-sided bandwidth in chip rates.
     pub fn of(spectrum: impl Fn(f64) -> f64, d: f64, band: f64) -> Self {
         let pi = std::f64::consts::PI;
         let intervals = 2.0 * (0.5 * INTERVALS_PER_LOBE * (0.5 * band + 1.0) * (1.0 + d)).ceil();

@@ -16,7 +16,7 @@ pub enum Integrator {
     Forward,
     /// The state after it.
     Boxcar,
-    /// Their mean.
+    /// Mean of the states before and after.
     Bilinear,
 }
 
@@ -26,9 +26,9 @@ pub enum Feedback {
     /// The oscillator's phase and rate are both set at each update: gains correct the mean phase of the
     /// coming interval. Stephens and Thomas 1995.
     PhaseAndRate,
-    /// Only the rate is set: the filters of Kaplan and Hegarty, table 8.23. `interval_mean` says whether the
-    /// discriminator sees the mean phase of an interval (a correlator does) or that at its start; `delay` is
-    /// one more epoch.
+    /// Correction of the rate only: the filters of Kaplan and Hegarty, table 8.23. The discriminator sees the
+    /// mean phase of an interval (a correlator does) if `interval_mean` is true, otherwise that at its start.
+    /// `delay` is one more epoch.
     Rate {
         /// Integration of the filter.
         integrator: Integrator,
@@ -57,11 +57,11 @@ pub struct PhaseLoop {
 pub struct FrequencyLoop {
     /// Gains of rate and acceleration per update.
     pub gains: [f64; 2],
-    /// Which prompts make the discriminator.
+    /// Pairs of prompts for the discriminator.
     pub pairs: Pairs,
 }
 
-/// Which prompts a frequency discriminator pairs.
+/// Pairs of prompts for a frequency discriminator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pairs {
     /// Each prompt with the one before, updates every T: successive errors share a prompt.
@@ -132,7 +132,7 @@ const FORGOTTEN: f64 = 1e-6;
 const DOUBLINGS: usize = 64;
 
 impl Linear {
-    /// From the step of a loop: (state, noise) to (next state, error).
+    /// Matrices of a loop's step: (state, noise) to (next state, error).
     fn of<const N: usize>(step: impl Fn([f64; N], f64) -> ([f64; N], f64)) -> Self {
         let mut a = DMatrix::zeros(N, N);
         let mut c = DVector::zeros(N);

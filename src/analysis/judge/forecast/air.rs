@@ -40,7 +40,7 @@ pub struct Sight<'a> {
     pub look: Look,
     /// Earth-fixed position of the satellite, in metres.
     pub satellite_m: &'a Vector3<f64>,
-    /// When the signal arrives, GPS time.
+    /// Time of the signal's arrival, GPS time.
     pub at: Epoch,
     /// Frequency of the carrier, in hertz.
     pub carrier_hz: f64,

@@ -34,7 +34,7 @@ pub struct Dispersion {
     pub sample: u64,
     /// Seconds from sample 0 by the receiver's clock.
     pub time_s: f64,
-    /// Both signals, the one of the higher carrier first.
+    /// Pair of the signals, the one of the higher carrier first.
     pub links: [Link; 2],
     /// Standard deviation of its noise on 1575.42 MHz, metres.
     pub sigma_m: f64,

@@ -8,7 +8,8 @@ use gnss::record::Event;
 use gnss::satellite::Sv;
 use gnss::signal::Link;
 
-/// From when on each satellite's message is known, and while it says that a signal is unhealthy: samples.
+/// Samples from which each satellite's message is known, and intervals in which it marks a signal as
+/// unhealthy.
 pub struct Heard {
     /// Message of each satellite, complete or in short form, with the sample from which it is known.
     known: BTreeMap<(Sv, &'static str), (u64, &'static Message)>,

@@ -99,7 +99,7 @@ pub struct Links {
     pub left_out: BTreeMap<LeftOut, Vec<String>>,
 }
 
-/// Why figures of a satellite's loops are not judged.
+/// Reason why figures of a satellite's loops are not judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LeftOut {
     /// No loop of the receiver's settings can hold the signal.

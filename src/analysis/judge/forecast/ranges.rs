@@ -121,7 +121,7 @@ const MASK_SLACK_RAD: f64 = 2e-3;
 pub struct Forecast {
     /// The satellite.
     pub sv: Sv,
-    /// Which of [`Scene::scales`] its clock is counted against.
+    /// Index in [`Scene::scales`] of the clock that the range is counted against.
     pub clock: usize,
     /// Frequency of the carrier, in hertz.
     pub carrier_hz: f64,

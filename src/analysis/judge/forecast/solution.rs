@@ -185,7 +185,7 @@ pub struct Expected {
 /// of the receiver's biases.
 #[derive(Clone, Copy, Debug)]
 pub struct Offset {
-    /// Which of [`Scene::scales`].
+    /// Index of the time scale in [`Scene::scales`].
     pub scale: usize,
     /// Known bias, metres.
     pub bias_m: f64,

@@ -20,9 +20,9 @@ const JUMP_M: f64 = 1e-4 * SPEED_OF_LIGHT_MPS;
 /// A carrier error.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Carrier {
-    /// In metres, the receiver's clock still in.
+    /// Error in metres, with the receiver's clock.
     pub raw_m: f64,
-    /// Without the clock and the arc's constant.
+    /// Error in cycles, without the clock and the arc's constant.
     pub cycles: f64,
 }
 

@@ -30,7 +30,7 @@ pub struct ObservationError {
     /// Satellite and signal.
     #[serde(skip)]
     pub link: Link,
-    /// When the signal was received, by the truth's time in seconds after the truth began.
+    /// Time of reception, by the truth's time in seconds after the truth began.
     #[serde(skip)]
     pub at_s: f64,
     /// Values of the file.
@@ -62,7 +62,7 @@ pub struct Slip {
     pub label_s: f64,
     /// The satellite.
     pub sv: String,
-    /// To the half cycle; unknown where the count was interrupted.
+    /// Size of the slip to the half cycle; `None` where the count was interrupted.
     pub size_cycles: Option<f64>,
     /// True if the file's loss-of-lock indicator declares the slip.
     pub declared: bool,

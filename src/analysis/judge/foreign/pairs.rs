@@ -12,7 +12,7 @@ use gnss::signal::{self, Link, Signal};
 pub(super) struct Pair<'a> {
     pub epoch: usize,
     pub label_s: f64,
-    /// When the signal was received, by the truth's time.
+    /// Time of reception, by the truth's time in seconds.
     pub at_s: f64,
     pub link: Link,
     pub values: &'a Values,

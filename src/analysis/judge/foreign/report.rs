@@ -159,7 +159,7 @@ pub struct Doppler {
     pub scale: Option<f64>,
     /// Standard deviation of the scale.
     pub scale_sigma: Option<f64>,
-    /// Without the clock's drift.
+    /// Root mean square without the clock's drift, Hz.
     pub rms_hz: Option<f64>,
     /// Doppler plus the carrier's own rate.
     pub minus_carrier_rate_hz: Option<f64>,

@@ -25,9 +25,9 @@ pub struct Finding {
     pub value: f64,
     /// Unit of the value.
     pub unit: &'static str,
-    /// Most that a sound receiver has.
+    /// Largest value of a sound receiver.
     pub limit: f64,
-    /// Why, and where the first or worst was found.
+    /// Reason for the limit, and the position of the first or worst occurrence.
     pub source: String,
 }
 

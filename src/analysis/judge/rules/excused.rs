@@ -21,9 +21,9 @@ pub(super) const LOOP_MPS: f64 = 10.0;
 /// Largest shift of a receiver's signals from the true ones that the scene allows.
 #[derive(Default)]
 struct Reach {
-    /// Most that a mirror or a spoofer changes a range's rate by.
+    /// Largest change of a range's rate by a mirror or a spoofer, m/s.
     rate_mps: f64,
-    /// Most that a spoofer's place is away.
+    /// Largest distance of a spoofer's position, metres.
     place_m: f64,
 }
 

@@ -1,5 +1,4 @@
-//! Why fixes may be off, from what the judge knows of both sides: the scene's atmosphere and the receiver's
-//! corrections.
+//! Hints about errors of fixes, from the scene's atmosphere and the receiver's corrections.
 
 use serde_json::Value;
 

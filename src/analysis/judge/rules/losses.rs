@@ -101,7 +101,7 @@ impl Witness {
         Ok(Self { rows, usual_dbhz, interval_s: run.truth_interval_s(), timetable })
     }
 
-    /// Why a loss or a slip at a time is none of the receiver's, if it is not.
+    /// Excuse for a loss or a slip at a time, if it is not the receiver's fault.
     fn excuse(&self, run: &Run, receiver: &Receiver, sv: Sv, slip: &Slip) -> Option<Excuse> {
         let scene = Scene {
             receiver,

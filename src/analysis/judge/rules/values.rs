@@ -334,8 +334,8 @@ fn threshold(freedom: u32, alarm: f64) -> Option<f64> {
     Some(ChiSquared::new(f64::from(freedom)).ok()?.inverse_cdf(1.0 - alarm))
 }
 
-/// When errors of fixes are judged: not while the scene expects any, and not while smoothing remembers that
-/// time.
+/// Times at which errors of fixes are judged: not while the scene expects any, and not while smoothing
+/// remembers that time.
 pub(super) struct Bounded<'a> {
     run: &'a Run,
     memory_s: f64,

@@ -90,7 +90,7 @@ pub struct Satellites {
     pub in_view: usize,
     /// Found by the receiver's search, true or not.
     pub acquired: usize,
-    /// Most satellites in one fix.
+    /// Largest number of satellites in one fix.
     pub used: usize,
     /// Signals of satellites acquired though the truth never has them.
     pub false_acquired: usize,
@@ -130,7 +130,7 @@ pub struct Position {
 /// 1 s are null where the record is too short for them, or the clock is steady to rounding.
 #[derive(Clone, Debug, Serialize)]
 pub struct Clock {
-    /// In that stretch.
+    /// Number of fixes in that segment.
     pub fixes: usize,
     /// Mean of estimated minus true bias.
     pub bias_mean_s: Option<f64>,
@@ -163,7 +163,8 @@ pub struct Clock {
 /// Errors of the observations, over every satellite and epoch.
 #[derive(Clone, Debug, Serialize)]
 pub struct Observables {
-    /// After the mean over the satellites of each epoch is removed.
+    /// Root mean square of the pseudorange errors in metres, after the mean over the satellites of each epoch
+    /// is removed.
     pub pseudorange_rms_m: Option<f64>,
     /// Mean of the satellites' mean code errors, nothing removed.
     pub pseudorange_bias_m: Option<f64>,

@@ -1,8 +1,8 @@
-//! Which power-law noise dominates at an averaging time.
+//! Identification of the power-law noise that dominates at an averaging time.
 //!
 //! Source: W. J. Riley and C. A. Greenhall, "Power law noise identification using the lag 1 autocorrelation",
 //! 18th EFTF (2004), which NIST SP 1065 repeats in section 5.5. Phase is taken every τ and differenced until
-//! it is stationary; the lag-1 autocorrelation then gives the exponent. Limits: one noise a τ, at least
+//! it is stationary. The lag-1 autocorrelation then gives the exponent. Limits: one noise a τ, at least
 //! [`FEWEST`] phases, drift not removed.
 
 /// Fewest phases at the spacing of τ from which a noise is identified.

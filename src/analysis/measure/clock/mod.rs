@@ -85,7 +85,7 @@ impl Line {
     }
 }
 
-/// Whose phase a deviation is of.
+/// Clock whose phase a deviation describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Of {
@@ -93,14 +93,14 @@ pub enum Of {
     Estimate,
     /// The clock.
     Truth,
-    /// Their difference: the noise of position alone.
+    /// Difference of both: the noise of position alone.
     Error,
 }
 
 /// Phases on an even grid, with their deviations over decades of τ.
 #[derive(Clone, Debug)]
 pub struct Series {
-    /// Which of the three.
+    /// Clock that the series describes.
     pub of: Of,
     phases_s: Vec<f64>,
     tau0_s: f64,
@@ -168,7 +168,8 @@ pub struct Clock {
     pub series: Vec<Series>,
     /// Standard deviation of a clock solved from independent code measurements of this run's scatter.
     pub code_sigma_s: Option<f64>,
-    /// From carrier phases, likewise.
+    /// Standard deviation in seconds of a clock solved from independent carrier measurements of this run's
+    /// scatter.
     pub carrier_sigma_s: Option<f64>,
     /// The oscillator that the scene names.
     pub oscillator: Option<PowerLaw>,

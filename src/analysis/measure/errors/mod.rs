@@ -31,7 +31,7 @@ pub struct SignalError {
     pub time_s: f64,
     /// Positive when the code is measured late: −c × (time sent as measured − as it was).
     pub code_m: f64,
-    /// After the arc's constant is removed, and with it.
+    /// Carrier error in cycles after the arc's constant is removed.
     pub carrier_cycles: f64,
     /// The error with the arc's constant, cycles.
     pub raw_cycles: f64,
@@ -43,7 +43,7 @@ pub struct SignalError {
     pub cn0_true_dbhz: f64,
     /// The true one with the other satellites counted as noise.
     pub cn0_effective_dbhz: f64,
-    /// Since the carrier locked, as the receiver says.
+    /// Time since the carrier locked, as the receiver states it, seconds.
     pub locked_s: f64,
     /// The time sent in truth, after a whole second.
     pub sent_fraction_s: f64,
@@ -149,7 +149,7 @@ impl Common<'_> {
 
 /// Every error of a run.
 pub struct Errors {
-    /// In the order of their samples.
+    /// Errors of the satellites' signals, in the order of their samples.
     pub signals: SpillStore<Link, SignalError>,
     /// Code errors of each epoch together, signal by signal. Differences between signals are not errors of a
     /// satellite.

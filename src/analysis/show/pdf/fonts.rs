@@ -10,7 +10,7 @@ use crate::show::plot::drawing::FONT as REGULAR;
 static BOLD: &[u8] = include_bytes!("../../assets/DejaVuSans-Bold-subset.ttf");
 static MONO: &[u8] = include_bytes!("../../assets/DejaVuSansMono-subset.ttf");
 
-/// Which font.
+/// Face of the bundled fonts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Face {
     Regular,
@@ -43,7 +43,7 @@ impl Face {
 pub(super) struct Glyph {
     pub face: Face,
     pub id: u16,
-    /// In units of the font size.
+    /// Advance width in units of the font size.
     pub advance: f32,
     /// Byte range of the glyph in the text.
     pub range: Range<usize>,

@@ -17,7 +17,7 @@ use thiserror::Error;
 
 use crate::show::plot::drawing::Drawing;
 
-/// Why a report could not be made. Each is a fault of the program, not of its data.
+/// Error in the making of a report. Each is a fault of the program, not of its data.
 #[derive(Debug, Error)]
 pub enum PdfError {
     /// A font of the program cannot be used.
@@ -28,7 +28,7 @@ pub enum PdfError {
     Picture {
         /// Number of the picture, counted from 1.
         number: usize,
-        /// Why, in words.
+        /// Reason in words.
         reason: String,
     },
     /// The document cannot be put together.
@@ -76,7 +76,7 @@ impl<T: Into<String>> From<T> for Cell {
     }
 }
 
-/// On which side a column's text is aligned; numbers are aligned right.
+/// Side on which a column's text is aligned; numbers are aligned right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     /// Words, flush left.
@@ -114,11 +114,11 @@ impl Table {
 pub enum Item {
     /// Heading of a chapter, listed in the outline.
     Heading(String),
-    /// Within a chapter.
+    /// Heading within a chapter.
     Subheading(String),
     /// A paragraph.
     Text(String),
-    /// In small letters.
+    /// Paragraph in small letters.
     Note(String),
     /// A bar across the page.
     Banner(String, Tone),
@@ -137,13 +137,13 @@ pub enum Item {
 /// A report to be printed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
-    /// On the first page and at the head of the others.
+    /// Title on the first page and at the head of the others.
     pub title: String,
     /// Below the title.
     pub subtitle: String,
-    /// At the right of every page's head; the title is at its left.
+    /// Text at the right of every page's head; the title is at its left.
     pub head: String,
-    /// In the order of the pages.
+    /// Elements in the order of the pages.
     pub items: Vec<Item>,
 }
 

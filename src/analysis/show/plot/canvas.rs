@@ -208,7 +208,7 @@ fn draw_series(context: &mut Context<'_, '_>, series: &Series) -> Result<(), Fai
 }
 
 const LEGEND_ROW_PX: i32 = 20;
-/// From a mark's left end to its name, and from a name's end to the next mark.
+/// Distances from a mark's left end to its name, and from a name's end to the next mark.
 const MARK_PX: i32 = 24;
 const GAP_PX: i32 = 18;
 

@@ -57,7 +57,7 @@ pub struct Series {
     pub colour: RGBColor,
     /// Form of the points.
     pub mark: Mark,
-    /// In data units.
+    /// Points in data units.
     pub points: Vec<(f64, f64)>,
 }
 
@@ -87,7 +87,7 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// From one value to another; half a unit about the first where they are the same.
+    /// An axis from one value to another. If they are equal, it extends half a unit about the first.
     pub fn new(label: &str, (from, to): (f64, f64)) -> Self {
         // plotters needs a range with a length.
         let (from, to) = if from < to { (from, to) } else { (from - 0.5, from + 0.5) };
@@ -202,7 +202,7 @@ impl Ends {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
-    /// Both ends, if there is a number: an axis around all numbers is one around these.
+    /// Values of both ends, if there is a number: an axis around all numbers is one around these.
     pub fn values(self) -> impl Iterator<Item = f64> {
         [self.low, self.high].into_iter().filter(move |_| self.low <= self.high)
     }
@@ -249,8 +249,8 @@ impl Shown {
     }
 }
 
-/// Most points that a series is drawn with, and most marks that the series of a run's chart have together:
-/// they cover it then.
+/// Largest number of points of a drawn series, and largest number of marks of a run's chart over all series.
+/// More marks would cover the chart.
 const MOST_POINTS: usize = 1000;
 const MOST_MARKS: usize = 4000;
 
@@ -276,7 +276,7 @@ struct Thinner {
 }
 
 impl Thinner {
-    /// For so many finite points.
+    /// A thinner for `count` finite points.
     fn new(mark: Mark, most: usize, count: usize) -> Self {
         let is_line = matches!(mark, Mark::Line | Mark::Dash) && count > most;
         let run = match count <= most {

@@ -26,7 +26,7 @@ const BAND_ROWS: u32 = 2048;
 
 /// The drawing surface, in virtual pixels.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-/// Why a drawing failed; only its text reaches the user.
+/// Error of a drawing; only its text reaches the user.
 pub type Failure = Box<dyn Error>;
 
 /// DejaVu Sans (assets/README.md).
@@ -35,7 +35,7 @@ pub(crate) static FONT: &[u8] = include_bytes!("../../assets/DejaVuSans.ttf");
 /// A vector picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawing {
-    /// In virtual pixels, [`FINE`] times the size.
+    /// Vector graphics in virtual pixels, [`FINE`] times the size.
     pub svg: String,
     /// Width, pixels of the picture.
     pub width_px: u32,

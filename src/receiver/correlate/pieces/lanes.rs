@@ -18,7 +18,7 @@ pub(super) const WINDOW_TAPS: usize = 3;
 /// Turns of an integer phase of 32 bits.
 pub(super) const TURNS: f32 = 1.0 / 4_294_967_296.0;
 
-/// Up to [`GROUPS`] groups, and where they are among the samples.
+/// Chunk of up to [`GROUPS`] groups, with their positions among the samples.
 pub(super) struct Chunk<'a, const T: usize> {
     pub starts: &'a [[u32; GROUP]],
     pub middles: &'a [[u32; GROUP]],

@@ -6,7 +6,7 @@ use gnss::gps::l1ca::L1_CA;
 use gnss::signal::Layers;
 use gnss::signal::synthetic::{LONG_BOC, MIXED, MULTIPLEXED};
 
-/// With a constant offset.
+/// Noise with a constant offset.
 fn noise(count: usize, seed: u64) -> Vec<f32> {
     super::super::noise::noise(count, seed, 2.0)
 }

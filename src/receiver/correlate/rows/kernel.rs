@@ -27,7 +27,7 @@ pub(super) type Sums<const T: usize> = [[[f64; LANES]; 2]; T];
 pub(super) struct Stretch<'a, const T: usize> {
     pub i: &'a [[i16; VECTOR]],
     pub q: &'a [[i16; VECTOR]],
-    /// Both components of the few samples after these, and zeros.
+    /// In-phase and quadrature parts of the few samples after these, padded with zeros.
     pub last: Option<&'a [[i16; VECTOR]; 2]>,
     /// A phasor for each vector, the same in both halves of a number.
     pub cos: &'a [i32; VECTORS],

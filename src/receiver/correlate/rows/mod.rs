@@ -160,7 +160,7 @@ struct Place {
 
 /// Motion of the positions, in 2⁻⁴⁰ samples.
 struct Motion {
-    /// Beyond a sample, in a sample.
+    /// Motion per sample, beyond one sample.
     gain: i64,
     period: i64,
     stride: usize,
@@ -232,7 +232,8 @@ fn body<const T: usize>(job: &Job, codes: [i64; T], add: impl Fn(&Stretch<T>, &m
 
 /// A period's steps at places that are equally far apart, less than a step.
 struct Places {
-    /// From a whole number of periods before zero on, at each step's beginning and at the end.
+    /// Integral of the steps at each step's beginning and at the end, from a whole number of periods before
+    /// zero on.
     integral: Vec<f64>,
     /// The first place in steps from there, and from one to the next.
     begin: f64,
@@ -240,7 +241,7 @@ struct Places {
 }
 
 impl Places {
-    /// So many from `first` on.
+    /// Positions of a row: `count` of them, from `first` on.
     fn new(steps: &[i8], (first, apart): (f64, f64), count: usize) -> Self {
         let period = steps.len() as f64;
         let begin = first - period * (first / period).floor();
@@ -255,7 +256,7 @@ impl Places {
         Self { integral, begin, apart }
     }
 
-    /// At a row's next places: what steps add up to, and the step there.
+    /// Integral of the steps at a row's next positions, and the step there.
     #[inline(always)]
     fn at(&self, entry: usize) -> [[f64; ROWS]; 2] {
         let [mut sums, mut steps] = [[0.0; ROWS]; 2];

@@ -43,7 +43,7 @@ const VANISHED_SHARE: f64 = 0.66;
 const CLOCK_SIGMAS: f64 = 6.0;
 const CLOCK_DRIFT: f64 = 2e-8;
 const CLOCK_LEAST_S: f64 = 1e-6;
-/// Less is a pause only when a jump is known whose size is not.
+/// Shortest pause in seconds. A shorter one counts only when a jump of unknown size is known.
 const PAUSE_S: f64 = 1.05;
 
 /// Observations of a channel's code.
@@ -106,7 +106,7 @@ impl Watched {
 enum Stage {
     #[default]
     Quiet,
-    /// Since a sample; whether carriers are whole.
+    /// Scan since a sample; `whole` is true if the carriers keep their whole cycles.
     Scanning { since: u64, whole: bool },
     /// The replicas were moved at a sample by what the scan found.
     Settling(Moved),
@@ -129,12 +129,12 @@ pub(super) struct Gap {
     stage: Stage,
     last_look: u64,
     last_edges: u64,
-    /// When a scan found codes where they were.
+    /// Sample at which a scan found the codes at their expected positions.
     in_place: Option<u64>,
     scan: Option<(&'static Signal, Scan)>,
     planes: Planes,
     pub jumps: Vec<Jump>,
-    /// Since when nobody knows how many periods are missing.
+    /// Sample since which the number of missing periods is unknown.
     pub unknown: Option<u64>,
 }
 

@@ -23,7 +23,7 @@ struct Correlations {
     sums: [Complex64; 3],
     /// Correlation at a delay where the code does not correlate with itself, if it was requested.
     noise: Option<Complex64>,
-    /// On the neighbouring peaks, ahead and behind, of a signal that has them.
+    /// Correlations on the neighbouring peaks, ahead and behind, of a signal that has them.
     sides: Option<[Complex64; 2]>,
 }
 

@@ -1,4 +1,4 @@
-//! From the code that the search found to the long code of a pilot beside it.
+//! Change from the code that the search found to the long code of a pilot beside it.
 
 use super::pilot::Data;
 use super::{Channel, Stage};
@@ -37,8 +37,8 @@ impl Channel {
         self.long.as_mut()?.add(self.period, prompt)
     }
 
-    /// From the next code period on the long code is followed, and the code that was is that of the data
-    /// beside it. The carrier gets the right half cycle.
+    /// Tracks the long code from the next code period on; the code before is then that of the data beside it.
+    /// The carrier gets the right half cycle.
     pub(super) fn follow_long(&mut self, phase: SecondaryCodePhase) {
         let Some(pilot) = self.long.as_ref().map(LongCode::component) else { return };
         let rates = (self.rate.hz(), self.sense);

@@ -132,7 +132,7 @@ impl Channel {
         }
     }
 
-    /// From the next code period on the secondary code is taken off. The carrier gets the right half cycle.
+    /// Removes the secondary code from the next code period on. The carrier gets the right half cycle.
     pub(super) fn wipe(&mut self, phase: SecondaryCodePhase) {
         if phase.inverted {
             self.carrier += (0.5 * TURN) as i128;

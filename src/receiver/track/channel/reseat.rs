@@ -217,7 +217,7 @@ impl Channel {
         self.set_steps();
     }
 
-    /// After the code was moved, integrations begin anew with the first symbol.
+    /// Restarts integrations with the first symbol after the code was moved.
     pub(super) fn keep_to_symbols(&mut self, number: u64) {
         if !self.moved || self.held {
             return;

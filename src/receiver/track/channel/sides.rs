@@ -1,4 +1,4 @@
-//! From one side of a sub-carrier to both.
+//! Change from one sideband of a sub-carrier to both.
 
 use super::Channel;
 use crate::correlate::Replica;
@@ -18,7 +18,7 @@ impl Channel {
         replica.set_second(sides.are_opposed(phase, self.period));
     }
 
-    /// From the next code period on both sides are followed: the noise is that of one, the power twice as
+    /// Tracks both sidebands from the next code period on: the noise is that of one, the power twice as
     /// large.
     pub(super) fn join_sides(&mut self) {
         let Some(both) = self.sides.as_ref().map(|sides| sides.both().clone()) else { return };

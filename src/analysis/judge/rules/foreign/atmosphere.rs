@@ -44,7 +44,7 @@ impl Moved {
         if error_up_m < 0.0 { self.down_m } else { self.up_m }
     }
 
-    /// With any of these moves, or none: east, north and up.
+    /// Largest shift over these moves, or none: east, north and up.
     fn any(moves: &[Vector3<f64>]) -> Self {
         moves.iter().fold(Self::default(), |most, one| Self {
             horizontal_m: most.horizontal_m.max(one.xy().norm()),
@@ -66,7 +66,7 @@ impl Moved {
 pub(super) struct Atmosphere<'r> {
     run: &'r Run,
     sent: Option<Coefficients>,
-    /// When the page has come, seconds from sample 0.
+    /// Arrival of the page, seconds from sample 0.
     page_s: f64,
     /// Sample of the epoch that was asked for last, and the answer.
     last: Option<(u64, Moved)>,

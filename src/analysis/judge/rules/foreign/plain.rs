@@ -110,11 +110,11 @@ pub(super) struct Scene<'r> {
     edges_m: BTreeMap<&'static str, f64>,
     /// Seconds from sample 0 to where labels count from.
     offset_s: f64,
-    /// When a spoofer claims a place.
+    /// Interval in which a spoofer claims a position, seconds.
     spoofed_s: Option<(f64, f64)>,
-    /// Most that a mirror or a spoofer changes a range's rate by.
+    /// Largest change of a range's rate by a mirror or a spoofer, m/s.
     pub rate_mps: f64,
-    /// Most that a spoofer's place is away.
+    /// Largest distance of a spoofer's position, metres.
     pub place_m: f64,
 }
 

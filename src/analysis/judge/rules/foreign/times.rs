@@ -1,11 +1,12 @@
-//! When a foreign receiver's observations and positions are due.
+//! Times at which a foreign receiver's observations and positions are due.
 //!
-//! It is not known how it searches, nor whether it writes observations before its first fix. So its first
-//! observation and its first fix are due by one generous time: satellites locked after a slow search, their
-//! ephemerides whole, the ionosphere's page where that comes at once, and a reserve. Observations that come
-//! before any orbit can be whole show when satellites were locked, and then that lock counts. From its own
-//! first epoch on it must go on to within seconds of the scene's end. Limits: a receiver that writes every
-//! second epoch alone is one of twice the interval, unless its header states the interval.
+//! The way it searches is unknown. It is also unknown if it writes observations before its first fix. So its
+//! first observation and its first fix are due by one generous time. It holds the lock of satellites after a
+//! slow search, their complete ephemerides, the ionosphere's page where that comes at once, and a reserve.
+//! Observations before any orbit can be complete show the time of lock, and then that lock counts. From its
+//! own first epoch on the receiver must continue to within seconds of the scene's end. Limits: a receiver
+//! that writes only every second epoch counts as one of twice the interval, unless its header states the
+//! interval.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -118,7 +119,7 @@ impl Observed for Labels {
     }
 }
 
-/// When the first observation and the first fix are due at the latest, in seconds from sample 0.
+/// Latest times of the first observation and the first fix, in seconds from sample 0.
 pub(super) struct Begin {
     pub observation_s: Option<f64>,
     pub fix_s: Option<f64>,
@@ -175,7 +176,7 @@ impl Verdict {
         self.explain(vec![format!("{found_s:.3} s, stated {stated_s:.3} s")]);
     }
 
-    /// When observations begin and end, and whether epochs lack.
+    /// Judges the beginning and the end of the observations, and missing epochs.
     pub(super) fn span(&mut self, what: &str, scene: &Scene<'_>, labels: &[f64], begin_s: Option<f64>) {
         let (Some(first_s), Some(last_s)) = (labels.first().copied(), labels.last().copied()) else { return };
         let step_s = interval_s(labels).unwrap_or(0.0);
