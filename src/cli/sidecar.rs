@@ -58,8 +58,8 @@ pub fn gnss_sdr(scene: &Scene, samples: &Path) -> Result<String, CliError> {
 /// PocketSDR's tag for a scene's samples, of which the first is taken at that time: its program's lines of
 /// format, sample rate, local oscillator and kind of sampling, in MHz.
 ///
-/// PocketSDR's own front end has its quadrature turned: its `INT8X2` is a mirrored spectrum, and `CS8` one as
-/// it is.
+/// PocketSDR's own front end has its quadrature turned: its `INT8X2` is an inverted spectrum, and `CS8` one
+/// as it is.
 ///
 /// # Errors
 /// Samples that it would not read, by name.

@@ -1,14 +1,14 @@
 //! Motion and events as they come in: datagrams of Skydel's hardware-in-the-loop layout, lines of text, NMEA.
 //!
 //! A datagram that begins with 1 to 8 is binary, little-endian, by its first byte: 1 hello, 2 bye, 3 a
-//! request (passed over), 5 a place, 6 with attitude, 7 and 8 the same with a byte for the derivatives that
-//! follow (0 velocity, 1 and acceleration, 2 and jerk). Then the time in milliseconds since the start, the
-//! place and its derivatives, ECEF in metres, each with its angles' in 6 and 8; at the end a name, a 32-bit
-//! length before it. Angles are yaw, pitch and roll of nose, right and down against north, east and down, in
-//! radians, and their derivatives in 8. Everything else is lines, one or more: `t x y z` with velocity,
-//! acceleration and jerk where known (seconds, metres, ECEF) and `ypr` with the angles and their rates where
-//! known, a sentence of NMEA (`nmea`), or an event. Limits: the order of angles in 8 is as its vendor's
-//! clients send it, by description and not seen on a wire; of their derivatives the first is used.
+//! request (passed over), 5 a position, 6 with attitude, 7 and 8 the same with a byte for the derivatives
+//! that follow (0 velocity, 1 and acceleration, 2 and jerk). Then the time in milliseconds since the start,
+//! the position and its derivatives, ECEF in metres, each with its angles' in 6 and 8; at the end a name, a
+//! 32-bit length before it. Angles are yaw, pitch and roll of nose, right and down against north, east and
+//! down, in radians, and their derivatives in 8. Everything else is lines, one or more: `t x y z` with
+//! velocity, acceleration and jerk where known (seconds, metres, ECEF) and `ypr` with the angles and their
+//! rates where known, a sentence of NMEA (`nmea`), or an event. Limits: the order of angles in 8 is as its
+//! vendor's clients send it, by description and not seen on a wire; of their derivatives the first is used.
 
 mod nmea;
 

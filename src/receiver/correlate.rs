@@ -149,7 +149,7 @@ impl Replica {
         Some(if inverted && component.tone().is_some() { replica.mirrored() } else { replica })
     }
 
-    /// One side of a sub-carrier: its chips times the tone. Taps have the tone's phase at the prompt.
+    /// One sideband of a sub-carrier: its chips times the tone. Taps have the tone's phase at the prompt.
     fn of_side(wave: Wave, edge: Edge, tone: Tone) -> Option<Self> {
         let patterns = Pattern::of(&wave, tone.gain.conj() / tone.gain.norm(), edge)?;
         let toned = |pattern| Pattern { half_cycles: tone.half_cycles, ..pattern };
@@ -357,16 +357,16 @@ pub fn power(i: &[f32], q: &[f32]) -> f64 {
     kernel::power(kernel::Level::best(), i, q)
 }
 
-/// Error of the code, root mean square, while every chip meets the same few places between samples: at whole
-/// ratios of sample and chip rate, or ratios of small numbers, and a satellite whose code does not move
+/// Error of the code, root mean square, while every chip meets the same few positions between samples: at
+/// whole ratios of sample and chip rate, or ratios of small numbers, and a satellite whose code does not move
 /// against the samples. In metres.
 ///
-/// With `q` places in turn nearest edges know the code to a sample in `q` (uniform: over √12). Area edges
+/// With `q` positions in turn nearest edges know the code to a sample in `q` (uniform: over √12). Area edges
 /// against a signal limited to half the rate err by 5.1, 1.61 and 0.11 m at 2, 4 and 10 samples a chip; the
 /// law is the second's, with the square.
 pub fn standing_bias_m(edge: Edge, rate_hz: f64, component: &Component) -> f64 {
     let chips = f64::from(component.code_chips);
-    // Places drift apart within a code period when the ratio misses by more than this.
+    // Positions drift apart within a code period when the ratio misses by more than this.
     let meets = |q: u32| {
         let samples = f64::from(q) * rate_hz / component.chip_rate_hz;
         (samples - samples.round()).abs() < 1.0 / chips
@@ -558,7 +558,7 @@ mod tests {
                 assert!((replica.value(code, step as u64) - sent).abs() < 1e-12, "{chip} {sixth}");
             }
         }
-        // A stretch across the end of the period, 49 104 steps on.
+        // A segment across the end of the period, 49 104 steps on.
         let (i, q) = (noise(2000, 8), noise(2000, 9));
         let taps = [chips_to_units(0.05), 0, chips_to_units(-0.05)];
         let nco = Nco {

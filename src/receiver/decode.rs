@@ -129,7 +129,7 @@ impl Decoder {
 
     /// Takes the time of week by the satellite's clock in the code period `period` from another of its
     /// signals; whether the time of this one is known from here on. One that puts the beginnings of units
-    /// further from their places than a code period is not believed.
+    /// further from their positions than a code period is not believed.
     pub fn date(&mut self, period: u64, of_week: (i64, f64)) -> bool {
         let Some(Units { unit_s, first_s, begin: Some(begin) }) = self.undated else { return false };
         let rate = self.periods_per_second as f64;

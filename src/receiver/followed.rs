@@ -20,7 +20,7 @@ pub struct Followed {
     /// Index of the replica's layer among the component's. `None` where the replica has all layers, or the
     /// tone of a sideband.
     pub layer: Option<usize>,
-    /// Place of the component on the other side of the sub-carrier, where both are followed together.
+    /// Index of the component on the other sideband of the sub-carrier, where both are followed together.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub other_side: Option<usize>,
     /// Distance of early and late, fitted to the layer's pulse.
@@ -42,7 +42,7 @@ pub struct Followed {
 /// The sums in which a signal is searched for.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Searched {
-    /// Places of the components among the signal's whose powers are added.
+    /// Indices of the components among the signal's whose powers are added.
     pub components: Vec<usize>,
     /// Length of a coherent sum, seconds: no longer than a component keeps its sign.
     pub coherent_s: f64,

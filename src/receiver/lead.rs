@@ -18,7 +18,7 @@ pub fn lead(signal: &'static Signal) -> Option<&'static Component> {
 
 /// The component whose data can be read once the secondary code of `pilot` is aligned: their codes have the
 /// same length, symbols and secondary code of the data begin where the pilot's secondary code does, and both
-/// are on the same side of a sub-carrier where they have one.
+/// are on the same sideband of a sub-carrier where they have one.
 pub fn beside(pilot: &'static Component, signal: &'static Signal) -> Option<&'static Component> {
     let side = pilot.tone().map(|tone| tone.half_cycles);
     let fits = |component: &&Component| {
@@ -31,7 +31,7 @@ pub fn beside(pilot: &'static Component, signal: &'static Signal) -> Option<&'st
     signal.components.iter().find(|component| !std::ptr::eq(*component, pilot) && fits(component))
 }
 
-/// The pilot on the other side of the sub-carrier of which `pilot` is one side, as strong and with a
+/// The pilot on the other sideband of the sub-carrier of which `pilot` is one side, as strong and with a
 /// secondary code as long: both are followed together once the secondary code is aligned.
 pub fn other_side(pilot: &Component, signal: &'static Signal) -> Option<&'static Component> {
     let tone = pilot.tone().filter(|_| pilot.message.is_none() && pilot.secondary_code.periods() > 1)?;
@@ -64,7 +64,7 @@ pub fn long_beside(lead: &'static Component, signal: &'static Signal) -> Option<
 }
 
 /// Correlation of a component with the replica that is made of it, and of the replica with itself. Of one
-/// side of a sub-carrier that of the chips alone: what a tone beside the carrier finds of them.
+/// sideband of a sub-carrier that of the chips alone: what a tone beside the carrier finds of them.
 pub fn shapes(component: &Component, made: Layers) -> Option<[Shape; 2]> {
     let strongest = component.strongest()?;
     if let Some(tone) = component.tone() {

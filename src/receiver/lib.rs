@@ -2,7 +2,7 @@
 //!
 //! It sees IF metadata, samples and settings; no argument can carry truth. [`acquire`] finds satellites,
 //! [`track`] follows them with [`correlate`], [`decode`] reads their messages, [`observe`] makes observables
-//! at common epochs and [`position`] solves for place and time. [`interference`] watches the spectrum,
+//! at common epochs and [`position`] solves for position and time. [`interference`] watches the spectrum,
 //! [`parting`] how code and carrier part, [`gap`] whether samples are missing.
 //!
 //! A [`Receiver`] takes samples and returns [`output::Record`]s as values; [`receive`] reads a stream to its

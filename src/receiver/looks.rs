@@ -31,7 +31,7 @@ const LEAST_SPREAD_HZ: f64 = 300.0;
 pub enum Pattern {
     /// Code and carrier Dopplers are equal, apart from the common carrier offset given here.
     Sound(Estimate),
-    /// The opposite: the spectrum is mirrored. What the carrier would be ahead by in the right one.
+    /// The opposite: the spectrum is inverted. What the carrier would be ahead by in the right one.
     Mirrored(Estimate),
 }
 

@@ -133,7 +133,7 @@ impl Settings {
     ///
     /// # Errors
     /// Text that is no TOML, an unknown key, a value of the wrong type or out of its range, each with its
-    /// place.
+    /// position.
     pub fn parse(text: &str, origin: &str) -> Result<Self, SettingsError> {
         Self::read(text, origin, "", |text| toml::from_str(text))
     }
@@ -151,7 +151,7 @@ impl Settings {
         Self::read(text, origin, "receiver", |text| toml::from_str::<Scenario>(text).map(|scenario| scenario.receiver))
     }
 
-    /// Reads the table `above` of a text by `typed`, and gives errors their places.
+    /// Reads the table `above` of a text by `typed`, and gives errors their positions.
     fn read(
         text: &str,
         origin: &str,
@@ -183,7 +183,7 @@ impl Settings {
     /// Reads a TOML table that is in no text.
     ///
     /// # Errors
-    /// As [`Self::parse`], without places.
+    /// As [`Self::parse`], without positions.
     pub fn from_table(table: Table, origin: &str) -> Result<Self, SettingsError> {
         check_keys(&table, &known(), "", origin)?;
         let settings: Self = table.try_into().map_err(|error: toml::de::Error| {

@@ -5,7 +5,7 @@
 //! through the loops, discriminators and C/N0 estimate of `receiver::track`, and what is left between truth
 //! and oscillators is measured. Source of the model: Kaplan and Hegarty, Understanding GPS 2nd ed., 5.3.
 //! Limits: one satellite, constant C/N0, no multipath; a period lasts its nominal time; signals of which both
-//! sides of a sub-carrier are followed are left out.
+//! sidebands of a sub-carrier are followed are left out.
 
 use num_complex::Complex64;
 

@@ -148,7 +148,7 @@ impl Joint {
     }
 }
 
-/// Cuts what is written into stretches and hands each to `each` with the number of its first sample.
+/// Cuts what is written into segments and hands each to `each` with the number of its first sample.
 struct Stretches<F> {
     metadata: IfMetadata,
     stretch: usize,
@@ -191,7 +191,7 @@ fn scene(cn0_dbhz: f64, seed: u64, duration_s: f64) -> Result<Scene, DetectionEr
     Ok(scene)
 }
 
-/// Runs `each` on every stretch of a scene, with the satellite's true Doppler there; the truth goes through
+/// Runs `each` on every segment of a scene, with the satellite's true Doppler there; the truth goes through
 /// `writer`.
 fn on_stretches(
     scene: &Scene,
@@ -226,7 +226,7 @@ pub fn settings(false_alarm_probability: f64) -> AcquisitionSettings {
     AcquisitionSettings { doppler_max_hz: 1000.0, false_alarm_probability, ..AcquisitionSettings::default() }
 }
 
-/// Finds the satellite at `cn0_dbhz` in `trials` stretches.
+/// Finds the satellite at `cn0_dbhz` in `trials` segments.
 ///
 /// # Errors
 /// [`DetectionError`], none on sound settings.

@@ -2,7 +2,7 @@
 //! predicted one.
 //!
 //! Where T·C/N0 is at least 10 and B·T at most 0.36 the ratio must be one within 5 % (10 % for the frequency
-//! loop) or the measurement's own uncertainty; outside, the cause of a departure is named. Every cell runs
+//! loop) or the measurement's own uncertainty; outside, the cause of a deviation is named. Every cell runs
 //! until its spread is known to a stated precision. Thermal noise alone; unlimited bandwidth.
 
 use serde::Serialize;
@@ -78,7 +78,7 @@ pub struct ProofRow {
     pub lost: bool,
     /// True if the linear theory is claimed to hold.
     pub in_region: bool,
-    /// Largest departure of the ratio from one that is allowed in the region.
+    /// Largest deviation of the ratio from one that is allowed in the region.
     pub bar: f64,
     /// Reason why the ratio deviates by more than the bar; empty where it does not.
     pub cause: String,
@@ -88,7 +88,7 @@ pub struct ProofRow {
 pub const LEAST_SNR: f64 = 10.0;
 /// Bandwidth times integration up to which the linear theory claims to hold.
 pub const LARGEST_BANDWIDTH_TIME: f64 = 0.36;
-/// Allowed departures there.
+/// Allowed deviations there.
 pub const BAR: f64 = 0.05;
 /// Largest relative deviation from theory of a frequency's jitter.
 pub const FREQUENCY_BAR: f64 = 0.10;

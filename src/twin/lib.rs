@@ -93,7 +93,7 @@ pub fn settings_for(scenes: &[Scene], settings: &Settings) -> Settings {
     own
 }
 
-/// Takes a batch of samples of a front end by its place.
+/// Takes a batch of samples of a front end by its index.
 pub type Listen<'a, E> = dyn FnMut(usize, &[u8]) -> Result<(), E> + Send + 'a;
 
 /// Results of [`feed`].
@@ -106,7 +106,7 @@ pub struct Fed {
 }
 
 /// Generates a scene and gives its samples to `listen`, batch by batch in their order, for each front end by
-/// its place; the first call comes with none, while the first batch is generated. Whichever side is done
+/// its index; the first call comes with none, while the first batch is generated. Whichever side is done
 /// first helps the other's threads.
 ///
 /// # Errors

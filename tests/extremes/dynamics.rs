@@ -53,7 +53,7 @@ fn after(&[t, s, v, a]: &[f64; 4], dt: f64, jerk: f64) -> [f64; 4] {
     ]
 }
 
-/// Largest departure of a signal's carrier (cycles) and code (metres) from the truth's arrivals over samples
+/// Largest deviation of a signal's carrier (cycles) and code (metres) from the truth's arrivals over samples
 /// `from..to` of a scene of a whole rate, taken at `count` places.
 fn worst_of(scene: &Scene, (sv, signal): (Sv, &'static Signal), (from, to): (u64, u64), count: u64) -> (Worst, Worst) {
     let mut transmitter = Transmitter::new(scene, sv, signal, Edge::Nearest).unwrap().unwrap();
@@ -78,7 +78,7 @@ fn worst_of(scene: &Scene, (sv, signal): (Sv, &'static Signal), (from, to): (u64
     (carrier, code_m)
 }
 
-/// Largest departure of the synthesiser's carrier and code (as cycles) from the truth over samples
+/// Largest deviation of the synthesiser's carrier and code (as cycles) from the truth over samples
 /// `from..to`, taken at `count` places.
 fn worst_cycles(scene: &Scene, sv: Sv, (from, to): (u64, u64), count: u64) -> (Worst, Worst) {
     let mut transmitter = Transmitter::new(scene, sv, &L1_CA, Edge::Nearest).unwrap().unwrap();

@@ -85,7 +85,7 @@ fn sixty_signals_in_eight_bits_keep_their_amplitudes_and_phases() {
     the.at_most("phase moved by rounding to eight bits", across, bar, "rad");
 }
 
-/// Largest departure of double differences from whole numbers, how many there are, and how many of them keep
+/// Largest deviation of double differences from whole numbers, how many there are, and how many of them keep
 /// the whole number that their pair had first.
 fn double_differences(of: [&Scene; 2], signal: &'static Signal, step_s: u64) -> (Worst, [usize; 2]) {
     let authentic = Constellation::authentic();

@@ -40,7 +40,7 @@ fn doppler_hz(scene: &Scene, sv: Sv, sample: u64, second_order: bool) -> f64 {
     L1_CA.centre_hz() * (clocks * motion - 1.0)
 }
 
-/// Largest departure of the truth's Doppler from the equation, largest Doppler, largest second-order term,
+/// Largest deviation of the truth's Doppler from the equation, largest Doppler, largest second-order term,
 /// Doppler rate.
 fn dopplers(scene: &Scene, step_s: f64) -> [Worst; 4] {
     let mut most = <[Worst; 4]>::default();

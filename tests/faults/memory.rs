@@ -92,13 +92,13 @@ fn ten_minutes_take_the_memory_of_a_short_run_and_the_judge_that_of_its_epochs()
 
 /// Columns that go on where a run is made longer, and what a second adds to them.
 const COLUMNS: [(&str, f64); 4] = [("sample", 2.6e6), ("gps_s", 1.0), ("sent_s", 1.0), ("locked_s", 1.0)];
-/// The stretch of the run that is repeated, seconds: a part with fixes.
+/// The segment of the run that is repeated, seconds: a part with fixes.
 const REPEATED_S: [f64; 2] = [28.0, 36.0];
 /// Satellites of a longer run, and of how many loop updates one is kept.
 const SATELLITES: [&str; 5] = ["G03", "G06", "G07", "G08", "G10"];
 const UPDATES: usize = 25;
 
-/// A table of fewer rows with its stretch repeated so often, each time as late as in a longer run.
+/// A table of fewer rows with its segment repeated so often, each time as late as in a longer run.
 fn repeated(text: &str, times: usize, every: usize) -> String {
     let (header, rows) = text.split_once('\n').unwrap();
     let place = |column: &str| header.split(',').position(|name| name == column);
@@ -124,7 +124,7 @@ fn repeated(text: &str, times: usize, every: usize) -> String {
     all
 }
 
-/// A run whose tables have its stretch so often more.
+/// A run whose tables have its segment so often more.
 fn longer(run: &Path, to: &Path, times: usize) {
     for part in ["truth", "rx"] {
         fs::create_dir_all(to.join(part)).unwrap();

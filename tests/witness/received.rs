@@ -178,7 +178,7 @@ fn half_a_second_of_the_second_carrier_holds_l2c_as_listed_and_none_else() {
     let Some(file) = external("if/pocket_l2_2021-12-02_4msps_ci8.bin").filter(|_| crate::long::is_asked_for()) else {
         return;
     };
-    // What L1 would have: 347.82 MHz above L2, and the spectrum is mirrored.
+    // What L1 would have: 347.82 MHz above L2, and the spectrum is inverted.
     let flags = [&POCKET_FLAGS[..], &["--if-hz=-347.82e6"]].concat();
     let found = received(&file, &flags, &["GPS L2C"], "");
     assert_found(&found, &[("GPS L2C", "G03 G04 G18 G25 G26 G29 G31 G32", "G27")]);

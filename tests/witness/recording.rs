@@ -252,7 +252,7 @@ pub fn secondary_code_begins_s(
     ((-begun_s).rem_euclid(18.0), places[0].0 / places[1].0)
 }
 
-/// Phase of a pilot of L1C against L1 C/A of the satellite in a recording of mirrored spectrum, in cycles
+/// Phase of a pilot of L1C against L1 C/A of the satellite in a recording of inverted spectrum, in cycles
 /// modulo half a cycle: neither bits nor secondary code have to be known. Codes begin together, every tenth
 /// period of C/A.
 fn l1c_ahead_of_ca_cycles(hit: &Acquired, [i, q]: [&[f32]; 2], rate_hz: f64, [pilot, civil]: [&[i8]; 2]) -> f64 {
@@ -324,7 +324,7 @@ fn a_recording_holds_the_pilots_of_l1c_that_others_found_in_it_where_l1_ca_is_an
     let mut begins_s = Vec::new();
     for (hit, doppler_hz) in hits.iter().zip([3250.0, 2700.0]) {
         println!("{} {:.1} Hz {:.2} chips {:.1} dB-Hz", hit.sv, hit.doppler_hz, hit.code_phase_chips, hit.cn0_dbhz);
-        // The list is on a grid of 50 Hz, and of the mirrored spectrum.
+        // The list is on a grid of 50 Hz, and of the inverted spectrum.
         assert!((hit.doppler_hz - doppler_hz).abs() < 60.0, "{hit:?}");
         if let Some(ca) = civil.iter().find(|ca| ca.sv == hit.sv) {
             let apart = (hit.code_phase_chips - ca.code_phase_chips + 511.5).rem_euclid(1023.0) - 511.5;
@@ -358,7 +358,7 @@ fn a_recording_holds_the_pilots_of_b1c_that_others_found_in_it_and_their_seconda
     let hits: Vec<Acquired> = rows.into_iter().filter_map(|(_, hit)| hit).collect();
     hits.iter().for_each(|hit| println!("{} {:.1} Hz {:.1} dB-Hz", hit.sv, hit.doppler_hz, hit.cn0_dbhz));
     assert_eq!(hits.iter().map(|hit| hit.sv.number).collect::<Vec<_>>(), [30, 36, 45, 18], "{hits:?}");
-    // The list has that of C30 alone, on a grid of 50 Hz, and of the mirrored spectrum.
+    // The list has that of C30 alone, on a grid of 50 Hz, and of the inverted spectrum.
     assert!((hits[0].doppler_hz - 600.0).abs() < 60.0, "{:?}", hits[0]);
     let begins_s: Vec<f64> = hits
         .iter()
@@ -405,7 +405,7 @@ fn half_a_second_of_real_signal_tracks_with_steady_power_and_bit_edges_twenty_mi
         assert!(rows.len() > 240, "{}", rows.len());
 
         // Signal to noise of a 1 ms prompt at 47 dB-Hz is 20 dB: its magnitude wanders by a tenth, so a mean
-        // of 240 by 1 %, and the halves of the stretch agree to 5 %.
+        // of 240 by 1 %, and the halves of the segment agree to 5 %.
         let magnitude = |rows: &[gnss_twin::gnss::record::TrackingRow]| {
             rows.iter().map(|row| libm::hypot(row.prompt_i, row.prompt_q)).sum::<f64>() / rows.len() as f64
         };

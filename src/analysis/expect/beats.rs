@@ -26,7 +26,7 @@ use crate::expect::loops::Theory;
 use crate::read::Run;
 use gnss::signal::{Component, Link, SecondaryCode};
 
-/// Distance of the places at which carriers are compared, and how many there are of a run at most.
+/// Distance of the positions at which carriers are compared, and how many there are of a run at most.
 const NODE_S: f64 = 1.0;
 const MOST_NODES: f64 = 4096.0;
 

@@ -28,7 +28,7 @@ pub(crate) struct Entry {
 /// The sums in which a signal is searched for.
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct Searched {
-    /// Places of the components whose powers are added.
+    /// Indices of the components whose powers are added.
     pub components: Vec<usize>,
     pub coherent_s: f64,
     /// Coherent sums of each.

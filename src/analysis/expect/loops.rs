@@ -144,7 +144,7 @@ impl Carrier {
     }
 }
 
-/// A loop of exact bandwidth whose roots all lie at one place; `None` where no such place is.
+/// A loop of exact bandwidth whose roots all lie at one position; `None` where no such position is.
 pub fn exact_loop(order: u32, bandwidth_time: f64) -> Option<PhaseLoop> {
     let of = |root: f64| PhaseLoop { gains: controlled_root_gains(order, root), feedback: Feedback::PhaseAndRate };
     let (mut low, mut high) = (1e-6_f64, 1.0 - 1e-6);
@@ -275,7 +275,7 @@ impl Places {
         self.squares += place * place;
     }
 
-    /// Mean and mean square; of none those of any place.
+    /// Mean and mean square; of none those of any position.
     fn means(&self) -> [f64; 2] {
         match self.count {
             0 => [0.0, 1.0 / 12.0],
@@ -371,8 +371,8 @@ impl Theory {
         self.update_s * cn0_hz * self.share
     }
 
-    /// Raw and thermal sigma, in the loop's unit, at the whole signal's C/N0, of observations at some places
-    /// in the intervals.
+    /// Raw and thermal sigma, in the loop's unit, at the whole signal's C/N0, of observations at some
+    /// positions in the intervals.
     pub fn noise(&self, which: Loop, cn0_hz: f64, places: &Places) -> (f64, f64) {
         let (update_s, snr) = (self.update_s, self.snr(cn0_hz));
         let phase_rad = pll::raw_rad(update_s, cn0_hz * self.share);
@@ -461,7 +461,7 @@ pub(crate) struct Stresses {
     of: BTreeMap<Loop, Stress>,
 }
 
-/// Longest stretch that is followed interval by interval.
+/// Longest segment that is followed interval by interval.
 const MOST_UPDATES: usize = 4_000_000;
 
 impl Stresses {

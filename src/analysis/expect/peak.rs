@@ -12,7 +12,7 @@ use gnss::signal::Tone;
 /// integral and a difference of 1/w.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Peak {
-    /// Places in chips, and by how much the slope grows there.
+    /// Positions in chips, and by how much the slope grows there.
     corners: Vec<(f64, f64)>,
     width_chips: f64,
     averages: u32,

@@ -146,7 +146,7 @@ fn found(run: &Run, signal: &'static Signal, filtered: bool) -> Option<f64> {
     let first_hz = run.expected.iter().find(|one| front_end.has(one.signal))?.nominal_hz;
     let filter = Some(&front_end).filter(|_| filtered).and_then(|own| own.filter_at(first_hz));
     let carrier_hz = front_end.place_hz(signal.centre_hz());
-    // Of both sides of a sub-carrier the chips are what is found, about the sub-carrier's frequency.
+    // Of both sidebands of a sub-carrier the chips are what is found, about the sub-carrier's frequency.
     let side_hz = followed.sides.map_or(0.0, |tone| tone.side_hz(followed.own.chip_rate_hz()));
     let step_hz = rate_hz / f64::from(STEPS);
     let (mut amplitude, mut noise) = (0.0, 0.0);

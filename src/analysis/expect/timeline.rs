@@ -66,7 +66,7 @@ struct Track {
 /// Antenna and sampler's clock at an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
-    /// Place, Earth-fixed, metres.
+    /// Position, Earth-fixed, metres.
     pub position_m: Vector3<f64>,
     /// Velocity, Earth-fixed, m/s.
     pub velocity_mps: Vector3<f64>,

@@ -12,7 +12,7 @@ const MOST_LAGS: usize = 4096;
 /// Factor of 95 % of a normal law.
 const TWO_SIDED_95: f64 = 1.959_963_984_540_054;
 
-/// Several stretches of one kind of error, evenly spaced in each, with their common autocorrelation.
+/// Several segments of one kind of error, evenly spaced in each, with their common autocorrelation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Correlated {
     /// Values in all.

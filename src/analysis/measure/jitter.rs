@@ -5,10 +5,10 @@
 //! √(1/(2B·T)) times what the loop lets through. The theory takes the loops as the settings file describes
 //! them, controlled roots of exact bandwidth, with phase and rate fed back
 //! ([`crate::expect::theory::linear`]), at the C/N0 of which the measured one is stated
-//! ([`Stated::effective_dbhz`]) and at the places in the loops' intervals where observations fall, and adds
-//! the scene's oscillator and the stress that the true motion puts on that same linear loop. In the tracking
-//! stage the frequency is that of the phase loop; its row judges the rate. Limits: discriminators as of
-//! early minus late power and two-quadrant arctangent; a front-end filter's rounding of the correlation is
+//! ([`Stated::effective_dbhz`]) and at the positions in the loops' intervals where observations fall, and
+//! adds the scene's oscillator and the stress that the true motion puts on that same linear loop. In the
+//! tracking stage the frequency is that of the phase loop; its row judges the rate. Limits: discriminators as
+//! of early minus late power and two-quadrant arctangent; a front-end filter's rounding of the correlation is
 //! left out.
 
 use serde::Serialize;

@@ -62,7 +62,7 @@ impl Common {
     }
 
     /// Takes what a scene's facts say, for the rows counted so far and what `receiver.json` says of code
-    /// loops; `received` gives the front end in which a signal is received, by its place.
+    /// loops; `received` gives the front end in which a signal is received, by its index.
     pub(super) fn set_front_end(&mut self, scene: &SceneFacts, receiver: &Value, received: &dyn Fn(&Signal) -> usize) {
         let offset_hz = oscillator_offset_hz(&scene.front_end);
         self.doppler_hz = if scene.inverted { -offset_hz } else { offset_hz };

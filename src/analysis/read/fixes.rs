@@ -42,7 +42,7 @@ impl Texts {
     }
 }
 
-/// A fix without its texts, and their places.
+/// A fix without its texts, and their positions.
 #[derive(Clone, Debug)]
 struct Row {
     fix: Fix,
@@ -60,7 +60,7 @@ const MODELS: [IonosphereModel; 7] = [
     IonosphereModel::Bdgim,
 ];
 
-/// Place of a model among [`MODELS`]; another one does not compile without a place.
+/// Index of a model in [`MODELS`]; a new model does not compile without an index.
 fn place(model: IonosphereModel) -> u64 {
     match model {
         IonosphereModel::None => 0,

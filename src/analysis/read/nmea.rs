@@ -1,4 +1,4 @@
-//! NMEA 0183 position files: GGA for the place, RMC and ZDA for the date, RMC and VTG for the velocity.
+//! NMEA 0183 position files: GGA for the position, RMC and ZDA for the date, RMC and VTG for the velocity.
 //!
 //! Sentences are read by [`gnss::nmea::read`]. Those of one time of day are one epoch, and an epoch has one
 //! fix: that of the talker GN, or of the first one. A date holds until the next; where a file has none, the
@@ -20,7 +20,7 @@ use gnss::time::Epoch;
 pub struct PlaceFix {
     /// Time label of the receiver, in GPS time.
     pub label: Epoch,
-    /// Place, Earth-fixed, metres.
+    /// Position, Earth-fixed, metres.
     pub position_m: Vector3<f64>,
     /// Satellites used.
     pub satellites: u32,

@@ -192,7 +192,7 @@ fn the_example_of_rinex_2_11_is_read_with_its_events() {
 #[test]
 fn lines_of_rinex_2_that_go_on_are_one_record() {
     // Seven observations, so two lines each; fourteen satellites, so two lines of names. Values tell where
-    // they stand: satellite, and place in the list of types.
+    // they stand: satellite, and position in the list of types.
     let mut text = format!("{:60}RINEX VERSION / TYPE\n", "     2.11           OBSERVATION DATA    G (GPS)");
     let types = ["C1", "L1", "D1", "S1", "P2", "L2", "C2", "D2", "S2", "C5", "L5"];
     let named = |some: &[&str]| some.iter().map(|code| format!("    {code}")).collect::<String>();

@@ -88,7 +88,7 @@ pub struct Run {
     pub expected: Vec<MeanSignal>,
     /// Reflected rays; none in a scene without multipath.
     pub rays: SpillStore<Link, RayRow>,
-    /// The antenna's true places.
+    /// The antenna's true positions.
     pub trajectory: Table<TrajectoryRow>,
     /// Usual time between them.
     truth_interval_s: f64,
@@ -113,7 +113,7 @@ pub struct Run {
     pub tracking: SpillStore<Link, TrackingRow>,
     /// Median time of the loops' updates.
     pub update_s: Option<f64>,
-    /// Place of the front end in which each signal is received.
+    /// Index of the front end in which each signal is received.
     pub front_ends: BTreeMap<&'static Signal, usize>,
     /// The ionosphere that it measured with two bands; none without.
     pub ionosphere: SpillStore<Sv, IonosphereRow>,
@@ -383,7 +383,7 @@ impl Run {
         sample as f64 / self.scene.sample_rate_hz
     }
 
-    /// Place of the front end in which a signal is received.
+    /// Index of the front end in which a signal is received.
     pub fn front_end(&self, signal: &Signal) -> usize {
         self.front_ends.get(signal).copied().unwrap_or(0)
     }

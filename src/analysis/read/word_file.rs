@@ -46,7 +46,7 @@ impl WordFile {
         if let Some(file) = &mut self.file {
             let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
             let file = file.get_mut().unwrap_or_else(PoisonError::into_inner);
-            // Reading has left the place where it ends.
+            // Reading has left the position where it ends.
             file.seek(SeekFrom::Start(8 * start)).and_then(|_| file.write_all(&bytes)).map_err(failed)?;
         }
         self.words += words.len() as u64;

@@ -1,6 +1,6 @@
-//! States from sentences of NMEA: GGA alone has the place and RMC alone place, speed and course, at the last
-//! height that was known. Where both come for one time they make one state, with what the height gained since
-//! the one before. Altitudes are above mean sea level; a GGA without a geoid separation takes EGM96's.
+//! States from sentences of NMEA: GGA alone has the position and RMC alone position, speed and course, at the
+//! last height that was known. Where both come for one time they make one state, with what the height gained
+//! since the one before. Altitudes are above mean sea level; a GGA without a geoid separation takes EGM96's.
 
 use super::{Message, WireError};
 use generator::vehicle::file::{Rmc, gga, rising, rmc};
@@ -108,7 +108,7 @@ mod tests {
         format!("${body}*{:02X}", body.bytes().fold(0, |sum, byte| sum ^ byte))
     }
 
-    /// 08:05:45 UTC is the scene's start; a place that climbs at 3 m/s.
+    /// 08:05:45 UTC is the scene's start; a position that climbs at 3 m/s.
     fn gga_at(second: u32) -> String {
         let height_m = 473.0 + 3.0 * f64::from(second);
         with_sum(&format!("GPGGA,0805{:02}.00,4806.0000,N,01136.0000,E,1,08,1.0,{height_m},M,47.0,M,,", 45 + second))

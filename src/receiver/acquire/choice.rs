@@ -22,7 +22,7 @@ const SURE: f64 = 4.0;
 /// dominates the first dwells, the threshold is 0.8 of the value expected from them.
 const DOUBTFUL: f64 = 0.7;
 
-/// Place of the largest value, of equal ones the first.
+/// Position of the largest value, of equal ones the first.
 fn place_of_largest(values: &[f64]) -> usize {
     (0..values.len()).fold(0, |best, n| if values[n] > values[best] { n } else { best })
 }

@@ -258,7 +258,7 @@ impl Grid {
     }
 
     /// The bins of a long spectrum within the band, those from zero on and those below: the signed number of
-    /// the first, their places, and those in the order of the short transform. The others of the short one
+    /// the first, their positions, and those in the order of the short transform. The others of the short one
     /// have none.
     pub(super) fn band(&self, length: usize) -> [(f64, Range<usize>, Range<usize>); 2] {
         let band = self.inverse.len();

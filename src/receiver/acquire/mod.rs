@@ -226,7 +226,7 @@ impl Band {
     }
 }
 
-/// A satellite that is known to be there, and its place.
+/// A satellite that is known to be there, and its position.
 type Known<'a> = (&'a Code, Refined);
 
 /// The data beside a pilot, where both are searched for: they have the same power, and the pilot's secondary

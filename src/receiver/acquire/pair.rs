@@ -2,8 +2,8 @@
 //!
 //! Both components change sign from code period to code period, so a coherent sum is one period of one of
 //! them, and the powers of both are added. The samples of a dwell are transformed once for every Doppler that
-//! is a whole number of bins away: the spectrum is read from another bin on. Dwells begin at different places
-//! of the code, so a sign that turns in the middle of one turns elsewhere in another.
+//! is a whole number of bins away: the spectrum is read from another bin on. Dwells begin at different
+//! positions of the code, so a sign that turns in the middle of one turns elsewhere in another.
 
 use std::f64::consts::TAU;
 

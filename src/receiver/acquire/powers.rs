@@ -86,8 +86,8 @@ mod tests {
     use super::super::tests::Noise;
     use super::*;
 
-    /// Powers of `sums` sums of white noise, and of a code of that amplitude at a place, whose correlation is
-    /// that of rectangular chips, `cells` a chip.
+    /// Powers of `sums` sums of white noise, and of a code of that amplitude at a position, whose correlation
+    /// is that of rectangular chips, `cells` a chip.
     fn powers(count: usize, sums: usize, cells: f64, sent: Option<(f64, f64)>, random: &mut Noise) -> Powers {
         let mut powers = Powers::new(count);
         for _ in 0..sums {

@@ -20,7 +20,7 @@ const NOISE_TAPS: usize = 16;
 /// The FFT of the squares is padded by this factor at least, then a parabola takes over.
 const PADDING: usize = 8;
 
-/// A satellite's place after refinement.
+/// A satellite's position after refinement.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Refined {
     /// Code phase at the first sample of the block, in [0, code length).
@@ -94,7 +94,7 @@ pub(super) fn refine(
     }
 }
 
-/// Correlation of the layer that a search looks for: of one side of a sub-carrier that of chips.
+/// Correlation of the layer that a search looks for: of one sideband of a sub-carrier that of chips.
 pub(super) fn searched_shape(component: &Component) -> Shape {
     let made = component.tone().map_or(component.strongest(), |_| Some(&Layer::BPSK));
     made.map_or_else(

@@ -14,7 +14,7 @@ struct Count {
     skies: u32,
     there: u32,
     found: u32,
-    /// Satellites at places where nobody sends.
+    /// Satellites at positions where nobody sends.
     false_ones: u32,
 }
 

@@ -36,8 +36,8 @@ pub struct Wave {
 }
 
 impl Wave {
-    /// The strongest layer of a satellite by its number; of a component that is one side of a sub-carrier the
-    /// chips that its tone has. `None` where the documents assign it no code.
+    /// The strongest layer of a satellite by its number; of a component that is one sideband of a sub-carrier
+    /// the chips that its tone has. `None` where the documents assign it no code.
     pub fn new(component: &Component, number: u8) -> Option<Self> {
         let Some(tone) = component.tone() else {
             return Self::of(component, component.strongest()?, number);

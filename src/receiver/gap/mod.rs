@@ -280,7 +280,7 @@ pub fn turned_by(channels: &[(&Edges, u64)]) -> Option<u64> {
     let (mut expected, mut noise) = (0.0, 0.0);
     for (edges, begin) in channels.iter().filter(|(edges, _)| edges.products.len() == length) {
         let visits = edges.count as f64 / length as f64;
-        // All places but one have the signal's power.
+        // All positions but one have the signal's power.
         let power = edges.products.iter().sum::<f64>() / edges.count.max(1) as f64 * length as f64
             / (length as f64 - 1.0).max(1.0);
         if power <= 0.0 {
@@ -329,7 +329,7 @@ fn secondary_code_turned_by(channels: &[(&Edges, u64)], length: usize) -> Option
     (most > 0.0 && lead > TURN_SIGMAS * (2.0 * noise).sqrt() && lead > TURN_SHARE * most).then_some(best as u64)
 }
 
-/// A place at which samples are missing or came twice.
+/// A position at which samples are missing or came twice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Jump {
     /// Sample of the recording near the jump, 0.1 s at most after it. With several front ends it is the first
@@ -337,7 +337,7 @@ pub struct Jump {
     pub sample: u64,
     /// Number of missing samples; negative where samples came twice.
     pub samples: i64,
-    /// The place of the front end that lost its own samples, from 0 on.
+    /// The index of the front end that lost its own samples, from 0 on.
     #[serde(skip_serializing_if = "is_first")]
     pub front_end: usize,
 }

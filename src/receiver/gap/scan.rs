@@ -16,7 +16,7 @@ use crate::source::Block;
 /// Code periods before a decision is tried, and taken of one block at most.
 const LEAST_PERIODS: u32 = 20;
 const PERIODS_A_BLOCK: usize = 20;
-/// A peak counts beyond so many deviations; with 1e6 places, noise has one in 1e7 scans.
+/// A peak counts beyond so many deviations; with 1e6 positions, noise has one in 1e7 scans.
 const PEAK_SIGMAS: f64 = 8.0;
 /// Standard deviations by which a peak has to exceed the value at the expected position.
 const LEAD_SIGMAS: f64 = 6.0;
@@ -143,12 +143,12 @@ impl Scan {
         })
     }
 
-    /// The place at which a channel that gains so many samples a second is, after so many seconds.
+    /// The position at which a channel that gains so many samples a second is, after so many seconds.
     fn moved(&self, place: usize, gain: f64, seconds: f64) -> usize {
         (place as i64 + (gain * seconds).round() as i64).rem_euclid(self.length as i64) as usize
     }
 
-    /// Place and height of the channels' common peak.
+    /// Position and height of the channels' common peak.
     fn peak(&self, channels: &[(Vec<f64>, f64)], seconds: f64) -> (usize, f64) {
         let mut sums = vec![0.0; self.length];
         for (powers, gain) in channels {

@@ -40,7 +40,7 @@ impl<W: Write> JsonLines<W> {
         self.line(kind, value)
     }
 
-    /// A fix with its place as people read it.
+    /// A fix with its position as people read it.
     fn fix(&mut self, fix: &Fix) -> Result<(), OutputError> {
         let place = Geodetic::from_ecef(&fix.position_m());
         let mut value = serde_json::to_value(fix).map_err(|error| OutputError::Refused(Box::new(error)))?;

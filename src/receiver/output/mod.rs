@@ -75,7 +75,7 @@ pub enum Record {
     Ionosphere(Vec<IonosphereRow>),
     /// A line in the spectrum of a front end's samples; front ends count from 0.
     Interference {
-        /// The front end's place, from 0 on.
+        /// The front end's index, from 0 on.
         front_end: usize,
         /// The line.
         row: LineRow,

@@ -21,7 +21,8 @@ pub struct Rinex {
 }
 
 impl Rinex {
-    /// Creates the files in an existing directory, for a receiver of these signals at a place named `marker`.
+    /// Creates the files in an existing directory, for a receiver of these signals at a position named
+    /// `marker`.
     ///
     /// # Errors
     ///

@@ -135,7 +135,7 @@ impl Store {
             Content::Test => {}
             Content::Mask(mask) => {
                 if self.mask.as_ref().is_some_and(|(old, _)| old != mask) {
-                    // Places mean other satellites from here on.
+                    // Positions mean other satellites from here on.
                     (self.quick, self.long, self.ageing) = Default::default();
                 }
                 self.mask = Some((mask.clone(), sent));

@@ -32,7 +32,7 @@ struct Content {
 }
 
 impl Electrons {
-    /// Contents on the way from the satellites of `ranges` to a place, in TECU.
+    /// Contents on the way from the satellites of `ranges` to a position, in TECU.
     pub fn of(&mut self, model: NequickG, ranges: &[Range], place_m: &Vector3<f64>) -> Vec<(Sv, f64)> {
         if self.model.replace(model) != Some(model) {
             self.latest.clear();

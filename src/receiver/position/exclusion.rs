@@ -41,7 +41,7 @@ pub type Consistent = (Vec<Range>, Solution, Vec<(Sv, f64)>);
 ///
 /// # Errors
 /// As [`least_squares::position`]; [`NoFix::Inconsistent`] when a fault shows but no set explains it,
-/// [`NoFix::Ambiguous`] when several do and lead to different places.
+/// [`NoFix::Ambiguous`] when several do and lead to different positions.
 pub fn consistent(
     ranges: Vec<Range>,
     start_m: Vector3<f64>,
@@ -105,7 +105,7 @@ fn without(ranges: &[Range], set: &[usize]) -> Vec<Range> {
     kept.map(|(_, range)| range.clone()).collect()
 }
 
-/// Places of the ranges of each satellite: a fault of it is in all of them.
+/// Indices of the ranges of each satellite: a fault of it is in all of them.
 fn satellites(ranges: &[Range]) -> Vec<Vec<usize>> {
     let mut groups: Vec<(Sv, Vec<usize>)> = Vec::new();
     for (index, range) in ranges.iter().enumerate() {

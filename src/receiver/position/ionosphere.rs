@@ -28,7 +28,7 @@ use gnss::time::Epoch;
 pub const NOMINAL_ERROR: DelayError = DelayError { share: 0.6, least_m: 0.5 };
 
 /// The error that those three do not describe, as a share of the common one: the days' odd coefficients
-/// change the ratio to the nominal model by 10 to 20 % within the sky of one place.
+/// change the ratio to the nominal model by 10 to 20 % within the sky of one position.
 const INDEPENDENT_SHARE: f64 = 0.25;
 /// Angles at the Earth's centre, northwards and eastwards, over which the error changes by its own deviation:
 /// the crests of the equatorial anomaly are 10° wide, and an hour of local time is 15°.
@@ -48,7 +48,7 @@ pub enum Delays {
 }
 
 impl Delays {
-    /// Delay of a range that is received at a place from a direction, in seconds.
+    /// Delay of a range that is received at a position from a direction, in seconds.
     pub fn delay_s(&self, range: &Range, user: Geodetic, look: Look, received: Epoch) -> f64 {
         match self {
             Self::Klobuchar(..) | Self::Beidou(_) | Self::Bdgim(_) if user.height_m > IONOSPHERE_TOP_M => 0.0,

@@ -158,9 +158,9 @@ pub fn freedom(ranges: &[Range]) -> isize {
     ranges.len() as isize - (COORDINATES + scales(ranges).len()) as isize
 }
 
-/// Dilution of precision of the coordinates at a place near the Earth, by the ranges whose satellites stand
-/// above a mask; `None` where these give no position. The satellites' places are taken as they are: light
-/// times turn a direction by 1e-5 at most.
+/// Dilution of precision of the coordinates at a position near the Earth, by the ranges whose satellites
+/// stand above a mask; `None` where these give no position. The satellites' positions are taken as they are:
+/// light times turn a direction by 1e-5 at most.
 pub fn dilution(ranges: &[Range], place_m: &Vector3<f64>, mask_rad: f64) -> Option<f64> {
     let user = Geodetic::from_ecef(place_m);
     let is_above = |range: &&Range| look(user, place_m, &range.satellite.position_m).elevation_rad >= mask_rad;

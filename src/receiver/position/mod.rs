@@ -1,4 +1,4 @@
-//! Place, velocity and time from observations and decoded ephemerides.
+//! Position, velocity and time from observations and decoded ephemerides.
 //!
 //! A [`Solver`] smooths code with carrier ([`smooth`]), finds where satellites were, corrects the atmosphere
 //! by the decoded ionosphere (until then by a nominal one, [`ionosphere`]) and its own [`troposphere`],

@@ -1,4 +1,4 @@
-//! The other place that the same ranges lead to.
+//! The other position that the same ranges lead to.
 //!
 //! As many ranges as unknowns are quadratic equations: they have two solutions, and an iteration ends at
 //! either. With x = (r, b), the product ⟨x, y⟩ = r·r' − b b' and dᵢ = (sᵢ − r, ρᵢ − b) of a solution, another
@@ -25,10 +25,10 @@ const DECIDING: f64 = 30.0;
 const SAME_M: f64 = 1.0;
 
 /// Solves from a first estimate that is not a position of the same receiver, such as the Earth's centre: of
-/// two places that the ranges agree on, the one where the receiver can be.
+/// two positions that the ranges agree on, the one where the receiver can be.
 ///
 /// # Errors
-/// As [`position`]; two places where it can be, or, without a range to spare, none.
+/// As [`position`]; two positions where it can be, or, without a range to spare, none.
 pub fn first(ranges: &[Range], start_m: Vector3<f64>, corrections: &Corrections) -> Result<Solution, NoFix> {
     let found = position(ranges, start_m, corrections)?;
     let Some(other) = other(ranges, &found, corrections) else {

@@ -247,7 +247,7 @@ mod with_real_orbits {
     use gnss::rinex;
 
     /// Transmit time of a signal by the satellite's clock, relative to `start`. It arrives `seconds` after
-    /// `start` at a moving place.
+    /// `start` at a moving position.
     fn sent_s(ephemeris: &Ephemeris, start: Epoch, seconds: f64, here_m: Vector3<f64>) -> (f64, f64) {
         let mut travel_s = 0.075;
         for _ in 0..6 {

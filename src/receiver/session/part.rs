@@ -11,7 +11,7 @@ use gnss::record::AcquisitionRow;
 /// Lines begin anew so long after the code loops were moved: two time constants 1/(4B) of the narrow loop at
 /// least.
 const MOVING_S: f64 = 1.0;
-/// A rate beyond so many deviations is named beside a mirrored spectrum.
+/// A rate beyond so many deviations is named beside an inverted spectrum.
 const RATE_SIGMAS: f64 = 6.0;
 /// Number of lines from which on two searches have nothing to add.
 const LINES: usize = 3;

@@ -69,7 +69,7 @@ impl FrontEnd {
         self.widenings = if enough { 0 } else { self.widenings + 1 };
     }
 
-    /// Searches soon when there is another place to look at than last time.
+    /// Searches soon when there is another position to look at than last time.
     pub(super) fn hasten(&mut self, now: u64, shared: &Shared) {
         let exhausted = self.widenings > 0 && self.widenings.is_multiple_of(WIDTHS.len());
         let Some((aimed, _)) = self.aimed else { return };

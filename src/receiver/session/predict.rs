@@ -1,12 +1,12 @@
 //! Searches for satellites that are known to be there: after a loss, risen, or followed on another signal.
 //!
-//! Place, velocity and clock of the last fix and a satellite's ephemeris give its elevation and Doppler; a
+//! Position, velocity and clock of the last fix and a satellite's ephemeris give its elevation and Doppler; a
 //! signal of it that any front end follows gives the Doppler of its others, in the ratio of carriers. Such
 //! a search looks at a few Doppler bins of a few satellites, a tenth of the work for each, and so comes four
-//! times as often as one for all. What it may miss is left to those: the place errs by a fraction of a hertz
-//! for each hundred metres, but velocity and clock change, by [`GROWTH_HZ`] a second (2 m/s²) while there
-//! is no fix. Limits: the strong satellites are not subtracted first, so a hit that their cross-correlation
-//! may have made is left to a search for all.
+//! times as often as one for all. What it may miss is left to those: the position errs by a fraction of a
+//! hertz for each hundred metres, but velocity and clock change, by [`GROWTH_HZ`] a second (2 m/s²) while
+//! there is no fix. Limits: the strong satellites are not subtracted first, so a hit that their
+//! cross-correlation may have made is left to a search for all.
 
 use std::collections::BTreeMap;
 
@@ -48,8 +48,8 @@ pub(super) struct Missed {
     led: bool,
 }
 
-/// Doppler of a satellite at an antenna's place and velocity, without the receiver's clock, in parts of the
-/// carrier, and its elevation.
+/// Doppler of a satellite at an antenna's position and velocity, without the receiver's clock, in parts of
+/// the carrier, and its elevation.
 fn seen((here_m, velocity_mps): (Vector3<f64>, Vector3<f64>), at: Epoch, ephemeris: &Ephemeris) -> Option<(f64, f64)> {
     let travel_s = (ephemeris.state(at).ok()?.position_m - here_m).norm() / SPEED_OF_LIGHT_MPS;
     let sent = ephemeris.state(at.plus_s(-travel_s)).ok()?;

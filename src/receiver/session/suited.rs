@@ -102,8 +102,8 @@ fn is_within(metadata: &IfMetadata, signal: &Signal) -> bool {
 }
 
 /// The signals that the bands of these samples hold, as far as this receiver can follow them to a position
-/// without others; without those of two sides of a sub-carrier, whose sides are signals too. At least one:
-/// where the bands hold none, GPS L1 C/A, whose absence has a diagnosis.
+/// without others; without those of two sidebands of a sub-carrier, whose sides are signals too. At least
+/// one: where the bands hold none, GPS L1 C/A, whose absence has a diagnosis.
 pub(crate) fn held(metadata: &[IfMetadata], settings: &Settings) -> Vec<&'static Signal> {
     let is_held = |signal: &'static Signal, metadata: &IfMetadata| {
         let rate_hz = metadata.rate.hz();

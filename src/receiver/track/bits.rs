@@ -10,7 +10,7 @@ use num_complex::Complex64;
 const LEAST_PERIODS: u64 = 300;
 /// Bits after which a search begins anew.
 const MOST_BITS: u64 = 300;
-/// Standard deviations by which the best place leads every other.
+/// Standard deviations by which the best position leads every other.
 const LEAD_SIGMAS: f64 = 5.0;
 /// Upper bound of the energy at any other position, as a share of the best position's energy. Without noise,
 /// the best wrong position has a ninth for D1 and a half for D2, ± 0.04 after 150 bits.
@@ -84,14 +84,14 @@ impl BitSync {
         if self.taken < length {
             return None;
         }
-        // The last `length` prompts are a bit of the place that comes next.
+        // The last `length` prompts are a bit of the position that comes next.
         let begin = ((number + 1) % length) as usize;
         let (late, early) = self.last.split_at(begin.min(self.last.len()));
         let sum: f64 = early.iter().chain(late).zip(self.signs).map(|(soft, sign)| soft * f64::from(*sign)).sum();
         if let Some(energy) = self.energies.get_mut(begin) {
             *energy += sum * sum;
         }
-        // Every place has had as many bits now.
+        // Every position has had as many bits now.
         if !(self.taken + 1).is_multiple_of(length) || self.taken < LEAST_PERIODS {
             return None;
         }
@@ -107,7 +107,7 @@ impl BitSync {
         let (best, most) = self.energies.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
         let others = self.energies.iter().enumerate().filter(|(place, _)| *place != best);
         let next = others.map(|(_, energy)| *energy).fold(0.0, f64::max);
-        // A sum of m prompts has noise of variance m: its square, of amplitude a, 4a²m + 2m². Two places.
+        // A sum of m prompts has noise of variance m: its square, of amplitude a, 4a²m + 2m². Two positions.
         let m = self.signs.len() as f64;
         let deviation = (2.0 * (4.0 * most * m + 2.0 * bits * m * m)).sqrt();
         // All prompts in step would have as much, noise aside.

@@ -142,7 +142,7 @@ pub struct Channel {
     long: Option<LongCode>,
     segment: Option<u64>,
     side_peaks: Option<SidePeaks>,
-    /// The other side of the sub-carrier of which what is followed is one.
+    /// The other sideband of the sub-carrier of which what is followed is one.
     sides: Option<Sides>,
     /// C/N0 of what is followed over that of the whole signal.
     followed_db: f64,

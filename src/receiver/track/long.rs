@@ -1,7 +1,7 @@
 //! A pilot whose code is many periods of the followed one long: which of its segments is on the air.
 //!
 //! Both codes begin together, so each period of the followed code has one segment of the long one. What a
-//! period correlates to with every segment is summed for every place that the first period may have in the
+//! period correlates to with every segment is summed for every position that the first period may have in the
 //! long code, until one is beyond doubt. Source of the scheme: IS-GPS-200N, 3.2.1.5 (L2 CL has 75 periods of
 //! CM). Limits: chips of one rectangular step; a segment's replica is cyclic, so its first and last chip lack
 //! their true neighbours, two of 20 460.

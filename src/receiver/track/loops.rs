@@ -1,8 +1,8 @@
 //! Tracking loops in the discrete domain: gains with an exact noise bandwidth, the step of a loop,
 //! discriminators.
 //!
-//! Gains put every closed-loop root at one place p (Stephens and Thomas, controlled-root formulation): order
-//! 1: K1 = 1−p; 2: K1 = 1−p², K2 = (1−p)²; 3: K1 = 1−p³, K2 = (1−p)²(1+2p), K3 = (1−p)³. The state is
+//! Gains put every closed-loop root at one position p (Stephens and Thomas, controlled-root formulation):
+//! order 1: K1 = 1−p; 2: K1 = 1−p², K2 = (1−p)²; 3: K1 = 1−p³, K2 = (1−p)²(1+2p), K3 = (1−p)³. The state is
 //! corrected in phase and rate at each update, without further delay, and is the mean phase of the coming
 //! interval; then the one-sided noise bandwidth is exact and the loop is stable for every p in (0, 1). Steady
 //! error of order 3 under constant jerk: jerk·T³/K3.

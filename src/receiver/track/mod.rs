@@ -3,7 +3,7 @@
 //! A [`Channel`] takes consecutive blocks of samples and gives the state of its replica at requested samples,
 //! message symbols, rows for the judge and events. Its loops ([`loops`]) are designed in the discrete domain
 //! and closed in [`closed`]; detectors are in [`lock`], [`cn0`] and `sync`, the pull-in of weak signals in
-//! `pull_in`, the secondary code of pilots in `secondary_code`, both sides of a sub-carrier in `sides`.
+//! `pull_in`, the secondary code of pilots in `secondary_code`, both sidebands of a sub-carrier in `sides`.
 //! Limits: loops follow the component that leads, a code period is at least as long as a few samples.
 
 use gnss::record::{Event, TrackingRow};

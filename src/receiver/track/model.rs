@@ -57,7 +57,7 @@ pub struct SidePeak {
     pub ratio: f64,
 }
 
-/// The side peak nearest to the main one of both sides of a sub-carrier together; `None` without one.
+/// The side peak nearest to the main one of both sidebands of a sub-carrier together; `None` without one.
 pub fn side_peak_of_both(component: &Component) -> Option<SidePeak> {
     let tone = component.tone()?;
     // Of (1 − x)·cos(πmx), which has its extreme a little before half a cycle's end.

@@ -276,8 +276,8 @@ mod tests {
                     u32::from(batch(&mut normal, dbhz, 20.0, 0.1, run % GROUP, 250).search(2.0).unwrap().changes);
             }
             println!("{dbhz} dB-Hz: changes in {still} of 40 without, in {changing} of 40 with");
-            // Without changes the worst of twenty places is 0.4 ± 0.2 symbols below at 40 dB-Hz; eleven edges
-            // change half of the time.
+            // Without changes the worst of twenty positions is 0.4 ± 0.2 symbols below at 40 dB-Hz; eleven
+            // edges change half of the time.
             assert!(still <= 8 && changing >= 39, "{dbhz}: {still} {changing}");
         }
     }

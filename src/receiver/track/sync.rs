@@ -44,7 +44,7 @@ impl SymbolSync {
         if let Some(energy) = self.energy.get_mut(begin as usize) {
             *energy += sum.re * sum.re;
         }
-        // Every place has had as many symbols now: one more would win where no symbol turns.
+        // Every position has had as many symbols now: one more would win where no symbol turns.
         if !(self.taken + 1).is_multiple_of(length) {
             return None;
         }

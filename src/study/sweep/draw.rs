@@ -1,7 +1,7 @@
 //! Curves with bands of confidence, heat maps, and where a figure crosses a level.
 //!
 //! [`pictures`] turns results into charts as data; nothing is drawn before [`Picture::draw`]. A value without
-//! a number has its place by its rank. Limits: a crossing is found by straight lines between neighbouring
+//! a number has its position by its rank. Limits: a crossing is found by straight lines between neighbouring
 //! cells.
 
 use std::fmt::Write;
@@ -189,7 +189,7 @@ impl View<'_> {
         let ticks = if !numbers {
             study_axis.map(|axis| (0..axis.values.len()).map(|rank| (rank as f64, axis.words_of(rank))).collect())
         } else if self.plot.log_y && !self.plot.log_x {
-            // A grid needs the places of both axes.
+            // A grid needs the positions of both axes.
             study_axis.map(|axis| {
                 let every = axis.values.len().div_ceil(MOST_TICKS).max(1);
                 let tick = |value| Some((axis::number_of(value)?, axis::text_of(value)));

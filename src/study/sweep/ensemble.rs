@@ -1,4 +1,4 @@
-//! All cases of a study taken together: how its figures are distributed over starts, places and noises.
+//! All cases of a study taken together: how its figures are distributed over starts, positions and noises.
 //!
 //! `ensemble = [axis, …]` names the axes that keep ensembles apart; all others are pooled. One case counts
 //! once, however long it is, so that the intervals are those of independent runs. Percentiles are of the
@@ -60,7 +60,7 @@ impl Collector {
         Self { axes: axes.to_vec(), figures, found: Vec::new() }
     }
 
-    /// Takes a case: its place on all axes, and those figures that it has.
+    /// Takes a case: its position on all axes, and those figures that it has.
     pub fn take(&mut self, at: &[usize], values: &[Option<f64>]) {
         let key: Vec<usize> = self.axes.iter().filter_map(|&axis| at.get(axis).copied()).collect();
         let index = self.found.iter().position(|(known, ..)| *known == key).unwrap_or_else(|| {

@@ -339,7 +339,7 @@ fn parse(path: &Path) -> Result<Study, StudyError> {
 }
 
 fn base(written: &Path, path: &Path, text: &str) -> Result<Base, StudyError> {
-    // As it is first, so that its own errors have their place.
+    // As it is first, so that its own errors have their position.
     let scenario = Scenario::parse(text, &path.display().to_string())?;
     let document = text.parse().map_err(|e: toml::de::Error| StudyError::input(path, e.message()))?;
     let directory = path.parent().unwrap_or(Path::new(".")).to_owned();

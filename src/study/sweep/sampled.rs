@@ -266,7 +266,7 @@ fn pll_theory_deg(places_s: &[f64], channel: &Case) -> Option<f64> {
     let closed = expect::carrier_loop(&channel.settings, Mode::Phase, update_s);
     let gain = |place: f64| closed.linear_at(place).noise_gain();
     let (start, middle, end) = (gain(0.0)?, gain(0.5)?, gain(1.0)?);
-    // The variance is a quadratic of the place, here from -1/2 to 1/2.
+    // The variance is a quadratic of the position, here from -1/2 to 1/2.
     let (slope, curve) = (end - start, 2.0 * (start + end - 2.0 * middle));
     let gains: Vec<f64> = places_s
         .iter()

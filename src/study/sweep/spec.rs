@@ -117,7 +117,7 @@ impl Study {
     /// Reads a study; `origin` names it in errors.
     ///
     /// # Errors
-    /// The first key or value that is not as expected, with its place.
+    /// The first key or value that is not as expected, with its position.
     pub fn parse(text: &str, origin: &str) -> Result<Self, ScenarioError> {
         let source = Source { origin, text };
         let refuse = |at: usize, message: String| ScenarioError::Toml { place: source.place(at), message };
@@ -373,7 +373,7 @@ fn plot(table: &Table<'_>, axes: &[Axis], grid: &Grid, keep: &[String]) -> Resul
         log_x: table.flag("log_x")?.unwrap_or(false),
         log_y: table.flag("log_y")?.unwrap_or(false),
     };
-    // Each axis, or one that is zipped with it, must have its place: else several cells would fall on one
+    // Each axis, or one that is zipped with it, must have its position: else several cells would fall on one
     // point.
     let mut placed: Vec<&str> = vec![&plot.x];
     placed.extend(plot.series.iter().chain(&plot.panel).map(String::as_str));

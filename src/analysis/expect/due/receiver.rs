@@ -20,10 +20,10 @@ use gnss::signal::{Component, SIGNALS, Signal};
 const HOLDING_RAD: f64 = 10.0 * std::f64::consts::PI / 180.0;
 /// Least C/N0 at which the message can be read: at 27 dB-Hz one bit in 4e6 is wrong (Eb/N0 of 10 dB).
 const MESSAGE_DBHZ: f64 = 27.0;
-/// Share of the power that the worst place between cells leaves: 1.5 dB of code, of cells half a chip apart
-/// with others between them, at few samples a chip.
+/// Share of the power that the worst position between cells leaves: 1.5 dB of code, of cells half a chip
+/// apart with others between them, at few samples a chip.
 const CODE_LOSS: f64 = 0.7;
-/// Places of an edge within a sum that are looked at.
+/// Positions of an edge within a sum that are looked at.
 const EDGES: u32 = 8;
 /// Factor of the number of independent cells with one cell between any two.
 const CELLS_BETWEEN: f64 = 1.5;
@@ -125,7 +125,7 @@ impl Receiver {
         Self::new(settings, None, None)
     }
 
-    /// Probability that one search misses a signal, in the worst place between its cells.
+    /// Probability that one search misses a signal, in the worst position between its cells.
     pub fn miss(&self, effective_dbhz: f64, first: bool) -> f64 {
         let [at_first, later] = self.thresholds;
         let threshold = if first { at_first } else { later };
@@ -184,7 +184,7 @@ impl Search {
     ///
     /// A sum in which a sign turns after a share x of it keeps (1 − 2x)² of its power. Of one code every
     /// sum begins at the same place of a code period, which is as likely as any other. Sums of data and
-    /// pilot begin at places all over the period: mean and mean square of (1 − 2x)² are ⅓ and ⅕. What
+    /// pilot begin at positions all over the period: mean and mean square of (1 − 2x)² are ⅓ and ⅕. What
     /// random signs add is binomial; three values with the weights ⅙, ⅔, ⅙ have its mean and variance, and
     /// five moments of the normal distribution near it.
     fn left(&self) -> impl Iterator<Item = (f64, f64)> {

@@ -60,7 +60,7 @@ fn folded_m(waveform: &Waveform, chips: f64, rate_hz: f64) -> f64 {
 /// Longer and shorter chips are in proportion.
 fn locked_m(chip_rate_hz: f64, chips: f64, rate_hz: f64) -> f64 {
     let samples = |places: u32| f64::from(places) * rate_hz / chip_rate_hz;
-    // Within a code the places drift apart otherwise.
+    // Within a code the positions drift apart otherwise.
     let places = (1..=32).find(|places| (samples(*places) - samples(*places).round()).abs() < 1.0 / chips);
     let scale = MEASURED_HZ / chip_rate_hz;
     places.map_or(0.0, |places| 1.6 * scale * (4.0 / samples(places)) * (4.0 / samples(places)))
@@ -83,8 +83,8 @@ mod tests {
                 averaged_m(&L1_CA, Layers::Whole, rate_hz)
             );
         }
-        // Four samples a chip, and five chips to 8 · 2.5 samples: 1.6 · (4 / 5)² m with two places at 2.5575
-        // Msps.
+        // Four samples a chip, and five chips to 8 · 2.5 samples: 1.6 · (4 / 5)² m with two positions at
+        // 2.5575 Msps.
         assert!(
             (averaged_m(&L1_CA, Layers::Whole, 4.092e6) - 1.6).abs() < 1e-9
                 && (averaged_m(&L1_CA, Layers::Whole, 2.5575e6) - 1.024).abs() < 1e-9

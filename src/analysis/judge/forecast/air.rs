@@ -34,7 +34,7 @@ const SHELL: f64 = 0.948;
 /// One line of sight.
 #[derive(Clone, Copy, Debug)]
 pub struct Sight<'a> {
-    /// The true place.
+    /// The true position.
     pub user: Geodetic,
     /// Direction to the satellite.
     pub look: Look,

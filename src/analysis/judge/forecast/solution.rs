@@ -204,7 +204,7 @@ const BIAS_SHARE: f64 = 0.1;
 const TROPOSPHERE_SHARE: f64 = 0.05;
 
 /// Shows `see` the expectations of all fixes that have a truth and enough satellites, in the order of their
-/// samples: each with its fix, the true place, and what is expected of clocks beyond the first.
+/// samples: each with its fix, the true position, and what is expected of clocks beyond the first.
 ///
 /// # Errors
 /// [`JudgeError::Read`] where spilled rows cannot be read, and those of `see`.

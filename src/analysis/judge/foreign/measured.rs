@@ -71,7 +71,7 @@ pub struct Slip {
     pub link: Link,
 }
 
-/// An unbroken stretch of a satellite's carrier.
+/// An unbroken segment of a satellite's carrier.
 #[derive(Clone, Copy, Debug)]
 pub struct Arc {
     /// Satellite and signal.
@@ -148,7 +148,7 @@ pub struct Measured {
     pub clock: Vec<ClockRow>,
     /// Every break of a carrier.
     pub slips: Vec<Slip>,
-    /// Every unbroken stretch of a carrier with more than two epochs.
+    /// Every unbroken segment of a carrier with more than two epochs.
     pub arcs: Vec<Arc>,
     /// Every satellite.
     pub satellites: Vec<Satellite>,

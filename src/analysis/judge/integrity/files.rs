@@ -61,7 +61,7 @@ fn opened(path: &Path) -> Result<Option<BufReader<File>>, JudgeError> {
     }
 }
 
-/// A row of `fixes.csv` with the columns that say its place and time once more.
+/// A row of `fixes.csv` with the columns that say its position and time once more.
 #[derive(Deserialize)]
 struct Placed {
     gps_s: i64,
@@ -83,7 +83,7 @@ struct Placed {
 }
 
 impl Placed {
-    /// Distance between both places, in sigmas of the fix.
+    /// Distance between both positions, in sigmas of the fix.
     fn departure(&self) -> Option<f64> {
         let place = Geodetic::from_degrees(self.latitude_deg?, self.longitude_deg?, self.height_m?);
         let apart_m = (place.to_ecef() - nalgebra::Vector3::new(self.x_m, self.y_m, self.z_m)).norm();
@@ -352,7 +352,7 @@ fn sentences(run: &Run, mut file: BufReader<File>, path: &Path) -> Result<Vec<Fi
         if read.map_err(|source| JudgeError::Read { path: path.to_owned(), source })? == 0 {
             break;
         }
-        // The sentences of an epoch begin with its place.
+        // The sentences of an epoch begin with its position.
         if line.get(3..6) == Some(b"GGA") {
             all.take(&own, number)?;
             own.clear();

@@ -132,7 +132,7 @@ impl Case {
         pairs.map(|(stated, square)| (stated / square.sqrt() - 1.0).abs()).fold(condition, f64::max)
     }
 
-    /// Largest departure of a correlation ρ from the expected one, as the difference of their artanh.
+    /// Largest deviation of a correlation ρ from the expected one, as the difference of their artanh.
     ///
     /// Weights that err by a factor s at most, each in its own way, change N = Σ w h hᵀ by a share of ±ln s
     /// in the order of matrices, and so N⁻¹. Of two axes with the correlation matrix R, that is R^½ E R^½

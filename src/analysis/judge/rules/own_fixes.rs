@@ -28,7 +28,7 @@ const ABOVE_DEG: f64 = 0.5;
 /// Time that half cycles, residual tests and the solution may take.
 const SETTLED_S: f64 = LOCK_S + 1.0;
 
-/// One signal's observations beside its satellite's place in the sky.
+/// One signal's observations beside its satellite's position in the sky.
 struct Seen<'r> {
     link: Link,
     rows: std::iter::Peekable<Cursor<'r, Link, Observation>>,

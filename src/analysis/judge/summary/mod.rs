@@ -126,7 +126,7 @@ pub struct Position {
     pub nees_verdict: Option<Calibration>,
 }
 
-/// The receiver's clock, over the longest stretch of fixes without a gap. Deviations at an averaging time of
+/// The receiver's clock, over the longest segment of fixes without a gap. Deviations at an averaging time of
 /// 1 s are null where the record is too short for them, or the clock is steady to rounding.
 #[derive(Clone, Debug, Serialize)]
 pub struct Clock {

@@ -2,7 +2,7 @@
 //!
 //! Bias is the clock's reading minus GPS time. The receiver's error of it is minus the error of the GPS time
 //! that it gives, so that it does not matter how the receiver set its clock; truth plus error is the
-//! estimate. Deviations need an even grid: the longest stretch of fixes without a gap is taken, and of the
+//! estimate. Deviations need an even grid: the longest segment of fixes without a gap is taken, and of the
 //! truth the whole run. Expected beside them: the white phase noise of a clock solved from independent code
 //! or carrier measurements, TDOP × σ. Limits: the code loop's bandwidth and carrier smoothing correlate
 //! fixes, so the estimate lies below the code's line; its noise is no oscillator's.
@@ -132,7 +132,7 @@ impl Series {
         allan::curve(deviation, &self.phases_s, self.tau0_s, [m as usize], CONFIDENCE).into_iter().next()
     }
 
-    /// Strengths of its power-law noises below half its rate, from octaves, so that no stretch of τ counts
+    /// Strengths of its power-law noises below half its rate, from octaves, so that no segment of τ counts
     /// more.
     pub fn power_law(&self) -> Option<PowerLaw> {
         let octaves = octaves(self.phases_s.len());
@@ -156,7 +156,7 @@ impl Series {
 /// The clock over a run.
 #[derive(Debug)]
 pub struct Clock {
-    /// The longest stretch of fixes without a gap.
+    /// The longest segment of fixes without a gap.
     pub rows: Table<ClockRow>,
     /// Straight line of the estimate.
     pub estimate_line: Option<Line>,
@@ -335,7 +335,7 @@ fn interval_s(run: &Run, samples: &[u64]) -> Option<f64> {
     (last > first).then(|| (last - first) as f64 / (run.scene.sample_rate_hz * (samples.len() - 1) as f64))
 }
 
-/// Median time dilution of the fixes in a stretch.
+/// Median time dilution of the fixes in a segment.
 fn tdop(run: &Run, rows: &Table<ClockRow>) -> Result<Option<f64>, JudgeError> {
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else { return Ok(None) };
     let mut found = Vec::new();

@@ -127,8 +127,8 @@ fn fonts() -> Arc<fontdb::Database> {
 }
 
 /// Joins circles of the same look that follow each other into one path: filled ones as strokes without length
-/// under round caps, hollow ones as arcs. Circles at one and the same place stay: a stroke without any extent
-/// is not drawn.
+/// under round caps, hollow ones as arcs. Circles at one and the same position stay: a stroke without any
+/// extent is not drawn.
 fn with_dots_joined(svg: &str) -> String {
     let mut joined = String::with_capacity(svg.len());
     let mut run: Vec<(Circle<'_>, &str)> = Vec::new();

@@ -216,7 +216,7 @@ pub fn spoofing(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     Ok(Some(Sketch::charts((WIDTH_PX, 340), 2, [plan, Chart::new("While the spoofer is on", x, y, distances)], legend)))
 }
 
-/// The way in plan and its height over time, as it was and as found.
+/// Horizontal path and height over time, true and found.
 pub fn trajectory(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let run = judged.run;
     let origin_m = run.trajectory.first().map_or_else(Vector3::zeros, |row| row.position_m());

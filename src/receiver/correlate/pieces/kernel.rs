@@ -1,6 +1,6 @@
 //! Groups of pieces eight at a time with AVX2, and running sums; elsewhere [`super::lanes`].
 //!
-//! Sums lie as (in-phase, quadrature) pairs, four to a register. Phasors and places of a chunk are made
+//! Sums lie as (in-phase, quadrature) pairs, four to a register. Phasors and positions of a chunk are made
 //! first: so every loop has few values at hand, and runs that do not wait for each other. No operation is
 //! fused, so the bits are those of the plain twin.
 
@@ -16,7 +16,7 @@ use super::lanes::{PLACE_BITS, PRODUCT_BITS, SINE, TURNS, WINDOW_TAPS};
 use super::{GROUP, GROUPS};
 
 /// Adds the products of a chunk. Groups `inner` go by windows: early, prompt and late come first, a sample
-/// apart at most, with two samples on either side of every place; `level` must be one that this processor
+/// apart at most, with two samples on either side of every position; `level` must be one that this processor
 /// has.
 pub(super) fn add<const T: usize>(level: Level, chunk: &Chunk<T>, inner: [usize; 2], products: &mut Products<T>) {
     let ([from, to], all) = (inner, chunk.starts.len());
@@ -198,7 +198,7 @@ fn groups<const T: usize, const WINDOW: bool>(
     }
 }
 
-/// Places of the groups' starts, and by how much the replica times the phasor changes there.
+/// Positions of the groups' starts, and by how much the replica times the phasor changes there.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 #[inline]
@@ -305,17 +305,17 @@ fn twice(half: usize, values: x86::__m256) -> x86::__m256 {
     if half == 0 { x86::_mm256_unpacklo_ps(values, values) } else { x86::_mm256_unpackhi_ps(values, values) }
 }
 
-/// The entries of half a group's places, and those after them.
+/// The entries of half a group's positions, and those after them.
 ///
 /// # Safety
-/// `entries` and two pairs from each place on must be within one allocation.
+/// `entries` and two pairs from each position on must be within one allocation.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 #[inline]
 unsafe fn two(entries: *const [i32; 2], places: &[u32; GROUP], half: usize) -> [x86::__m256i; 2] {
     let at = |piece: usize| {
-        // SAFETY: a place that is there. Volatile, or the compiler would take it from a register in two steps
-        // on one port.
+        // SAFETY: a position that is there. Volatile, or the compiler would take it from a register in two
+        // steps on one port.
         let place = unsafe { std::ptr::read_volatile(&raw const places[piece]) } >> PLACE_BITS;
         // SAFETY: the caller's.
         unsafe { x86::_mm_loadu_si128(entries.wrapping_add(place as usize).cast()) }
@@ -367,7 +367,7 @@ fn each_tap<const T: usize>(
             unsafe { x86::_mm256_storeu_si256(held.as_mut_ptr().cast(), places) };
             let f = fractions(places);
             for half in 0..2 {
-                // SAFETY: places are held between the first entry and that after the last sample, beyond
+                // SAFETY: positions are held between the first entry and that after the last sample, beyond
                 // which there is one more.
                 let [a, b] = unsafe { two(entries, &held, half) };
                 let part = x86::_mm256_mul_ps(twice(half, f), less(b, a));
@@ -405,7 +405,7 @@ fn windows<const T: usize>(chunk: &Chunk<T>, made: &[Made], cos: &mut [x86::__m2
             x86::_mm256_max_ps(x86::_mm256_sub_ps(late, one), none),
         ];
         for half in 0..2 {
-            // SAFETY: the caller's groups have two entries on either side of every place.
+            // SAFETY: the caller's groups have two entries on either side of every position.
             let ([s0, s1], [s2, s3]) =
                 unsafe { (two(entries, &made.places, half), two(entries.wrapping_add(2), &made.places, half)) };
             let (before, here, after) = (less(s1, s0), less(s2, s1), less(s3, s2));

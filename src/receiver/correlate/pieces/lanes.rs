@@ -3,7 +3,7 @@
 use super::super::sums::Sums;
 use super::{GROUP, GROUPS};
 
-/// Fraction bits of a place in samples, and of the products that give it.
+/// Fraction bits of a position in samples, and of the products that give it.
 pub(super) const PLACE_BITS: u32 = 16;
 pub(super) const PRODUCT_BITS: u32 = 26;
 /// Pairs of sums side by side: half a group.
@@ -11,7 +11,7 @@ pub(super) const PAIRS: usize = GROUP / 2;
 /// The pieces of either half of a group, as two instructions part them.
 const HALVES: [[usize; PAIRS]; 2] = [[0, 1, 4, 5], [2, 3, 6, 7]];
 /// sin 2πy = y·(…y²) for |y| ≤ 1/4 to 5e-6: coefficients of the polynomial that is nearest at Chebyshev's
-/// places.
+/// positions.
 pub(super) const SINE: [f32; 4] = [6.283_180_5, -41.339_246, 81.408_01, -71.607_68];
 /// Taps that a window serves.
 pub(super) const WINDOW_TAPS: usize = 3;
@@ -26,11 +26,11 @@ pub(super) struct Chunk<'a, const T: usize> {
     pub sums: Sums<'a>,
     /// Offset that is subtracted from all entries, in-phase and quadrature.
     pub base: [i32; 2],
-    /// The entry from which places count, which may lie before the first one.
+    /// The entry from which positions count, which may lie before the first one.
     pub origin: isize,
-    /// Places of the first and after the last sample.
+    /// Positions of the first and after the last sample.
     pub bounds: [i32; 2],
-    /// Place of a start: this and so much for each step, in 2⁻²⁶ samples.
+    /// Position of a start: this and so much for each step, in 2⁻²⁶ samples.
     pub place: i64,
     pub samples_a_step: u32,
     /// Shifts of the taps that are added to a position.
@@ -71,7 +71,7 @@ pub(super) fn phasor(phase: u32) -> [f32; 2] {
     [sine(quarter), sine(folded)]
 }
 
-/// Groups `from` to `to` of a chunk, taps wherever they are; places beyond the samples are held at their
+/// Groups `from` to `to` of a chunk, taps wherever they are; positions beyond the samples are held at their
 /// ends.
 pub(super) fn anywhere<const T: usize>(chunk: &Chunk<T>, groups: (usize, usize), products: &mut Products<T>) {
     let mut own = Products::after(products.last);
@@ -136,7 +136,7 @@ fn each_tap<const T: usize>(
     }
 }
 
-/// Sum of the samples before the one at a place, or `beyond` places further.
+/// Sum of the samples before the one at a position, or `beyond` positions further.
 fn sum<const T: usize>(chunk: &Chunk<T>, at: i32, beyond: isize, c: usize) -> i32 {
     let entry = chunk.origin + (at >> PLACE_BITS) as isize + beyond;
     chunk.sums.entries()[entry as usize][c]
@@ -175,7 +175,7 @@ fn changes<const T: usize>(
     (from..to).map(of).collect()
 }
 
-/// Place of a start, in samples with [`PLACE_BITS`] behind the point.
+/// Position of a start, in samples with [`PLACE_BITS`] behind the point.
 fn place<const T: usize>(chunk: &Chunk<T>, g: usize, k: usize) -> i32 {
     let product = u64::from(chunk.starts[g][k]) * u64::from(chunk.samples_a_step);
     (product.wrapping_add(chunk.place as u64) >> (PRODUCT_BITS - PLACE_BITS)) as i32

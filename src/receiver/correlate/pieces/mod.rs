@@ -1,9 +1,9 @@
 //! The correlator by pieces: work for each change of the code's sign, whatever the rate of the samples.
 //!
 //! Between two changes of its sign a replica is constant. What the samples add up to there is a difference of
-//! their running sums ([`super::sums`]), which all channels share. With S(p) the sum up to place p, between
-//! samples in proportion, and u the replica's value times the carrier's conjugate phasor in the middle of a
-//! piece, a correlation is
+//! their running sums ([`super::sums`]), which all channels share. With S(p) the sum up to position p,
+//! between samples in proportion, and u the replica's value times the carrier's conjugate phasor in the
+//! middle of a piece, a correlation is
 //!
 //! > Σ u·(S(end) − S(begin)) = Σ (u before − u after)·S(change) + u last·S(last sample)
 //!
@@ -41,7 +41,7 @@ const LONGEST_CHIPS: usize = 4;
 const MOST_TURNS: f64 = 0.04;
 /// Pieces a sample at most: with more of them products sample by sample are quicker.
 const MOST_PIECES: f64 = 0.3;
-/// Samples that a group spans at most: places within a chunk have 16 bits, and sums 24.
+/// Samples that a group spans at most: positions within a chunk have 16 bits, and sums 24.
 const MOST_SAMPLES: f64 = 28_000.0;
 /// Samples in a step at most: steps have 6 bits before the point.
 const MOST_SAMPLES_A_STEP: f64 = 60.0;
@@ -65,7 +65,7 @@ pub(super) struct Pieces {
 }
 
 impl Pieces {
-    /// The pieces of a wave that is `gain` of a replica; `None` where their places cannot be counted.
+    /// The pieces of a wave that is `gain` of a replica; `None` where their positions cannot be counted.
     pub fn of(wave: &Wave, gain: Complex64) -> Option<Self> {
         let length = wave.values.len();
         if wave.steps_per_chip == 0 || !(64..MOST_STEPS - 4 * MARGIN as usize).contains(&length) {
@@ -145,7 +145,7 @@ impl Pieces {
         }
         let by_themselves = if first.is_some() { 3 } else { 0 };
         for (tap, found) in taps.iter().zip(&mut found).skip(by_themselves) {
-            // Counted from itself it has a place near those of its changes.
+            // Counted from itself it has a position near those of its changes.
             [*found] = self.together(level, sums, &Nco { code: self.moved(nco.code, *tap), ..nco }, [0]);
         }
         found

@@ -8,7 +8,7 @@ use super::super::{CODE_BITS, Nco, TURN};
 use super::lanes::{Chunk, PAIRS, PLACE_BITS, PRODUCT_BITS, Products, phasor};
 use super::{GROUP, GROUPS, LONGEST_CHIPS, MARGIN, MOST_SAMPLES, Pieces, extent, kernel};
 
-/// Places of chunks are held within 16 bits.
+/// Positions of chunks are held within 16 bits.
 const FARTHEST: f64 = 32_000.0;
 /// Unit of the entries.
 const HALF: f64 = 0.5;
@@ -70,7 +70,7 @@ pub(super) fn correlate<const T: usize>(
 struct Way {
     /// Phase of the table's steps where the first sample's interval begins.
     begin: i64,
-    /// Groups that are met, and those of them about whose places all four sums are there.
+    /// Groups that are met, and those of them about whose positions all four sums are there.
     groups: (usize, usize),
     inner: (usize, usize),
     /// Groups of a chunk at most.
@@ -113,7 +113,7 @@ impl Way {
         }
     }
 
-    /// Places and phases are exact at a chunk's first start, and roll on from there.
+    /// Positions and phases are exact at a chunk's first start, and roll on from there.
     fn chunk<'a, const T: usize>(
         &self,
         pieces: &'a Pieces,

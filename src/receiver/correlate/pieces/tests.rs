@@ -55,8 +55,8 @@ fn with_the_carrier_at_rest_sums_are_those_of_the_slow_twin_at_any_length_place_
                 let nco = nco(rate_hz, 1.023e6, 0.0, code + 0.001 * turn as f64);
                 let samples = (&i[..length], &q[..length]);
                 // Products of a chunk reach 1e5 (an offset of 2 in 12 000 samples), and 300 sums of them in
-                // f32 err by 0.1; places have 2⁻¹⁷ sample at each of 600 changes a millisecond; phasors 5e-6
-                // of the sum.
+                // f32 err by 0.1; positions have 2⁻¹⁷ sample at each of 600 changes a millisecond; phasors
+                // 5e-6 of the sum.
                 let bound = 0.02 + 2e-4 * (length as f64).sqrt() * 23.0;
                 if length == 0 {
                     continue;
@@ -126,7 +126,7 @@ fn a_carrier_that_turns_costs_what_is_stated_and_biases_nothing() {
         // by a sample or less; on 580 of them 0.006 sample of 4000, and four times that. 1e-5 of phasors.
         let apart = 0.024 * std::f64::consts::TAU * doppler_hz.abs() / rate_hz + 1e-5;
         assert!((prompt / slow).arg().abs() < apart, "{doppler_hz}: {}", (prompt / slow).arg());
-        // Early and late lose the same but for such places, a tenth of it.
+        // Early and late lose the same but for such positions, a tenth of it.
         let balance = |early: Complex64, late: Complex64| (early.norm() - late.norm()) / (early.norm() + late.norm());
         let moved = balance(early, late) - balance(slow_early, slow_late);
         assert!(moved.abs() < 0.1 * most + 1e-5, "{doppler_hz}: {moved}");

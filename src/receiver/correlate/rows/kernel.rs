@@ -11,7 +11,7 @@ use super::super::carrier::LANES;
 use super::super::kernel::Level;
 use super::{AMPLITUDE, Job, Places, ROWS, SEGMENT, SEGMENTS, body};
 
-/// Samples that share a phasor, and such vectors of a stretch.
+/// Samples that share a phasor, and such vectors of a segment.
 pub(super) const VECTOR: usize = 2 * LANES;
 pub(super) const VECTORS: usize = SEGMENTS * SEGMENT / VECTOR;
 /// Phasors of length one.
@@ -19,7 +19,7 @@ pub(super) const UNIT: f32 = 32_767.0;
 /// Adding this to a float leaves its integer, rounded half to even, in the low bits.
 const ROUND: f32 = 12_582_912.0;
 
-/// Sums of the pairs of all vectors, in phase and in quadrature, a tap: whole numbers. Those of a stretch, 32
+/// Sums of the pairs of all vectors, in phase and in quadrature, a tap: whole numbers. Those of a segment, 32
 /// pairs of 127.5·2⁴·√2 · 127 · 64, stay below 2³¹.
 pub(super) type Sums<const T: usize> = [[[f64; LANES]; 2]; T];
 
@@ -255,7 +255,7 @@ fn add_avx512<const T: usize>(stretch: &Stretch<T>, sums: &mut Sums<T>) {
     }
 }
 
-/// Fills rows with the means of a period's steps over a sample of `step` steps from each of their places,
+/// Fills rows with the means of a period's steps over a sample of `step` steps from each of their positions,
 /// and beside each the next row's.
 pub(super) fn fill(level: Level, entries: &mut [[i8; 2]], places: &Places, step: f64) {
     match level {
@@ -296,7 +296,7 @@ fn fill_plain(entries: &mut [[i8; 2]], places: &Places, step: f64) {
         let mut values = [0_i8; ROWS];
         for row in 0..ROWS {
             let exact = (next_sums[row] - sums[row]) * scale;
-            // A change's place is seen in the sign in which it goes.
+            // A change's position is seen in the sign in which it goes.
             let way = (next_steps[row] - steps[row]).clamp(-1.0, 1.0);
             let way = if exact.abs() < AMPLITUDE { way } else { 0.0 };
             let wanted = (exact + way * owed[row]).clamp(-AMPLITUDE, AMPLITUDE);

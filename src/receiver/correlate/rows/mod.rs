@@ -34,7 +34,7 @@ const AFTER: usize = SEGMENT + LANES + 2;
 const AMPLITUDE: f64 = 127.0;
 /// The weights of two rows add up to this.
 const WEIGHTS: i64 = 64;
-/// Bits of a place behind the point, and behind a weight's last one.
+/// Bits of a position behind the point, and behind a weight's last one.
 const PLACE_BITS: u32 = 40;
 const FINE_BITS: u32 = PLACE_BITS - (ROWS as i64 * WEIGHTS).ilog2();
 /// Undoes the scales of samples, values, weights and phasors.
@@ -48,7 +48,7 @@ const MOST_TURNS: f64 = 0.01;
 /// Largest relative error of the code rate against the nominal one: 0.013 sample at a segment's ends.
 const MOST_APART: f64 = 5e-5;
 
-/// A period of the replica at every row's place.
+/// A period of the replica at every row's position.
 #[derive(Clone, Debug)]
 pub(super) struct Rows {
     steps_per_chip: i64,
@@ -230,7 +230,7 @@ fn body<const T: usize>(job: &Job, codes: [i64; T], add: impl Fn(&Stretch<T>, &m
     found
 }
 
-/// A period's steps at places that are equally far apart, less than a step.
+/// A period's steps at positions that are equally far apart, less than a step.
 struct Places {
     /// Integral of the steps at each step's beginning and at the end, from a whole number of periods before
     /// zero on.

@@ -121,7 +121,7 @@ fn the_code_stands_where_that_of_the_slow_twin_does() {
             let balance = |of: [Complex64; 3]| 0.5 * (of[0].norm() - of[2].norm()) / of[1].norm() * 293.05;
             let apart_m = balance(found) - balance(slow);
             // Corners within two rows smooth edges on either side of a tap unevenly where few changes share
-            // a place between samples.
+            // a position between samples.
             assert!(apart_m.abs() < worst_m, "{rate_hz} {turn}: {apart_m}");
             sum_m += apart_m;
         }

@@ -193,7 +193,8 @@ impl FrontEnd {
         let glances: Vec<Option<Glance>> = self.tracks.iter_mut().map(|track| track.channel.glance()).collect();
         match self.gap.stage {
             Stage::Quiet => {
-                // Signs in the wrong place say how many periods are missing; what shakes carriers says less.
+                // Signs in the wrong position say how many periods are missing; what shakes carriers says
+                // less.
                 self.compare_edges(now, sink)?;
                 if self.gap.stage == Stage::Quiet {
                     self.suspect(&glances, middle_s, before, shared);

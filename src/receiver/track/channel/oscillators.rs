@@ -4,7 +4,7 @@ use super::Channel;
 use crate::correlate::{Nco, Replica, TURN, chips_to_units};
 use gnss::time::tone_turns;
 
-/// Places of the code at which the noise is measured, in turn.
+/// Positions of the code at which the noise is measured, in turn.
 const NOISE_PLACES: usize = 16;
 
 impl Channel {

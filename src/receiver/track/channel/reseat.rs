@@ -128,8 +128,8 @@ impl Channel {
     /// The replica and its oscillators at `sample`, as they would be had the loop moved the code by
     /// `moved_chips` and no other amount, and at these rates.
     pub fn predicted(&self, sample: u64, moved_chips: f64, rates: &[Rates; 2]) -> Option<(&Replica, Nco)> {
-        // A segment of a long code is there once, and both sides of a sub-carrier have signs of their own;
-        // the code beside comes in every period.
+        // A segment of a long code is there once, and both sidebands of a sub-carrier have signs of their
+        // own; the code beside comes in every period.
         let passes = self.segment.is_some() || self.sides.is_some();
         let beside = self.data.as_ref().filter(|_| passes).map(Data::replica);
         let replica = beside.or(self.replica.as_ref())?;

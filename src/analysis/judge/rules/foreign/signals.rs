@@ -20,7 +20,7 @@ use gnss::signal::{Link, Signal};
 
 /// Epochs of a satellite from which on its deviation says something.
 const ENOUGH: usize = 20;
-/// Length of the stretches whose means are judged beside the whole.
+/// Length of the segments whose means are judged beside the whole.
 const STRETCH_S: f64 = 5.0;
 /// Allowed difference between estimates of C/N0 of two satellites in decibels: a factor of two in power.
 const CN0_DB: f64 = 3.0;
@@ -102,7 +102,7 @@ fn mean_rate_hzps(rows: &[&ObservationError]) -> f64 {
     ends.map_or(0.0, |(first, last)| (last.truth.doppler_hz - first.truth.doppler_hz) / (last.at_s - first.at_s))
 }
 
-/// Stretches of at most [`STRETCH_S`] and the whole: span and mean of each.
+/// Segments of at most [`STRETCH_S`] and the whole: span and mean of each.
 fn means(values: &[(f64, f64)]) -> Vec<(usize, f64, f64)> {
     let mut parts: Vec<&[(f64, f64)]> = vec![values];
     let mut rest = values;
