@@ -178,7 +178,7 @@ impl Replica {
         Some(Self { wave: first.wave.clone(), patterns, pieces: Vec::new(), rows: None })
     }
 
-    /// Inverts the second side, or does not.
+    /// Inverts the second sideband, or does not.
     pub fn set_second(&mut self, inverted: bool) {
         if let [_, second] = self.patterns.as_mut_slice() {
             second.is_inverted = inverted;

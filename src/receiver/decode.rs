@@ -29,11 +29,11 @@ pub enum News {
     Contradiction,
     /// Start of a unit, with the week that it says, resolved near the given epoch.
     Time(Epoch),
-    /// A whole set of elements.
+    /// Complete ephemeris.
     Ephemeris(Box<Ephemeris>),
-    /// A set of elements in short.
+    /// Reduced elements.
     Reduced {
-        /// The set.
+        /// Elements of the satellite.
         set: Box<Ephemeris>,
         /// True if the elements come with group delays and health.
         with_delays: bool,
@@ -150,7 +150,7 @@ impl Decoder {
         self.anchor.is_some()
     }
 
-    /// Parts of a set of elements that have not been decoded.
+    /// Parts of an ephemeris that have not been decoded.
     pub fn missing(&self) -> Vec<u8> {
         self.reader.missing()
     }

@@ -147,8 +147,8 @@ impl Diagnosis {
         Self { stage, seconds, advice }
     }
 
-    /// Puts first what the messages of these signals take, where no frame or no whole set was found and the
-    /// recording may have been too short for one.
+    /// Puts first what the messages of these signals take, where no frame or no complete ephemeris was found
+    /// and the recording may have been too short for one.
     pub(super) fn with_messages(mut self, signals: &[&'static Signal]) -> Self {
         let too_short = match self.stage {
             Stage::NoFrame { .. } => too_short_for_a_frame,

@@ -31,7 +31,7 @@ pub fn beside(pilot: &'static Component, signal: &'static Signal) -> Option<&'st
     signal.components.iter().find(|component| !std::ptr::eq(*component, pilot) && fits(component))
 }
 
-/// The pilot on the other sideband of the sub-carrier of which `pilot` is one side, as strong and with a
+/// The pilot on the other sideband of the sub-carrier of which `pilot` is one, as strong and with a
 /// secondary code as long: both are followed together once the secondary code is aligned.
 pub fn other_side(pilot: &Component, signal: &'static Signal) -> Option<&'static Component> {
     let tone = pilot.tone().filter(|_| pilot.message.is_none() && pilot.secondary_code.periods() > 1)?;
@@ -45,7 +45,7 @@ pub fn other_side(pilot: &Component, signal: &'static Signal) -> Option<&'static
     signal.components.iter().find(is_other)
 }
 
-/// C/N0 of both sides over that of one.
+/// Ratio of the C/N0 of both sidebands to that of one.
 pub const BOTH_SIDES: f64 = 2.0;
 
 /// The pilot whose code begins with that of `lead` and is whole periods of it long: too long to be searched

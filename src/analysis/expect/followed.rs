@@ -66,8 +66,8 @@ impl Entry {
     }
 }
 
-/// Power that the replica of a component's strongest layer finds over the component's; of one side of a
-/// sub-carrier that of its chips.
+/// Power that the replica of a component's strongest layer finds over the component's. For one sideband
+/// of a sub-carrier it is that of its chips.
 pub(crate) fn efficiency(component: &Component) -> f64 {
     let layer = component.strongest().filter(|_| component.tone().is_none());
     layer.map_or(1.0, |layer| {
@@ -90,8 +90,8 @@ pub(crate) struct Followed {
     pub own: Waveform,
     /// Autocorrelation of the whole waveform.
     pub whole: Waveform,
-    /// The sub-carrier, of which both sides are followed: what is found, assumed and the replica's own are
-    /// those of the chips then.
+    /// The sub-carrier, of which both sidebands are followed: what is found, assumed and the replica's own
+    /// are those of the chips then.
     pub sides: Option<Tone>,
     /// Power of what is followed over the whole signal's.
     pub share: f64,

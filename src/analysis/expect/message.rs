@@ -1,8 +1,8 @@
 //! Orbits, clocks and ionosphere as the truth says that they were sent: what a receiver can know at best.
 //!
 //! The raw integers of `truth/navigation.csv` go through the message's own tables. Limits: a satellite whose
-//! set is incomplete there has none. Where a satellite sends a new set during the run, the one that the
-//! receiver says that it had read last counts, as all of them are right.
+//! ephemeris is incomplete there has none. Where a satellite sends a new ephemeris during the run, the one
+//! that the receiver says that it had read last counts, as all of them are right.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -36,7 +36,7 @@ impl Message {
         }
         let mut message = Self::default();
         for ((sv, name, issue), rows) in &groups {
-            // What a set has beside its issue is sent for all issues alike.
+            // What an ephemeris has beside its issue is sent for all issues alike.
             let common = groups.get(&(*sv, *name, 0)).into_iter().flatten();
             let all: Vec<&NavigationRow> = rows.iter().chain(common).copied().collect();
             let found = set(run, (*sv, name, *issue), &all, near);
@@ -88,7 +88,7 @@ impl Message {
 /// own order. An ephemeris that it read again after a loss comes before a new one.
 fn read(run: &Run, (sv, name): (Sv, &str)) -> Vec<(u64, u32)> {
     let mut issues: Vec<u32> = Vec::new();
-    // One that every set has.
+    // One that every ephemeris has.
     let of_message = messages(run, sv).find(|(message, _)| message.name == name);
     let of_sets = of_message.and_then(|(message, _)| (message.set_parameters)().first().copied()).unwrap_or("");
     let own = |row: &&NavigationRow| row.sv == sv && row.message == name && row.parameter == of_sets;
@@ -106,7 +106,7 @@ fn read(run: &Run, (sv, name): (Sv, &str)) -> Vec<(u64, u32)> {
     completed.iter().enumerate().filter_map(|(index, sample)| Some((*sample, issue(index)?))).collect()
 }
 
-/// The set in those rows, by the message of one of the satellite's signals that has that name.
+/// Ephemeris in those rows, by the message of one of the satellite's signals that has that name.
 fn set(
     run: &Run,
     (sv, name, issue): (Sv, &str, u32),
@@ -136,7 +136,7 @@ fn ionosphere(run: &Run, (sv, name): (Sv, &str), rows: &[&NavigationRow]) -> Opt
     (message.ionosphere.coefficients)(&raw)
 }
 
-/// Names of the parameters of sets that bear their issue, of each message of a satellite's signals.
+/// Names of the parameters of ephemerides that bear their issue, of each message of a satellite's signals.
 pub fn orbit_parameters(run: &Run, sv: Sv) -> BTreeMap<&'static str, BTreeSet<&'static str>> {
     messages(run, sv).map(|(message, _)| (message.name, (message.set_parameters)().into_iter().collect())).collect()
 }

@@ -64,7 +64,7 @@ fn both_sides_together_are_chips_and_tones_at_the_place_of_every_tap_and_every_a
     }
 }
 
-/// Chips of a side as they are when it is received alone.
+/// Chips of a sideband as they are when it is received alone.
 fn e5_code(pilot: &Component) -> Vec<i8> {
     let chips = (pilot.code)(NUMBER).unwrap();
     chips.into_iter().enumerate().map(|(index, chip)| if index % 2 == 1 { -chip } else { chip }).collect()

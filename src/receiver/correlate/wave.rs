@@ -2,9 +2,9 @@
 //!
 //! BPSK and BOC are made as they are. Of CBOC, TMBOC and QMBOC the strongest layer is made, unless settings
 //! say otherwise: against the full waveform that costs 0.4 dB where BOC(6,1) has a tenth of the power, and
-//! spares steps six times as short, which take six times the samples, and a pass for each layer. Of one side
-//! of a sub-carrier chips are made without steps, and the sub-carrier as a tone beside the carrier: it lacks
-//! lines that no front end passes.
+//! spares steps six times as short, which take six times the samples, and a pass for each layer. For one
+//! sideband of a sub-carrier, chips are made without steps, and the sub-carrier is a tone beside the carrier.
+//! That tone lacks lines that no front end passes.
 
 use gnss::signal::{Component, Layer, Layers, Signal};
 

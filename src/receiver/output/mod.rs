@@ -63,7 +63,7 @@ pub enum Record {
     Event(EventRow),
     /// Measurement of a channel at a common epoch.
     Observation(Observation),
-    /// Parameters as decoded; those of a set that is read again come again.
+    /// Parameters as decoded. An ephemeris that is read again is reported again.
     Navigation(Vec<NavigationRow>),
     /// A position, velocity and time.
     Fix(Fix),

@@ -66,7 +66,7 @@ impl Sink for Rinex {
     fn finish(&mut self, _: &serde_json::Value) -> Result<(), OutputError> {
         let ended = self.observations.finish();
         ended.map_err(|error| write_error(&self.directory.join(OBSERVATIONS), error))?;
-        // Without an observation no set is whole either.
+        // Without an observation no ephemeris is complete either.
         let Some(near) = self.near else { return Ok(()) };
         let path = self.directory.join("navigation.rnx");
         let file = File::create(&path).map_err(|error| create_error(&path, error))?;

@@ -25,8 +25,8 @@ use gnss::satellite::Sv;
 const LARGEST_TRIED: usize = 1000;
 /// Sets of one size that are solved.
 const SOLVED: usize = 8;
-/// Separation of two sets in metres that a wrong model of the atmosphere causes. A troposphere of 2.4 m at
-/// the zenith is 14 m at 10°. One satellite's range moves a position by about as much.
+/// Separation of two solutions in metres that a wrong model of the atmosphere causes. A troposphere of 2.4 m
+/// at the zenith is 14 m at 10°. One satellite's range moves a position by about as much.
 const ATMOSPHERE_M: f64 = 20.0;
 
 /// The value that chi-square with so many degrees of freedom exceeds with the probability `false_alarm`.

@@ -21,7 +21,7 @@ use gnss::time::GPST;
 /// Half of the shorter and of the longer curve fit interval (IS-GPS-200N, 20.3.3.4.3.1).
 const HALF_FIT_S: f64 = 7200.0;
 const HALF_LONG_FIT_S: f64 = 10_800.0;
-/// A set is used a little beyond its interval, until the next one is decoded.
+/// An ephemeris is used a little beyond its interval, until the next one is decoded.
 const FIT_GRACE_S: f64 = 600.0;
 
 /// Corrected ranges serve while the directions of their satellites dilute a position by no more than this

@@ -1,10 +1,10 @@
-//! Elements in short: what a satellite may be used by until its whole set is decoded.
+//! Reduced elements: a substitute until a satellite's complete ephemeris is decoded.
 //!
-//! Their ranges are weighted by the error of the elements, found by comparison with whole sets: of the real
-//! words of an hour of 2025 and of what is sent for the sets of 2020-11-29, below. A set without group
-//! delays has that of single-frequency users in its error as well. Limits: the error is the same from epoch
-//! to epoch, though counted as independent; nothing shows whose elements they are but the code, as the word
-//! names no satellite.
+//! Their ranges are weighted by the error of the elements, found by comparison with complete ephemerides: of
+//! the real words of an hour of 2025 and of what is sent for the ephemerides of 2020-11-29, below. Elements
+//! without group delays has that of single-frequency users in its error as well. Limits: the error is the
+//! same from epoch to epoch, though counted as independent; nothing shows whose elements they are but the
+//! code, as the word names no satellite.
 
 use super::Solver;
 use gnss::broadcast::Ephemeris;
@@ -17,7 +17,7 @@ const ELEMENTS_M: f64 = 2.0;
 /// Standard deviation in metres of a group delay that is not known yet.
 const DELAY_M: f64 = 1.5;
 
-/// A set in short.
+/// Reduced elements of a satellite.
 #[derive(Clone, Debug)]
 pub(super) struct InShort {
     pub set: Ephemeris,
@@ -34,8 +34,8 @@ impl InShort {
 }
 
 impl Solver {
-    /// Takes elements in short, if the settings want them: they serve until a whole set does. Whether they
-    /// are the satellite's first ones.
+    /// Takes reduced elements, if the settings want them: they serve until a complete ephemeris does. Whether
+    /// they are the satellite's first ones.
     pub fn take_reduced(&mut self, set: Ephemeris, with_delays: bool) -> bool {
         let sigma_m = if with_delays { ELEMENTS_M } else { libm::hypot(ELEMENTS_M, DELAY_M) };
         self.settings.reduced_elements && self.reduced.insert(set.sv, InShort { set, sigma_m }).is_none()

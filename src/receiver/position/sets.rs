@@ -1,8 +1,9 @@
 //! The decoded elements: of each satellite those of each of its messages, the latest.
 //!
-//! A set serves the signals whose delays its message has ([`SetForm::serves`]). For several signals together
-//! one set is taken that serves them all, so that they have one clock. All messages of BeiDou have that of
-//! B3I, so that each of their sets takes the group delays that it has not from the others.
+//! An ephemeris serves the signals whose delays its message has ([`SetForm::serves`]). For several signals
+//! together one ephemeris is taken that serves them all, so that they have one clock. All messages of BeiDou
+//! have that of B3I, so that each of their ephemerides takes the group delays that it has not from the
+//! others.
 //!
 //! [`SetForm::serves`]: gnss::broadcast::SetForm::serves
 
@@ -12,12 +13,12 @@ use gnss::broadcast::Ephemeris;
 use gnss::satellite::{Sv, System};
 use gnss::signal::{self, Signal};
 
-/// Sets by satellite.
+/// Ephemerides by satellite.
 #[derive(Clone, Debug, Default)]
 pub struct Sets(BTreeMap<Sv, Vec<Ephemeris>>);
 
 impl Sets {
-    /// Takes a set in place of the one of the same satellite and message, which it returns.
+    /// Takes an ephemeris in place of the one of the same satellite and message, which it returns.
     pub fn insert(&mut self, set: Ephemeris) -> Option<Ephemeris> {
         let own = self.0.entry(set.sv).or_default();
         let place = own.iter().position(|old| old.form == set.form);
@@ -27,22 +28,22 @@ impl Sets {
         old
     }
 
-    /// Forgets the sets of a satellite.
+    /// Removes the ephemerides of a satellite.
     pub fn remove(&mut self, sv: Sv) {
         self.0.remove(&sv);
     }
 
-    /// Satellites of which there is a set.
+    /// Satellites with an ephemeris.
     pub fn satellites(&self) -> impl Iterator<Item = Sv> {
         self.0.keys().copied()
     }
 
-    /// All sets of a satellite.
+    /// All ephemerides of a satellite.
     pub fn of(&self, sv: Sv) -> &[Ephemeris] {
         self.0.get(&sv).map_or(&[], Vec::as_slice)
     }
 
-    /// The set for ranges of some signals of a satellite: of those that serve all of them one of a message
+    /// Ephemeris for ranges of some signals of a satellite: of those that serve all of them one of a message
     /// that the last of them carries, if there is one.
     pub fn serving(&self, sv: Sv, signals: &[&'static Signal]) -> Option<&Ephemeris> {
         let serves = |set: &&Ephemeris| signals.iter().all(|signal| set.serves(signal));
@@ -61,7 +62,7 @@ impl Sets {
     }
 }
 
-/// Gives each set of a satellite of BeiDou the delays that the others have in their own form.
+/// Gives each ephemeris of a satellite of BeiDou the delays that the others have in their own form.
 fn share_delays(sets: &mut [Ephemeris]) {
     if sets.first().is_none_or(|set| set.sv.system != System::BeiDou) {
         return;

@@ -57,7 +57,7 @@ pub(super) struct Shared {
     /// The best that a search met: satellite, statistic and threshold.
     pub strongest: Option<(Sv, f64, f64)>,
     pub progress: BTreeMap<Sv, Progress>,
-    /// Units that passed their checks and were not used, by satellite and reason, since its last set.
+    /// Units that passed their checks and were not used, by satellite and reason, since its last ephemeris.
     pub refused: BTreeMap<Sv, BTreeMap<String, u64>>,
     pub acquired: BTreeSet<Sv>,
     pub used: BTreeSet<Sv>,

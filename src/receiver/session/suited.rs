@@ -102,7 +102,7 @@ fn is_within(metadata: &IfMetadata, signal: &Signal) -> bool {
 }
 
 /// The signals that the bands of these samples hold, as far as this receiver can follow them to a position
-/// without others; without those of two sidebands of a sub-carrier, whose sides are signals too. At least
+/// without others; without those of two sidebands of a sub-carrier, which are signals too. At least
 /// one: where the bands hold none, GPS L1 C/A, whose absence has a diagnosis.
 pub(crate) fn held(metadata: &[IfMetadata], settings: &Settings) -> Vec<&'static Signal> {
     let is_held = |signal: &'static Signal, metadata: &IfMetadata| {
@@ -170,7 +170,7 @@ mod tests {
         let wide = held(&[of(Format::Ci8, 4e6, 1_575.42e6)]);
         assert!(["Galileo E1", "GPS L1C", "BeiDou B1C"].iter().all(|name| wide.contains(name)), "{wide:?}");
         assert!(narrow.iter().all(|name| wide.contains(name)), "{wide:?}");
-        // Both sides, not the one signal of them.
+        // Both sidebands, not the one signal of them.
         let e5 = held(&[of(Format::Ci8, 65e6, 1_191.795e6)]);
         assert!(e5.contains(&"Galileo E5a") && e5.contains(&"Galileo E5b") && !e5.contains(&"Galileo E5"), "{e5:?}");
         // Real samples at an IF of 4.092 MHz, and beyond half the rate, where B1I may be meant as well.

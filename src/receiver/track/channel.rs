@@ -234,7 +234,7 @@ impl Channel {
         let sense = if metadata.inverted { -1.0 } else { 1.0 };
         let rates = (metadata.rate.hz(), sense);
         let sides = component.and_then(|c| Sides::beside(c, (hit.signal, number), settings, rates));
-        // One side has the triangle of its chips.
+        // One sideband has the triangle of its chips.
         let wider = component.filter(|_| sides.is_some()).map_or(1.0, |c| settings.narrower(c));
         let alone = TrackingSettings { spacing_chips: wider * settings.spacing_chips, ..settings.clone() };
         let model = component.and_then(|c| ReplicaModel::new(&alone, c, metadata.rate.hz()));

@@ -137,7 +137,7 @@ impl Scene<'_> {
     fn unfit(&self, sv: Sv, time_s: f64) -> bool {
         let wrong =
             [FaultKind::ClockStep, FaultKind::ClockRamp, FaultKind::ClockNoise, FaultKind::Orbit, FaultKind::Parameter];
-        // What is wrong leaves smoothed ranges and decoded sets wrong for a while after.
+        // What is wrong leaves smoothed ranges and decoded ephemerides wrong for a while after.
         let wrong = self.of(sv, &wrong).any(|fault| time_s >= fault.from_s);
         wrong || self.of(sv, &[FaultKind::Health]).any(|fault| during(fault, time_s, HEALTH_S))
     }

@@ -15,7 +15,7 @@ use gnss::time::Epoch;
 const HEADER_S: f64 = 1.2;
 /// Times of arrival of satellites around the Earth, at most: a geostationary user across the Earth.
 const LIGHT_S: f64 = 0.25;
-/// Satellites change their sets at whole multiples of this: of GPS at even hours, of Galileo every ten
+/// Satellites change their ephemerides at whole multiples of this: of GPS at even hours, of Galileo every ten
 /// minutes.
 const RENEWAL_S: f64 = 300.0;
 /// Units that are looked through for one: two rounds of LNAV's pages.

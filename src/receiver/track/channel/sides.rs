@@ -5,8 +5,8 @@ use crate::correlate::Replica;
 use crate::lead::BOTH_SIDES;
 
 impl Channel {
-    /// Makes the replica ready for the running period: with the segment of a long code, or with both sides of
-    /// a sub-carrier once the secondary code is known, in the signs that they have.
+    /// Makes the replica ready for the current period: with the segment of a long code, or with both
+    /// sidebands of a sub-carrier once the secondary code is known, in the signs that they have.
     pub(super) fn ready(&mut self, replica: &mut Replica) {
         if let Some(segment) = self.next_segment() {
             *replica = segment;
