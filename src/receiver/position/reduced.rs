@@ -2,7 +2,7 @@
 //!
 //! Their ranges are weighted by the error of the elements, found by comparison with complete ephemerides: of
 //! the real words of an hour of 2025 and of what is sent for the ephemerides of 2020-11-29, below. Elements
-//! without group delays has that of single-frequency users in its error as well. Limits: the error is the
+//! without group delays have that of single-frequency users in their error as well. Limits: the error is the
 //! same from epoch to epoch, though counted as independent; nothing shows whose elements they are but the
 //! code, as the word names no satellite.
 
