@@ -11,6 +11,7 @@ pub struct Member {
     pub name: String,
     /// Offset of the member's contents in the archive, bytes.
     pub first: u64,
+    /// Length of the contents, bytes.
     pub size: u64,
 }
 

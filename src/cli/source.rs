@@ -171,8 +171,9 @@ impl Read for Stream {
     }
 }
 
-/// Bytes of a block that is read ahead, and blocks: 16 MiB, which is 3 s of 8-bit samples at 2.6 Msps.
+/// Bytes of a block that is read ahead.
 const BLOCK_BYTES: usize = 1 << 16;
+/// Number of blocks: 16 MiB together, which is 3 s of 8-bit samples at 2.6 Msps.
 const BLOCKS: usize = 256;
 /// Polling interval for signals while no data comes.
 const LOOK: Duration = Duration::from_millis(50);

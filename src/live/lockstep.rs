@@ -98,8 +98,9 @@ pub struct Finished {
 pub struct Lockstep<'a> {
     driver: Driver<'a>,
     receiver: Option<Receiver>,
-    /// Samples of the last step and of the current one; the receiver has taken those before.
+    /// Samples of the last step; the receiver has taken those before.
     samples: Vec<u8>,
+    /// Samples of the current step.
     next: Vec<u8>,
 }
 

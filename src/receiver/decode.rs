@@ -86,8 +86,9 @@ pub struct Decoder {
 /// Units of a message that does not say when they begin.
 #[derive(Clone, Copy, Debug)]
 struct Units {
-    /// Seconds of a unit, and after the beginning of the week those of the first.
+    /// Length of a unit in seconds.
     unit_s: i64,
+    /// Beginning of the first unit after the beginning of the week, seconds.
     first_s: i64,
     /// First code period of one that was read.
     begin: Option<u64>,

@@ -31,14 +31,15 @@ pub use own::Followed;
 
 /// Probability that noise alone shows a line in one spectrum, a second's: once in three years.
 pub const FALSE_ALARM: f64 = 1e-8;
-/// Time between segments, and segments of a spectrum.
+/// Time between segments, in milliseconds.
 const INTERVAL_MS: u64 = 100;
+/// Number of segments in a spectrum.
 const SEGMENTS: u32 = 10;
 /// Widest bin; the segment is the next power of two.
 const BIN_HZ: f64 = 1000.0;
-/// Bins on either side that make the density, and those between them and the one tested: a Hann window's lobe
-/// and more.
+/// Number of bins on either side whose mean is the density.
 const BESIDE: usize = 64;
+/// Number of bins between those and the tested one: a Hann window's lobe and more.
 const GUARD: usize = 4;
 /// Bins about a constant offset that are not looked at.
 const OFFSET_BINS: usize = 3;

@@ -22,10 +22,11 @@ const NEAREST_TRAVEL_S: f64 = 0.070;
 const FARTHER_S: f64 = 0.052;
 /// Semi-major axis between both kinds.
 const BETWEEN_M: f64 = 35e6;
-/// Departure of a travel time from the median of all, less the time to a medium orbit. From near the Earth
-/// they lie between 60 and 95 ms, and from 119 to 140 ms; from anywhere two satellites differ by 53 200 km at
-/// most, the width of their orbits.
+/// Largest deviation of a travel time from the median of all, less the time to a medium orbit, near the
+/// Earth. Travel times lie between 60 and 95 ms there, and from 119 to 140 ms.
 const NEAR_SPREAD_S: f64 = 0.035;
+/// Largest deviation for a receiver anywhere. Two satellites differ by 53 200 km at most, the width of their
+/// orbits.
 const FAR_SPREAD_S: f64 = 0.178;
 /// A receiver is far away where this share of all satellites departs by more than from near the Earth: wrong
 /// times are single.

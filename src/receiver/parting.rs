@@ -35,9 +35,9 @@ const LEAST_POINTS: u32 = 6;
 const LEAST_LINES: usize = 3;
 /// The share of all lines that has to agree.
 const AGREEING_SHARE: f64 = 0.66;
-/// Lines agree when they are this many deviations apart, and this much for what no noise explains
-/// (multipath).
+/// Standard deviations within which lines agree.
 const AGREEING_SIGMAS: f64 = 5.0;
+/// Difference in hertz within which lines agree, for errors other than noise (multipath).
 const AGREEING_HZ: f64 = 3.0;
 /// Standard deviations beyond which an offset is accepted: 1e-9 a look, with a look each 50 ms of which few
 /// are independent.

@@ -53,8 +53,9 @@ impl Answer {
     }
 }
 
-/// The largest bandwidth that [`suggestion`] tries, and the steps towards it.
+/// Largest bandwidth that [`suggestion`] tries, hertz.
 const LARGEST_HZ: u32 = 100;
+/// Step between the tried bandwidths, hertz.
 const STEP_HZ: u32 = 5;
 /// Bandwidth times update time up to which a discrete loop is near the analogue one.
 const SUGGESTED_BANDWIDTH_TIME: f64 = 0.1;

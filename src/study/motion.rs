@@ -34,14 +34,15 @@ pub struct Motion {
 /// Motion of the carrier in one code period.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Advance {
-    /// Phase at the end and its mean over the period, both from that at the start.
+    /// Phase at the end of the period, from that at the start, cycles.
     pub(super) cycles: f64,
+    /// Mean phase over the period, from that at the start, cycles.
     pub(super) mean_cycles: f64,
 }
 
-/// Poles of the flicker bank: each a factor of 4 above the one before, the highest at half the rate of
-/// periods.
+/// Number of poles of the flicker bank, the highest at half the rate of periods.
 const FLICKER_POLES: usize = 14;
+/// Ratio of one pole to the one before.
 const FLICKER_RATIO: f64 = 4.0;
 
 /// An oscillator's fractional frequency, times the carrier.

@@ -17,11 +17,13 @@ use super::normal::{Normals, Purpose, uniform};
 use analysis::waveform::Waveform;
 use gnss::signal::{Signal, sinc_squared};
 
-/// Cells to either side of the nearest one that are drawn, in code and in Doppler.
+/// Cells to either side of the nearest one that are drawn, in code.
 const SIDE_LAGS: i32 = 3;
+/// Cells to either side of the nearest one that are drawn, in Doppler.
 const SIDE_BINS: i32 = 2;
-/// Lags and bins of the neighbourhood.
+/// Number of lags of the neighbourhood.
 const LAGS: usize = 2 * SIDE_LAGS as usize + 1;
+/// Number of bins of the neighbourhood.
 const BINS: usize = 2 * SIDE_BINS as usize + 1;
 /// Lags, and those between them.
 const CELLS: usize = 2 * LAGS - 1;

@@ -26,8 +26,9 @@ use crate::expect::loops::Theory;
 use crate::read::Run;
 use gnss::signal::{Component, Link, SecondaryCode};
 
-/// Distance of the positions at which carriers are compared, and how many there are of a run at most.
+/// Distance in seconds of the times at which carriers are compared.
 const NODE_S: f64 = 1.0;
+/// Largest number of such times in a run.
 const MOST_NODES: f64 = 4096.0;
 
 /// Carriers of all satellites, from time to time.

@@ -159,11 +159,13 @@ pub fn exact_loop(order: u32, bandwidth_time: f64) -> Option<PhaseLoop> {
 /// Response of a loop to unit noise of its discriminator, computed from its response to one value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Response {
-    /// Variances of the estimate of an interval's mean phase, of what the discriminator puts out, of that
-    /// one's difference from one interval to the next, and of the rate in phase an interval.
+    /// Variance of the estimate of an interval's mean phase.
     phase: f64,
+    /// Variance of the discriminator's output.
     put_out: f64,
+    /// Variance of the output's difference from one interval to the next.
     difference: f64,
+    /// Variance of the rate, in phase an interval.
     rate: f64,
     /// Covariance of that phase and that rate.
     cross: f64,

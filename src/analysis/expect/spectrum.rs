@@ -39,8 +39,9 @@ pub struct Spectrum {
     pub null_reason: Option<&'static str>,
 }
 
-/// Half width over which a null is looked for, in chip rates, and over which its bottom is fitted.
+/// Half width of the search for a null, in chip rates.
 const SEARCH: f64 = 0.1;
+/// Half width of the fit of its bottom, in chip rates.
 const BOTTOM: f64 = 0.02;
 /// Least number of bins to each side of that bottom.
 const BOTTOM_BINS: f64 = 4.0;

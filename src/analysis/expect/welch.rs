@@ -19,8 +19,9 @@ pub const BINS: usize = 2048;
 pub(super) const LOOKED_S: f64 = 0.2;
 /// Pieces that share it where the spectrum changes.
 const PIECES: u64 = 60;
-/// Relative variance of one bin and of the mean of many, for one segment and one bin.
+/// Relative variance of one bin, for one segment.
 const ONE: f64 = 19.0 / 18.0;
+/// Relative variance of the mean of many bins, for one segment and one bin.
 const MANY: f64 = 19.0 / 9.0;
 
 /// Samples of the estimate: the signal's start, or pieces spread over a scene whose spectrum changes.

@@ -54,11 +54,13 @@ const OPEN_EPOCHS: usize = 4;
 /// The sentences of one time of day.
 #[derive(Default)]
 struct Instant {
-    /// The time of day as written and in seconds.
+    /// Time of day as written.
     time: String,
+    /// Time of day in seconds.
     of_day_s: f64,
-    /// Midnights since the file's first time, and the date's day number where a sentence names it.
+    /// Midnights since the file's first time.
     midnights: i64,
+    /// Day number of the date, where a sentence names it.
     day: Option<i64>,
     fix: Option<Candidate>,
     talkers: Vec<String>,

@@ -328,8 +328,9 @@ impl<R: BufRead> Reader<R> {
     }
 }
 
-/// Satellites on an epoch line of RINEX 2, and values on a line.
+/// Satellites on an epoch line of RINEX 2.
 const NAMES: usize = 12;
+/// Values on a line.
 const PER_LINE: usize = 5;
 
 /// Lines that continue an epoch line of RINEX 2 with so many satellites.

@@ -7,8 +7,9 @@ use serde_json::{Value, json};
 use crate::generator::vehicle::joining::{Kind, Refusal, Tick};
 use crate::gnss::time::Rate;
 
-/// Width of a bin of ages, and how many there are; older ones count in the last.
+/// Width of a bin of ages.
 const BIN: Duration = Duration::from_micros(100);
+/// Number of bins; older ages count in the last.
 const BINS: usize = 5000;
 /// Least time over which the sink's rate is measured, seconds.
 const SETTLED_S: f64 = 5.0;
@@ -62,9 +63,11 @@ impl Ages {
 /// Counts of the first sink's thread.
 #[derive(Default)]
 pub struct Handed {
-    /// Samples handed over, since when, and until when.
+    /// Number of samples handed over.
     pub samples: u64,
+    /// Time of the first of them.
     pub since: Option<Instant>,
+    /// Time of the last of them.
     pub until: Option<Instant>,
     /// Times at which the sink wanted samples that were not there.
     pub underruns: u64,
@@ -79,8 +82,9 @@ pub struct Handed {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Intake {
     pub messages: u64,
-    /// No message, by its length or contents, and what the first of them was.
+    /// Number of messages that are malformed, by length or contents.
     pub malformed: u64,
+    /// Description of the first malformed message.
     pub first_malformed: Option<String>,
     /// Messages from another sender than the first.
     pub strangers: u64,
@@ -101,11 +105,13 @@ pub struct Made {
     pub worst_gap_m: f64,
     /// Largest jerk over ticks that are not snaps, m/s³.
     pub worst_jerk_mps3: f64,
-    /// Pushes that were taken, and those whose time had been sent by more than the joining time before.
+    /// Number of pushes that were taken.
     pub taken: u64,
+    /// Number of pushes whose time had been sent more than the joining time before.
     pub late: u64,
-    /// States with an attitude that turns the body, and with one that the scene does not use.
+    /// Number of states with an attitude that turns the body.
     pub attitudes: u64,
+    /// Number of states with an attitude that the scene does not use.
     pub attitudes_not_used: u64,
     /// Offset that was added to the times of states, seconds.
     pub offset_s: Option<f64>,
@@ -118,8 +124,9 @@ pub struct Made {
     pub last_refusal: Option<String>,
     pub events: u64,
     pub events_refused: u64,
-    /// Fewest blocks that waited for the first sink in the second, and whole blocks dropped before others.
+    /// Fewest blocks that waited for the first sink in the second.
     pub low_water: Option<usize>,
+    /// Number of blocks dropped before other sinks.
     pub dropped_blocks: u64,
     /// Longest time that a tick took to make.
     pub slowest_tick: Duration,

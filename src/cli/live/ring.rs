@@ -23,8 +23,9 @@ pub struct Ring {
 #[derive(Default)]
 struct Inside {
     blocks: VecDeque<Arc<Block>>,
-    /// The generator is done; and the sink is.
+    /// True once the generator is done.
     ended: bool,
+    /// True once the sink is gone.
     gone: bool,
 }
 

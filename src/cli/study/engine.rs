@@ -25,8 +25,9 @@ use crate::study::sweep::shard;
 
 /// Arrays of GNU parallel have no size of their own; a script has a line a task.
 const MOST_LINES: u32 = 100_000;
-/// Least time between two inspections of the shards, and its least ratio to the duration of an inspection.
+/// Least time between two inspections of the shards.
 const LOOK: Duration = Duration::from_secs(1);
+/// Least ratio of that time to the duration of an inspection.
 const REST: u32 = 10;
 /// A file system of several machines may show a file some seconds after it was made.
 const SETTLES: Duration = Duration::from_secs(3);

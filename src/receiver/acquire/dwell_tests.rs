@@ -6,11 +6,13 @@ use super::dwells::Dwells;
 use super::tests::Noise;
 use crate::threshold::{of_one_cell, threshold};
 
-/// Independent cells of a code period at 2.6 Msps, and Dopplers.
+/// Independent cells of a code period at 2.6 Msps.
 const CELLS: usize = 3120;
+/// Number of Dopplers.
 const DOPPLERS: f64 = 41.0;
-/// Seconds of a coherent sum and of a data bit.
+/// Length of a coherent sum, seconds.
 const SUM_S: f64 = 2e-3;
+/// Length of a data bit, seconds.
 const BIT_S: f64 = 20e-3;
 
 /// The share of satellites that a search of C/A finds with all its sums and with those it makes, of the same

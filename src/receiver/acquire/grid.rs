@@ -59,8 +59,9 @@ pub(super) struct Grid {
     pub dopplers_hz: Vec<f64>,
     /// Step between Dopplers, in hertz.
     pub step_hz: f64,
-    /// Cells in one code period, and the samples from one to the next. There is another between any two.
+    /// Number of cells in one code period.
     pub lags: usize,
+    /// Samples from one cell to the next. There is another cell between any two.
     pub lag_samples: f64,
     /// Independent cells that have the same law.
     pub cells: usize,

@@ -39,8 +39,9 @@ pub struct AcquisitionSettings {
 }
 }
 
-/// The widest range of Dopplers, and the most sums, that a search may be asked for.
+/// Widest range of Dopplers that a search may be asked for, in hertz.
 pub(crate) const MOST_DOPPLER_HZ: f64 = 1e6;
+/// Largest number of sums that a search may be asked for.
 pub(crate) const MOST_SUMS: u32 = 100_000;
 
 /// Word in place of names, for all signals that the bands hold.

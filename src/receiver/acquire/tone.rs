@@ -18,16 +18,19 @@ use crate::interference::hann_peak;
 
 /// Power over noise density from which a wave is taken out: 50 dB-Hz.
 const STRONG_HZ: f64 = 1e5;
-/// Segments of the look, spread over the window, and samples in each at most.
+/// Number of segments of the look, spread over the window.
 const SEGMENTS: usize = 4;
+/// Largest number of samples in a segment.
 const SEGMENT: usize = 4096;
-/// Bins on either side whose median is the density, and those between: a Hann window's lobe and more.
+/// Number of bins on either side whose median is the density.
 const BESIDE: usize = 32;
+/// Number of bins between those and the tested one: a Hann window's lobe and more.
 const GUARD: usize = 8;
 /// Noise bandwidth of a Hann window in bins.
 const HANN_BINS: f64 = 1.5;
-/// Waves that are taken out at a time, and looks.
+/// Number of waves that are removed at a time.
 const AT_ONCE: usize = 8;
+/// Number of looks.
 const LOOKS: usize = 4;
 /// Time over which a wave keeps amplitude and phase.
 const BLOCK_S: f64 = 2.5e-4;

@@ -35,8 +35,9 @@ pub(super) struct Steps {
     pub lanes: [[u16; 2]; LANES],
     /// Fraction bits of a phase.
     pub fine: u32,
-    /// A sample's interval, and the replica's slope within it, in 2⁻¹⁵.
+    /// Width of a sample's interval, in 2⁻¹⁵.
     pub width: u16,
+    /// Slope of the replica within the interval, in 2⁻¹⁵.
     pub slope: i16,
     /// Added to a code phase at the beginning.
     offset: u64,
@@ -96,8 +97,9 @@ pub(super) struct Chunk<'a> {
     pub steps: &'a Steps,
     pub i: &'a [[f32; GROUP]],
     pub q: &'a [[f32; GROUP]],
-    /// Phasors of samples 0 and 16 of each group, the latter in the upper half.
+    /// Cosines of samples 0 and 16 of each group, the latter in the upper half.
     pub cos: &'a [i32],
+    /// Sines of samples 0 and 16 of each group, the latter in the upper half.
     pub sin: &'a [i32],
 }
 

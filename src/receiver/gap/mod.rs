@@ -28,11 +28,13 @@ pub mod scan;
 const LOOKS: usize = 100;
 /// Looks before it predicts.
 const LEAST_LOOKS: usize = 6;
-/// Satellites that have to agree, and their share of all.
+/// Least number of satellites that have to agree.
 const LEAST_CHANNELS: usize = 3;
+/// Least share of the satellites that has to agree.
 const AGREEING_SHARE: f64 = 0.66;
-/// Channels agree when they are this many deviations apart, and this much for what is no noise (multipath).
+/// Standard deviations within which channels agree.
 const AGREEING_SIGMAS: f64 = 5.0;
+/// Difference in chips within which channels agree, for errors other than noise (multipath).
 const AGREEING_CHIPS: f64 = 0.03;
 /// Standard deviations beyond which a common step is suspicious.
 const SUSPICIOUS_SIGMAS: f64 = 6.0;
@@ -40,15 +42,15 @@ const SUSPICIOUS_SIGMAS: f64 = 6.0;
 const SUSPICIOUS_SAMPLES: f64 = 0.3;
 /// Seconds of Doppler are suspicious beyond as many deviations and this.
 const SUSPICIOUS_S: f64 = 5e-3;
-/// Signs turn where the mean product of neighbouring prompts falls by so many deviations, and by this share
-/// of what turns at every other symbol take away.
+/// Standard deviations by which the mean product of neighbouring prompts has to fall where signs turn.
 const TURN_SIGMAS: f64 = 6.0;
+/// Share of the expected fall that it has to reach too. The expectation is a turn at every other symbol.
 const TURN_SHARE: f64 = 0.25;
 
 /// The way of one channel's code against its carrier: a straight line through the last looks.
 #[derive(Clone, Debug, Default)]
 pub struct Trend {
-    /// Seconds and chips.
+    /// Looks: seconds and chips.
     looks: VecDeque<(f64, f64)>,
     power: f64,
 }

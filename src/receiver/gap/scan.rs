@@ -13,15 +13,17 @@ use num_complex::Complex;
 use crate::correlate::{Nco, Replica, TURN};
 use crate::source::Block;
 
-/// Code periods before a decision is tried, and taken of one block at most.
+/// Code periods before a decision is tried.
 const LEAST_PERIODS: u32 = 20;
+/// Largest number of code periods taken from one block.
 const PERIODS_A_BLOCK: usize = 20;
 /// A peak counts beyond so many deviations; with 1e6 positions, noise has one in 1e7 scans.
 const PEAK_SIGMAS: f64 = 8.0;
 /// Standard deviations by which a peak has to exceed the value at the expected position.
 const LEAD_SIGMAS: f64 = 6.0;
-/// Longest jump that is tried, and its steps: 0.06 chip of Doppler at 5 kHz to either side.
+/// Longest jump that is tried, in seconds.
 const LONGEST_S: f64 = 1.0;
+/// Step between the tried jumps, in seconds: 0.06 chip of Doppler at 5 kHz to either side.
 const STEP_S: f64 = 0.04;
 /// No jump of whole seconds is taken for what one within a step explains as well as this.
 const AS_GOOD: f64 = 0.97;

@@ -14,8 +14,9 @@ use gnss::signal::Signal;
 pub struct Nmea<W> {
     name: PathBuf,
     writer: W,
-    /// The sample of the newest observations, and C/N0 of the signals that were observed then.
+    /// Sample of the newest observations.
     sample: u64,
+    /// C/N0 in dB-Hz of the signals that were observed then.
     observed: BTreeMap<(Sv, &'static Signal), f64>,
     fix: Option<Fix>,
 }

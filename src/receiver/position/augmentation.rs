@@ -20,15 +20,18 @@ use gnss::klobuchar::L1_HZ;
 use gnss::satellite::Sv;
 use gnss::time::Epoch;
 
-/// Seconds for which what is said stays in force (table A-25): an indicator of accuracy, a long-term
-/// correction, masks, and a delay of the grid.
+/// Validity of an indicator of accuracy, seconds (table A-25).
 const INDICATOR_S: f64 = 12.0;
+/// Validity of a long-term correction, seconds (table A-25).
 const LONG_TERM_S: f64 = 240.0;
+/// Validity of masks, seconds (table A-25).
 const MASK_S: f64 = 600.0;
+/// Validity of a delay of the grid, seconds (table A-25).
 const DELAY_S: f64 = 600.0;
 /// Seconds for which a satellite that has sent type 0 is not used (A.4.4.1).
 const TEST_S: f64 = 60.0;
-/// Long-term corrections of a satellite that are kept: those of the set before and of the running one.
+/// Number of long-term corrections of a satellite that are kept: those of the ephemeris before and of the
+/// current one.
 const SETS: usize = 2;
 const DAY_S: f64 = 86_400.0;
 /// Indicator of ageing until it is said: the fastest.
@@ -98,7 +101,7 @@ pub(super) struct Store {
     mask: Option<(Mask, Epoch)>,
     quick: BTreeMap<u8, Quick>,
     long: BTreeMap<u8, Vec<(LongTerm, Epoch)>>,
-    /// Latency, and indicators.
+    /// Latency, and indicators of ageing by satellite.
     ageing: Option<(u8, BTreeMap<u8, u8>)>,
     bands: BTreeMap<u8, Band>,
     closed: Option<Epoch>,

@@ -13,8 +13,9 @@ use gnss::nequick::NequickG;
 use gnss::satellite::Sv;
 use gnss::time::Epoch;
 
-/// A content is integrated anew after so long, or so far away.
+/// Time in seconds after which a content is integrated again.
 const KEPT_S: f64 = 1.0;
+/// Distance in metres after which a content is integrated again.
 const KEPT_M: f64 = 1000.0;
 
 /// The latest contents.

@@ -18,8 +18,9 @@ use gnss::satellite::System;
 use gnss::signal::Link;
 use gnss::time::GPST;
 
-/// Half of the shorter and of the longer curve fit interval (IS-GPS-200N, 20.3.3.4.3.1).
+/// Half of the shorter curve fit interval, seconds (IS-GPS-200N, 20.3.3.4.3.1).
 const HALF_FIT_S: f64 = 7200.0;
+/// Half of the longer curve fit interval, seconds.
 const HALF_LONG_FIT_S: f64 = 10_800.0;
 /// An ephemeris is used a little beyond its interval, until the next one is decoded.
 const FIT_GRACE_S: f64 = 600.0;

@@ -42,8 +42,9 @@ struct State {
     age_s: f64,
     /// Divergence in metres accumulated so far, per hertz of carrier offset.
     parted_m_per_hz: f64,
-    /// Variance, and covariance with the latest code error, over the code's variance.
+    /// Variance over the code's variance.
     variance: f64,
+    /// Covariance with the latest code error, over the code's variance.
     covariance: f64,
 }
 
@@ -57,9 +58,9 @@ struct Input {
     pseudorange_m: f64,
     carrier_m: f64,
     locked_s: f64,
-    /// Excess of the carrier's Doppler over the code's in hertz, and the metres per second of each hertz of
-    /// it.
+    /// Excess of the carrier's Doppler over the code's, in hertz.
     offset_hz: f64,
+    /// Rate of the range for each hertz of that excess, in metres per second.
     metres_per_hz: f64,
     /// Factor of the noise over that of one signal.
     gain: f64,

@@ -50,14 +50,15 @@ const COLUMNS: [Column; 5] = [
 ];
 /// Height correction (Niell 1996, equation 6).
 const HEIGHT: [f64; 3] = [2.53e-5, 5.49e-3, 1.14e-3];
-/// The day of the year with the northern winter's extreme, and the length of a year.
+/// Day of the year with the northern winter's extreme.
 const WINTER_DAY: f64 = 28.0;
+/// Length of a year, days.
 const YEAR_DAYS: f64 = 365.25;
 /// Mapping at this elevation serves for all below it: sin 2°.
 const LOWEST_SINE: f64 = 0.034_899_5;
-/// Heights of the model; none outside. The lower end is below the lowest shore, the upper where pressure
-/// vanishes.
+/// Lowest height of the model in metres, below the lowest shore.
 const LOWEST_M: f64 = -1000.0;
+/// Highest height of the model in metres, where pressure vanishes.
 const HIGHEST_M: f64 = 44_000.0;
 const TROPOPAUSE_M: f64 = 11_000.0;
 const RELATIVE_HUMIDITY: f64 = 0.5;

@@ -61,8 +61,9 @@ pub(super) struct Track {
     pub report: Report,
     pub since: u64,
     pub cn0_dbhz: f64,
-    /// C/N0 in dB-Hz and Doppler in hertz, as the search estimated them.
+    /// C/N0 that the search estimated, in dB-Hz.
     pub found_dbhz: f64,
+    /// Doppler that the search estimated, in hertz.
     pub found_hz: f64,
     pub symbols: u64,
     pub wrong_time: u32,

@@ -8,9 +8,10 @@ use gnss::record::{Event, EventRow, Observation};
 
 /// Residuals beyond this are no noise: the channel has the wrong time.
 const WRONG_TIME_M: f64 = 10_000.0;
-/// Satellites that have to show by how much a front end is out of step, and how well they agree: the
-/// ionosphere parts two carriers by less than a microsecond.
+/// Number of satellites that have to show by how much a front end is out of step.
 const SHOWING: usize = 3;
+/// Difference in seconds within which they have to agree: the ionosphere separates two carriers by less than
+/// a microsecond.
 const AGREEING_S: f64 = 1e-6;
 
 impl FrontEnd {

@@ -33,9 +33,10 @@ const OPENING_S: f64 = 0.064;
 /// Ratio to the samples of the first search that makes another search worthwhile: it finds signals that are 1
 /// dB weaker.
 const WORTH: f64 = 1.5;
-/// Delays this near, in chips, and Dopplers this near, in cycles of a coherent sum, are equal: a search tells
-/// apart no more, and the side peaks of a sub-carrier lie half a chip from the main one.
+/// Delays closer than this are equal, in chips. A search does not resolve more, and the side peaks of a
+/// sub-carrier lie half a chip from the main one.
 const SAME_CHIPS: f64 = 0.75;
+/// Dopplers closer than this are equal, in cycles of a coherent sum.
 const SAME_CYCLES: f64 = 0.5;
 
 /// Level in decibels below a signal at which another code of its family may be mistaken for it. It is three

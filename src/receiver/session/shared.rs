@@ -41,8 +41,9 @@ pub(super) struct Shared {
     pub timebase: Timebase,
     pub solver: Solver,
     pub ephemerides: Sets,
-    /// The model by which it corrects the ionosphere, if by one, and its coefficients.
+    /// Model that corrects the ionosphere, if any.
     pub ionosphere_model: Option<Model>,
+    /// Coefficients of that model.
     pub ionosphere: Option<Coefficients>,
     pub last_fix: Option<LastFix>,
     /// Fix that predicts the satellites.

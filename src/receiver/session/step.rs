@@ -15,8 +15,9 @@ pub(super) struct Step {
     pub number: usize,
     rate: Rate,
     main: Rate,
-    /// Samples that are missing so far, here and in the first front end.
+    /// Number of samples missing so far in this front end.
     behind: i64,
+    /// Number of samples missing so far in the first front end.
     main_behind: i64,
 }
 

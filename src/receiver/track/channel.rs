@@ -121,25 +121,30 @@ pub struct Channel {
     if_hz: f64,
     /// Turns a sample at the nominal IF, in 2⁻⁶⁴ turns.
     if_step: u64,
-    /// +1, or −1 where the spectrum is inverted: sense of Doppler in the samples.
+    /// Sense of Doppler in the samples: +1, or −1 where the spectrum is inverted.
     sense: f64,
+    /// Chip rate of the code, in hertz.
     chip_rate_hz: f64,
-    /// Excess of the carrier's Doppler over the code's in hertz: now, and from the next code period on.
+    /// Excess of the carrier's Doppler over the code's now, in hertz.
     carrier_offset_hz: f64,
+    /// Excess from the next code period on, in hertz.
     next_offset_hz: f64,
+    /// Length of a code period, in seconds.
     period_s: f64,
-    /// Code periods a symbol, or those summed where there are none; 1 while a secondary code is unknown.
+    /// Code periods per symbol, or periods that are summed where there are no symbols. It is 1 while a
+    /// secondary code is unknown.
     group: u32,
     has_symbols: bool,
-    /// Bit synchronisation for symbols of one period that build a bit by known signs. `bit_begin` is the
-    /// period at which bits begin, once that is known; `group` is then the number of periods per bit.
+    /// Bit synchronisation for symbols of one period that build a bit by known signs.
     bits: Option<BitSync>,
+    /// Code period at which bits begin, once it is known. `group` is then the number of periods per bit.
     bit_begin: Option<u64>,
     secondary_code: Option<SecondaryCodeSync>,
     secondary_code_phase: Option<SecondaryCodePhase>,
     data: Option<Data>,
-    /// A pilot with a code too long for the search, and the segment of it that is the replica.
+    /// Pilot with a code too long for the search.
     long: Option<LongCode>,
+    /// Index of the long code's segment that is the replica.
     segment: Option<u64>,
     side_peaks: Option<SidePeaks>,
     /// The other sideband of the sub-carrier of which what is followed is one.
@@ -148,7 +153,7 @@ pub struct Channel {
     followed_db: f64,
     /// Carrier phase of what is followed against the signal's.
     phase_cycles: f64,
-    /// `None` where the documents assign no code: such a channel is lost from the start.
+    /// Replica of the code. `None` where the documents assign no code: such a channel is lost from the start.
     replica: Option<Replica>,
     arithmetic: Arithmetic,
     replica_power: f64,
@@ -156,8 +161,9 @@ pub struct Channel {
     /// Delays at which the code does not correlate with itself.
     noise_taps: Vec<i64>,
 
-    /// Number of the sample at which the running period begins, and the NCOs there.
+    /// Sample at which tracking began; `None` before.
     start: Option<u64>,
+    /// Sample at which the current code period begins.
     first: u64,
     code: i64,
     period: u64,
@@ -173,8 +179,9 @@ pub struct Channel {
     stage: Stage,
     stage_since: u64,
     update_since: u64,
-    /// Code period at which the pull-in began, and its prompts.
+    /// Sample at which the pull-in began.
     pull_in_since: u64,
+    /// Prompts of the pull-in.
     batch: Batch,
     /// True if the pull-in is that of a weak signal, by a batch.
     is_batched: bool,

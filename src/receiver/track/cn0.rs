@@ -33,14 +33,16 @@ pub struct Cn0 {
     average_periods: f64,
     /// Code periods a symbol of this signal.
     group: u32,
-    /// Every prompt has a sign of its own: the signal is what its power exceeds the noise by.
+    /// True if every prompt has its own sign. The signal's power is then the excess over the noise.
     single: bool,
     known: bool,
     previous: Option<Complex64>,
     seen: u32,
-    /// Sum of a symbol's prompts so far, sum of their powers, and sum of their squares.
+    /// Sum of a symbol's prompts so far.
     sum: Complex64,
+    /// Sum of their powers.
     power: f64,
+    /// Sum of their squares.
     square: Complex64,
     /// Mean product of neighbours while symbols are unknown, then the signal's power in the first place.
     signal: Mean,

@@ -355,8 +355,9 @@ struct Jitter {
     update_s: f64,
     code_m: f64,
     carrier_cycles: f64,
-    /// Code and carrier, over theory, and the deviations of these ratios.
+    /// Ratios of code and carrier jitter to theory.
     ratios: [f64; 2],
+    /// Standard deviations of these ratios.
     spreads: [f64; 2],
 }
 

@@ -62,9 +62,10 @@ impl Mean {
     }
 }
 
-/// Symbols over which phase lock is averaged once they are known, and for how long at least: six of a
-/// millisecond at 36 dB-Hz scatter by a quarter of their mean.
+/// Symbols over which phase lock is averaged once they are known.
 const LOCK_SYMBOLS: f64 = 6.0;
+/// Least time of that average, seconds: six symbols of a millisecond at 36 dB-Hz scatter by a quarter of
+/// their mean.
 const LOCK_S: f64 = 0.12;
 /// Symbols whose mean phase is 60° or more away are taken for a slip.
 const SLIP_COSINE: f64 = -0.5;

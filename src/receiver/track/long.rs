@@ -11,8 +11,9 @@ use crate::correlate::{Edge, Replica, Wave};
 use crate::lead::long_beside;
 use gnss::signal::{Component, Signal};
 
-/// Code periods before a decision is tried, and after which a search begins anew.
+/// Code periods before a decision is tried.
 const LEAST_PERIODS: u32 = 4;
+/// Code periods after which a search begins again.
 const MOST_PERIODS: u32 = 200;
 
 /// Search for the segment of a code period, and the segments' replicas.
@@ -21,8 +22,9 @@ pub struct LongCode {
     component: &'static Component,
     number: u8,
     edge: Edge,
-    /// Chips of a segment, and segments of the code.
+    /// Chips of a segment.
     length: usize,
+    /// Number of segments of the code.
     segments: u64,
     /// The whole code; made when it is asked for.
     chips: Vec<i8>,

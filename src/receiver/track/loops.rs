@@ -183,8 +183,9 @@ pub struct CodeGain {
     table: Vec<Option<f64>>,
 }
 
-/// Entries of the table an octave, and octaves: interpolation errs by less than 1e-3.
+/// Entries of the table per octave: interpolation errs by less than 1e-3.
 const ENTRIES: f64 = 4.0;
+/// Number of octaves.
 const OCTAVES: f64 = 20.0;
 
 impl CodeGain {

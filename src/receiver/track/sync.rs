@@ -10,9 +10,9 @@ pub struct SymbolSync {
     taken: u64,
 }
 
-/// Symbols before a decision is tried, and after which a new search begins: those of a pull-in's default
-/// limit, 6 s.
+/// Symbols before a decision is tried.
 const LEAST_SYMBOLS: u64 = 25;
+/// Symbols after which a new search begins: those of a pull-in's default limit, 6 s.
 const MOST_SYMBOLS: u64 = 300;
 /// Standard deviations by which the best edge must lead every other. Where no symbol turns, noise alone leads
 /// a neighbour by as much with 3e-7, and it has to lead both; where symbols turn, it has to outweigh them

@@ -52,8 +52,9 @@ impl FromStr for Directive {
 /// Tasks of an array where its site says nothing else: Slurm's `MaxArraySize` is 1001 by default, indices up
 /// to 1000.
 pub const MOST_TASKS: u32 = 1001;
-/// A task may take so many times what the plan expects, and some minutes to start.
+/// Ratio of a task's time limit to the plan's expectation.
 const PATIENCE: f64 = 3.0;
+/// Additional time of a task to start, minutes.
 const START_MINUTES: f64 = 5.0;
 
 /// Text that a POSIX shell takes for one word, whatever it holds.

@@ -470,12 +470,13 @@ pub(super) fn modelled(study: &Study, values: &[(&Axis, &Value)]) -> Result<Mode
     Model::of(&document, "model").map_err(|e| e.without_place())
 }
 
-/// Real time that one core covers in a second: of the loops, and of each satellite generated and followed at
-/// 2.6 Msps.
+/// Simulated seconds per second of one core, of the loops.
 const MODEL_SPEED: f64 = 3000.0;
+/// Samples per second of one core, for each satellite generated and tracked at 2.6 Msps.
 const SAMPLES_PER_S: f64 = 0.6e9;
-/// Satellites in a scene, and what a search and the judge cost, seconds.
+/// Number of satellites in a scene.
 const SATELLITES: f64 = 12.0;
+/// Cost of a search and of the judge, seconds.
 const OVERHEAD_S: f64 = 0.5;
 
 /// Seconds of one core that a case takes, roughly.

@@ -141,13 +141,15 @@ impl Receiver {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Search {
     coherent_s: f64,
-    /// Coherent sums of each code, and how many codes.
+    /// Number of coherent sums of each code.
     sums: u32,
+    /// Number of codes.
     codes: u32,
     /// Power that the replicas find, over the signal's.
     share: f64,
-    /// Share of the sums in which a sign turns, and of those in which it may or may not.
+    /// Share of the sums in which a sign turns.
     turning: f64,
+    /// Share of the sums in which a sign may or may not turn.
     random: f64,
 }
 

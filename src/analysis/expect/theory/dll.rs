@@ -83,11 +83,15 @@ pub fn jitter_banded_chips(d: f64, band: f64, bandwidth_hz: f64, t_s: f64, cn0_h
 /// Integrals of a code's spectrum over a rectangular front end, for eq. 5.22. Frequencies in chip rates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BandIntegrals {
-    /// ∫S·sin²(πfd), ∫f·S·sin(πfd), ∫S·cos²(πfd), ∫S·cos(πfd), ∫f²·S over ±band/2.
+    /// Integral ∫S·sin²(πfd) over ±band/2.
     sin2: f64,
+    /// Integral ∫f·S·sin(πfd) over ±band/2.
     slope: f64,
+    /// Integral ∫S·cos²(πfd) over ±band/2.
     cos2: f64,
+    /// Integral ∫S·cos(πfd) over ±band/2.
     cos: f64,
+    /// Integral ∫f²·S over ±band/2.
     gabor: f64,
 }
 

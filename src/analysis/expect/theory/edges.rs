@@ -14,8 +14,9 @@ use gnss::signal::{Layers, Signal};
 
 /// Lines a chip rate that are summed. A code of other length has others, whose power is in proportion.
 const LINES: f64 = 1023.0;
-/// Chip rate of the code whose locked error was measured: GPS C/A.
+/// Chip rate of the code whose locked error was measured, in hertz: GPS C/A.
 const MEASURED_HZ: f64 = 1.023e6;
+/// Early-late spacing of the code loop, in chips.
 const SPACING_CHIPS: f64 = 0.5;
 /// Zones of the rate that fold back; their power falls with the fourth power of their number.
 const ZONES: i32 = 4;

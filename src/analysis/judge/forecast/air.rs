@@ -18,9 +18,10 @@ use gnss::time::Epoch;
 
 /// The ionosphere ends here for models that give the whole of it.
 const TOP_M: f64 = 1e6;
-/// Deviation of the nominal ionosphere at the zenith: a share of its delay, beside a constant. Against the
-/// models of seven days from 2005 to 2024 its error has an rms of 0.75 of that.
+/// Standard deviation of the nominal ionosphere at the zenith, as a share of its delay. Against the models of
+/// seven days from 2005 to 2024 its error has an rms of 0.75 of this deviation.
 const NOMINAL_SHARE: f64 = 0.6;
+/// Constant part of that deviation, metres.
 const NOMINAL_LEAST_M: f64 = 0.5;
 /// Part of a deviation that is a satellite's own.
 const OWN_SHARE: f64 = 0.25;

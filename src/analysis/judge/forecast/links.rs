@@ -36,8 +36,9 @@ const THEORY_LOW: f64 = 1.35;
 const WORST_PAIR: f64 = 10.0;
 /// A sound estimate of C/N0 is right within this.
 pub const CN0_DB: f64 = 1.0;
-/// Errors of a carrier from rounding, light time and interpolation: a hundredth of a cycle, and of a hertz.
+/// Error of a carrier from rounding, light time and interpolation, cycles.
 const REST_CYCLES: f64 = 0.01;
+/// Error of a Doppler from rounding, light time and interpolation, Hz.
 const REST_HZ: f64 = 0.01;
 /// Least number of settled observations that are judged.
 const LEAST: usize = 30;
@@ -210,8 +211,9 @@ struct One<'a> {
     name: String,
     theory: &'a Theory,
     rows: Settled,
-    /// Errors of a carrier in cycles and of C/N0 in decibels that rays may cause.
+    /// Error of a carrier that rays may cause, cycles.
     ray_cycles: f64,
+    /// Error of C/N0 that rays may cause, dB.
     ray_db: f64,
     /// Largest error of the code that chip edges leave.
     edge_m: f64,

@@ -21,8 +21,9 @@ const STEADY_S: f64 = 3.0;
 
 /// A satellite's settled observations.
 pub(super) struct Settled {
-    /// Number of observations where the scene expects no errors, and number of all.
+    /// Number of observations where the scene expects no errors.
     pub count: usize,
+    /// Number of all observations.
     all: usize,
     /// Times of the first and the last.
     pub ends_s: (f64, f64),
@@ -39,14 +40,17 @@ pub(super) struct Settled {
     pub carrier: Numbers,
     /// Errors, Hz.
     pub doppler: Numbers,
-    /// Sums: of one over C/N0, of C/N0 in units of the samples' own power, of its decibels, and of the share
-    /// that other satellites have in the noise.
+    /// Sum of one over C/N0.
     pub inverse_hz: f64,
+    /// Sum of C/N0 in units of the samples' own power.
     pub white_hz: f64,
+    /// Sum of C/N0 in decibels.
     pub dbhz: f64,
+    /// Sum of the share that other satellites have in the noise.
     pub others: f64,
-    /// Sum of the errors of C/N0, and the largest.
+    /// Sum of the errors of C/N0, dB.
     pub off_db: f64,
+    /// Largest error of C/N0, dB.
     pub most_off_db: f64,
 }
 

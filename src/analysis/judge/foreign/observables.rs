@@ -22,9 +22,10 @@ use gnss::signal::{Link, Signal};
 
 /// Times that the truth is looked up at a better time.
 const LOOKS: usize = 6;
-/// Errors of one epoch further from their median than this many deviations, or than the metres below, are of
-/// a wrong lock.
+/// Deviation from the median of an epoch, in standard deviations, beyond which errors are those of a wrong
+/// lock.
 const OUTLIER_SIGMAS: f64 = 10.0;
+/// Deviation from the median in metres beyond which errors are those of a wrong lock.
 const OUTLIER_M: f64 = 30.0;
 
 const MILLISECOND_M: f64 = 1e-3 * SPEED_OF_LIGHT_MPS;

@@ -14,9 +14,10 @@ use gnss::signal::Link;
 
 /// Allowed error of a lock time in seconds: it counts whole updates, of which none is longer than a bit.
 const LOCK_S: f64 = 0.02;
-/// Rounding of readings: pseudoranges of 1e8 m in a double are known to 2e-8 m, and GPS time's fraction to
-/// 1e-16 s.
+/// Largest deviation that rounding explains, metres. Pseudoranges of 1e8 m in a double are known to 2e-8 m,
+/// and GPS time's fraction to 1e-16 s.
 const READING_M: f64 = 1e-4;
+/// Largest relative deviation of dilutions from one another.
 const IDENTITY: f64 = 1e-9;
 
 pub(super) fn findings(run: &Run) -> Result<Vec<Finding>, JudgeError> {

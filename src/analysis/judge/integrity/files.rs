@@ -32,7 +32,7 @@ const CODE_M: f64 = 1.0;
 /// A tenth of the half cycle that a slip is at the least.
 const CARRIER_CYCLES: f64 = 0.05;
 const DOPPLER_HZ: f64 = 1.0;
-/// Half a step of the digit for strength (RINEX 3.05, table 9).
+/// Half a step of the digit for strength, dB (RINEX 3.05, table 9).
 const CN0_DB: f64 = 3.0;
 const SPEED_MPS: f64 = 0.5;
 /// Share of a table's rows that a file may lack, or have elsewhere: a row that somebody mended misleads
@@ -134,8 +134,9 @@ struct Compared {
     carrier_cycles: f64,
     doppler_hz: f64,
     cn0_db: f64,
-    /// Rows of the table, and those of them that the file lacks.
+    /// Number of the table's rows.
     rows: usize,
+    /// Rows that the file lacks.
     lacking: Found,
     /// Losses of lock that are flagged wrongly, channels that are not the truth's, lines that are none.
     flags: Found,

@@ -12,9 +12,9 @@ use crate::read::Run;
 use crate::read::levels::Levels;
 use gnss::record::TrajectoryRow;
 
-/// The rate of a loop (s + ω)³ lags by 3J/ω² under jerk J, that of a loop (s + ω)² by 2a/ω under acceleration
-/// a; neither overshoots.
+/// Factor of the lag of a loop (s + ω)³ under jerk J: its rate lags by 3J/ω² and does not overshoot.
 const THIRD_ORDER: f64 = 3.0;
+/// Factor of the lag of a loop (s + ω)² under acceleration a: its rate lags by 2a/ω and does not overshoot.
 const SECOND_ORDER: f64 = 2.0;
 /// Share of the rate at which a turning antenna winds up all carriers together by which satellites differ: a
 /// tilt of θ makes the rate of one satellite swing by tan θ times the tangent of its angle from the axis, and

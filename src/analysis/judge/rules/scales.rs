@@ -24,8 +24,9 @@ struct ScaleCase {
     sample: u64,
     /// The offset between the scales as the receiver has it, less the true one and less known biases.
     error_m: f64,
-    /// Standard deviation of it in theory, and what may come on top.
+    /// Standard deviation in theory, metres.
     sigma_m: f64,
+    /// Additional error that is allowed, metres.
     allowed_m: f64,
     /// The stated sigma of the clock over the one that should be stated; none where that is not known.
     sigma_ratio: Option<f64>,
@@ -71,8 +72,9 @@ impl<'r> Clocks<'r> {
 pub(super) struct Scales {
     /// Cases by the names of time scales other than the fix's own.
     cases: BTreeMap<&'static str, Table<ScaleCase>>,
-    /// Fixes whose rows are not all there, and the first of them.
+    /// Number of fixes whose rows are incomplete.
     missing: usize,
+    /// Sample of the first such fix.
     first_missing: Option<u64>,
     /// Largest difference of a row of the fix's own scale from what the fix says, in sigmas of the fix.
     own: f64,

@@ -208,8 +208,9 @@ fn draw_series(context: &mut Context<'_, '_>, series: &Series) -> Result<(), Fai
 }
 
 const LEGEND_ROW_PX: i32 = 20;
-/// Distances from a mark's left end to its name, and from a name's end to the next mark.
+/// Distance from a mark's left end to its name, pixels.
 const MARK_PX: i32 = 24;
+/// Distance from a name's end to the next mark, pixels.
 const GAP_PX: i32 = 18;
 
 /// Positions of the named series of a legend: its left end, its row, itself. Rows are as long as the picture

@@ -249,9 +249,9 @@ impl Shown {
     }
 }
 
-/// Largest number of points of a drawn series, and largest number of marks of a run's chart over all series.
-/// More marks would cover the chart.
+/// Largest number of points of a drawn series.
 const MOST_POINTS: usize = 1000;
+/// Largest number of marks of a run's chart over all series. More marks would cover the chart.
 const MOST_MARKS: usize = 4000;
 
 /// Few enough points to draw. Of a line, the lowest and the highest of each run of neighbours, so that no

@@ -3,8 +3,9 @@
 use super::super::sums::Sums;
 use super::{GROUP, GROUPS};
 
-/// Fraction bits of a position in samples, and of the products that give it.
+/// Fraction bits of a position in samples.
 pub(super) const PLACE_BITS: u32 = 16;
+/// Fraction bits of the products that give a position.
 pub(super) const PRODUCT_BITS: u32 = 26;
 /// Pairs of sums side by side: half a group.
 pub(super) const PAIRS: usize = GROUP / 2;
@@ -30,13 +31,15 @@ pub(super) struct Chunk<'a, const T: usize> {
     pub origin: isize,
     /// Positions of the first and after the last sample.
     pub bounds: [i32; 2],
-    /// Position of a start: this and so much for each step, in 2⁻²⁶ samples.
+    /// Position of the start at step 0, in 2⁻²⁶ samples.
     pub place: i64,
+    /// Increment of the position for each step, in 2⁻²⁶ samples.
     pub samples_a_step: u32,
     /// Shifts of the taps that are added to a position.
     pub taps: [i32; T],
-    /// Phase of a middle: this and so much for each half step, in 2⁻³² turns.
+    /// Phase of the middle at half step 0, in 2⁻³² turns.
     pub phase: u32,
+    /// Increment of the phase for each half step, in 2⁻³² turns.
     pub phase_a_step: u32,
     /// Samples between early, prompt and late.
     pub apart: f32,

@@ -55,8 +55,9 @@ pub(super) struct Pieces {
     steps_per_chip: usize,
     /// Steps of a period.
     length: usize,
-    /// Beginnings of the pieces in steps, and their middles in half steps.
+    /// Beginnings of the pieces, in steps.
     starts: Vec<[u32; GROUP]>,
+    /// Middles of the pieces, in half steps.
     middles: Vec<[u32; GROUP]>,
     /// Values of the replica in the pieces.
     levels: Vec<[f32; GROUP]>,

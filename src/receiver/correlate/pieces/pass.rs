@@ -76,8 +76,9 @@ struct Way {
     /// Groups of a chunk at most.
     most: usize,
     samples_a_unit: f64,
-    /// Turns of the carrier a sample, and at the first one.
+    /// Turns of the carrier per sample.
     turns: f64,
+    /// Turns of the carrier at the first sample.
     first_turns: f64,
     /// Samples between prompt and the taps beside it.
     apart: f64,

@@ -11,8 +11,9 @@ use super::super::carrier::LANES;
 use super::super::kernel::Level;
 use super::{AMPLITUDE, Job, Places, ROWS, SEGMENT, SEGMENTS, body};
 
-/// Samples that share a phasor, and such vectors of a segment.
+/// Samples that share a phasor.
 pub(super) const VECTOR: usize = 2 * LANES;
+/// Number of such vectors in a segment.
 pub(super) const VECTORS: usize = SEGMENTS * SEGMENT / VECTOR;
 /// Phasors of length one.
 pub(super) const UNIT: f32 = 32_767.0;
@@ -29,8 +30,9 @@ pub(super) struct Stretch<'a, const T: usize> {
     pub q: &'a [[i16; VECTOR]],
     /// In-phase and quadrature parts of the few samples after these, padded with zeros.
     pub last: Option<&'a [[i16; VECTOR]; 2]>,
-    /// A phasor for each vector, the same in both halves of a number.
+    /// Cosine of each vector, in both halves of a number.
     pub cos: &'a [i32; VECTORS],
+    /// Sine of each vector, in both halves of a number.
     pub sin: &'a [i32; VECTORS],
     /// Values of two rows side by side; those of a segment's first sample are entry `from`.
     pub entries: &'a [[i8; 2]],

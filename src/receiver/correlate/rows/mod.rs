@@ -24,18 +24,21 @@ pub(super) mod kernel;
 
 /// Rows a sample.
 const ROWS: usize = 16;
-/// Samples whose replica is taken from the same rows, and such segments whose products are added in 32 bits.
+/// Samples whose replica is taken from the same rows.
 const SEGMENT: usize = 512;
+/// Number of such segments whose products are added in 32 bits.
 const SEGMENTS: usize = 2;
-/// Entries of a row before the period and after it: half a segment, a whole one, and a little more.
+/// Entries of a row before the period: half a segment, and a little more.
 const BEFORE: usize = SEGMENT / 2 + 2;
+/// Entries of a row after the period: a whole segment, and a little more.
 const AFTER: usize = SEGMENT + LANES + 2;
 /// Value of a step of ±1 in a row.
 const AMPLITUDE: f64 = 127.0;
 /// The weights of two rows add up to this.
 const WEIGHTS: i64 = 64;
-/// Bits of a position behind the point, and behind a weight's last one.
+/// Bits of a position behind the point.
 const PLACE_BITS: u32 = 40;
+/// Bits of a position behind a weight's last one.
 const FINE_BITS: u32 = PLACE_BITS - (ROWS as i64 * WEIGHTS).ilog2();
 /// Undoes the scales of samples, values, weights and phasors.
 const SCALE: f64 = 32_768.0 / ((1 << POINT_BITS) as f64 * AMPLITUDE * WEIGHTS as f64 * kernel::UNIT as f64);
@@ -235,8 +238,9 @@ struct Places {
     /// Integral of the steps at each step's beginning and at the end, from a whole number of periods before
     /// zero on.
     integral: Vec<f64>,
-    /// The first place in steps from there, and from one to the next.
+    /// First position, in steps from the beginning of the integral.
     begin: f64,
+    /// Distance from one position to the next, in steps.
     apart: f64,
 }
 

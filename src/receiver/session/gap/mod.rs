@@ -35,8 +35,9 @@ const LOOK_S: f64 = 0.045;
 /// Looks whose rates are remembered: a phase loop that a secondary code misleads is noticed after three at
 /// most.
 const REMEMBERED: usize = 5;
-/// Channels whose power has to vanish at once, and their share.
+/// Least number of channels whose power has to vanish at once.
 const LEAST_CHANNELS: usize = 3;
+/// Least share of the channels whose power has to vanish at once.
 const VANISHED_SHARE: f64 = 0.66;
 /// A clock whose reading after a pause is off by more than noise, this drift and this much was moved by a
 /// jump.
@@ -115,8 +116,9 @@ enum Stage {
 /// Move of the replicas.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Moved {
-    /// Sample of the suspicion, and of the move.
+    /// Sample of the suspicion.
     since: u64,
+    /// Sample of the move.
     at: u64,
     found: Found,
     /// True if the carriers keep their whole cycles.

@@ -13,11 +13,13 @@ use crate::session::shared::Shared;
 use crate::track::Glance;
 use gnss::signal::{Component, Signal};
 
-/// The turns of the signs are looked at for so long at least, and at most.
+/// Least time of the inspection of the signs' turns, seconds.
 const TURNS_S: f64 = 0.2;
+/// Largest time of that inspection, seconds.
 const TURNS_LIMIT_S: f64 = 2.0;
-/// A jump is a whole number of samples within this and so many deviations.
+/// Largest difference of a jump from a whole number of samples, in samples.
 const WHOLE_SAMPLES: f64 = 0.2;
+/// Additional difference that is allowed, in standard deviations.
 const WHOLE_SIGMAS: f64 = 4.0;
 /// A code is foreseen over so long a jump: a satellite's acceleration of 0.1 m/s² moves it by a millimetre.
 const FORESEEN_S: f64 = 0.1;

@@ -15,9 +15,10 @@ use gnss::record::Event;
 /// A frequency error beyond this, in spite of phase lock, is a false lock: between 0 and the nearest one,
 /// 1/(2·symbol).
 const FALSE_LOCK_SHARE: f64 = 0.4;
-/// Symbols over which the frequency is verified, and for how long at least: at 25 dB-Hz the error that is
-/// found in those of 20 ms scatters by 2 Hz.
+/// Symbols over which the frequency is verified.
 const VERIFY_SYMBOLS: u32 = 25;
+/// Least time of the verification, seconds. At 25 dB-Hz the error that is found in symbols of 20 ms scatters
+/// by 2 Hz.
 const VERIFY_S: f64 = 0.5;
 /// Phase lock must come within this share of the limit for symbols.
 const PHASE_LIMIT_SHARE: f64 = 0.5;

@@ -32,9 +32,10 @@ const MASK_DEG: f64 = 5.0;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Moved {
     pub horizontal_m: f64,
-    /// Down and up. A delay that is not corrected lifts a position, as it is longest near the horizon; one
-    /// that is corrected and is not there lowers it.
+    /// Largest shift downwards, metres. A delay that is corrected but does not exist lowers a position.
     down_m: f64,
+    /// Largest shift upwards, metres. A delay that is not corrected raises a position, as it is longest near
+    /// the horizon.
     up_m: f64,
 }
 

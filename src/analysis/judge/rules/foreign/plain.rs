@@ -18,8 +18,9 @@ use gnss::facts::FaultKind;
 use gnss::signal::{Link, Signal};
 use gnss::time::Epoch;
 
-/// A plain receiver's code loop: bandwidth, and early to late in chips.
+/// Bandwidth of a plain receiver's code loop, hertz.
 pub(super) const PLAIN_HZ: f64 = 2.0;
+/// Distance of early and late of a plain receiver, chips.
 const PLAIN_CHIPS: f64 = 1.0;
 /// Least that code edges between samples cost a replica of whole chips, rms: GNSS-SDR's satellites have
 /// biases of up to 0.45 m at 2.6 Msps, three times what folds back there from edges that are averaged.
@@ -28,8 +29,9 @@ const EDGES_M: f64 = 0.5;
 const BOUND_SIGMAS: f64 = 3.0;
 /// Rule of thumb for a phase loop (Kaplan and Hegarty, 5.6): 15 degrees of jitter.
 pub(super) const PHASE_CYCLES: f64 = 15.0 / 360.0;
-/// A plain receiver's phase loop, hertz, and its natural frequency at a damping of 0.707: 1.89 B.
+/// Bandwidth of a plain receiver's phase loop, hertz.
 pub(super) const PHASE_HZ: f64 = 18.0;
+/// Factor from that bandwidth to the natural frequency at a damping of 0.707: 1.89 B.
 const NATURAL: f64 = 1.89;
 /// Age of a plain receiver's Doppler: half an integration and the delay of its loop.
 const AGE_S: f64 = 0.1;
@@ -66,8 +68,9 @@ pub(super) struct Reach {
     pub code_m: f64,
     /// Shift of the carrier, cycles.
     pub carrier_cycles: f64,
-    /// Mean change of the strength, dB, and its standard deviation.
+    /// Mean change of the strength, dB.
     pub cn0_db: f64,
+    /// Standard deviation of the change, dB.
     pub cn0_sigma_db: f64,
 }
 
