@@ -2,7 +2,6 @@
 
 use std::fmt::Write;
 use std::path::Path;
-use std::process::Command;
 
 use gnss_twin::analysis::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREY, Mark, Series, figure};
 use gnss_twin::generator::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade, allowed_m, kernel_ns};
@@ -344,16 +343,6 @@ fn draw_scenes(directory: &Path, rows: &[SceneRow]) {
     figure(&directory.join("trade_scenes.png"), (1280, height), 2, &charts, &legend).unwrap();
 }
 
-fn commit() -> String {
-    let output = |arguments: &[&str]| {
-        let found = Command::new("git").args(arguments).output().ok();
-        found.map_or_else(String::new, |output| String::from_utf8_lossy(&output.stdout).trim().to_owned())
-    };
-    let dirty =
-        if output(&["status", "--porcelain", "src", "benches", "scenarios"]).is_empty() { "" } else { " with changes" };
-    format!("{}{dirty}", output(&["rev-parse", "--short", "HEAD"]))
-}
-
 fn table<T: serde::Serialize>(path: &Path, rows: &[T]) {
     let mut file = csv::Writer::from_path(path).unwrap();
     rows.iter().for_each(|row| file.serialize(row).unwrap());
@@ -391,8 +380,7 @@ pub fn write(
         "# Speed against accuracy\n\n\
          What users pay for accuracy: processor time against errors, for every signal, for whole scenes and for the \
          knobs of both sides. `cargo bench --bench trade` makes this page, its tables and its pictures.\n\n\
-         Commit {}; {}. \n",
-        commit(),
+         {}.\n",
         machine::machine()
     );
     signals(&mut text, signal_rows, doppler_rows);

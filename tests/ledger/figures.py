@@ -1,0 +1,184 @@
+"""The figures that this repository publishes: what each is, how it is made, and the rooms of code that it speaks of.
+
+A figure is declared here and measured nowhere else; `reports/evidence.csv` has its value. Rooms are chosen as small as the figure
+allows: whatever in them changes makes the figure stale.
+"""
+
+from dataclasses import dataclass
+
+import make
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One figure. `digits` are significant ones; None leaves the text as its source has it."""
+
+    id: str
+    what: str
+    unit: str
+    source: object
+    rooms: tuple = ()
+    bar: str = ""
+    digits: int | None = None
+    scale: float = 1.0
+
+
+ALL_SAMPLES = ("src/fft", "src/gnss", "src/generator", "src/receiver")
+# What a run of a scene is measured for: id, words, unit, path in `summary.json`.
+OF_A_SCENE = [
+    ("first_fix_s", "first fix after the first sample", "s", "position.first_fix_s"),
+    ("fixes", "fixes", "", "position.fixes"),
+    ("horizontal_p95_m", "horizontal error, 95 %", "m", "position.horizontal_p95_m"),
+    ("vertical_p95_m", "vertical error, 95 %", "m", "position.vertical_p95_m"),
+    ("velocity_p95_mps", "velocity error, 95 %", "m/s", "position.velocity_p95_mps"),
+    ("east_m", "mean error east", "m", "position.bias_enu_m.0"),
+    ("north_m", "mean error north", "m", "position.bias_enu_m.1"),
+    ("up_m", "mean error up", "m", "position.bias_enu_m.2"),
+    ("pseudorange_rms_m", "pseudorange error, rms", "m", "observables.pseudorange_rms_m"),
+    ("carrier_rms_cycles", "carrier phase error, rms", "cycle", "observables.carrier_rms_cycles"),
+    ("doppler_rms_hz", "Doppler error, rms", "Hz", "observables.doppler_rms_hz"),
+    ("losses", "losses of lock", "", "tracking.losses_of_lock"),
+    ("slips", "cycle slips", "", "tracking.cycle_slips"),
+]
+SCENES = {
+    "static": "antenna at rest, 60 s",
+    "moderate": "car ride, 90 s",
+    "high_dynamics": "rocket above 20 g, 110 s",
+    "noise_free": "antenna at rest without noise, 60 s",
+    "galileo": "Galileo E1 alone",
+    "two_systems": "GPS L1 C/A and Galileo E1",
+    "dual_band": "Galileo E1 and E5a",
+    "gps_bands": "GPS L1, L2C and L5",
+    "beidou_bands": "BeiDou B1C and B2a",
+}
+BANDS = [
+    ("ionosphere_p95_m", "ionospheric delay by two carriers, error, 95 %", "m", "ionosphere.error_p95_m"),
+    ("ionosphere_mean_m", "true ionospheric delay, mean", "m", "ionosphere.true_mean_m"),
+]
+
+
+def accuracy():
+    for scene, words in SCENES.items():
+        file = f"scenarios/{scene}.toml"
+        rows = OF_A_SCENE + (BANDS if scene in ("dual_band", "gps_bands", "beidou_bands") else [])
+        for name, what, unit, path in rows:
+            counted = unit == ""
+            yield Figure(
+                f"accuracy.{scene}.{name}", f"{what}: {words}", unit, make.Run(file, path),
+                (*ALL_SAMPLES, "src/analysis/measure", file), "= 0" if name == "losses" else "",
+                None if counted else 3 if name == "first_fix_s" else 2,
+            )
+
+
+BENCH = "reports/performance.md"
+GENERATOR = "cargo bench --bench generator -- --write"
+RECEIVER = "cargo bench --bench receiver -- --write"
+RATE = "G satellite·samples/s/core"
+
+
+def speed():
+    timed = ("src/fft", "src/generator", "src/receiver")
+    yield Figure("speed.run.static_realtime", "run of the static scene, generator and receiver with truth, pictures apart",
+                 "× real time", make.Timing("scenarios/static.toml", "speed.run_x_real_time"), timed, "≥ 40", 2)
+    yield Figure("speed.run.static_memory_mib", "largest memory of that run before the judge", "MiB",
+                 make.Timing("scenarios/static.toml", "speed.peak_memory_mib"), timed, "≤ 200", 2)
+    for name, row, bar in [
+        ("fast", "fast, noise-free, 2.6 Msps, ci8", "≥ 3"),
+        ("balanced", "balanced, noise-free, 2.6 Msps, ci8", "≥ 2"),
+        ("balanced_noise", "balanced, seeded noise, 2.6 Msps, ci8", "≥ 1.2"),
+        ("fast_25msps", "fast, noise-free, 25 Msps, ci8", "≥ 4"),
+        ("balanced_25msps", "balanced, noise-free, 25 Msps, ci8", "≥ 3"),
+        ("reference", "reference, noise-free, 2.6 Msps, ci8", "≥ 0.1"),
+    ]:
+        yield Figure(f"speed.synthesis.{name}", f"synthesis: {row}", RATE,
+                     make.Page(BENCH, GENERATOR, row=row, mark="generator", runs="15"),
+                     ("src/generator/synth", "src/fft"), bar, 2)
+    for name, row in [("gps_l1ca", "GPS L1 C/A"), ("gps_l5", "GPS L5"), ("galileo_e1", "Galileo E1"), ("galileo_e5", "Galileo E5")]:
+        for level, column in [("fast", "`fast` (ns)"), ("balanced", "`balanced` (ns), edge"), ("reference", "`reference` (ns)")]:
+            yield Figure(f"speed.signal.{name}.{level}_ns", f"synthesis of {row}, {level}: time of one core for a sample of a satellite",
+                         "ns", make.Page("reports/trade.md", "cargo bench --bench trade", row=row, column=column, runs="15"),
+                         ("src/generator/synth", "src/fft"), "", 2)
+    for name, row, unit, bar in [
+        ("tracking_2_6msps", "tracking in i16, area edges, 3 taps, ci8, 2.6 Msps", "G channel·samples/s/core", "≥ 1.6"),
+        ("tracking_10msps", "tracking in i16, area edges, 3 taps, ci8, 10 Msps", "G channel·samples/s/core", "≥ 1.6"),
+        ("search", "search, 32 PRNs, ±5 kHz, 10 × 2 ms, 2.6 Msps, two cores", "s", "≤ 0.15"),
+    ]:
+        rooms = ("src/receiver/acquire", "src/fft") if name == "search" else ("src/receiver/correlate",)
+        yield Figure(f"speed.receiver.{name}", row, unit,
+                     make.Page(BENCH, RECEIVER, row=row, mark="receiver", runs="15"), rooms, bar, 2)
+
+
+def validation():
+    both = ("src/gnss", "src/generator", "scenarios/static.toml")
+    script = "bash tests/interop.sh \"$GNSS_TWIN\""
+    for name, what, pattern, rooms in [
+        ("gnss_sdr_m", "mean position of GNSS-SDR by our samples, 3-D error, static scene",
+         r"GNSS-SDR, static, .* 3-D ([\d.]+) m \(limit ([\d.]+) m\)", both),
+        ("rtklib_receiver_m", "mean position of RTKLIB by our receiver's observations, 3-D error, static scene",
+         r"RTKLIB, receiver: .* 3-D ([\d.]+) m \(limit ([\d.]+) m\)", (*both, "src/receiver")),
+        ("rtklib_truth_m", "mean position of RTKLIB by our true observations, 3-D error, static scene",
+         r"RTKLIB, truth: .* 3-D ([\d.]+) m \(limit ([\d.]+) m\)", both),
+        ("rtklib_bare_m", "the same without a troposphere", r"RTKLIB, bare: .* 3-D ([\d.]+) m \(limit ([\d.]+) m\)", both),
+    ]:
+        yield Figure(f"validation.interop.{name}", what, "m", make.Script(script, pattern), rooms)
+
+
+def counts():
+    rows = [
+        ("signals", "signals built in", r"pub static SIGNALS: \[&Signal; (\d+)\]", "src/gnss/signal/*.rs"),
+        ("messages", "navigation messages built in, each signal's own variant counted", r"^pub static \w+: Message = ", "src/gnss/**/*.rs"),
+        ("scenes", "scenes that come with the program", None, "scenarios/**/*.toml"),
+        ("studies", "studies that come with the program", None, "studies/*.toml"),
+        ("planted_faults", "planted faults listed", r"^    fault\(", "tests/planted/*.rs"),
+        ("witness_tests", "tests that hold the program against sources from outside", r"#\[test\]", "tests/witness/*.rs"),
+    ]
+    for name, what, pattern, files in rows:
+        yield Figure(f"counts.{name}", what, "", make.Count(pattern, files))
+    rows = [
+        ("planted", "planted faults that a test catches", r"^(\d+ of \d+) faults are caught", "reports/planted.md",
+         "planted", ("tests/planted",)),
+        ("sabotage", "kinds of damaged results that the judge catches", r"Caught: (\d+ of \d+)\.", "reports/sabotage.md",
+         "sabotage", ("tests/sabotage", "src/analysis/judge", "src/analysis/measure", "src/analysis/expect")),
+    ]
+    for name, what, pattern, page, test, rooms in rows:
+        command = f"GNSS_TWIN_LONG=1 GNSS_TWIN_WRITE_{test.upper()}=$PWD/{page} cargo test --test {test}"
+        yield Figure(f"validation.{name}", what, "", make.Page(page, command, pattern=pattern), rooms, "all")
+    extremes = "GNSS_TWIN_LONG=1 GNSS_TWIN_WRITE_STABILITY=$PWD/reports/stability.md cargo test --test extremes"
+    rooms = ("tests/extremes", "src/gnss", "src/generator", "src/receiver")
+    yield Figure("validation.extremes", "extreme cases with measured figures", "",
+                 make.Page("reports/stability.md", extremes, counted=r"^\| \d+ \|"), rooms)
+    yield Figure("validation.extreme_figures", "figures of extreme cases, each beside its bar", "",
+                 make.Page("reports/stability.md", extremes, counted=r"^\| *\d* *\|"), rooms)
+    faults = "GNSS_TWIN_LONG=1 GNSS_TWIN_WRITE_ROBUSTNESS=$PWD/reports/robustness.md cargo test --test faults -- --test-threads 1"
+    rooms = ("tests/faults", "src/cli", "src/receiver/source")
+    for name, what, column in [("cases", "cases of damaged input and of a failing machine", 1), ("failures", "of them failed", 5)]:
+        yield Figure(f"validation.robustness_{name}", what, "",
+                     make.Page("reports/robustness.md", faults, summed=column), rooms, "= 0" if name == "failures" else "")
+
+
+def studies():
+    page = "reports/studies/starts/report.md"
+    command = "\"$GNSS_TWIN\" study studies/starts.toml"
+    for name, row, unit, what in [
+        ("first_fix_s", "position.first_fix_s", "s", "first fix"),
+        ("first_horizontal_m", "first.horizontal_m", "m", "horizontal error of the first fix"),
+        ("first_vertical_m", "first.vertical_m", "m", "vertical error of the first fix"),
+        ("nominal_horizontal_m", "nominal.horizontal_p95_m", "m", "horizontal 95 % of a run before the ionosphere's page"),
+        ("horizontal_m", "broadcast.horizontal_p95_m", "m", "horizontal 95 % of a run after the ionosphere's page"),
+        ("vertical_m", "broadcast.vertical_p95_m", "m", "vertical 95 % of a run after the ionosphere's page"),
+        ("velocity_mps", "broadcast.velocity_p95_mps", "m/s", "velocity 95 % of a run after the ionosphere's page"),
+    ]:
+        for column, words in [("median", "median"), ("95 %", "95 %"), ("largest", "largest")]:
+            short = {"median": "median", "95 %": "p95", "largest": "largest"}[column]
+            yield Figure(f"studies.starts.{name}.{short}", f"{what}, {words} of 200 starts", unit,
+                         make.Page(page, command, row=row, column=column, runs="200"),
+                         (*ALL_SAMPLES, "studies/starts.toml"), "", 3 if unit == "s" else 2)
+    yield Figure("studies.loops.cells", "cells with T·C/N0 ≥ 10 and B·T ≤ 0.36 whose jitter is within 5 % of theory", "",
+                 make.Page("reports/loops.md", "cargo bench --bench loops", pattern=r"(\d+ of \d+) cells are within 5 %"),
+                 ("src/receiver/track", "src/study"))
+    yield Figure("studies.acquisition.counts", "counts of detections and false alarms within the 95 % of their binomial law", "",
+                 make.Page("reports/acquisition.md", "cargo bench --bench acquisition", pattern=r"(\d+ of \d+) counts are within"),
+                 ("src/receiver/acquire", "src/fft"))
+
+
+FIGURES = {figure.id: figure for part in (accuracy, speed, validation, counts, studies) for figure in part()}

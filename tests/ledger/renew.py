@@ -1,0 +1,92 @@
+"""Makes figures anew: runs what a figure's declaration names, and writes its row."""
+
+import datetime
+import functools
+import sys
+import tempfile
+from pathlib import Path
+
+import check
+import digest
+import make
+
+
+def chosen(figures, prefixes):
+    some = [figure for name, figure in figures.items() if not prefixes or name.startswith(tuple(prefixes))]
+    if not some:
+        sys.exit(f"no figure begins with {' or '.join(prefixes)}")
+    return some
+
+
+def stamp(path):
+    """Says in a page that its command just wrote at which commit, when and on what."""
+    text = path.read_text(encoding="utf8")
+    if not make.STAMP.search(text) and not make.BENCHED.search(text):
+        title, rest = text.split("\n\n", 1)
+        today = datetime.datetime.now(datetime.UTC).date()
+        line = f"Measured at commit {make.head_commit(('src', 'tests'))} on {today}, {make.processor()}."
+        path.write_text(f"{title}\n\n{line}\n\n{rest}", encoding="utf8")
+
+
+@functools.cache
+def digest_at(commit, rooms):
+    """Digest of rooms at a commit; unknown where they were not there."""
+    with tempfile.TemporaryDirectory() as place:
+        make.tree_of(commit, place)
+        try:
+            return digest.of(Path(place), rooms)
+        except FileNotFoundError:
+            return "unknown"
+
+
+def row_of(figure, old):
+    """A figure made anew."""
+    source = figure.source
+    if isinstance(source, make.Page) and not source.mark and (make.ROOT / source.page).is_file():
+        stamp(make.ROOT / source.page)
+    if isinstance(source, (make.Run, make.Timing, make.Script)):
+        make.warn_of_old_program([path for room in figure.rooms for path in digest.files(make.ROOT, room)])
+    made = source.make()
+    value, bar = check.rounded(made.value, figure.digits), made.bar if made.bar is not None else figure.bar
+    rooms = " ".join(figure.rooms)
+    commit = made.commit or (make.head_commit(figure.rooms) if figure.rooms else "")
+    if old and made.commit == old["commit"] and rooms == old["rooms"]:
+        code = old["digest"]
+    elif made.commit and not made.commit.endswith("+") and made.commit != make.head_commit():
+        code = digest_at(made.commit, figure.rooms)
+    else:
+        code = digest.of(make.ROOT, figure.rooms) if figure.rooms else ""
+    today = str(datetime.datetime.now(datetime.UTC).date()) if figure.rooms else ""
+    cells = (figure.id, figure.what, value, figure.unit, bar, check.met(value, bar), source.command, commit, made.date or today,
+             made.processor, made.runs, rooms, code)
+    return dict(zip(check.COLUMNS, cells))
+
+
+def make_all(figures, prefixes):
+    table, failed = check.read(make.ROOT), 0
+    for name in table.keys() - figures.keys():
+        del table[name]
+    for figure in chosen(figures, prefixes):
+        try:
+            old = table.get(figure.id)
+            table[figure.id] = row = row_of(figure, old)
+            before = f" (was {old['value']})" if old and old["value"] != row["value"] else ""
+            bar = f", {row['bar']}: {row['met']}" if row["bar"] else ""
+            print(f"{figure.id}: {check.shown(row, '=')}{before}{bar}", flush=True)
+        except (make.NotMade, OSError) as error:
+            failed += 1
+            print(f"{figure.id}: not made: {error}", file=sys.stderr)
+        check.save(make.ROOT, table)
+    check.write(make.ROOT, figures)
+    return failed > 0
+
+
+def compare(figures, prefixes):
+    table, failed = check.read(make.ROOT), 0
+    for figure in chosen(figures, prefixes):
+        if isinstance(figure.source, (make.Run, make.Count)):
+            value = check.rounded(figure.source.make().value, figure.digits)
+            if value != table[figure.id]["value"]:
+                failed += 1
+                print(f"{figure.id} is {value}, {check.LEDGER} has {table[figure.id]['value']}; make it anew by: --make {figure.id}")
+    return failed > 0

@@ -1,0 +1,167 @@
+"""Faults planted in a small repository with a ledger of its own: each must be found, with its file, its line and its cure."""
+
+import tempfile
+from pathlib import Path
+
+import check
+import digest
+import make
+from figures import Figure
+
+SOURCE = '''//! A room.
+/// Speed of light in m/s.
+pub const C: f64 = 299_792_458.0; // a comment
+pub fn text() -> &'static str {
+    "// no comment"
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn c_is_large() {
+        assert!(super::C > 1.0);
+    }
+}
+'''
+README = '''# Twin
+
+The error is <!--=a.error_m-->0.31 m<!--/--> at rest, of <!--#a.bias_m-->−0.05<!--/--> m east on average.
+
+The carrier is 1575.42 MHz; an epoch is 100 ms long.
+<!--const-->
+
+```
+error 17 m
+```
+
+| key | range |
+| --- | --- |
+| `mask_deg` | 0 to 90 ° |
+
+All <!--=a.cells-->3 of 3<!--/--> cells fit, and `0.7 m` is code.
+'''
+PAGE = "# Page\n\nMeasured at commit 1234567 on 2026-01-02, a processor.\n\n3 of 3 cells fit.\n"
+
+
+class Given:
+    """A figure whose value nothing makes."""
+
+    command = "measure"
+
+
+FIGURES = {
+    figure.id: figure
+    for figure in (
+        Figure("a.error_m", "an error", "m", Given(), ("src/room",)),
+        Figure("a.bias_m", "a bias", "m", Given(), ("src/room",)),
+    )
+}
+
+
+class Place:
+    """A small repository, sound until something in it is changed."""
+
+    def __init__(self, root):
+        self.root = Path(root)
+        for folder in ("src/room", "reports", "book/src"):
+            (self.root / folder).mkdir(parents=True)
+        self.put("src/room/lib.rs", SOURCE)
+        self.put("README.md", README)
+        self.put("book/src/first.md", "# First\n\nNothing is measured here.\n")
+        self.put("reports/page.md", PAGE)
+        page = make.Page(str(self.root / "reports/page.md"), "bench", pattern=r"^(\d+ of \d+) cells")
+        cells = Figure("a.cells", "cells that fit", "", page, ("src/room",), "all")
+        self.figures = {**FIGURES, cells.id: cells}
+        code = digest.of(self.root, ["src/room"])
+        row = dict(zip(check.COLUMNS, ["a.error_m", "an error", "0.31", "m", "≤ 0.5", "yes", "measure", "1234567", "2026-01-02",
+                                          "a processor", "1", "src/room", code]))
+        bias = {**row, "id": "a.bias_m", "what": "a bias", "value": "-0.05", "bar": "", "met": "–"}
+        cells = {**row, "id": "a.cells", "what": "cells that fit", "value": "3 of 3", "unit": "", "bar": "all", "command": "bench"}
+        check.save(self.root, {each["id"]: each for each in (row, bias, cells)})
+
+    def put(self, path, text):
+        (self.root / path).write_text(text, encoding="utf8")
+
+    def change(self, path, old, new):
+        text = (self.root / path).read_text(encoding="utf8")
+        assert old in text, f"{path} has no {old!r}"
+        self.put(path, text.replace(old, new, 1))
+
+    def found(self):
+        digest.of_room.cache_clear()
+        return check.check(self.root, self.figures)
+
+
+# What is changed, and what one finding must then say. A change that nothing may report has no text.
+FAULTS = [
+    ("nothing", [], None),
+    ("a figure in prose", [("README.md", "0.31 m<", "0.12 m<")], "README.md:3: a.error_m is shown as '0.12 m', the ledger has '0.31 m'; fill it by: --write"),
+    ("a number alone", [("README.md", "−0.05<", "−0.04<")], "README.md:3: a.bias_m is shown as '−0.04'"),
+    ("an id", [("README.md", "=a.error_m", "=a.errors_m")], "README.md:3: no figure a.errors_m in reports/evidence.csv; the nearest is a.error_m"),
+    ("a figure typed by hand", [("README.md", "an epoch is 100 ms long.\n<!--const-->", "the error is 0.2 m.")], "README.md:5: '0.2 m' has no source"),
+    ("a figure in the book", [("book/src/first.md", "Nothing", "12 of 12 cells fit. Nothing")], "book/src/first.md:3: '12 of 12' has no source"),
+    ("a figure in a table of results", [("README.md", "| key |", "| error |")], "README.md:14: '90 °' has no source"),
+    ("a marker without an end", [("README.md", "0.31 m<!--/-->", "0.31 m")], "README.md:3: "),
+    ("a marker that begins a line", [("README.md", "The error is <", "<")], "README.md:3: a marker begins the line; put a word before it"),
+    ("code", [("src/room/lib.rs", "458.0", "459.0")], "stale: a.error_m speaks of src/room, made at 1234567; make it anew by: --make a.error_m"),
+    ("text in code", [("src/room/lib.rs", "// no comment", "// a comment")], "stale: a.bias_m speaks of src/room"),
+    ("a comment", [("src/room/lib.rs", "// a comment", "// another comment")], None),
+    ("a comment of the library", [("src/room/lib.rs", "/// Speed of light in m/s.", "/// Speed of light.\n\n")], None),
+    ("layout", [("src/room/lib.rs", "() -> &'static str {", "() ->\n    &'static str\n{")], None),
+    ("a test", [("src/room/lib.rs", "C > 1.0", "C > 2.0")], None),
+    ("a value in the ledger", [("reports/evidence.csv", "3 of 3", "4 of 4")], "reports/evidence.csv:3: a.cells is 4 of 4, its source says 3 of 3; make it anew"),
+    ("a page made anew", [("reports/page.md", "1234567", "7654321")], "a.cells is of 1234567, its page of 7654321"),
+    ("a page without its commit", [("reports/page.md", "Measured at commit 1234567 on", "Of")], "does not say at which commit it was measured"),
+    ("a missed bar that is called met", [("reports/evidence.csv", "≤ 0.5", "≤ 0.2")], "reports/evidence.csv:4: a.error_m: met says yes of 0.31 against ≤ 0.2"),
+    ("words of a row", [("reports/evidence.csv", "an error", "a tiny error")], "a.error_m: what is 'a tiny error', declared 'an error'"),
+    ("a row that nobody declared", [("reports/evidence.csv", "a.bias_m", "a.bios_m")], "a.bios_m is not declared in tests/ledger/figures.py"),
+    ("a row too few", [("reports/evidence.csv", "a.bias_m", "a.bios_m")], "a.bias_m is declared and has no row; make it by: --make a.bias_m"),
+]
+
+
+def run():
+    """Plants each fault alone; returns whether one was missed."""
+    missed = []
+    for what, changes, expected in FAULTS:
+        with tempfile.TemporaryDirectory() as root:
+            place = Place(root)
+            for path, old, new in changes:
+                place.change(path, old, new)
+            found, _ = place.found()
+            if expected is None and found:
+                missed.append(f"{what}: reported though it is no fault: {found}")
+            elif expected and not any(text.startswith(expected) or expected in text for text in found):
+                missed.append(f"{what}: expected {expected!r} in {found}")
+    missed += write_mends_what_it_can() + a_stale_page_says_so()
+    print("\n".join(missed) or f"evidence: {len(FAULTS) + 2} planted faults, all found")
+    return bool(missed)
+
+
+def write_mends_what_it_can():
+    with tempfile.TemporaryDirectory() as root:
+        place = Place(root)
+        place.change("README.md", "0.31 m<", "9 km<")
+        check.write(place.root, place.figures)
+        found, _ = place.found()
+        same = (place.root / "README.md").read_text(encoding="utf8") == README
+        return [] if not found and same else [f"--write: {found}"]
+
+
+def a_stale_page_says_so():
+    """A page of an expensive command may be older than the code where it says so; it is warned of, and never silently."""
+    with tempfile.TemporaryDirectory() as root:
+        place = Place(root)
+        place.change("src/room/lib.rs", "458.0", "459.0")
+        silent, warnings = place.found()
+        check.write(place.root, place.figures)
+        told, again = place.found()
+        text = (place.root / "reports/page.md").read_text(encoding="utf8")
+        page = str(place.root / "reports/page.md")
+        good = (
+            any(f"{page}:3: the page does not say" in one for one in silent)
+            and len(warnings) == len(again) == 1
+            and not any(page in one for one in told)
+            and any("README.md:16: a.cells is older than the code" in one for one in told)
+            and "*Older than the code: measured at commit 1234567 on 2026-01-02. `bench` makes it anew.*" in text
+        )
+        return [] if good else [f"a stale page: {silent} {warnings} {told}"]
