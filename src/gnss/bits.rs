@@ -1,4 +1,5 @@
-//! Fields of navigation messages: where each parameter is among the bits, and what its integer means.
+//! Fields of navigation messages: the position of each parameter among the bits, and the meaning of its
+//! integer.
 //!
 //! A field is read and written through the same entry of a table, so that encoder and decoder cannot differ.
 //! What holds the bits is a [`Store`]: ten words with parity of GPS LNAV, a word of 128 bits of Galileo
@@ -46,7 +47,7 @@ impl<const N: usize> Bits<N> {
         Bits::joined(std::iter::once(self.0.get(first..).unwrap_or_default()))
     }
 
-    /// Rows of bits one after the other; zeros after the last.
+    /// Joins rows of bits one after the other; bits after the last row are zero.
     pub fn joined<'a, B: AsRef<[bool]> + 'a + ?Sized>(rows: impl Iterator<Item = &'a B>) -> Self {
         let mut all = Self::default();
         let bits = rows.flat_map(|row| row.as_ref().iter().copied());
@@ -155,12 +156,12 @@ pub enum Kind {
     Turn,
 }
 
-/// Bits, the first sent the most significant, as a number.
+/// Converts bits to a number; the bit that is sent first is the most significant.
 pub fn number(bits: &[bool]) -> u128 {
     bits.iter().fold(0, |all, &bit| all << 1 | u128::from(bit))
 }
 
-/// The lowest `count` bits of a number, the most significant first.
+/// Returns the lowest `count` bits of a number, the most significant first.
 pub fn bits_of(number: u128, count: usize) -> impl Iterator<Item = bool> {
     (0..count).rev().map(move |place| number >> place & 1 == 1)
 }
@@ -170,7 +171,7 @@ pub fn bits_of(number: u128, count: usize) -> impl Iterator<Item = bool> {
 pub struct Field {
     /// Unit last, as everywhere.
     pub name: &'static str,
-    /// First bit, counted as the document does, and length of each piece, most significant first.
+    /// First bit and length of each piece, most significant first. Bits count as in the document.
     pub pieces: &'static [(u16, u8)],
     /// Interpretation of the integer.
     pub kind: Kind,
@@ -238,7 +239,7 @@ impl Field {
         }
     }
 
-    /// Puts the low bits of `raw` there, or its sign and magnitude.
+    /// Writes the low bits of `raw` into the field, or its sign and magnitude.
     pub fn write<S: Store>(&self, data: &mut S, raw: i64) {
         let mut left = self.bits();
         let sign = 1_i64 << (left - 1);
@@ -279,7 +280,7 @@ impl Field {
     }
 }
 
-/// A field bound to a member of what carries it.
+/// Field with access to the member of `T` that it encodes.
 pub struct Element<T> {
     /// Position and scale.
     pub field: Field,
@@ -302,7 +303,7 @@ impl<T> Element<T> {
     }
 }
 
-/// A field and how it is taken from, and put into, what carries it.
+/// Creates an element from a field and the functions that read and write the member.
 pub const fn element<T>(field: Field, get: fn(&T) -> f64, set: fn(&mut T, f64)) -> Element<T> {
     Element { field, get, set }
 }
@@ -335,7 +336,7 @@ pub fn read_all<T, S: Store>(table: &[Element<T>], data: &S, into: &mut T) {
     }
 }
 
-/// Replaces every field of `table` by what it is after being sent.
+/// Replaces every parameter of `table` by its value after encoding and decoding.
 pub fn quantise_all<T>(table: &[Element<T>], into: &mut T) -> Result<(), FieldError> {
     table.iter().try_for_each(|element| {
         let raw = element.field.raw((element.get)(into))?;
@@ -344,14 +345,14 @@ pub fn quantise_all<T>(table: &[Element<T>], into: &mut T) -> Result<(), FieldEr
     })
 }
 
-/// Adds `by` to the field of `table` called `name`; whether there is one.
+/// Adds `by` to the field of `table` with this name. Returns false if there is none.
 pub fn add_to<T>(table: &[Element<T>], name: &str, into: &mut T, by: f64) -> bool {
     let Some(element) = table.iter().find(|element| element.field.name == name) else { return false };
     (element.set)(into, (element.get)(into) + by);
     true
 }
 
-/// The fields of `table` with their integers in `data`.
+/// Reads the integers of all fields of `table` from `data`.
 pub fn integers<T, S: Store>(table: &[Element<T>], data: &S) -> Vec<(&'static str, i64)> {
     table.iter().map(|element| (element.field.name, element.field.read(data))).collect()
 }

@@ -24,11 +24,11 @@ pub use kepler::solve_kepler;
 use kepler::wrap;
 pub use vector::StateVector;
 
-/// The code whose delay is T_GD itself: P(Y) on L1, against the clock of P(Y) on L1 and L2 together
+/// RINEX code whose delay is T_GD itself: P(Y) on L1, against the clock of P(Y) on L1 and L2 together
 /// (IS-GPS-200N, 20.3.3.3.3.2).
 pub const GPS_CLOCK_CODE: &str = "1W";
 
-/// A broadcast ephemeris of one satellite, in SI units and radians.
+/// Broadcast ephemeris of one satellite, in SI units and radians.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ephemeris {
     /// The satellite.
@@ -48,9 +48,9 @@ pub struct Ephemeris {
     pub iodc: u16,
     /// User range accuracy index, 0..=15 (IS-GPS-200N, 20.3.3.3.1.3); SISA index of Galileo.
     pub ura_index: u8,
-    /// Bits of which 0 is healthy: the six of IS-GPS-200N, 20.3.3.3.1.4; of Galileo, from the lowest bit on,
-    /// data validity (1) and health (2) of E1-B, then those of E5b, then those of E5a; of NavIC the flags of
-    /// S and L5. See [`Self::is_healthy`].
+    /// Health bits, of which 0 is healthy. GPS has the six of IS-GPS-200N, 20.3.3.3.1.4. Galileo has validity
+    /// (1) and health (2) of E1-B, then of E5b, then of E5a, from the lowest bit on. NavIC has the flags of S
+    /// and L5. See [`Self::is_healthy`].
     pub health: u16,
     /// Codes on L2: 1 for P, 2 for C/A (IS-GPS-200N, 20.3.3.3.1.2).
     pub l2_codes: u8,
@@ -68,9 +68,9 @@ pub struct Ephemeris {
     pub eccentricity: f64,
     /// Mean anomaly at the reference time, in radians.
     pub m0_rad: f64,
-    /// Mean motion beyond that of the semi-major axis, rad/s.
+    /// Mean motion correction in rad/s, relative to the semi-major axis.
     pub delta_n_radps: f64,
-    /// Rate of that correction, rad/s²; zero for messages without it.
+    /// Rate of the mean motion correction in rad/s²; zero for messages without it.
     pub delta_n_rate_radps2: f64,
     /// Longitude of the ascending node at the beginning of the week, in radians.
     pub omega0_rad: f64,
@@ -100,23 +100,22 @@ pub struct Ephemeris {
     pub af1_sps: f64,
     /// Half the rate of that drift, s/s².
     pub af2_sps2: f64,
-    /// Group delay: T_GD of GPS (IS-GPS-200N, 20.3.3.3.3.2), BGD(E1,E5b) of Galileo, T_GD of NavIC's S, T_GD1
-    /// of BeiDou.
+    /// Group delay in seconds: T_GD of GPS (IS-GPS-200N, 20.3.3.3.3.2), BGD(E1,E5b) of Galileo, T_GD of
+    /// NavIC's S, T_GD1 of BeiDou.
     pub tgd_s: f64,
-    /// The second group delay of messages that have two: BGD(E1,E5a) of Galileo beside BGD(E1,E5b) in
-    /// `tgd_s`, T_GD2 of BeiDou.
+    /// Second group delay in seconds, for messages that have two: BGD(E1,E5a) of Galileo, T_GD2 of BeiDou.
     pub tgd2_s: f64,
-    /// Corrections between signals beside the group delay in `tgd_s`, in seconds: of L1 C/A, L2C, I5 and Q5
-    /// in CNAV, and of the pilot and the data of L1C in CNAV-2; of NavIC on L1 the two of its message at the
-    /// last places.
+    /// Inter-signal corrections in seconds, beside the group delay in `tgd_s`. CNAV has L1 C/A, L2C, I5 and
+    /// Q5. CNAV-2 adds pilot and data of L1C. NavIC on L1 has two, at the last positions.
     pub isc_s: [f64; 6],
     /// Carriers of the clock, as the message states them: NavIC on L1 has 0 for L1 and L5, 1 for S and L5.
     /// Other messages have 0.
     pub reference_flag: u8,
-    /// Group delays that another message of the satellite states, by the code of RINEX to which they belong
-    /// ("5Q"), that of GPS's clock, T_GD, by [`GPS_CLOCK_CODE`]; others follow from `tgd_s`.
+    /// Group delays in seconds that another message of the satellite states, by RINEX code ("5Q"). T_GD of
+    /// GPS's clock is under [`GPS_CLOCK_CODE`]. Other delays follow from `tgd_s`.
     pub signal_delays_s: Vec<(&'static str, f64)>,
-    /// State and forces at the reference time, of messages without elements, whose own here are zero.
+    /// State and forces at the reference time, for messages without Keplerian elements, which are then zero
+    /// here.
     pub vector: Option<StateVector>,
 }
 
@@ -138,7 +137,7 @@ pub struct ClockState {
     pub drift: f64,
 }
 
-/// Elements at a reference time of choice, without harmonics: [`Ephemeris::mean_at`].
+/// Mean elements at a chosen reference time, without harmonics: [`Ephemeris::mean_at`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mean {
     /// Square root of the semi-major axis, √m.
@@ -266,8 +265,8 @@ impl Ephemeris {
         Self { toe: change(self.toe), toc: change(self.toc), transmitted: change(self.transmitted), ..self }
     }
 
-    /// ECEF state at GPS time `at`, in the ECEF axes of that same instant; the velocity is that of
-    /// the rotating frame.
+    /// ECEF state at GPS time `at`, in the ECEF axes of that instant. The velocity is that in the rotating
+    /// frame.
     ///
     /// # Errors
     /// [`OrbitError`] for elements that describe no orbit. The age of the elements is not judged.
@@ -278,7 +277,7 @@ impl Ephemeris {
         }
     }
 
-    /// [`Self::state`] and [`Self::clock_l1`] of the same instant, for one solution of Kepler's equation.
+    /// Computes [`Self::state`] and [`Self::clock_l1`] of one instant with one solution of Kepler's equation.
     ///
     /// # Errors
     /// As [`Self::state`].
@@ -343,8 +342,8 @@ impl Ephemeris {
         if is_geostationary { tilted(state, rotation_radps, anomaly.since_toe_s) } else { state }
     }
 
-    /// The elements without harmonics, carried to another reference time: what almanacs are made of. The
-    /// correction of the mean motion goes into the axis, and the node counts from the beginning of that week.
+    /// Mean elements without harmonics at another reference time, as almanacs need them. The axis absorbs the
+    /// mean motion correction, and the node refers to the beginning of that week.
     pub fn mean_at(&self, at: Epoch) -> Mean {
         let Constants { mu_m3ps2, rotation_radps, .. } = *Constants::of(self.sv.system);
         let age_s = at.since(self.toe);
@@ -362,8 +361,8 @@ impl Ephemeris {
         }
     }
 
-    /// The satellite clock at GPS time `at` with the relativistic term, without group delay
-    /// (IS-GPS-200N, 20.3.3.3.3.1, equation 1).
+    /// Satellite clock at GPS time `at` with the relativistic term, without group delay (IS-GPS-200N,
+    /// 20.3.3.3.3.1, equation 1).
     ///
     /// # Errors
     /// [`OrbitError`] for elements that describe no orbit.
@@ -390,8 +389,8 @@ impl Ephemeris {
         }
     }
 
-    /// The clock as a single-frequency L1 C/A user meets it: [`Self::clock`] minus T_GD
-    /// (IS-GPS-200N, 20.3.3.3.3.2); of another system that of the carrier to which its group delay belongs.
+    /// Satellite clock for a single-frequency user of L1 C/A: [`Self::clock`] minus T_GD (IS-GPS-200N,
+    /// 20.3.3.3.3.2). For another system it is the clock on the carrier to which its group delay belongs.
     ///
     /// # Errors
     /// As [`Self::clock`].
@@ -403,7 +402,7 @@ impl Ephemeris {
         ClockState { offset_s: clock.offset_s - self.given_delay_s(), ..clock }
     }
 
-    /// The group delay on the carrier of which the message gives it, in seconds.
+    /// Group delay in seconds on the carrier for which the message gives it.
     pub fn given_delay_s(&self) -> f64 {
         let given_s = (self.form.given_delay_s)(self);
         planted!("gnss.clock.group_delay", given_s, -given_s)
@@ -425,14 +424,14 @@ impl Ephemeris {
         self.given_delay_s() * against_b3i(carrier_hz) / against_b3i(given_hz)
     }
 
-    /// (f/f_signal)² with the carrier on which the message gives its delay: that of L1, and of NavIC that of
-    /// S (IRNSS SIS ICD for SPS 1.1, user algorithms).
+    /// Factor (f/f_signal)², with f the carrier for which the message gives its delay: L1, or S for NavIC
+    /// (IRNSS SIS ICD for SPS 1.1, user algorithms).
     pub fn dispersion(&self, signal: &Signal) -> f64 {
         let ratio = Constants::of(self.sv.system).delay_carrier_hz / signal.carrier_hz(self.sv);
         planted!("gnss.delay.square", ratio * ratio, ratio)
     }
 
-    /// The clock as a user of `signal` alone meets it.
+    /// Satellite clock for a user of `signal` alone.
     ///
     /// # Errors
     /// As [`Self::clock`].
@@ -479,9 +478,9 @@ impl Ephemeris {
         }
     }
 
-    /// Curve fit interval around the reference time; of a state vector the half hour in whose middle it is
-    /// (GLONASS ICD L1, L2 5.1, 4.4, P1). Of Galileo, NavIC and BeiDou, whose documents have none,
-    /// eight hours: an ephemeris is used for four hours after its reference time.
+    /// Curve fit interval around the reference time, in seconds. A state vector has half an hour with the
+    /// reference time in its middle (GLONASS ICD L1, L2 5.1, 4.4, P1). Galileo, NavIC and BeiDou document
+    /// none: eight hours, because an ephemeris is used for four hours after its reference time.
     ///
     /// Of QZSS two hours (IS-QZSS-PNT-005, 4.1.2.4), of SBAS twelve minutes (RTCA DO-229D, table A-25).
     /// Of GPS four hours, or what the issue of data states when the fit flag is set

@@ -1,6 +1,6 @@
 //! Cyclic redundancy checks of navigation messages.
 
-/// The remainder of CRC-24Q, of the Galileo and modernised GPS messages.
+/// Remainder of CRC-24Q, which Galileo and modernised GPS messages use.
 ///
 /// Generator 0x1864CFB, register from zero, bits in the order in which they are sent (Galileo OS SIS ICD 2.1,
 /// 5.1.9.4; IS-GPS-200N, 20.3.5 in appendix III). Bits followed by their own check leave zero.

@@ -77,7 +77,7 @@ impl Geodetic {
         }
     }
 
-    /// The matrix whose rows are the local east, north and up directions in ECEF.
+    /// Matrix whose rows are the local east, north and up directions in ECEF.
     pub fn ecef_to_enu(self) -> Matrix3<f64> {
         let (sin_lat, cos_lat) = libm::sincos(self.latitude_rad);
         let (sin_lon, cos_lon) = libm::sincos(self.longitude_rad);
@@ -95,7 +95,7 @@ impl Geodetic {
     }
 }
 
-/// A direction as seen from a position: azimuth from north over east in [0, 2π), elevation above the horizon.
+/// Direction as seen from a position: azimuth and elevation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
     /// Azimuth from north over east, in radians, [0, 2π).
@@ -104,7 +104,7 @@ pub struct Look {
     pub elevation_rad: f64,
 }
 
-/// The direction from `here` (whose ECEF position is `here_m`) to `there_m`.
+/// Direction from `here` (with ECEF position `here_m`) to `there_m`.
 pub fn look(here: Geodetic, here_m: &Vector3<f64>, there_m: &Vector3<f64>) -> Look {
     look_in(&here.ecef_to_enu(), here_m, there_m)
 }
@@ -119,7 +119,7 @@ pub fn look_in(axes: &Matrix3<f64>, here_m: &Vector3<f64>, there_m: &Vector3<f64
     }
 }
 
-/// `vector` in the ECEF axes of an instant `dt_s` later, as seen by someone who does not rotate.
+/// Rotates `vector` into the ECEF axes of an instant `dt_s` later, without rotation in inertial space.
 pub fn rotate_earth(vector: &Vector3<f64>, dt_s: f64) -> Vector3<f64> {
     let (sin, cos) = libm::sincos(planted!("gnss.earth.rotation", EARTH_ROTATION_RADPS, -EARTH_ROTATION_RADPS) * dt_s);
     Vector3::new(cos * vector.x + sin * vector.y, cos * vector.y - sin * vector.x, vector.z)

@@ -16,7 +16,7 @@ fn node_m(row: usize, column: usize) -> f64 {
     GRID.get(from..from + 2).map_or(0.0, |two| f64::from(i16::from_be_bytes([two[0], two[1]])) / 100.0)
 }
 
-/// Separation of geoid and ellipsoid, metres: positive where the sea is above the ellipsoid. Angles are in
+/// Separation of geoid and ellipsoid in metres, positive where the sea is above the ellipsoid. Angles are in
 /// radians; a longitude may be of any turn.
 pub fn separation_m(latitude_rad: f64, longitude_rad: f64) -> f64 {
     let y = (latitude_rad.to_degrees() + 90.0).clamp(0.0, 180.0);

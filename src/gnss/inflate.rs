@@ -30,7 +30,7 @@ pub enum InflateError {
     Damaged(String),
 }
 
-/// The plain bytes of a file, at most `largest` of them.
+/// Returns the plain bytes of a file, at most `largest` of them.
 ///
 /// # Errors
 /// [`InflateError`].

@@ -52,10 +52,10 @@ pub enum IonError {
     },
 }
 
-/// A stream of a file: its name, and what it is.
+/// Name of a stream in a file, and its description.
 pub type Stream = (String, Description);
 
-/// The streams in the XML text of a metadata file; `name` is how errors call it.
+/// Parses the streams in the XML text of a metadata file. Errors call the file `name`.
 ///
 /// # Errors
 /// [`IonError`] with the file, the element, its value and what was expected.

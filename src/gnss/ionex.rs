@@ -1,4 +1,4 @@
-//! IONEX: global maps of the ionosphere's vertical electron content, and how to read a value off them.
+//! IONEX files: global maps of the ionosphere's vertical electron content, and interpolation in them.
 //!
 //! Source: Schaer, Gurtner & Feltens 1998, "IONEX: The IONosphere Map EXchange Format Version 1". Between two
 //! maps the value is linear in time, each map turned with the Sun by the time since it (their equation 3);
@@ -33,7 +33,7 @@ pub enum Interpolation {
     Bicubic,
 }
 
-/// Consecutive maps of vertical electron content over the globe.
+/// Sequence of global maps of vertical electron content.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Maps {
     /// One for each map, ascending, at least two.
@@ -104,7 +104,7 @@ impl Maps {
         Reader::new(&text, name).maps()
     }
 
-    /// The instants of the first and the last map.
+    /// Returns the instants of the first and the last map.
     pub fn span(&self) -> (Epoch, Epoch) {
         let first = self.epochs.first().copied().unwrap_or(Epoch::new(0, 0.0));
         (first, self.epochs.last().copied().unwrap_or(first))

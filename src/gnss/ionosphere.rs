@@ -38,12 +38,12 @@ pub enum Coefficients {
     Bdgim(Bdgim),
 }
 
-/// Carrier on which NavIC's coefficients give the delay (IRNSS SIS ICD for SPS 1.1: they are for users of
-/// L5).
+/// Carrier frequency in Hz for which NavIC's coefficients give the delay (IRNSS SIS ICD for SPS 1.1: they are
+/// for users of L5).
 pub const NAVIC_HZ: f64 = 1_176.45e6;
 
 impl Model {
-    /// Forms of Klobuchar's model, in the order in which a receiver that takes any prefers them.
+    /// Variants of Klobuchar's model, in the order of preference for a receiver that accepts any.
     pub const KLOBUCHAR: [Self; 3] = [Self::Klobuchar, Self::KlobucharNavic, Self::KlobucharBeidou];
 }
 
@@ -59,8 +59,8 @@ impl Coefficients {
         }
     }
 
-    /// Group delay in seconds on a carrier of `carrier_hz` at GPS time `at` from `user` to `satellite_m`,
-    /// earth-fixed, which is seen at `look`.
+    /// Group delay in seconds on `carrier_hz` at GPS time `at` from `user` to the earth-fixed `satellite_m`,
+    /// which is seen at `look`.
     pub fn delay_s(
         &self,
         (user, look): (Geodetic, Look),

@@ -12,44 +12,44 @@ use std::f64::consts::{PI, TAU};
 use crate::earth::{Geodetic, Look};
 use crate::time::{BDT, Epoch};
 
-/// Carrier on which the coefficients are defined (IS-GPS-200N, 3.3.1.1).
+/// Carrier frequency in Hz for which the coefficients are defined (IS-GPS-200N, 3.3.1.1).
 pub const L1_HZ: f64 = 1_575.42e6;
 /// Delay at night, in seconds (IS-GPS-200N, figure 20-4).
 pub const NIGHT_S: f64 = 5e-9;
-/// Local time of the bulge's maximum (IS-GPS-200N, figure 20-4).
+/// Local time of the bulge's maximum, in seconds (IS-GPS-200N, figure 20-4).
 pub const MAXIMUM_S: f64 = 50_400.0;
-/// Phase beyond which the bulge is left out (IS-GPS-200N, figure 20-4).
+/// Phase in radians beyond which the bulge is left out (IS-GPS-200N, figure 20-4).
 pub const SERIES_END_RAD: f64 = 1.57;
 /// Seconds of a day.
 pub const DAY_S: f64 = 86_400.0;
 
-/// The eight broadcast coefficients, in the document's units (seconds and powers of semicircles).
+/// Klobuchar's eight broadcast coefficients, in the document's units (seconds and powers of semicircles).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Klobuchar {
-    /// Polynomial of the amplitude over geomagnetic latitude: s, s/semicircle and higher powers.
+    /// Polynomial of the amplitude over geomagnetic latitude, in s, s/semicircle and higher powers.
     pub alpha: [f64; 4],
     /// Polynomial of the period: the same units.
     pub beta: [f64; 4],
 }
 
-/// Coefficients of a nominal ionosphere, for where none are known yet: even in magnetic latitude, with a
-/// period of 100 000 s.
+/// Coefficients of a nominal ionosphere, for use before any are received. They are even in magnetic latitude,
+/// with a period of 100 000 s.
 ///
 /// The mean of what GPS satellites broadcast on seven days: 2005-04-02, 2010-07-01, 2020-11-29, 2021-09-22,
 /// 2022-01-01, 2023-03-12 and 2024-04-01. Their amplitudes at the magnetic equator are 11, 5, 15, 8, 12, 33
 /// and 26 ns.
 pub const NOMINAL: Klobuchar = Klobuchar { alpha: [1.6e-8, 0.0, -6.0e-8, 0.0], beta: [1.0e5, 0.0, 0.0, 0.0] };
 
-/// The model's intermediate quantities along one line of sight.
+/// Intermediate quantities of the model along one line of sight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bulge {
     /// Slant factor F.
     pub obliquity: f64,
-    /// Amplitude of the bulge, never negative.
+    /// Amplitude of the bulge in seconds, never negative.
     pub amplitude_s: f64,
-    /// Period of the bulge, at least 72 000 s.
+    /// Period of the bulge in seconds, at least 72 000.
     pub period_s: f64,
-    /// Local time at the ionospheric point, in [0, 86 400).
+    /// Local time at the ionospheric point in seconds, [0, 86 400).
     pub local_s: f64,
 }
 
@@ -112,8 +112,8 @@ impl Klobuchar {
         (NIGHT_S + day_s) / (1.0 - sine * sine).sqrt() * scale * scale
     }
 
-    /// The coefficients whose bulge on a carrier of `defined_hz` is the one that these have on L1. Delays at
-    /// night are 5 ns on either.
+    /// Scales the coefficients so that their bulge on `defined_hz` equals the present one on L1. Delays at
+    /// night are 5 ns on both.
     pub fn bulge_on(&self, defined_hz: f64) -> Self {
         let scale = L1_HZ / defined_hz;
         Self { alpha: self.alpha.map(|alpha| alpha * (scale * scale)), beta: self.beta }
@@ -125,7 +125,8 @@ impl Klobuchar {
         self.delay_from_s(L1_HZ, user, look, at, carrier_hz)
     }
 
-    /// [`Self::delay_s`] of coefficients that give the delay on a carrier of `defined_hz`, at night too.
+    /// Group delay in seconds like [`Self::delay_s`], for coefficients that give the delay on `defined_hz`,
+    /// at night too.
     pub fn delay_from_s(&self, defined_hz: f64, user: Geodetic, look: Look, at: Epoch, carrier_hz: f64) -> f64 {
         let bulge = self.bulge(user, look, at);
         let phase_rad = bulge.phase_rad();

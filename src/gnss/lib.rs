@@ -1,4 +1,4 @@
-//! The printed world: what interface documents and standards define, and nothing else.
+//! Interface documents and standards of satellite navigation: what they define, and nothing else.
 //!
 //! No truth and no opinions live here. Both generator and receiver use these modules, so an
 //! error in them would cancel in a closed loop: everything here is tested against something

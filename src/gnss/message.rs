@@ -27,54 +27,56 @@ pub struct Message {
     pub name: &'static str,
     /// Duration of a symbol, in seconds: whole periods of the code that it modulates.
     pub symbol_s: f64,
-    /// Signs of the symbols that make a bit of a satellite, one after another; one sign where symbols are not
-    /// of a known code.
+    /// Signs of the symbols that form one bit of a satellite, in order. It has one sign if symbols belong to
+    /// no known code.
     pub bit: fn(Sv) -> &'static [i8],
     /// Duration of a unit, which is encoded as a whole, in seconds.
     pub unit_s: i64,
-    /// Seconds, from one multiple of them to the next, in which all units are of one ephemeris: whole units.
-    /// Messages whose units each state of which ephemeris they are have those of one unit.
+    /// Interval in seconds, from one multiple of it to the next, in which all units belong to one ephemeris.
+    /// Messages whose units each identify their ephemeris have the interval of one unit.
     pub set_s: i64,
-    /// Seconds after the beginning of the week at which its first unit begins.
+    /// Seconds from the beginning of the week to the start of its first unit.
     pub first_s: i64,
-    /// Makes what all satellites of a scene send alike.
+    /// Function that creates the encoder for the satellites of a scene.
     pub sender: fn(&Common) -> Result<Box<dyn Sender>, FieldError>,
-    /// Number by which faults name the unit that begins then: a subframe's, a word's type.
+    /// Function that returns the number by which faults name the unit that begins at a time: a subframe's
+    /// number, or a word's type.
     pub number: fn(Epoch) -> u8,
-    /// Numbers of the units that state their time; none where another signal of the satellite has to give it.
+    /// Numbers of the units that state their time; empty if another signal of the satellite has to supply it.
     pub timed: &'static [u8],
-    /// Numbers of the units all of which have to be read before one of those states its whole time; none
-    /// where each states it by itself.
+    /// Numbers of the units that must all be received before the time is complete; empty if each unit states
+    /// it completely.
     pub dated: &'static [u8],
     /// Numbers of the units that make up an ephemeris.
     pub set: &'static [u8],
-    /// Numbers of the units each of which carries an ephemeris in short.
+    /// Numbers of the units each of which carries reduced elements.
     pub reduced: &'static [u8],
     /// Ionosphere model and the units that carry its coefficients.
     pub ionosphere: IonosphereForm,
-    /// Names of the parameters of an ephemeris that bear its issue.
+    /// Names of the ephemeris parameters that carry its issue.
     pub set_parameters: fn() -> Vec<&'static str>,
-    /// The ephemeris of a satellite by the raw integers of its parameters, read near a time; `None` where
-    /// some are missing or contradict each other.
+    /// Function that decodes a satellite's ephemeris from raw parameters near a time. `None` if some are
+    /// missing or contradict each other.
     pub elements: fn(Sv, Raw<'_>, Epoch) -> Option<Ephemeris>,
-    /// The parameters in the symbols of a unit and whether they belong to an ephemeris; `None` where the
-    /// unit fails its checks or has no parameters.
+    /// Function that reads a unit's parameters from its symbols, with true if they belong to an ephemeris.
+    /// `None` if the unit fails its checks or has no parameters.
     pub parameters: fn(&[bool]) -> Option<(bool, Parameters)>,
     /// A reader of what a satellite sends.
     pub reader: fn(Sv) -> Box<dyn Reader>,
-    /// The ephemeris that satellites send in this form, of one in the form of another of their messages:
-    /// orbits are the same, clocks differ by group delays.
+    /// Function that converts an ephemeris of another message of the same satellite to this form. The orbit
+    /// is the same, clocks differ by group delays.
     pub form: fn(&Ephemeris) -> Ephemeris,
     /// Meaning of clock and health in ephemerides of this message.
     pub sets: &'static SetForm,
-    /// The ephemeris that a receiver decodes when this one is sent.
+    /// Function that returns the ephemeris as a receiver decodes it after transmission.
     pub quantised: fn(&Ephemeris) -> Result<Ephemeris, FieldError>,
-    /// Names of the parameters of an ephemeris that may be wrong with a right check: all but those that
-    /// distinguish ephemerides and senders apart.
+    /// Names of the ephemeris parameters that a fault may change while checks stay right. Parameters that
+    /// identify ephemeris or sender are excluded.
     pub adjustable: fn() -> Vec<&'static str>,
-    /// Makes an alert page of a unit; absent where the message has none.
+    /// Function that turns a unit into an alert page; absent if the message has none.
     pub alert: Option<Alert>,
-    /// Adds to the parameter of an ephemeris that the tables call so, in its unit; whether there is one.
+    /// Function that adds a value to the named ephemeris parameter, in its unit. It returns false if there is
+    /// no such parameter.
     pub adjust: fn(&mut Ephemeris, &str, f64) -> bool,
     /// RINEX record names of the message. Absent if RINEX has the message in a form that this crate does not
     /// write.
@@ -89,11 +91,11 @@ pub struct Records {
     /// Record name of the parameters that all satellites send alike: ionosphere coefficients and time offsets
     /// between systems.
     pub common: &'static str,
-    /// The fields of the message, from which offsets of time are read.
+    /// Fields of the message, from which time offsets are read.
     pub fields: fn() -> Vec<(&'static str, Vec<&'static Field>)>,
-    /// Lines after the clock's of ephemerides that version 4 alone has, by the ephemeris and its raw
-    /// parameters; a blank field has no value. Absent where ephemerides have the lines that version 3 has,
-    /// too.
+    /// Record lines after the clock's, for ephemerides that only RINEX 4 has. They are made from the
+    /// ephemeris and its raw parameters; a blank field has no value. Absent if the lines are those of version
+    /// 3.
     pub lines: Option<fn(&Ephemeris, Raw<'_>) -> Vec<RecordLine>>,
 }
 
@@ -107,24 +109,24 @@ pub struct IonosphereForm {
     pub model: Model,
     /// Function that returns true if the unit that begins at this time carries the coefficients.
     pub unit: fn(Epoch) -> bool,
-    /// The coefficients by the raw integers of their parameters; `None` where one is missing.
+    /// Function that decodes the coefficients from raw parameters; `None` if one is missing.
     pub coefficients: fn(Raw<'_>) -> Option<Coefficients>,
 }
 
-/// The raw integers of some parameters, by their names in the tables.
+/// Raw integers of parameters, by their names in the tables.
 pub type Parameters = Vec<(&'static str, i64)>;
-/// The symbols of a unit without content but that something is wrong, its checks right, instead of those of
-/// another; `None` where these fail their own.
+/// Function that replaces a unit by one that reports a fault, with right checks. `None` if the symbols fail
+/// their own checks.
 pub type Alert = fn(&[bool]) -> Option<Vec<bool>>;
-/// Gives the raw integer of a parameter by its name.
+/// Function that returns the raw integer of a parameter by its name.
 pub type Raw<'a> = &'a dyn Fn(&str) -> Option<i64>;
 
 /// Parameters that all satellites of a system send alike.
 #[derive(Clone, Debug, Default)]
 pub struct Common {
-    /// Coefficients of GPS's model of the ionosphere; absent means none are sent.
+    /// Klobuchar coefficients of GPS; absent means none are sent.
     pub klobuchar: Option<Klobuchar>,
-    /// Coefficients of the same model as NavIC sends them, for L5; absent means none are sent.
+    /// Klobuchar coefficients of NavIC, for L5; absent means none are sent.
     pub klobuchar_navic: Option<Klobuchar>,
     /// Klobuchar coefficients of BeiDou; absent means none are sent.
     pub klobuchar_beidou: Option<Klobuchar>,
@@ -135,7 +137,7 @@ pub struct Common {
     pub nequick: Option<[f64; 3]>,
     /// GPS time against UTC.
     pub utc: UtcData,
-    /// Galileo's time against GPS time; absent means that it is not stated.
+    /// Offset of Galileo's time from GPS time; absent means that it is not stated.
     pub galileo: Option<TimePolynomial>,
     /// Ephemerides for the almanacs, one for each satellite.
     pub almanac: Vec<Ephemeris>,
@@ -323,12 +325,12 @@ impl Message {
         (self.unit_s as f64 / self.symbol_s).round() as usize
     }
 
-    /// Number of the unit, since the beginning of the system's time, in which a whole second of it lies.
+    /// Number of the unit in which a whole second lies, counted from the beginning of the system's time.
     pub fn unit_at(&self, second: i64) -> i64 {
         (second - self.first_s).div_euclid(self.unit_s)
     }
 
-    /// The unit whose beginning decides of which ephemeris a unit is.
+    /// Number of the unit whose start decides to which ephemeris a unit belongs.
     pub fn unit_of_set(&self, unit: i64) -> i64 {
         let units = (self.set_s / self.unit_s).max(1);
         unit.div_euclid(units) * units
@@ -339,8 +341,8 @@ impl Message {
         Epoch::new(unit * self.unit_s + self.first_s, 0.0)
     }
 
-    /// Seconds in which each unit of an ephemeris comes whole, whatever the moment from which it is waited
-    /// for; `None` where the message carries no ephemeris.
+    /// Longest time in seconds until every unit of an ephemeris has been received, from any moment. `None` if
+    /// the message carries no ephemeris.
     pub fn set_within_s(&self) -> Option<i64> {
         // Two rounds of LNAV's pages; no message repeats its ephemeris more seldom.
         const UNITS: i64 = 250;

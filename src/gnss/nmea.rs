@@ -58,7 +58,7 @@ pub struct Seen {
     pub used: bool,
 }
 
-/// All sentences of an epoch: GGA, RMC, VTG, ZDA, then GSA by system and GSV by system and signal.
+/// Writes all sentences of an epoch: GGA, RMC, VTG, ZDA, then GSA by system and GSV by system and signal.
 pub fn epoch(place: &Place, seen: &[Seen]) -> String {
     let mut systems: Vec<System> = seen.iter().filter(|seen| seen.used).map(|seen| seen.sv.system).collect();
     systems.sort();
@@ -82,7 +82,7 @@ pub fn epoch(place: &Place, seen: &[Seen]) -> String {
     text + &in_view(seen)
 }
 
-/// A sentence with its checksum: the exclusive or of all between `$` and `*`.
+/// Writes a sentence with its checksum, the exclusive or of all characters between `$` and `*`.
 pub fn sentence(talker: &str, body: &str) -> String {
     let sum = talker.bytes().chain(body.bytes()).fold(0, |sum, byte| sum ^ byte);
     format!("${talker}{body}*{sum:02X}\r\n")

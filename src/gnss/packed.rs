@@ -1,4 +1,4 @@
-//! Recordings whose samples are no whole bytes, or lie among those of other channels.
+//! Packed recordings: samples that do not fill whole bytes, or that are interleaved with other channels.
 //!
 //! A [`Layout`] states which bits of a group of words are the samples of one channel; an [`Unpacker`] reads
 //! them as a [`Format`] of whole bytes. Values of 1 to 4 bits lie in the middle of their step, at odd
@@ -150,7 +150,7 @@ pub enum LayoutError {
     },
 }
 
-/// Samples that follow each other, of one channel or of several in turn.
+/// Consecutive samples of one channel, or of several in turn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Interleaved {
     /// Bits of a value.
@@ -205,7 +205,8 @@ impl Layout {
         Self::of_fields(Group { word_bytes, big_endian, words, lowest_first }, (bits, encoding, components), starts)
     }
 
-    /// The layout of samples of which each begins at one of `starts`, bits counted from the group's first.
+    /// Creates the layout of samples each of which begins at one of `starts`. Bits count from the group's
+    /// first.
     ///
     /// # Errors
     /// [`LayoutError`].
@@ -266,7 +267,7 @@ impl Layout {
         self.fields.len() / if self.complex { 2 } else { 1 }
     }
 
-    /// Reads the whole groups of `bytes` and appends their samples.
+    /// Unpacks the whole groups of `bytes` and appends their samples.
     pub fn unpack(&self, bytes: &[u8], out: &mut Vec<u8>) {
         let mask = (1_u64 << self.bits) - 1;
         // Few bits have few values: each is worked out once.

@@ -43,7 +43,8 @@ impl<'t> Keys<'t> {
         format!("{}:{line}:{column}", self.origin)
     }
 
-    /// The position of a key, or of what is above it, if that is there; else the name of the text alone.
+    /// Position of a key, or of the nearest enclosing table if the key is absent. Without either it is the
+    /// name of the text.
     pub fn place_of(&self, path: &str) -> String {
         let mut path = path;
         loop {
@@ -55,7 +56,7 @@ impl<'t> Keys<'t> {
         }
     }
 
-    /// The key whose value holds a byte, the innermost one.
+    /// Returns the innermost key whose value contains a byte.
     pub fn holding(&self, byte: usize) -> Option<&str> {
         let inside =
             self.entries.iter().filter(|(_, _, value)| value.start <= byte && byte < value.end.max(value.start + 1));

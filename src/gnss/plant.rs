@@ -1,4 +1,4 @@
-//! Faults planted on purpose, so that tests can prove that something notices each of them.
+//! Planted faults: they let tests prove that each of them is noticed.
 //!
 //! Present only with the feature `planted`, which the package's own tests turn on; without it `planted!` is
 //! its first value and leaves nothing in the program. At most one fault is active in a process: the one named

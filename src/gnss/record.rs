@@ -1,4 +1,4 @@
-//! The rows that generator and receiver write and the judge joins, one CSV file a kind.
+//! Rows that generator and receiver write and the judge joins, one CSV file for each kind.
 //!
 //! A row states *when* by sample number: the only clock that truth and estimate share without
 //! agreeing on anything. Columns end with their unit; angles are in degrees in files, in radians nowhere.
@@ -25,7 +25,7 @@ macro_rules! linked {
 
 linked!(Observation, SkyRow, RayRow, AcquisitionRow, TrackingRow, EventRow);
 
-/// One satellite's signal at one sample: `observations.csv`, on both sides.
+/// Observation of one satellite's signal at one sample: `observations.csv`, from generator and receiver.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Observation {
     /// Number of the sample, from 0 at the start of the scene or recording.
@@ -48,9 +48,9 @@ pub struct Observation {
     pub carrier_cycles: f64,
     /// Doppler in Hz, positive when approaching (RINEX sense).
     pub doppler_hz: f64,
-    /// Carrier power over noise density of the whole signal, dB-Hz.
+    /// Carrier power over noise density of the whole signal, in dB-Hz.
     pub cn0_dbhz: f64,
-    /// Time since the carrier was locked without interruption, in seconds; in the truth, since the satellite
+    /// Time in seconds since the carrier was locked without interruption; in the truth, since the satellite
     /// appeared.
     pub locked_s: f64,
 }
@@ -78,7 +78,7 @@ pub struct SkyRow {
     pub elevation_deg: f64,
     /// Geometric range with light time and Earth rotation, in metres.
     pub range_m: f64,
-    /// Satellite clock as that signal carries it (relativity and group delay included), in metres.
+    /// Satellite clock offset for that signal in metres, with relativity and group delay included.
     pub satellite_clock_m: f64,
     /// Group delay of the ionosphere on that signal, in metres.
     pub ionosphere_m: f64,
@@ -100,7 +100,7 @@ pub enum PassEnd {
     Ephemeris,
 }
 
-/// A time in which a satellite is in the scene's sky, whole seconds of the receiver's clock:
+/// Interval in which a satellite is in the scene's sky, in whole seconds of the receiver's clock:
 /// `truth/passes.csv`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct PassRow {
@@ -116,7 +116,7 @@ pub struct PassRow {
     pub ends_by: PassEnd,
 }
 
-/// A ray that comes beside the direct one: `truth/rays.csv`.
+/// Reflected ray beside the direct one: `truth/rays.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RayRow {
     /// Number of the sample, from 0 at the start of the scene or recording.
@@ -180,8 +180,8 @@ impl TrajectoryRow {
     }
 }
 
-/// A position and a time as people and maps have them: what stands behind the columns of a [`TrajectoryRow`]
-/// and of a [`Fix`] in their files, and is not read again.
+/// Position and time in geographic form: additional columns after those of a [`TrajectoryRow`] and a [`Fix`]
+/// in their files. They are not read again.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Geographic {
     /// Geodetic latitude, north positive, in degrees.
@@ -217,7 +217,7 @@ pub struct InterferenceRow {
     pub sample: u64,
     /// Number of the source among the computed ones, from 1.
     pub source: usize,
-    /// Mean power over a repetition, over the density of the thermal noise.
+    /// Mean power over a repetition, relative to the density of the thermal noise, in dB-Hz.
     pub jn0_dbhz: f64,
     /// Carrier frequency in the samples, in Hz, with Doppler and the receiver's clock included.
     pub frequency_hz: f64,
@@ -272,18 +272,17 @@ pub struct Fix {
     pub vdop: f64,
     /// Dilution of precision of the clock.
     pub tdop: f64,
-    /// Ratio of the extreme singular values of the geometry: 1 would be perfect, 10 000 and more is refused.
+    /// Ratio of the extreme singular values of the geometry: 1 is the best, 10 000 and more is refused.
     pub condition: f64,
     /// Satellites in the solution.
     pub satellites: u32,
     /// Weighted sum of squared residuals; its degrees of freedom are [`Fix::freedom`].
     pub chi_square: f64,
-    /// Satellites left out by the residual test, separated by blanks.
+    /// Satellites excluded by the residual test, separated by blanks.
     pub excluded: String,
     /// Ionosphere correction of the fix.
     pub ionosphere: IonosphereModel,
-    /// Ranges in the solution, and clocks that it estimates: one a satellite, and one, where the file does
-    /// not state.
+    /// Number of ranges in the solution; absent if the file does not state it.
     #[serde(default)]
     pub ranges: Option<u32>,
     /// Clocks that it estimates.
@@ -314,22 +313,23 @@ pub struct SightRow {
     pub used: bool,
 }
 
-/// The ionosphere on the way from a satellite as two of its carriers show it: `rx/ionosphere.csv`, of fixes
-/// with a satellite on two bands.
+/// Ionosphere delay of a satellite, estimated from two of its carriers: `rx/ionosphere.csv`, for fixes with a
+/// satellite on two bands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct IonosphereRow {
     /// Sample number of the fix.
     pub sample: u64,
     /// The satellite.
     pub sv: Sv,
-    /// Group delay on 1575.42 MHz, smoothed by the carriers. What the receiver's bands are apart, seen on
-    /// that carrier, is in it, alike for all satellites of the same signals.
+    /// Group delay in metres on 1575.42 MHz, smoothed by the carriers. It includes the receiver's delay
+    /// between its bands, which is common to all satellites of the same signals.
     pub delay_m: f64,
     /// Standard deviation by thermal noise, in metres.
     pub sigma_m: f64,
 }
 
-/// The receiver's clock against one time scale: `rx/clocks.csv`, of fixes with another than GPS time.
+/// Offset of the receiver's clock from one time scale: `rx/clocks.csv`, for fixes with a scale other than GPS
+/// time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ClockRow {
     /// Number of the sample, from 0 at the start of the scene or recording.
@@ -370,7 +370,7 @@ impl Fix {
         self.ranges.unwrap_or(self.satellites).saturating_sub(3 + self.clocks.unwrap_or(1))
     }
 
-    /// GPS time of the sample as the receiver found it.
+    /// Estimated GPS time of the sample.
     pub fn time(&self) -> Epoch {
         Epoch::new(self.gps_s, self.gps_fraction_s)
     }
@@ -386,7 +386,7 @@ impl Fix {
     }
 }
 
-/// The outcome of a search for one satellite: `rx/acquisition.csv`.
+/// Result of the search for one satellite: `rx/acquisition.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct AcquisitionRow {
     /// First sample searched.
@@ -406,12 +406,12 @@ pub struct AcquisitionRow {
     pub doppler_hz: f64,
     /// Code phase at `sample`.
     pub code_phase_chips: f64,
-    /// Carrier power over noise density of the whole signal, dB-Hz.
+    /// Carrier power over noise density of the whole signal, in dB-Hz.
     pub cn0_dbhz: f64,
 }
 
-/// A line in the spectrum of the samples that no satellite sends: `rx/interference.csv`, a row for each
-/// second that has one.
+/// Spectral line in the samples that no satellite sends: `rx/interference.csv`, one row for each second with
+/// a line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LineRow {
     /// First sample looked at.
@@ -427,9 +427,9 @@ pub struct LineRow {
     pub statistic: f64,
     /// Threshold of the statistic.
     pub threshold: f64,
-    /// Lines above the threshold: one of a continuous wave, many of a sweep or of pulses.
+    /// Number of lines above the threshold: one for a continuous wave, many for a sweep or for pulses.
     pub lines: u32,
-    /// Width of a bin: frequencies are known to a part of it.
+    /// Width of a bin in Hz, which limits the resolution of the frequency.
     pub resolution_hz: f64,
 }
 
@@ -443,7 +443,7 @@ pub struct TrackingRow {
     /// Signal of the satellite.
     #[serde(with = "by_name")]
     pub signal: &'static Signal,
-    /// Prompt correlator, in units of its noise's standard deviation per component.
+    /// In-phase prompt correlator, in units of its noise's standard deviation.
     pub prompt_i: f64,
     /// Quadrature prompt correlator, in units of its noise's standard deviation.
     pub prompt_q: f64,
@@ -453,15 +453,15 @@ pub struct TrackingRow {
     pub pll_discriminator_cycles: f64,
     /// Raw frequency discriminator of this update, in Hz.
     pub fll_discriminator_hz: f64,
-    /// Carrier power over noise density of the whole signal, dB-Hz.
+    /// Carrier power over noise density of the whole signal, in dB-Hz.
     pub cn0_dbhz: f64,
-    /// cos of twice the phase error, averaged: 1 is perfect lock.
+    /// Mean cosine of twice the phase error: 1 is perfect lock.
     pub phase_lock: f64,
     /// Time between updates of the loops, in seconds.
     pub integration_s: f64,
 }
 
-/// One parameter of a navigation message as its raw integer: `navigation.csv`, on both sides.
+/// Parameter of a navigation message as its raw integer: `navigation.csv`, from generator and receiver.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct NavigationRow {
     /// The satellite.
@@ -472,7 +472,7 @@ pub struct NavigationRow {
     pub parameter: String,
     /// Raw integer as sent, with its sign extended.
     pub raw: i64,
-    /// The message's name: satellites may send several. Files of one message do not state it: LNAV.
+    /// Name of the message, because satellites may send several. A file that does not state it contains LNAV.
     #[serde(default = "lnav")]
     pub message: String,
 }
@@ -482,7 +482,7 @@ fn lnav() -> String {
 }
 
 impl NavigationRow {
-    /// A row for each parameter of a message of a satellite.
+    /// Creates one row for each parameter of a satellite's message.
     pub fn each(
         sv: Sv,
         message: &'static str,

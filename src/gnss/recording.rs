@@ -26,7 +26,7 @@ pub struct Description {
     pub samples: Option<Samples>,
     /// Samples per second.
     pub rate: Option<Rate>,
-    /// The radio frequency at 0 Hz of the samples.
+    /// Radio frequency in Hz that appears at 0 Hz in the samples.
     pub center_hz: Option<f64>,
     /// True if the spectrum is mirrored.
     pub inverted: bool,
@@ -36,20 +36,20 @@ pub struct Description {
     pub start: Option<Epoch>,
     /// Channels, a sample of each in turn.
     pub channels: u32,
-    /// Bytes before the first sample, and after the last one.
+    /// Number of bytes before the first sample.
     pub header_bytes: u64,
     /// Bytes after the last sample.
     pub trailing_bytes: u64,
-    /// Blocks of the file, each with a header and a footer of its own that are no samples; none where the
-    /// file is samples from one end to the other.
+    /// Blocks of the file, each with a header and a footer that are not samples. Absent if the file has only
+    /// samples.
     pub blocks: Option<Blocks>,
     /// Samples before the first one that is described.
     pub skipped_samples: u64,
-    /// The file of samples, where it is none of the same name.
+    /// Name of the file of samples, if it differs from that of the metadata.
     pub dataset: Option<String>,
 }
 
-/// Blocks of equal size, from the first byte of samples on.
+/// Layout of blocks of equal size, from the first byte of samples on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Blocks {
     /// Bytes before the samples of each.
@@ -61,7 +61,7 @@ pub struct Blocks {
 }
 
 impl Blocks {
-    /// Bytes of samples among the first `bytes` of the file.
+    /// Number of sample bytes among the first `bytes` of the file.
     pub fn samples_among(&self, bytes: u64) -> u64 {
         let whole = self.header_bytes + self.sample_bytes + self.footer_bytes;
         let begun = (bytes % whole).saturating_sub(self.header_bytes).min(self.sample_bytes);
@@ -80,7 +80,7 @@ pub struct Unblocked<R> {
 }
 
 impl<R: Read> Unblocked<R> {
-    /// Reads the blocks of `reader`, which begins with a header.
+    /// Creates a reader of the samples in blocks; `reader` begins with a header.
     pub fn new(blocks: Blocks, reader: R) -> Self {
         Self { blocks, reader, skip: blocks.header_bytes, left: blocks.sample_bytes }
     }
@@ -127,7 +127,7 @@ impl Default for Description {
 }
 
 impl Samples {
-    /// A channel of several that have these samples in turn; channels count from 1.
+    /// Returns the description of one channel of interleaved samples; channels count from 1.
     ///
     /// # Errors
     /// [`LayoutError`]: no such channel, and floating point.
@@ -142,7 +142,7 @@ impl Samples {
         Layout::interleaved(&of).map(|_| Self::Interleaved(of))
     }
 
-    /// The format in which they are received, and how they are unpacked where they are not in it.
+    /// Returns the format after unpacking, and the layout if the samples are packed.
     ///
     /// # Errors
     /// [`LayoutError`].

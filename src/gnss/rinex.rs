@@ -34,19 +34,19 @@ pub const LARGEST_BYTES: u64 = 256 << 20;
 /// Content of a navigation file for GPS, Galileo, NavIC, BeiDou, GLONASS, QZSS and SBAS.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Navigation {
-    /// Ephemerides of LNAV of GPS and QZSS, Galileo I/NAV, NavIC, BeiDou D1 or D2, GLONASS and SBAS by
-    /// satellite and time of clock; of a Galileo satellite without any of I/NAV those of F/NAV.
+    /// Ephemerides of LNAV of GPS and QZSS, Galileo I/NAV, NavIC, BeiDou D1 or D2, GLONASS and SBAS, ordered
+    /// by satellite and time of clock. A Galileo satellite without I/NAV has those of F/NAV.
     pub ephemerides: Vec<Ephemeris>,
-    /// Coefficients of GPS's model of the ionosphere, where the header has them.
+    /// Klobuchar coefficients of GPS, if the header has them.
     pub klobuchar: Option<Klobuchar>,
-    /// Coefficients of the same model as NavIC sends them, for L5, where the header has them.
+    /// Klobuchar coefficients of NavIC, for L5, if the header has them.
     pub klobuchar_navic: Option<Klobuchar>,
     /// Klobuchar coefficients of BeiDou, where the header has them.
     pub klobuchar_beidou: Option<Klobuchar>,
-    /// Coefficients of BDGIM: of version 4's first record of them that are not all zero, of version 3 by the
+    /// BDGIM coefficients. Version 4 gives the first record that is not all zero. Version 3 gives the
     /// header's lines BDS1 to BDS3, which some providers write.
     pub bdgim: Option<Bdgim>,
-    /// Effective ionisation coefficients of NeQuick-G: solar flux units, per degree, per degree squared.
+    /// Effective ionisation coefficients of NeQuick-G, in solar flux units, per degree, per degree squared.
     pub nequick: Option<[f64; 3]>,
     /// GPS time minus UTC, in whole seconds.
     pub leap_seconds: Option<i64>,
@@ -119,7 +119,7 @@ pub enum NavigationError {
     },
 }
 
-/// The whole day of 2010-07-01 as broadcast by GPS: what a scene uses that names no file.
+/// GPS broadcast of the whole day of 2010-07-01. It is the default of a scene that names no file.
 ///
 /// # Errors
 /// As [`read`]; a test makes sure that there are none.
@@ -127,7 +127,7 @@ pub fn embedded() -> Result<Navigation, NavigationError> {
     read(include_bytes!("data/brdc1820-2010.n.gz"), "embedded brdc1820-2010.n.gz")
 }
 
-/// The hours around 2020-11-29T12:40 as broadcast by GPS and Galileo: the same for scenes of that day.
+/// GPS and Galileo broadcast of the hours around 2020-11-29T12:40. It is the default of scenes of that day.
 ///
 /// # Errors
 /// As [`read`]; a test makes sure that there are none.

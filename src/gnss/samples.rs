@@ -49,7 +49,7 @@ impl Format {
         Self::NAMES.iter().find(|(format, _)| *format == self).map_or("", |(_, name)| *name)
     }
 
-    /// Bytes of one sample, both components if it is complex.
+    /// Number of bytes of one sample, both components if it is complex.
     pub fn bytes(self) -> usize {
         match self {
             Self::Ri8 => 1,
@@ -64,7 +64,7 @@ impl Format {
         !matches!(self, Self::Ri8 | Self::Ri16Le)
     }
 
-    /// Largest magnitude a component can take, in LSB; `None` for floating point.
+    /// Largest magnitude of a component, in LSB; `None` for floating point.
     pub fn full_scale_lsb(self) -> Option<f32> {
         match self {
             Self::Ci8 | Self::Ri8 => Some(127.0),
@@ -82,7 +82,7 @@ impl Format {
         self.pack_into(i, q, &mut out[begin..]);
     }
 
-    /// [`Self::pack`] over the bytes of `out`, as many whole samples as all three hold.
+    /// Packs like [`Self::pack`] into the bytes of `out`, as many whole samples as all three hold.
     #[inline(always)]
     pub fn pack_into(self, i: &[f32], q: &[f32], out: &mut [u8]) {
         match self {
@@ -104,8 +104,9 @@ impl Format {
         }
     }
 
-    /// Reads the whole samples in `bytes` into planar LSB values, replacing what `i` and `q` held.
-    /// Real formats give `q` = 0; a cut sample at the end is left out. A non-finite float reads as 0.
+    /// Unpacks the whole samples in `bytes` into planar LSB values, which replace the content of `i` and `q`.
+    /// Real formats give `q` = 0, and an incomplete sample at the end is ignored. A non-finite float becomes
+    /// 0.
     #[inline(always)]
     pub fn unpack(self, bytes: &[u8], i: &mut Vec<f32>, q: &mut Vec<f32>) {
         // Whole samples as integers: shifts make vectors where picking bytes does not.
@@ -205,7 +206,7 @@ pub struct IfMetadata {
     pub format: Format,
     /// Samples per second by the recorder's clock.
     pub rate: Rate,
-    /// The radio frequency that appears at 0 Hz in the samples.
+    /// Radio frequency in Hz that appears at 0 Hz in the samples.
     pub center_hz: f64,
     /// True if the spectrum is mirrored about `center_hz` (local oscillator above the signal).
     pub inverted: bool,
@@ -214,7 +215,7 @@ pub struct IfMetadata {
 }
 
 impl IfMetadata {
-    /// The frequency at which a carrier of that frequency, as received, appears in the samples.
+    /// Frequency in Hz at which a received carrier of `carrier_hz` appears in the samples.
     pub fn if_hz(&self, carrier_hz: f64) -> f64 {
         let offset_hz = carrier_hz - self.center_hz;
         if self.inverted { -offset_hz } else { offset_hz }

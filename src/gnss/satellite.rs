@@ -50,8 +50,8 @@ impl System {
         }
     }
 
-    /// Semi-major axis of its orbits, in metres: those of its medium ones, if it has any. Nominal values of
-    /// the systems' documents; SBAS, QZSS and NavIC turn with the Earth.
+    /// Nominal semi-major axis of the system's medium orbits in metres. SBAS, QZSS and NavIC, which have
+    /// none, have that of orbits synchronous with the Earth.
     pub fn orbit_m(self) -> f64 {
         match self {
             Self::Gps => 26_559.7e3,
@@ -74,7 +74,7 @@ impl fmt::Display for System {
     }
 }
 
-/// A satellite: system and number (for GPS, the PRN).
+/// Satellite: system and number (for GPS, the PRN).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub struct Sv {
@@ -96,15 +96,15 @@ impl Sv {
         self.system == System::BeiDou && matches!(self.number, 1..=5 | 59..=63)
     }
 
-    /// Semi-major axis of its orbit, in metres: nominal values. Of BeiDou's inclined satellites that turn
-    /// with the Earth those are known that its status reports named in 2024.
+    /// Nominal semi-major axis of the satellite's orbit, in metres. BeiDou's inclined synchronous satellites
+    /// are those that its status reports named in 2024.
     pub fn orbit_m(self) -> f64 {
         let is_inclined = self.system == System::BeiDou && matches!(self.number, 6..=10 | 13 | 16 | 31 | 38..=40 | 56);
         if self.is_geostationary() || is_inclined { System::Navic.orbit_m() } else { self.system.orbit_m() }
     }
 
-    /// The number of its codes: of QZSS and SBAS, which share theirs with GPS, 192 and 100 more than its own
-    /// (RINEX 4.02, table 2).
+    /// Number of the satellite's codes. QZSS and SBAS share codes with GPS: their numbers are 192 and 100
+    /// more than the satellite's own (RINEX 4.02, table 2).
     pub fn prn(self) -> u8 {
         let more = match self.system {
             System::Qzss => planted!("gnss.qzss.prn", 192, 193),

@@ -152,16 +152,16 @@ struct Capture {
 /// Metadata of a recording beyond the sample format.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Beside<'a> {
-    /// The signals in it; none where it is not known.
+    /// Signals in the samples; empty if they are unknown.
     pub signals: &'a [&'static Signal],
-    /// The collection that it belongs to: the base name of its `.sigmf-collection` file.
+    /// Base name of the `.sigmf-collection` file to which the recording belongs.
     pub collection: Option<&'a str>,
     /// Packing of the samples in the file. A program that ignores it would read bytes as samples, so the
     /// extension is declared mandatory.
     pub packed: Option<&'a Interleaved>,
 }
 
-/// The metadata as the JSON text of a `.sigmf-meta` file.
+/// Writes the metadata as the JSON text of a `.sigmf-meta` file.
 pub fn write(metadata: &IfMetadata) -> String {
     write_with(metadata, &Beside::default())
 }
@@ -208,7 +208,7 @@ pub struct Member {
     pub hash: String,
 }
 
-/// The JSON text of a `.sigmf-collection` file (SigMF 1.2.0, "SigMF Collection Format").
+/// Writes the JSON text of a `.sigmf-collection` file (SigMF 1.2.0, "SigMF Collection Format").
 pub fn write_collection(description: &str, members: &[Member]) -> String {
     let streams: Vec<Value> =
         members.iter().map(|member| serde_json::json!({ "name": member.name, "hash": member.hash })).collect();
@@ -218,8 +218,8 @@ pub fn write_collection(description: &str, members: &[Member]) -> String {
     format!("{collection:#}\n")
 }
 
-/// The base names of the recordings in the JSON text of a `.sigmf-collection` file; `name` is how errors call
-/// it.
+/// Parses the base names of the recordings in the JSON text of a `.sigmf-collection` file. Errors call the
+/// file `name`.
 ///
 /// # Errors
 /// [`SigmfError`] with the file, the key, its value and what was expected.
@@ -249,8 +249,8 @@ fn utc_text(start: Epoch) -> String {
     format!("{whole}.{}Z", fraction.strip_prefix("0.").unwrap_or("0"))
 }
 
-/// Reads the JSON text of a `.sigmf-meta` file that states all that there is to know of samples in whole
-/// bytes; `name` is how errors call it.
+/// Parses the JSON text of a `.sigmf-meta` file that describes samples in whole bytes completely. Errors call
+/// the file `name`.
 ///
 /// # Errors
 /// [`SigmfError`] with the file, the key, its value and what was expected.
@@ -279,7 +279,8 @@ const DATATYPES: &str = "one of ci8, cu8, ci16_le, cf32_le, ri8, ri16_le";
 const RATES: &str = "samples a second, above 0 and below 1e12";
 const FREQUENCIES: &str = "the radio frequency at 0 Hz of the samples, in Hz";
 
-/// Reads what the JSON text of a `.sigmf-meta` file states; `name` is how errors call it.
+/// Parses the JSON text of a `.sigmf-meta` file as far as it describes the samples. Errors call the file
+/// `name`.
 ///
 /// # Errors
 /// [`SigmfError`] with the file, the key, its value and what was expected: of what is there and cannot be

@@ -29,9 +29,9 @@ const RADII_M: std::ops::RangeInclusive<f64> = 2.3e7..=3.3e7;
 pub struct Sample {
     /// Centre of mass, ECEF.
     pub position_m: Vector3<f64>,
-    /// Clock minus the file's time, without relativity's periodic part.
+    /// Clock offset in seconds from the file's time, without the periodic part of relativity.
     pub clock_s: Option<f64>,
-    /// The clock jumped, or the satellite was manoeuvred, between the epoch before and this one.
+    /// True if the clock jumped or the satellite was manoeuvred between the epoch before and this one.
     pub broken: bool,
 }
 
@@ -230,14 +230,14 @@ fn decimal(line: &str, first: usize, last: usize) -> Result<f64, Fault> {
 }
 
 impl Precise {
-    /// Takes in what another file states; where both state something, that one counts.
+    /// Adds the content of another file; where both have a value, the other file's counts.
     pub fn extend(&mut self, other: Self) {
         for (sv, samples) in other.satellites {
             self.satellites.entry(sv).or_default().extend(samples);
         }
     }
 
-    /// The first and the last epoch of any satellite.
+    /// Returns the first and the last epoch of any satellite.
     pub fn span(&self) -> Option<(Epoch, Epoch)> {
         let first = self.satellites.values().filter_map(|samples| samples.keys().next()).min()?;
         let last = self.satellites.values().filter_map(|samples| samples.keys().next_back()).max()?;

@@ -1,4 +1,4 @@
-//! GPS time as whole seconds and a fraction, and the exact time of a sample.
+//! GPS time as whole seconds and a fraction, and the exact time of samples.
 //!
 //! One `f64` of seconds since 1980 resolves only 0.2 µs (71 m), so an [`Epoch`] keeps the
 //! whole seconds as an integer: its resolution is 1e-16 s everywhere. Calendar dates and leap
@@ -14,14 +14,14 @@ pub const WEEK_S: i64 = 604_800;
 /// Seconds around a leap second within which tables and labels are looked at twice.
 const LEAP_SEARCH_S: i64 = 60;
 
-/// An instant of GPS time: whole seconds since 1980-01-06T00:00:00 and a fraction in [0, 1).
+/// Instant of GPS time: whole seconds since 1980-01-06T00:00:00 and a fraction in [0, 1).
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Serialize, Deserialize)]
 pub struct Epoch {
     seconds: i64,
     fraction: f64,
 }
 
-/// The time of a satellite system, by which its codes and messages run.
+/// Time scale of a satellite system, which determines the timing of its codes and messages.
 ///
 /// An [`Epoch`] stays GPS time; what a system's clock shows is some whole seconds less by definition, and off
 /// by nanoseconds in truth. In an inserted second a scale with leap seconds shows the second after it, twice.
@@ -29,7 +29,7 @@ pub struct Epoch {
 pub struct TimeScale {
     /// Name, such as GPST.
     pub name: &'static str,
-    /// Whole seconds by which it is behind GPS time, of a scale with leap seconds behind UTC.
+    /// Whole seconds by which the scale is behind GPS time; for a scale with leap seconds, behind UTC.
     pub behind_gpst_s: i64,
     /// True if the scale has leap seconds, as UTC does.
     pub has_leap_seconds: bool,
@@ -41,14 +41,14 @@ impl TimeScale {
         Epoch { seconds: at.seconds - self.behind_s(at), ..at }
     }
 
-    /// The instant at which this scale's clock shows `label`.
+    /// Converts from this scale: the instant at which its clock shows `label`.
     pub fn instant(&self, label: Epoch) -> Epoch {
         let utc = label.seconds + self.behind_gpst_s;
         let leap_s = if self.has_leap_seconds { Epoch::leap_seconds_of_label(utc) } else { 0 };
         Epoch { seconds: utc + leap_s, ..label }
     }
 
-    /// Whole seconds by which it is behind GPS time at an instant.
+    /// Whole seconds by which the scale is behind GPS time at an instant.
     pub fn behind_s(&self, at: Epoch) -> i64 {
         let leap_s = if self.has_leap_seconds { at.leap_seconds() } else { 0 };
         self.behind_gpst_s + planted!("gnss.time.scale_leaps", leap_s, 0)
@@ -58,19 +58,19 @@ impl TimeScale {
 /// GPS time (IS-GPS-200N, 3.3.4).
 pub static GPST: TimeScale = TimeScale { name: "GPST", behind_gpst_s: 0, has_leap_seconds: false };
 
-/// Galileo system time: its weeks begin when those of GPS do (Galileo OS SIS ICD 2.1, 5.1.2).
+/// Galileo system time; its weeks begin with those of GPS (Galileo OS SIS ICD 2.1, 5.1.2).
 pub static GST: TimeScale = TimeScale { name: "GST", behind_gpst_s: 0, has_leap_seconds: false };
 
-/// IRNSS network time: its weeks begin when those of GPS do (IRNSS SIS ICD for SPS 1.1, system time).
+/// IRNSS network time; its weeks begin with those of GPS (IRNSS SIS ICD for SPS 1.1, system time).
 pub static IRNSST: TimeScale = TimeScale { name: "IRNSST", behind_gpst_s: 0, has_leap_seconds: false };
 
-/// QZSS's time: its weeks begin when those of GPS do (IS-QZSS-PNT-005, 3.1.4).
+/// QZSS time; its weeks begin with those of GPS (IS-QZSS-PNT-005, 3.1.4).
 pub static QZSST: TimeScale = TimeScale { name: "QZSST", behind_gpst_s: 0, has_leap_seconds: false };
 
-/// BeiDou's time: UTC of 2006-01-01, when GPS time was 14 s ahead of it (BDS-SIS-ICD-B1I 3.0, 3.3).
+/// BeiDou time: UTC of 2006-01-01, when GPS time was 14 s ahead of it (BDS-SIS-ICD-B1I 3.0, 3.3).
 pub static BDT: TimeScale = TimeScale { name: "BDT", behind_gpst_s: 14, has_leap_seconds: false };
 
-/// Number of the week of GPS time in which BDT began: its week 0.
+/// Number of the GPS week in which BDT began: week 0 of BDT.
 pub const BDT_WEEK: i64 = 1356;
 
 /// GLONASS time: three hours ahead of UTC(SU), leap seconds included (GLONASS ICD L1, L2 5.1, 3.3.3).
@@ -108,7 +108,8 @@ pub struct TimeError {
 }
 
 impl Epoch {
-    /// The instant `seconds + fraction` after 1980-01-06T00:00:00 GPST; any finite fraction is carried.
+    /// Creates the instant `seconds + fraction` after 1980-01-06T00:00:00 GPST. Any finite fraction is
+    /// carried over.
     pub fn new(seconds: i64, fraction: f64) -> Self {
         let carry = fraction.floor();
         let rest = fraction - carry;
@@ -120,12 +121,12 @@ impl Epoch {
         }
     }
 
-    /// The instant at `tow_s` seconds of the (continuous, not modulo 1024) GPS week.
+    /// Creates the instant at `tow_s` seconds of the (continuous, not modulo 1024) GPS week.
     pub fn from_week(week: u32, tow_s: f64) -> Self {
         Self::new((i64::from(week) + planted!("gnss.time.week", 0, 1)) * WEEK_S, 0.0).plus_s(tow_s)
     }
 
-    /// Reads `YYYY-MM-DDThh:mm:ss[.f]` as GPS time, or as UTC when it ends in `Z`.
+    /// Parses `YYYY-MM-DDThh:mm:ss[.f]` as GPS time, or as UTC when it ends in `Z`.
     pub fn parse(text: &str) -> Result<Self, TimeError> {
         let error = || TimeError { text: text.to_owned() };
         let (body, utc) = text.trim().strip_suffix('Z').map_or((text.trim(), false), |body| (body, true));
@@ -186,7 +187,8 @@ impl Epoch {
         self.seconds.div_euclid(WEEK_S)
     }
 
-    /// Time of week; resolves 6e-11 s at the week's end, so never for code phase.
+    /// Time of week in seconds. Its resolution is 6e-11 s at the week's end, which is too coarse for code
+    /// phase.
     pub fn tow_s(self) -> f64 {
         self.tow_whole_s() as f64 + self.fraction
     }
@@ -196,13 +198,13 @@ impl Epoch {
         self.seconds.rem_euclid(WEEK_S)
     }
 
-    /// The whole second of the week `tow_s` that is nearest to this instant.
+    /// Instant nearest to this one whose whole second of the week is `tow_s`.
     pub fn nearest_tow(self, tow_s: i64) -> Self {
         let ahead_s = (tow_s - self.tow_whole_s() + WEEK_S / 2).rem_euclid(WEEK_S) - WEEK_S / 2;
         Self::new(self.seconds + ahead_s, 0.0)
     }
 
-    /// The week nearest to this instant's that a count modulo `modulus` gives as `count`.
+    /// Number of the week nearest to this instant that equals `count` modulo `modulus`.
     pub fn nearest_week(self, count: i64, modulus: i64) -> i64 {
         self.week() + (count - self.week() + modulus / 2).rem_euclid(modulus) - modulus / 2
     }
@@ -227,7 +229,7 @@ impl Epoch {
         .to_time_scale(scale)
     }
 
-    /// `YYYY-MM-DDThh:mm:ss.ssssssZ`, in UTC; an inserted second is the sixtieth.
+    /// Text `YYYY-MM-DDThh:mm:ss.ssssssZ` in UTC; an inserted second has the number 60.
     pub fn to_utc_text(self) -> String {
         let leap = self.leap_seconds();
         let inserted = Self { seconds: self.seconds + 1, ..self }.leap_seconds() - leap;
@@ -238,7 +240,7 @@ impl Epoch {
         format!("{y:04}-{m:02}-{d:02}T{hh:02}:{mm:02}:{ss:02}.{:06}Z", ns / 1000)
     }
 
-    /// Month of the calendar in GPS time, from 1, and hours of its day.
+    /// Calendar month in GPS time, from 1, and hours of the day.
     pub fn month_and_hour(self) -> (u8, f64) {
         let (_, month, ..) = self.hifitime(hifitime::TimeScale::GPST).to_gregorian(hifitime::TimeScale::GPST);
         (month, (self.seconds.rem_euclid(86_400) as f64 + self.fraction) / 3600.0)
@@ -249,8 +251,8 @@ impl Epoch {
         self.hifitime(hifitime::TimeScale::UTC).day_of_year()
     }
 
-    /// GPS time minus UTC, in whole seconds, at this instant: the new number from the end of an inserted
-    /// second on.
+    /// GPS time minus UTC in whole seconds at this instant. The new number applies from the end of an
+    /// inserted second on.
     pub fn leap_seconds(self) -> i64 {
         // The crate holds UTC times against atomic time, and so changes over up to 37 s early.
         let table = |seconds: i64| {
@@ -273,7 +275,7 @@ impl fmt::Display for Epoch {
     }
 }
 
-/// A sample rate as an exact fraction of integers.
+/// Sample rate as an exact fraction of integers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rate {
     samples: u64,
@@ -284,7 +286,7 @@ impl Rate {
     /// 1 MHz.
     pub const MEGAHERTZ: Self = Self { samples: 1_000_000, seconds: 1 };
 
-    /// A rate given in hertz, exact to the millihertz; `None` unless it is positive and below 1 THz.
+    /// Creates a rate from hertz, exact to the millihertz; `None` unless it is positive and below 1 THz.
     pub fn from_hz(hz: f64) -> Option<Self> {
         if !(hz.is_finite() && (1e-3..1e12).contains(&hz)) {
             return None;
@@ -315,14 +317,14 @@ impl Rate {
         (whole as i64, rest as f64 / self.samples as f64)
     }
 
-    /// Time from sample 0 to sample `n` in one number, in seconds; resolves 1e-16 of its size.
+    /// Time from sample 0 to sample `n` in seconds, as one number. Its resolution is 1e-16 of its size.
     pub fn elapsed_s(self, n: u64) -> f64 {
         let (whole, fraction) = self.elapsed(n);
         whole as f64 + fraction
     }
 
-    /// Whole turns, and 2^-64 turns, at sample `n` of something that turns `count` times in `seconds`; exact
-    /// up to 1e14 samples, 1e12 turns and 1e13 seconds.
+    /// Whole turns, and 2^-64 turns, at sample `n` of a repetition with `count` turns in `seconds`. It is
+    /// exact up to 1e14 samples, 1e12 turns and 1e13 seconds.
     pub fn turns(self, n: u64, count: u64, seconds: u64) -> (i64, u64) {
         let turns = u128::from(n) * u128::from(self.seconds) * u128::from(count);
         let one = u128::from(self.samples) * u128::from(seconds);
@@ -332,14 +334,14 @@ impl Rate {
         (whole as i64, ((high << 16) | ((low << 16) / one)) as u64)
     }
 
-    /// The number of the first sample at or after `numerator / denominator` seconds.
+    /// Number of the first sample at or after `numerator / denominator` seconds.
     pub fn first_sample_at(self, numerator: u64, denominator: u64) -> u64 {
         let ticks = u128::from(numerator) * u128::from(self.samples);
         ticks.div_ceil(u128::from(denominator) * u128::from(self.seconds)) as u64
     }
 }
 
-/// Turns of a tone of `hz` (to the millihertz) at sample `n`, modulo one, as a fraction of 2^64; exact in
+/// Phase of a tone of `hz` (to the millihertz) at sample `n`, in 2^-64 turn, modulo one turn. It is exact in
 /// `n`.
 pub fn tone_turns(hz: f64, rate: Rate, n: u64) -> u64 {
     let milli = (hz * 1000.0).round() as i128;

@@ -168,8 +168,8 @@ pub enum Vienna {
     Vmf3,
 }
 
-/// A file `VMF1_…` or `VMF3_…` of one epoch: latitude, longitude, a_h, a_w, and zenith delays, which are not
-/// read.
+/// Grid of one epoch from a file `VMF1_…` or `VMF3_…`: latitude, longitude, a_h and a_w. The file's zenith
+/// delays are not read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MappingGrid {
     globe: Globe<MappingA>,
@@ -245,7 +245,7 @@ pub struct Gpt3Weather {
     pub vapour_hpa: f64,
     /// Mean temperature of the water vapour above.
     pub mean_temperature_k: f64,
-    /// Exponent with which vapour falls off against pressure, less one.
+    /// Exponent of the vapour's decrease relative to pressure, less one.
     pub vapour_decrease: f64,
     /// Coefficients of the mapping functions.
     pub a: MappingA,
@@ -253,7 +253,7 @@ pub struct Gpt3Weather {
     pub undulation_m: f64,
 }
 
-/// The empirical model GPT3 on its grid of 5° (`gpt3_5.grd`) or 1°.
+/// Empirical model GPT3 on its grid of 5° (`gpt3_5.grd`) or 1°.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gpt3(Globe<Climate>);
 
@@ -312,8 +312,8 @@ impl Gpt3 {
     }
 }
 
-/// Zenith wet delay in metres (Askne & Nordius 1987, with the refractivities of Bevis et al. 1994 as GPT3's
-/// authors use them).
+/// Zenith wet delay in metres (Askne & Nordius 1987, with the refractivities of Bevis et al. 1994 as in
+/// GPT3).
 pub fn zenith_wet_m(weather: &Gpt3Weather) -> f64 {
     const K1_KPHPA: f64 = 77.604;
     const K2_KPHPA: f64 = 64.79;

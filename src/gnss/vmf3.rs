@@ -1,4 +1,4 @@
-//! VMF3's own coefficients b and c of the mapping functions, by position and season.
+//! Coefficients b and c of the VMF3 mapping functions, by position and season.
 //!
 //! Source: Landskron & Böhm 2018, "VMF3/GPT3: refined discrete and empirical troposphere mapping functions":
 //! each is an expansion in spherical harmonics to degree and order 12, of a mean and of a year's and half a
@@ -35,7 +35,7 @@ struct Term {
     sine: [Season; 4],
 }
 
-/// The expansion, order by order and in each from its lowest degree up.
+/// Spherical harmonic expansion, order by order, each from its lowest degree up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Vmf3(Vec<Term>);
 
@@ -48,8 +48,7 @@ impl Vmf3 {
         Self::read(include_str!("data/vmf3.csv"), "embedded vmf3.csv")
     }
 
-    /// Reads an expansion whose `name` goes into errors; sines of order zero, which add nothing, are not in
-    /// it.
+    /// Reads an expansion; errors call it `name`. Sines of order zero, which add nothing, are absent.
     ///
     /// # Errors
     /// [`ViennaError`] with the line that is wrong, or the last one if numbers are missing.
@@ -90,7 +89,7 @@ impl Vmf3 {
         }
     }
 
-    /// The coefficients at a position on a day of the year that counts from 1.0.
+    /// Coefficients at a position on a day of the year that counts from 1.0.
     pub fn at(&self, latitude_rad: f64, longitude_rad: f64, day_of_year: f64) -> MappingBc {
         let season = season_terms(day_of_year);
         let now = |amplitudes: &Season| amplitudes.iter().zip(season).map(|(a, term)| a * term).sum::<f64>();

@@ -1,4 +1,4 @@
-//! Weil codes: a Legendre sequence added to itself some chips later.
+//! Weil codes: sums of a Legendre sequence and the same sequence some chips later.
 //!
 //! Source: IS-GPS-800J, 3.2.2.1.1 (L1C, length 10 223); BDS-SIS-ICD-B1C 1.0, 5.2 (10 243 and 3607). For a
 //! prime p the Legendre sequence is one at the residues of squares, and zero at 0 and elsewhere.
@@ -18,7 +18,7 @@ impl Legendre {
         Self(ones)
     }
 
-    /// The Weil code whose second sequence is `later` chips on, from chip `first` on, again and again.
+    /// Weil code with a second sequence `later` chips later, from chip `first` on, repeated without end.
     pub fn weil(&self, later: u16, first: u16) -> impl Iterator<Item = bool> {
         let from = |skipped: usize| self.0.iter().cycle().skip(skipped);
         let first = usize::from(first);

@@ -101,7 +101,8 @@ pub fn faults(path: &str, doc: &Doc, rule: Rule) -> Vec<String> {
 
 /// True if a text begins with a word and not with a longer one.
 fn begins(text: &str, word: &str) -> bool {
-    text.strip_prefix(word).is_some_and(|rest| !rest.starts_with(|c: char| c.is_alphanumeric()) || word == "…")
+    text.strip_prefix(word)
+        .is_some_and(|rest| !rest.starts_with(|c: char| c.is_alphanumeric() || c == '-') || word == "…")
 }
 
 /// Words of [`WORDS`] in a text, each with the field's term.

@@ -1,4 +1,4 @@
-//! An ephemeris at another reference time: the same orbit and clock; and the same of another day.
+//! Propagation of an ephemeris to another reference time with the same orbit and clock, and to another day.
 //!
 //! Limits: a rate of the mean motion's correction and of the axis is left as it is, which ephemerides without
 //! them have as zero.
@@ -12,9 +12,9 @@ use crate::time::{Epoch, UTC};
 const DAY_S: i64 = 86_400;
 
 impl Ephemeris {
-    /// The ephemeris of a satellite that goes whole days later over the same ground, with the same clock. The
-    /// node counts from the beginning of a week, whose reference time is another now; issues stay.
-    /// Ephemerides of GLONASS keep their hour of UTC.
+    /// Returns the ephemeris of a satellite that passes whole days later over the same ground, with the same
+    /// clock. The node refers to the beginning of the new week, and issues stay. Ephemerides of GLONASS keep
+    /// their hour of UTC.
     pub fn moved(&self, days: i64) -> Self {
         let later = |at: Epoch| Epoch::new(at.seconds() + days * DAY_S, at.fraction());
         let moved = match self.sv.system {

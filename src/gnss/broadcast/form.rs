@@ -18,18 +18,18 @@ pub struct SetForm {
     pub group_delay_s: fn(&Ephemeris, &Signal) -> f64,
     /// True if a decoded ephemeris suffices for ranges of a signal: it then includes the signal's delays.
     pub serves: fn(&Signal) -> bool,
-    /// The group delay on the carrier of which the message gives it, in seconds.
+    /// Group delay in seconds on the carrier for which the message gives it.
     pub given_delay_s: fn(&Ephemeris) -> f64,
     /// True if an ephemeris reports the first of its signals as usable.
     pub is_healthy: fn(&Ephemeris) -> bool,
     /// True if an ephemeris reports a signal as usable; `None` if it does not state it.
     pub healthy: fn(&Ephemeris, &Signal) -> Option<bool>,
-    /// Data sources as records of RINEX name them; none of messages whose records have no such field.
+    /// Data sources field of RINEX records; `None` for messages whose records have no such field.
     pub rinex_sources: Option<f64>,
 }
 
-/// An ephemeris of no message in particular: one group delay, which goes with 1/f², and health of all signals
-/// together.
+/// Form of an ephemeris that belongs to no particular message: one group delay, which scales with 1/f², and
+/// one health for all signals.
 pub static PLAIN: SetForm = SetForm {
     name: "",
     group_delay_s: plain_delay_s,
@@ -50,7 +50,7 @@ fn plain_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
 }
 
 impl Ephemeris {
-    /// The group delay of a code of RINEX, where another message of the satellite states it.
+    /// Group delay in seconds of a RINEX code, if another message of the satellite states it.
     pub fn delay_of_code_s(&self, code: &str) -> Option<f64> {
         self.signal_delays_s.iter().find(|(own, _)| *own == code).map(|(_, delay_s)| *delay_s)
     }
@@ -73,13 +73,12 @@ impl PartialEq for SetForm {
     }
 }
 
-/// Bit of GLONASS's flag l of string 3, 1 where the satellite is unhealthy, among the health flags of a
-/// record. Bit 1 states whether the almanac's health is known, and bit 0 is that health, 1 where it is good
-/// (RINEX 3.05, table A10).
+/// Health flag of a RINEX record for GLONASS's flag l of string 3, 1 if the satellite is unhealthy. Bit 1
+/// states if the almanac's health is known, and bit 0 is that health, 1 for healthy (RINEX 3.05, table A10).
 pub const STRING_3_UNHEALTHY: u16 = 2;
 
-/// Galileo's data validity and health in the order of an ephemeris, of RINEX's: E1-B in bits 0 to 2, E5a in 3
-/// to 5, E5b in 6 to 8; and the other way, for it exchanges the last two.
+/// Converts Galileo's data validity and health from the order of RINEX to that of an ephemeris, or back. An
+/// ephemeris has E1-B in bits 0 to 2, E5a in 3 to 5, E5b in 6 to 8. RINEX exchanges the last two.
 pub fn status_of_record(health: u16) -> u16 {
     health & 0b111 | (health >> 6 & 0b111) << 3 | (health >> 3 & 0b111) << 6
 }

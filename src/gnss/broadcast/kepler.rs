@@ -12,8 +12,8 @@ pub(super) fn wrap(angle_rad: f64) -> f64 {
     angle_rad - TAU * (angle_rad / TAU).round()
 }
 
-/// The eccentric anomaly in [−π, π] of a mean anomaly; `None` when 20 Newton steps leave a residual above
-/// 1e-13.
+/// Eccentric anomaly in radians, [−π, π], of a mean anomaly. `None` when 20 Newton steps leave a residual
+/// above 1e-13.
 ///
 /// For M in [0, π] the start min(M + e, π) lies above the root, where E − e sin E is convex, so
 /// Newton's steps descend to the root for every eccentricity below one.

@@ -1,5 +1,5 @@
-//! An orbit as a state vector: position, velocity and the pull of Moon and Sun at a reference time, from
-//! which the user integrates the equations of motion.
+//! State vector of an orbit: position, velocity and the acceleration by Moon and Sun at a reference time. The
+//! user integrates the equations of motion from it.
 //!
 //! Source: GLONASS ICD L1, L2 5.1, A.3.1.2 (simplified algorithm, fourth-order Runge-Kutta) with constants of
 //! PZ-90.11, which agrees with WGS 84 and ITRF to centimetres: they are taken for the same. Steps of
@@ -25,14 +25,15 @@ const FARTHEST_S: f64 = 86_400.0;
 /// Least and largest distance from the Earth's centre of a satellite's state, with room.
 const DISTANCES_M: std::ops::RangeInclusive<f64> = 6.4e6..=1e8;
 
-/// State at the reference time, earth-fixed, and what Moon and Sun add to its acceleration.
+/// Earth-fixed state at the reference time, with the acceleration by Moon and Sun.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StateVector {
     /// Position, in metres.
     pub position_m: Vector3<f64>,
     /// Velocity in the rotating axes, in m/s.
     pub velocity_mps: Vector3<f64>,
-    /// Pull of Moon and Sun, in m/s²; of augmentation systems all of the acceleration in those axes.
+    /// Acceleration by Moon and Sun in m/s². For augmentation systems it is the total acceleration in the
+    /// rotating axes.
     pub acceleration_mps2: Vector3<f64>,
 }
 
@@ -40,7 +41,7 @@ pub struct StateVector {
 type Phase = (Vector3<f64>, Vector3<f64>);
 
 impl StateVector {
-    /// The state so long after the reference time, in the axes of that instant.
+    /// State `since_s` seconds after the reference time, in the axes of that instant.
     ///
     /// # Errors
     /// [`OrbitError`] for what is no satellite's state, or a time that is too far away.

@@ -18,7 +18,8 @@ pub enum Edge {
     BandLimited,
 }
 
-/// One stage, in the order in which the signal passes them. Stages that add power alone are not listed.
+/// Stage of a front end, in the order in which the signal passes them. Stages that only add power are not
+/// listed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "stage", rename_all = "snake_case")]
 pub enum StageSpec {
@@ -58,12 +59,12 @@ pub struct FilterSpec {
     /// Shape of the filter's response.
     #[serde(flatten)]
     pub shape: FilterShape,
-    /// Both sides of the carrier together, Hz: between the −3 dB points of a Butterworth filter, between the
-    /// −6 dB points of a brick wall.
+    /// Two-sided bandwidth in Hz: between the −3 dB points of a Butterworth filter, between the −6 dB points
+    /// of a brick wall.
     pub bandwidth_hz: f64,
-    /// Delay in the middle of the band, seconds: every satellite's code has it in common.
+    /// Group delay in the middle of the band, in seconds; all satellites' codes share it.
     pub group_delay_s: f64,
-    /// Frequency in the samples of its middle, Hz; without it that of the first signal's carrier.
+    /// Frequency of the band's middle in the samples, in Hz; absent means that of the first signal's carrier.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub middle_hz: Option<f64>,
 }
@@ -81,10 +82,10 @@ pub enum FilterShape {
     },
 }
 
-/// Gain and phase of one quadrature against the other, and direct current.
+/// Gain and phase imbalance of the quadratures, and direct current.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BalanceSpec {
-    /// Power of the mirrored spectrum relative to the spectrum, dB; absent where the quadratures are
+    /// Power of the mirrored spectrum relative to the spectrum, in dB; absent if the quadratures are
     /// balanced.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub image_db: Option<f64>,
@@ -98,9 +99,9 @@ pub struct BalanceSpec {
 pub struct ConverterSpec {
     /// Bits per component of a sample.
     pub bits: u32,
-    /// Step over the deviation of a component for which the gain is made.
+    /// Quantiser step relative to the standard deviation of a component for which the gain is set.
     pub step_sigma: f64,
-    /// Deviation of a component, in LSB, for which a fixed gain is made.
+    /// Standard deviation of a component, in LSB, for which a fixed gain is set.
     pub nominal_lsb: f64,
     /// True if the gain follows the power of the samples.
     pub gain_control: bool,

@@ -1,4 +1,4 @@
-//! Waveforms of interference, as far as their spectra need them.
+//! Waveforms of interference, with the parameters that determine their spectra.
 //!
 //! In `scene.json` each source is an object whose key `kind` names its waveform. A kind that is not known
 //! here is refused by name.

@@ -1,5 +1,5 @@
-//! Facts of a scene that generator and judge share: what is in its samples, what it expects of a receiver,
-//! and what is wrong with its satellites.
+//! Facts of a scene that generator and judge share: the content of its samples, its expectations about a
+//! receiver, and its satellite faults.
 //!
 //! They lie in `truth/scene.json` ([`SceneFacts`]), so that a run can be judged wherever it is. No receiver
 //! reads them. Both sides use these types: a name that one side does not know is refused, not taken for a
@@ -18,7 +18,7 @@ pub use front_end::{
 pub use interference::Interference;
 pub use scene::{FrontEndFacts, OscillatorFacts, SceneFacts};
 
-/// The time of a system that is not GPS time.
+/// Offset of a system's time scale from GPS time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TimeOffset {
     /// Name of the time scale.
@@ -75,7 +75,7 @@ impl Sizes {
     pub const NAMES: [(&'static str, Self); 2] = [("bounded", Self::Bounded), ("any", Self::Any)];
 }
 
-/// Expectations over a time. What is absent follows from the scene's physics.
+/// Expectations for a time. What is absent follows from the scene's physics.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Terms {
     /// Expectation about fixes.
@@ -90,7 +90,7 @@ pub struct Terms {
     /// Expectation about the size of the position errors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub errors: Option<Sizes>,
-    /// Error in space that no fix may exceed, metres, whatever is said of `errors`.
+    /// Bound of the three-dimensional position error in metres, independent of `errors`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub position_within_m: Option<f64>,
     /// Reason for the expectation, in the scene's words.
@@ -109,7 +109,7 @@ pub struct Interval {
     pub terms: Terms,
 }
 
-/// `[expect]`: of the whole scene, and over intervals, which replace what is said of the whole.
+/// Table `[expect]`: expectations for the whole scene, and for intervals, which replace those for the whole.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Expect {
     /// Expectations for the whole scene.
@@ -126,7 +126,7 @@ impl Expect {
         self.whole.is_none() && self.intervals.is_empty()
     }
 
-    /// The terms that state something at a time, the last of the intervals first and the whole scene's last.
+    /// Terms that apply at a time: the last of the intervals first, the whole scene's last.
     pub fn at(&self, time_s: f64) -> impl Iterator<Item = &Terms> {
         let within = move |interval: &&Interval| (interval.from_s..interval.to_s).contains(&time_s);
         self.intervals.iter().rev().filter(within).map(|interval| &interval.terms).chain(&self.whole)
@@ -143,7 +143,7 @@ impl Expect {
         self.at(time_s).filter(concerns).find_map(|terms| terms.losses)
     }
 
-    /// The terms at a time that bound the error of a fix, and their bound in metres.
+    /// Terms at a time that bound the position error, with the bound in metres.
     pub fn position_within_m(&self, time_s: f64) -> Option<(&Terms, f64)> {
         self.at(time_s).find_map(|terms| Some((terms, terms.position_within_m?)))
     }

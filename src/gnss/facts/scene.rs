@@ -1,11 +1,11 @@
-//! `truth/scene.json`: the facts of a scene, one record that the generator writes and the judge reads.
+//! Content of `truth/scene.json`: the facts of a scene, which the generator writes and the judge reads.
 
 use serde::{Deserialize, Serialize};
 
 use super::{Edge, Expect, Fault, Interference, StageSpec, TimeOffset};
 use crate::signal::Layers;
 
-/// The facts of a scene. What a file may lack has a default: a scene without it.
+/// Facts of a scene. A key that a file lacks has a default: a scene without that feature.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SceneFacts {
     /// The scene's name.
@@ -15,10 +15,10 @@ pub struct SceneFacts {
     pub front_end_name: Option<String>,
     /// Seed of every random number.
     pub seed: u64,
-    /// Time of the first sample by the receiver's clock, GPS time as text.
+    /// Time of the first sample by the receiver's clock, as text of GPS time.
     #[serde(default)]
     pub start: String,
-    /// The part's first sample by the scene's count, where only a part of the scene was made.
+    /// First sample of the generated part by the scene's count, if only a part of the scene was generated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first_sample: Option<u64>,
     /// Length of the samples, seconds.
@@ -70,11 +70,11 @@ pub struct SceneFacts {
     /// Arithmetic of the noise, by name.
     #[serde(default)]
     pub noise_arithmetic: String,
-    /// Standard deviation of the thermal noise per component, in LSB: the gain, also of a scene without
-    /// noise.
+    /// Standard deviation of the thermal noise per component, in LSB. It defines the gain, also for a scene
+    /// without noise.
     #[serde(default)]
     pub noise_lsb: Option<f64>,
-    /// Stages of the front end, in order; of several front ends, those of the first.
+    /// Stages of the front end, in order; of the first front end if there are several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub front_end: Vec<StageSpec>,
     /// Azimuth and elevation in degrees below which the direct path is obstructed at the start.
@@ -107,7 +107,7 @@ pub struct SceneFacts {
     /// Expectations that the scene declares for a receiver.
     #[serde(default, skip_serializing_if = "Expect::is_empty")]
     pub expect: Expect,
-    /// Systems' times that are off GPS time by more than whole seconds.
+    /// Time scales of systems that differ from GPS time by more than whole seconds.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub time_offsets: Vec<TimeOffset>,
 }
@@ -118,7 +118,7 @@ impl SceneFacts {
         self.time_offsets.iter().find(|offset| offset.time_scale == scale).map_or(0.0, |offset| offset.ahead_s)
     }
 
-    /// The stages and the sample rate in Hz of a front end by its position among several.
+    /// Stages and sample rate in Hz of a front end by its index among several.
     pub fn stages(&self, front_end: usize) -> (&[StageSpec], f64) {
         match self.front_ends.get(front_end) {
             Some(own) => (&own.front_end, own.sample_rate_hz),
@@ -145,11 +145,11 @@ impl SceneFacts {
 /// Power law of the receiver's oscillator.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OscillatorFacts {
-    /// Strengths h₂, h₁, h₀, h₋₁, h₋₂ of S_y = Σ h f^α, in Hz^(−α − 1).
+    /// Coefficients h₂, h₁, h₀, h₋₁, h₋₂ of S_y = Σ h f^α, in Hz^(−α − 1).
     pub h: [f64; 5],
 }
 
-/// One of several front ends. Keys as in [`SceneFacts`].
+/// Facts of one of several front ends. Keys are as in [`SceneFacts`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct FrontEndFacts {

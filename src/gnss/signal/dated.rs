@@ -1,4 +1,4 @@
-//! Signals whose messages state when they are sent and from where, and those that take it from these.
+//! Time of the signals: some messages state their time and ephemerides, and signals without them use those.
 
 use super::Signal;
 use crate::message::Message;

@@ -1,5 +1,5 @@
-//! A signal is data: a carrier and components, each with a code, the pulses that its chips have, and perhaps
-//! a secondary code and a message.
+//! Signals as data: a carrier and components, each with a code, the pulses of its chips, and optionally a
+//! secondary code and a message.
 //!
 //! To add a signal: one file in `gnss/<system>/` with a `static` [`Signal`], one word in [`SIGNALS`]. Law
 //! tests walk that registry. A program that has a signal of its own calls [`register`] before it names it
@@ -61,8 +61,8 @@ pub static SIGNALS: [&Signal; 25] = [
 /// scene's.
 static ADDED: RwLock<Vec<&'static Signal>> = RwLock::new(Vec::new());
 
-/// Adds a signal to those that names find. The receiver searches for it where its settings name it. Adding
-/// the same signal again changes nothing.
+/// Adds a signal to those that names find. The receiver searches for it if its settings name it. A second
+/// registration of the same signal changes nothing.
 ///
 /// # Errors
 /// Another signal of that name.
@@ -76,7 +76,7 @@ pub fn register(signal: &'static Signal) -> Result<(), NameTaken> {
     Ok(())
 }
 
-/// All signals that names find: the built-in ones, then those that were added, in that order.
+/// Lists all registered signals: the built-in ones first, then those that were added, in order.
 pub fn all() -> Vec<&'static Signal> {
     let added = ADDED.read().unwrap_or_else(PoisonError::into_inner);
     SIGNALS.iter().chain(added.iter()).copied().collect()
@@ -98,21 +98,21 @@ pub struct Signal {
     pub system: System,
     /// Time scale of the codes and messages.
     pub time: &'static TimeScale,
-    /// First and last number of the constellation's satellites; codes of others are reserved for other
+    /// First and last number of the constellation's satellites. Codes of other numbers belong to other
     /// transmitters.
     pub constellation: [u8; 2],
     /// Carrier of the signal.
     pub carrier: Carrier,
     /// Function that returns true if the satellite with this number sends the signal at a time.
     pub sent: fn(u8, Epoch) -> bool,
-    /// Least power received on the ground that its documents promise, of all components together; where none
-    /// is known a link budget is refused.
+    /// Least received power on the ground in dBW that the documents guarantee, for all components together.
+    /// Without it a link budget is refused.
     pub minimum_power_dbw: Option<f64>,
     /// Components on the carrier; their power shares add up to one.
     pub components: &'static [Component],
 }
 
-/// A signal of one satellite. Sorted by satellite, then by signal.
+/// One signal of one satellite. Links are ordered by satellite, then by signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Link {
     /// The satellite.
@@ -148,8 +148,9 @@ pub struct Component {
     pub chip_rate_hz: f64,
     /// Chips in one period of the code.
     pub code_chips: u32,
-    /// The code of a satellite by its number: `code_chips` values. +1 for a logical 0, −1 for a logical 1,
-    /// and 0 where the code of another component has its turn. `None` where the document assigns none.
+    /// Function that returns the code of a satellite number: `code_chips` values. They are +1 for a logical
+    /// 0, −1 for a logical 1, and 0 where another component's code has its turn. `None` if the document
+    /// assigns no code.
     pub code: fn(u8) -> Option<Vec<i8>>,
     /// Layers whose sum is the waveform of a chip.
     pub layers: &'static [Layer],
@@ -159,17 +160,17 @@ pub struct Component {
     pub message: Option<&'static Message>,
 }
 
-/// A pulse that chips have, with its amplitude and phase: BPSK and BOC are one layer, CBOC and QMBOC two on
-/// every chip, TMBOC two on different chips.
+/// Pulse of chips, with its amplitude and phase. BPSK and BOC are one layer, CBOC and QMBOC two on every
+/// chip, TMBOC two on different chips.
 #[derive(Clone, Copy, Debug)]
 pub struct Layer {
-    /// Amplitude. The mean power over all chips of all layers is one.
+    /// Amplitude of the layer. The mean power of all layers over all chips is one.
     pub weight: f64,
     /// Carrier phase relative to the component's, in cycles.
     pub phase_cycles: f64,
     /// Signs of equal steps of a chip.
     pub pulse: &'static [i8],
-    /// The chips that have the pulse, repeated from the beginning of each code period; empty for all chips.
+    /// Chips that have the pulse, repeated from the beginning of each code period; empty for all chips.
     pub chips: &'static [bool],
 }
 
@@ -197,7 +198,7 @@ impl Layers {
     }
 }
 
-/// A code of one chip for each period of the spreading code, which it multiplies.
+/// Code that multiplies the spreading code, with one chip for each of its periods.
 #[derive(Clone, Copy, Debug)]
 pub enum SecondaryCode {
     /// No secondary code.
@@ -224,8 +225,8 @@ impl Signal {
         all().into_iter().find(|signal| signal.name == name)
     }
 
-    /// Suggestion for a name that [`Signal::find`] does not know, to append to a refusal: the signals whose
-    /// names contain it, whatever the case of letters; empty if there are none.
+    /// Suggestion for a name that [`Signal::find`] does not know, for an error message. It lists the signals
+    /// whose names contain the text, regardless of case. It is empty if there are none.
     pub fn suggestion(name: &str) -> String {
         let lower = name.to_lowercase();
         let alike = all().into_iter().filter(|signal| !name.is_empty() && signal.name.to_lowercase().contains(&lower));
@@ -233,7 +234,7 @@ impl Signal {
         if names.is_empty() { String::new() } else { format!(" (did you mean {}?)", names.join(" or ")) }
     }
 
-    /// Carrier frequency of a satellite; the middle of the band for one to which no channel is assigned.
+    /// Carrier frequency of a satellite in Hz, or the middle of the band if the satellite has no channel.
     pub fn carrier_hz(&self, sv: Sv) -> f64 {
         match self.carrier {
             Carrier::Common(hz) => hz,
@@ -244,8 +245,8 @@ impl Signal {
         }
     }
 
-    /// The code of its first component for a satellite's number: chips of −1, 0 and +1 over one period;
-    /// `None` for a number to which the document assigns none.
+    /// Code of the first component for a satellite number: chips of −1, 0 and +1 over one period. `None` if
+    /// the document assigns no code to the number.
     ///
     /// ```
     /// use gnss::gps::l1ca::L1_CA;
@@ -277,7 +278,7 @@ impl Signal {
         }
     }
 
-    /// Lowest and highest carrier of the satellites to which one is assigned.
+    /// Lowest and highest carrier in Hz of the satellites to which one is assigned.
     pub fn carriers_hz(&self) -> (f64, f64) {
         match self.carrier {
             Carrier::Common(hz) => (hz, hz),
@@ -301,7 +302,7 @@ impl Signal {
         SPEED_OF_LIGHT_MPS / self.carrier_hz(sv)
     }
 
-    /// Satellites of this signal's system to which its documents assign a carrier and codes.
+    /// Satellites of the signal's system to which the documents assign a carrier and codes.
     pub fn satellites(&'static self) -> impl Iterator<Item = Sv> {
         (1..=u8::MAX).filter(|&number| self.is_assigned(number)).map(|number| Sv { system: self.system, number })
     }
@@ -321,7 +322,7 @@ impl Link {
         self.signal.carrier_hz(self.sv)
     }
 
-    /// Channel of its carrier, where satellites divide the band.
+    /// Frequency channel of the link, if satellites divide the band.
     pub fn channel(self) -> Option<i8> {
         match self.signal.carrier {
             Carrier::Common(_) => None,
@@ -340,7 +341,8 @@ impl Link {
         self == other || self.signal == other.signal && on_one_channel && self.signal.components.iter().all(same)
     }
 
-    /// True if a satellite of the constellation sends it, not another transmitter that borrows its code.
+    /// True if a satellite of the constellation sends the signal, and not another transmitter that borrows
+    /// its code.
     pub fn is_of_constellation(self) -> bool {
         let [first, last] = self.signal.constellation;
         (first..=last).contains(&self.sv.number)
@@ -361,7 +363,7 @@ impl fmt::Display for Link {
 impl Layer {
     /// One rectangular pulse on every chip.
     pub const BPSK: Self = Self { weight: 1.0, phase_cycles: 0.0, pulse: &[1], chips: &[] };
-    /// BOC(m, n) with m = n: one period of a sine-phased square wave on every chip.
+    /// Layer of BOC(m, n) with m = n: one period of a sine-phased square wave on every chip.
     pub const BOC11: Self = Self { pulse: &[1, -1], ..Self::BPSK };
     /// BOC(m, n) with m = 6 n.
     pub const BOC61: Self = Self { pulse: &[1, -1, 1, -1, 1, -1, 1, -1, 1, -1, 1, -1], ..Self::BPSK };
@@ -383,7 +385,7 @@ impl Layer {
 }
 
 impl SecondaryCode {
-    /// Periods of the spreading code in one of the secondary code; 1 without.
+    /// Number of spreading code periods in one secondary code period; 1 without a secondary code.
     pub fn periods(&self) -> u32 {
         match self {
             Self::None => 1,
@@ -392,8 +394,7 @@ impl SecondaryCode {
         }
     }
 
-    /// The values of satellite `number`; `[1]` without a secondary code, `None` where the document assigns
-    /// none.
+    /// Chips of satellite `number`; `[1]` without a secondary code, `None` if the document assigns none.
     pub fn of(&self, number: u8) -> Option<Vec<i8>> {
         match self {
             Self::None => Some(vec![1]),
@@ -404,25 +405,25 @@ impl SecondaryCode {
 }
 
 impl Component {
-    /// Duration of one code period by the satellite's clock.
+    /// Duration of one code period in seconds, by the satellite's clock.
     pub fn period_s(&self) -> f64 {
         f64::from(self.code_chips) / self.chip_rate_hz
     }
 
-    /// Code periods that carry one symbol of the message; `None` for a pilot, and for a symbol that is no
-    /// whole number of periods.
+    /// Number of code periods in one symbol of the message. `None` for a pilot, and for a symbol that is not
+    /// a whole number of periods.
     pub fn periods_per_symbol(&self) -> Option<u32> {
         let periods = self.message?.symbol_s / self.period_s();
         ((periods - periods.round()).abs() < 1e-6 && periods > 0.5).then_some(periods.round() as u32)
     }
 
-    /// Steps into which the pulses of all layers divide a chip.
+    /// Number of steps into which the pulses of all layers divide a chip.
     pub fn steps_per_chip(&self) -> usize {
         self.layers.iter().fold(1, |steps, layer| least_common_multiple(steps, layer.pulse.len().max(1)))
     }
 
-    /// The layers that it is made with: all of a component that is one side of a sub-carrier, which none of
-    /// them is alone.
+    /// Layers of the component that `layers` selects. A sideband of a subcarrier always keeps all, because no
+    /// single layer is the sideband.
     pub fn made_with(&self, layers: Layers) -> &[Layer] {
         match layers {
             Layers::Whole => self.layers,
@@ -431,7 +432,7 @@ impl Component {
         }
     }
 
-    /// The layer with the largest power over all chips; of equal ones the first.
+    /// Layer with the largest power over all chips; the first one if several are equal.
     pub fn strongest(&self) -> Option<&Layer> {
         let power = |layer: &Layer| {
             let covered = layer.chips.iter().filter(|&&covered| covered).count();
@@ -457,13 +458,14 @@ impl Component {
         self.shape_between(layers, layers)
     }
 
-    /// Correlation of some of its layers with some of them.
+    /// Cross correlation of some of the component's layers with others.
     pub fn shape_between(&self, sent: Layers, made: Layers) -> Shape {
         Shape::between(self.made_with(sent), self.made_with(made), self.chip_rate_hz)
     }
 
-    /// Correlation of the waveform, sent with `sent`, with a replica of one of its layers, which has that
-    /// layer's phase and sign, and of the replica, of unit weight, with itself.
+    /// Correlation of the waveform, sent with `sent`, with a replica of one of its layers. The replica has
+    /// that layer's phase and sign. The second result is the correlation of the replica, of unit weight, with
+    /// itself.
     pub fn shapes_by(&self, sent: Layers, made: &Layer) -> [Shape; 2] {
         let turned: Vec<Layer> = (self.made_with(sent).iter())
             .map(|layer| Layer {
@@ -521,7 +523,7 @@ impl fmt::Display for Signal {
     }
 }
 
-/// Serde of a `&'static Signal` by its name, for `#[serde(with = …)]`.
+/// Serialisation of a `&'static Signal` by its name, for `#[serde(with = …)]`.
 pub mod by_name {
     use serde::{Deserialize, Deserializer, Serializer, de::Error};
 

@@ -43,7 +43,7 @@ impl Shape {
         Self { step_s: 1.0 / (chip_rate_hz * steps as f64), lags }
     }
 
-    /// Correlation of the waveform with itself `delay_s` later, 1 at no delay.
+    /// Correlation of the waveform with itself at a delay of `delay_s`; 1 at zero delay.
     pub fn correlation(&self, delay_s: f64) -> f64 {
         let at = delay_s.abs() / self.step_s;
         let lag = at as usize;
@@ -52,7 +52,7 @@ impl Shape {
         value(lag) + share * (value(lag + 1) - value(lag))
     }
 
-    /// Power density at `hz` from the carrier, per hertz, for unit power.
+    /// Power density in 1/Hz at `hz` from the carrier, for unit power.
     pub fn density(&self, hz: f64) -> f64 {
         let (first, rest) = self.lags.split_first().unwrap_or((&0.0, &[]));
         let turn = TAU * hz * self.step_s;
@@ -61,7 +61,7 @@ impl Shape {
         self.step_s * sinc_squared(hz * self.step_s) * (first + 2.0 * sum)
     }
 
-    /// Duration of a step, the distance of the correlation's corners.
+    /// Duration in seconds of a step, the distance of the correlation's corners.
     pub fn step_s(&self) -> f64 {
         self.step_s
     }
@@ -85,8 +85,8 @@ pub(super) fn chip(layers: &[Layer], index: usize, steps: usize) -> Vec<Complex6
     wave
 }
 
-/// The kinds of chips that layers make, each as its waveform by equal steps, turned by the layers' phases;
-/// and which of them each chip has, from the beginning of a code period on and again.
+/// Kinds of chips that layers form, each as its waveform in equal steps, turned by the layers' phases. The
+/// second list gives the kind of each chip, from the beginning of a code period on and repeated.
 pub fn chip_kinds(layers: &[Layer]) -> (Vec<Vec<Complex64>>, Vec<usize>) {
     let common = |of: fn(&Layer) -> usize| {
         layers.iter().fold(1, |all, layer| super::least_common_multiple(all, of(layer).max(1)))

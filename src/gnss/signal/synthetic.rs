@@ -1,4 +1,5 @@
-//! Signals that no satellite sends, for tests alone: together they have every property that signals may have.
+//! Synthetic signals for tests, which no satellite sends. Together they have every property that signals may
+//! have.
 //!
 //! Their codes are random. What assumes one BPSK component of 1 ms, one carrier, a code of ±1 or one time
 //! scale goes wrong with one of them.
@@ -17,8 +18,8 @@ pub static SYNTHETIC: [&Signal; 6] = [&LONG_BOC, &QUADRATURE, &CHANNELS, &MULTIP
 /// Three seconds behind GPS time.
 pub static OWN_TIME: TimeScale = TimeScale { name: "synthetic", behind_gpst_s: 3, has_leap_seconds: false };
 
-/// Two components with codes of 4 ms in BOC(1,1), one with a coded message of a symbol a period and the other
-/// with a secondary code of 25 chips, in a time of its own.
+/// Test signal of two components with codes of 4 ms in BOC(1,1), in a time scale of its own. One has a coded
+/// message of one symbol per period, the other a secondary code of 25 chips.
 pub static LONG_BOC: Signal = Signal {
     name: "synthetic A",
     rinex: "1X",
@@ -54,7 +55,8 @@ pub static LONG_BOC: Signal = Signal {
     ],
 };
 
-/// Ten chips in a microsecond, data and pilot at right angles, a secondary code on each, on another carrier.
+/// Test signal with ten chips per microsecond, data and pilot in quadrature, and a secondary code on each, on
+/// another carrier.
 pub static QUADRATURE: Signal = Signal {
     name: "synthetic B",
     rinex: "5X",
@@ -101,7 +103,7 @@ pub static QUADRATURE_DATA: Signal = Signal {
     ..QUADRATURE
 };
 
-/// One code for all satellites, each on its own carrier.
+/// Test signal with one code for all satellites, each on its own carrier.
 pub static CHANNELS: Signal = Signal {
     name: "synthetic C",
     rinex: "1P",
@@ -127,7 +129,7 @@ pub static CHANNELS: Signal = Signal {
     }],
 };
 
-/// Chips of 10 230 and 767 250 in turn.
+/// Test signal that alternates chips of codes of 10 230 and 767 250 chips.
 pub static MULTIPLEXED: Signal = Signal {
     name: "synthetic D",
     rinex: "2X",
@@ -174,7 +176,7 @@ pub static MULTIPLEXED_DATA: Signal = Signal {
 const SIX: [bool; 33] = chips_with_six(true);
 const ONE: [bool; 33] = chips_with_six(false);
 
-/// A pilot with BOC(6,1) on four of 33 chips beside data in BOC(1,1), one to three in power.
+/// Test signal with a pilot in BOC(6,1) on four of 33 chips beside data in BOC(1,1), one to three in power.
 pub static MIXED: Signal = Signal {
     name: "synthetic E",
     rinex: "1L",
@@ -211,7 +213,8 @@ pub static MIXED: Signal = Signal {
     ],
 };
 
-/// Data and pilot on either side of a sub-carrier, a tenth as fast as those of Galileo's E5.
+/// Test signal with data and pilot on the two sidebands of a subcarrier, a tenth as fast as those of
+/// Galileo's E5.
 pub static SIDES: Signal = Signal {
     name: "synthetic F",
     rinex: "8X",

@@ -1,4 +1,5 @@
-//! Components that are one side of a sub-carrier: their pulses turn the phase, step by step, one way.
+//! Components that are one sideband of a subcarrier: their pulses turn the phase in one direction, step by
+//! step.
 //!
 //! A square wave has the lines of both sides in equal parts, half its power each at most. Pulses at right
 //! angles may leave one side alone, as those of AltBOC do: the phase turns by an eighth of a cycle from step
@@ -10,11 +11,11 @@ use num_complex::Complex64;
 
 use super::{Component, Layer, Shape, Signal, shape};
 
-/// The line of a component that is one side of a sub-carrier.
+/// Spectral line of a component that is one sideband of a subcarrier.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tone {
-    /// Half cycles in a chip, negative below the carrier. Of an odd number the sign changes from chip to chip
-    /// where the pulses begin again.
+    /// Number of half cycles in a chip, negative below the carrier. If it is odd, the sign changes from chip
+    /// to chip where the pulses begin again.
     pub half_cycles: i32,
     /// Amplitude and phase of the line at a chip's beginning, relative to the component's.
     pub gain: Complex64,
@@ -24,8 +25,8 @@ pub struct Tone {
 const MOST: f64 = 0.5;
 
 impl Component {
-    /// The line that has most of its power, where that is not the carrier's; `None` of pulses that do not
-    /// turn, and of those that are not on every chip.
+    /// Line with most of the component's power, if it is not at the carrier. `None` if the pulses do not turn
+    /// the phase, or are not on every chip.
     pub fn tone(&self) -> Option<Tone> {
         let phase = self.layers.first()?.phase_cycles;
         let is_real = self.layers.iter().all(|layer| (2.0 * (layer.phase_cycles - phase)).fract() == 0.0);
@@ -70,8 +71,8 @@ impl Tone {
         self.half_cycles == -other.half_cycles
     }
 
-    /// Correlation of a component's chips with those of a replica that has the line alone, and of that one
-    /// with itself.
+    /// Correlation of a component's chips with those of a replica that has the line alone, and correlation of
+    /// the replica with itself.
     pub fn shapes(&self, chip_rate_hz: f64) -> [Shape; 2] {
         [self.gain.norm(), 1.0].map(|weight| {
             let found = [Layer { weight, ..Layer::BPSK }];
