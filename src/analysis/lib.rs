@@ -139,7 +139,7 @@ fn measure(read: Run, run: &Path, limits: Option<&Limits>) -> Result<Measured, J
 fn find(run: &Path, limits: Option<&Limits>) -> Result<Found, JudgeError> {
     let measured = measure(Run::read(run)?, run, limits)?;
     let Measured { read, errors, clock, consistency, slips, jitter, summary } = measured;
-    let elevations = Elevations::measure(&read, &errors)?;
+    let elevations = Elevations::measure(&read, &errors, &summary.details.stated)?;
     let judged = Judged { run: &read, errors: &errors, clock: &clock, consistency: &consistency, summary: &summary };
     tables::write_measured(run, &judged, &elevations, &slips, &jitter)?;
     tables::write(run, &judged)?;

@@ -247,33 +247,13 @@ impl Waveform {
         sampler.aliases().map(|k| self.met(sampler, within_hz + f64::from(k) * rate_hz)).sum()
     }
 
-    /// Power that the sampler meets, over that of the signal.
+    /// Power that samples have of it when the whole signal has one at the antenna.
     pub fn power(&self, sampler: &Sampler) -> f64 {
         const HALF: i32 = 500;
         let step_hz = 0.5 * sampler.rate_hz() / f64::from(HALF);
         // Midpoints over half of the samples' band, which holds every alias: spectra are even.
         let at = |k: i32| self.sampled(sampler, (f64::from(k) + 0.5) * step_hz);
         2.0 * step_hz * (0..HALF).map(at).sum::<f64>()
-    }
-
-    /// A signal as samples have it: each component has its share of the signal's power there, whatever of its
-    /// spectrum the sampler meets, but for the layers that are left out. `None` without components.
-    pub fn in_samples(signal: &Signal, layers: Layers, sampler: &Sampler) -> Option<Self> {
-        let mut waveform = Self::sent(signal, layers)?;
-        for ((share, _), component) in waveform.parts.iter_mut().zip(signal.components) {
-            let kept = Self::of_shape(component.shape(), component.chip_rate_hz).power(sampler);
-            *share /= planted!("analysis.waveform.share", kept, 1.0);
-        }
-        Some(waveform)
-    }
-
-    /// Share of a whole signal's power that is left in samples with some of its layers.
-    pub fn kept(signal: &Signal, layers: Layers, sampler: &Sampler) -> f64 {
-        let power = |component: &Component, layers| {
-            Self::of_shape(component.shape_of(layers), component.chip_rate_hz).power(sampler)
-        };
-        let kept = |one: &Component| one.power_share * (power(one, layers) / power(one, Layers::Whole));
-        signal.components.iter().map(kept).sum()
     }
 
     /// κ of another signal against this one: what its power adds to the noise density, over that power, in
@@ -415,23 +395,17 @@ mod tests {
     }
 
     #[test]
-    fn in_samples_each_component_keeps_its_share_of_the_power_whatever_edges_take_from_it() {
+    fn in_samples_each_component_has_of_its_share_of_the_power_what_edges_leave() {
         let chip_rate_hz = L1C.components[0].chip_rate_hz;
         for edge in [Edge::Nearest, Edge::Area, Edge::BandLimited] {
             let sampler = Sampler::new(edge, 5.2e6);
-            let whole = Waveform::in_samples(&L1C, Layers::Whole, &sampler).unwrap();
-            assert!((whole.power(&sampler) - 1.0).abs() < 1e-12, "{edge:?}");
+            let whole = Waveform::sent(&L1C, Layers::Whole).unwrap();
             let [pilot, data] =
                 [0, 1].map(|place: usize| Waveform::of_shape(L1C.components[place].shape(), chip_rate_hz));
-            let at = |hz: f64| {
-                let part = |of: &Waveform| of.sampled(&sampler, hz) / of.power(&sampler);
-                (0.75 * part(&pilot) + 0.25 * part(&data)) / whole.sampled(&sampler, hz)
-            };
-            for hz in [0.4e6, 1.1e6, 2.3e6] {
-                assert!((at(hz) - 1.0).abs() < 1e-12, "{edge:?} {hz}");
-            }
+            let [of_pilot, of_data] = [&pilot, &data].map(|one| one.power(&sampler));
+            assert!((whole.power(&sampler) - 0.75 * of_pilot - 0.25 * of_data).abs() < 1e-12, "{edge:?}");
             // BOC(6,1) loses more to means and filters than BOC(1,1), and nothing at instants.
-            let lost = data.power(&sampler) / pilot.power(&sampler) - 1.0;
+            let lost = of_data / of_pilot - 1.0;
             assert!(if edge == Edge::Nearest { lost.abs() < 0.02 } else { lost > 0.1 }, "{edge:?}: {lost}");
         }
     }
@@ -450,24 +424,14 @@ mod tests {
         for hz in [0.31e6, 1.1e6, 2.9e6, 6.1e6] {
             assert!((alone.density(hz) / (10.0 / 11.0 * printed(hz, 1.0)) - 1.0).abs() < 1e-9, "{hz}");
         }
-        let kept = |layers, edge, rate_hz| Waveform::kept(&E1, layers, &Sampler::new(edge, rate_hz));
-        for edge in [Edge::Nearest, Edge::Area, Edge::BandLimited] {
-            assert_eq!(kept(Layers::Whole, edge, 6.5e6), 1.0);
-        }
-        assert!((kept(Layers::Strongest, Edge::Nearest, 6.5e6) - 10.0 / 11.0).abs() < 1e-3);
+        let kept = |edge| alone.power(&Sampler::new(edge, 6.5e6));
+        assert!((kept(Edge::Nearest) / (10.0 / 11.0) - 1.0).abs() < 3e-3, "{}", kept(Edge::Nearest));
         // Midpoints every kilohertz up to where the filter has stopped.
         let filter = |hz: f64| direct(hz / 6.5e6, 0.45).powi(2);
-        let within = |m: f64, n: f64| {
-            let at = |k: i32| 1e3 * (f64::from(k) + 0.5);
-            (0..4500).map(|k| 2e3 * wave(at(k), m) * wave(at(k), n) * filter(at(k))).sum::<f64>()
-        };
-        // Of one component the weak layer is added, of the other subtracted: behind the filter they are not
-        // orthogonal, and each component has half of the power.
-        let (strong, weak, both) =
-            (10.0 * within(1.0, 1.0), within(6.0, 6.0), 2.0 * 10.0_f64.sqrt() * within(1.0, 6.0));
-        let expected = 0.5 * (strong / (strong + weak + both) + strong / (strong + weak - both));
-        let found = kept(Layers::Strongest, Edge::BandLimited, 6.5e6);
-        assert!((found - expected).abs() < 2e-4, "{found}: {expected}, {strong}, {weak}, {both}");
+        let at = |k: i32| 1e3 * (f64::from(k) + 0.5);
+        let expected = 10.0 / 11.0 * (0..4500).map(|k| 2e3 * printed(at(k), 1.0) * filter(at(k))).sum::<f64>();
+        let found = kept(Edge::BandLimited);
+        assert!((found - expected).abs() < 2e-4, "{found}: {expected}");
     }
 
     /// Amplitude of a sinc of that cut-off under a Kaiser window of ±8 samples and β 5.65, by summing its

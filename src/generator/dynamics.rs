@@ -120,7 +120,7 @@ fn look(scene: &Scene, sight: &Sight) -> Look {
         - spin.cross(&state.velocity_mps) * 2.0
         - spin.cross(&spin.cross(&state.position_m));
     let across = (state.velocity_mps - sight.user_mps).cross(&towards).norm_squared() / sight.range_m;
-    Look { towards, own_mps2: towards.dot(&satellite_mps2) + across, cn0_dbhz: strength_dbhz(scene, sight).0 }
+    Look { towards, own_mps2: towards.dot(&satellite_mps2) + across, cn0_dbhz: strength_dbhz(scene, None, sight).0 }
 }
 
 /// The body's acceleration at each instant, and with its jerk between knots.

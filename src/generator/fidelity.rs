@@ -28,14 +28,17 @@ pub enum Grade {
     Reference,
 }
 
-/// Model of a chip edge between samples. Each model keeps the mean power of the waveform at one.
+/// Model of a chip edge between samples. C/N0 is at the antenna, before the front end: samples have the share
+/// of it that the edge keeps, each component its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CodeEdge {
-    /// The chip at the sample's instant.
+    /// The chip at the sample's instant: all power is kept, what lies outside the band folds back.
     Nearest,
-    /// The mean of the waveform over the sample's interval.
+    /// The mean of the waveform over the sample's interval: 1 − d/3 is kept of steps that are 1/d ≥ 1 samples
+    /// long.
     Area,
-    /// The waveform through a linear-phase low-pass filter just below half the sample rate.
+    /// The waveform through a linear-phase low-pass filter just below half the sample rate: what lies below
+    /// 0.45 of the rate is kept.
     BandLimited,
 }
 

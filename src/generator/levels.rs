@@ -2,10 +2,11 @@
 //!
 //! dBFS here are 20 lg of a component's root mean square over full scale: a complex tone whose circle touches
 //! full scale has −3.01 dBFS. Full scale is that of the sample format, or of the converter where the scene
-//! has one; floating point has none, and 1 counts as such. Parts have the power that the generator gives them
-//! before the front end's filter. The sum and what is clipped of it are measured on segments of the scene's
-//! own samples. Limits: satellites and sources are looked at at some instants, quick fading is left out, and
-//! a sweep counts as if all of it lay in the band.
+//! has one; floating point has none, and 1 counts as such. Parts have the power that the samples have of them
+//! before the front end's filter: C/N0 and J/N0 are at the antenna, and chip edges keep their share of it.
+//! The sum and what is clipped of it are measured on segments of the scene's own samples. Limits: satellites
+//! and sources are looked at at some instants, quick fading is left out, and a sweep counts as if all of it
+//! lay in the band.
 
 use std::fmt;
 use std::ops::Range;
@@ -17,7 +18,7 @@ use crate::ray::Ray;
 use crate::scene::Scene;
 use crate::sky::emission;
 use crate::spoof::Constellation;
-use crate::stream::{self, GenerateError, Stretch};
+use crate::stream::{self, GenerateError, Kept, Stretch};
 use gnss::broadcast::OrbitError;
 use gnss::satellite::Sv;
 
@@ -58,6 +59,8 @@ pub struct Source {
     pub jn0_dbhz: Option<Span>,
     /// While a pulse is on, above the mean.
     pub peak_db: f64,
+    /// What the samples have of it over that, in dB: chip edges take from a matched one.
+    pub kept_db: f64,
 }
 
 /// A spoofer's weakest and strongest signal.
@@ -67,6 +70,8 @@ pub struct Spoofed {
     pub number: usize,
     /// C/N0 of its signals, in dB-Hz; `None` where none is in view.
     pub cn0_dbhz: Option<Span>,
+    /// The same in the samples, of which chip edges take.
+    pub sampled_dbhz: Option<Span>,
 }
 
 /// The parts of a scene against full scale.
@@ -95,6 +100,9 @@ pub struct Levels {
     /// Largest share of a segment's components that is clipped, and the start of that segment in seconds.
     pub worst: (f64, f64),
     stretches: u64,
+    /// What chip edges keep of signals.
+    #[serde(skip)]
+    pub(crate) kept: Kept,
     /// Time of this machine for a sample of all that the scene sends, on one core: the median of the
     /// segments.
     #[serde(skip)]
@@ -107,7 +115,7 @@ impl Levels {
     /// # Errors
     /// Those of the stream.
     pub fn new(scene: &Scene) -> Result<Self, GenerateError> {
-        let tuning = scene.tuning();
+        let (tuning, kept) = (scene.tuning(), Kept::of(scene));
         let (even, own) = stretches(scene);
         let met = stream::measured(scene, &even)?;
         let extra = stream::measured(scene, &own)?;
@@ -124,7 +132,7 @@ impl Levels {
             attenuation_db: scene.playback.as_ref().map_or(0.0, |playback| playback.attenuation_db),
             noise_dbfs: scene.noise.then(|| level(tuning.noise_lsb)),
             sources: sources(scene),
-            spoofers: scene.spoofers.iter().map(|from| spoofed(scene, from)).collect::<Result<_, _>>()?,
+            spoofers: scene.spoofers.iter().map(|from| spoofed(scene, &kept, from)).collect::<Result<_, _>>()?,
             strongest: strongest(scene)?,
             sum_dbfs: level(deviation_lsb),
             clipped_share: sum(|stretch| stretch.clipped as f64) / components,
@@ -133,17 +141,19 @@ impl Levels {
             sample_s: middle(met.iter().map(|stretch| stretch.sample_s)),
             full_scale_lsb,
             scale,
+            kept,
         })
     }
 
-    /// Level of a power over noise density, at the antenna.
+    /// Level of a power over noise density in the samples.
     pub fn dbfs(&self, over_noise_dbhz: f64) -> f64 {
         over_noise_dbhz + self.unit_dbfs
     }
 
-    /// Level of a satellite or a spoofer's signal, behind the playback that a scene may have.
-    pub fn satellite_dbfs(&self, cn0_dbhz: f64) -> f64 {
-        self.dbfs(cn0_dbhz) - self.attenuation_db
+    /// Level of what the samples have of a satellite or a spoofer's signal, behind the playback that a scene
+    /// may have.
+    pub fn satellite_dbfs(&self, sampled_dbhz: f64) -> f64 {
+        self.dbfs(sampled_dbhz) - self.attenuation_db
     }
 }
 
@@ -217,14 +227,15 @@ fn sources(scene: &Scene) -> Vec<Source> {
             let row = source.row(0, sample).filter(|_| sample < scene.samples);
             row.into_iter().for_each(|row| Span::widen(&mut jn0_dbhz, row.jn0_dbhz));
         }
-        Source { kind: source.kind, jn0_dbhz, peak_db: -10.0 * libm::log10(source.duty()) }
+        let kept_db = 10.0 * libm::log10(source.kept(scene.clock.rate.hz()));
+        Source { kind: source.kind, jn0_dbhz, peak_db: -10.0 * libm::log10(source.duty()), kept_db }
     });
     found.collect()
 }
 
 /// The signals of a spoofer while it is on.
-fn spoofed(scene: &Scene, from: &Constellation) -> Result<Spoofed, OrbitError> {
-    let (on, mut cn0_dbhz) = (from.on(scene.clock, &scene.receiver_clock), None);
+fn spoofed(scene: &Scene, kept: &Kept, from: &Constellation) -> Result<Spoofed, OrbitError> {
+    let (on, mut cn0_dbhz, mut sampled_dbhz) = (from.on(scene.clock, &scene.receiver_clock), None, None);
     let last = scene.samples.saturating_sub(1);
     for k in 0..=INSTANTS {
         let sample = (last as f64 * k as f64 / INSTANTS as f64) as u64;
@@ -236,17 +247,20 @@ fn spoofed(scene: &Scene, from: &Constellation) -> Result<Spoofed, OrbitError> {
             if !arrival::in_view_from(scene, from, sv, local)? {
                 continue;
             }
-            let mut sum_hz = 0.0;
+            let (mut sum_hz, mut sampled_hz) = (0.0, 0.0);
             for signal in scene.signals_of(sv) {
                 let seen = arrival::seen_from(scene, from, sv, signal, local)?;
-                sum_hz += seen.map_or(0.0, |seen| seen.rays.iter().map(|ray| ray.cn0_hz).sum::<f64>());
+                let own_hz = seen.map_or(0.0, |seen| seen.rays.iter().map(|ray| ray.cn0_hz).sum::<f64>());
+                sum_hz += own_hz;
+                sampled_hz += own_hz * kept.share(signal);
             }
             if sum_hz > 0.0 {
                 Span::widen(&mut cn0_dbhz, 10.0 * libm::log10(sum_hz));
+                Span::widen(&mut sampled_dbhz, 10.0 * libm::log10(sampled_hz));
             }
         }
     }
-    Ok(Spoofed { number: from.number, cn0_dbhz })
+    Ok(Spoofed { number: from.number, cn0_dbhz, sampled_dbhz })
 }
 
 impl fmt::Display for Levels {
@@ -266,7 +280,7 @@ impl fmt::Display for Levels {
                 writeln!(f, "never on")?;
                 continue;
             };
-            write!(f, "{} dBFS, J/N0 {} dB-Hz", shifted(jn0, self.unit_dbfs), range(jn0))?;
+            write!(f, "{} dBFS, J/N0 {} dB-Hz", shifted(jn0, self.unit_dbfs + source.kept_db), range(jn0))?;
             if let Some((sv, cn0_dbhz)) = self.strongest {
                 write!(f, ", J/S {} dB over {sv} ({cn0_dbhz:.1} dB-Hz at the start)", shifted(jn0, -cn0_dbhz))?;
             }
@@ -275,8 +289,8 @@ impl fmt::Display for Levels {
             }
             writeln!(f)?;
         }
-        for Spoofed { number, cn0_dbhz } in &self.spoofers {
-            let level = cn0_dbhz.map_or("never on".to_owned(), |cn0| {
+        for Spoofed { number, sampled_dbhz, .. } in &self.spoofers {
+            let level = sampled_dbhz.map_or("never on".to_owned(), |cn0| {
                 format!("{} dBFS a satellite", shifted(cn0, self.unit_dbfs - self.attenuation_db))
             });
             writeln!(f, "  {:14}  {level}", format!("spoofer {number}"))?;

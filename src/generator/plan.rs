@@ -20,6 +20,7 @@ use crate::levels::{Levels, Span};
 use crate::presence::{Presence, presence};
 use crate::ray::{Ray, Sight};
 use crate::scene::{SPACE_M, Scene};
+use crate::stream::Kept;
 use gnss::broadcast::OrbitError;
 use gnss::earth::Geodetic;
 use gnss::record::PassEnd;
@@ -40,7 +41,8 @@ pub struct InView {
     pub elevation_deg: f64,
     /// C/N0 in dB-Hz of the satellite's first signal; `None` if the scene defines no signal power.
     pub cn0_dbhz: Option<f64>,
-    /// Power of all its signals and rays over noise density, weakest and strongest of the instants.
+    /// Power that the samples have of all its signals and rays over noise density, weakest and strongest of
+    /// the instants: C/N0 is at the antenna, and chip edges keep their share of it.
     pub power_dbhz: Option<Span>,
     /// Time in seconds since the start when the satellite comes into view, and the cause. `None` if it is in
     /// view from the beginning.
@@ -122,7 +124,7 @@ impl Plan {
     pub fn new(scene: &Scene, machinery: Machinery, levels: Levels) -> Result<Self, OrbitError> {
         let duration_s = scene.clock.rate.elapsed_s(scene.samples);
         let extremes = scene.trajectory.extremes(duration_s);
-        let satellites = in_view(scene, duration_s)?;
+        let satellites = in_view(scene, &levels.kept, duration_s)?;
         // A spoofer sends about as many signals again.
         let sources = (1 + scene.spoofers.len()) as f64;
         let links: usize = satellites.iter().map(|satellite| scene.signals_of(satellite.sv).count()).sum();
@@ -138,7 +140,7 @@ impl Plan {
             in_space: Geodetic::from_ecef(&scene.trajectory.at(0.0).position_m).height_m >= SPACE_M,
             speed_mps: extremes.speed_mps,
             acceleration_mps2: extremes.acceleration_mps2,
-            models: models(scene),
+            models: models(scene, &levels.kept),
             level: scene.fidelity.grade.name(),
             sample_ns: 1e9 * levels.sample_s,
             signal_sample_ns: 1e9 * levels.sample_s / (links as f64 * sources).max(1.0),
@@ -168,7 +170,7 @@ impl Plan {
 }
 
 /// The satellites above the mask at any instant looked at, highest first.
-fn in_view(scene: &Scene, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
+fn in_view(scene: &Scene, kept: &Kept, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
     let mut rows = Vec::new();
     for sv in scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)) {
         let (mut row, mut absent): (Option<InView>, Option<PassEnd>) = (None, None);
@@ -179,7 +181,7 @@ fn in_view(scene: &Scene, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
             let presence = presence(scene, sv, received, &motion)?;
             let end = presence.end();
             let (direct_dbhz, power_dbhz) = match &presence {
-                Presence::InView(emission) => strength_dbhz(scene, &emission.sight),
+                Presence::InView(emission) => strength_dbhz(scene, Some(kept), &emission.sight),
                 _ => (None, None),
             };
             match (presence, &mut row) {
@@ -214,15 +216,17 @@ fn in_view(scene: &Scene, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
     Ok(rows)
 }
 
-/// Power over noise density in dB-Hz of a satellite's first signal's direct ray, and of all signals and rays
-/// together; `None` when nothing in the scene states how strong they are.
-pub(crate) fn strength_dbhz(scene: &Scene, sight: &Sight) -> (Option<f64>, Option<f64>) {
+/// Power over noise density in dB-Hz of a satellite's first signal's direct ray at the antenna, and of all
+/// signals and rays together, in the samples where it is said what these keep; `None` when nothing in the
+/// scene says how strong they are.
+pub(crate) fn strength_dbhz(scene: &Scene, kept: Option<&Kept>, sight: &Sight) -> (Option<f64>, Option<f64>) {
     let (mut direct_hz, mut sum_hz) = (None, 0.0);
     for signal in scene.signals_of(sight.sv) {
         let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
         scene.effects.iter().for_each(|effect| effect.act(sight, signal, &mut rays));
         direct_hz = direct_hz.or(rays.first().map(|ray| ray.cn0_hz));
-        sum_hz += rays.iter().map(|ray| ray.cn0_hz).sum::<f64>();
+        let share = kept.map_or(1.0, |kept| kept.share(signal));
+        sum_hz += share * rays.iter().map(|ray| ray.cn0_hz).sum::<f64>();
     }
     let dbhz = |hz: f64| (hz > 0.0).then(|| 10.0 * libm::log10(hz));
     (direct_hz.and_then(dbhz), dbhz(sum_hz))

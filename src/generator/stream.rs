@@ -24,7 +24,7 @@ pub(crate) use front::transmitters;
 use front::{Front, share_geometry};
 pub use fronts::Fronts;
 pub use generator::{Batch, Generator};
-pub(crate) use measure::{Stretch, measured};
+pub(crate) use measure::{Kept, Stretch, measured};
 use ticks::Ticks;
 
 use serde::Serialize;

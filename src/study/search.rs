@@ -65,7 +65,7 @@ struct Folded {
     own: Vec<(f64, f64)>,
     /// Frequency and weight of the first image above, for all frequencies of the band.
     image: Vec<(f64, f64)>,
-    /// Share of the signal's power within the band.
+    /// Share of the signal's power at the antenna that is within the band.
     share: f64,
 }
 
@@ -87,13 +87,12 @@ impl Folded {
             let step = half / f64::from(count);
             (0..count).map(move |k| ((f64::from(k) + 0.5) * step, step))
         };
-        let whole: f64 = middles(0.5, NODES).map(|(turns, step)| 2.0 * step * folded(turns)).sum();
         let within: f64 = middles(half, NODES).map(|(turns, step)| 2.0 * step * folded(turns)).sum();
         // Both sides of the spectrum at once, in units of what is within the band.
         let own = middles(half, NODES).map(|(turns, step)| (turns, 2.0 * step * density(turns) / within)).collect();
         let above = |turns: f64, step: f64| (turns + 1.0, 2.0 * step * density(turns + 1.0) / within);
         let image = middles(half, NODES).flat_map(|(turns, step)| [above(turns, step), above(-turns, step)]).collect();
-        Self { own, image, share: within / whole }
+        Self { own, image, share: within }
     }
 
     /// Correlation of the signal at `offset` samples from a lag that is `place` samples past a whole one, in
@@ -279,7 +278,7 @@ mod tests {
         let half = folded.signal(0.5 / s, 0.0);
         assert!((half - 0.5 / at_zero).abs() < 2e-3, "{half}");
         assert!(folded.signal((1.0 + s) / s, 0.0).abs() < 2e-3);
-        assert!((folded.share - 1.0).abs() < 1e-9);
+        assert!((folded.share - at_zero).abs() < 1e-4, "{}", folded.share);
     }
 
     #[test]
@@ -290,7 +289,9 @@ mod tests {
         // Integrated by another program: 0.98654/0.99870 of the power within the band was not folded.
         assert!((mean - 0.986_545 / 0.998_696).abs() < 2e-4, "{mean}");
         assert!((0.010..0.013).contains(&image), "{image}");
-        assert!((folded.share - 0.998_696).abs() < 1e-4, "{}", folded.share);
+        // Of what means over samples leave at all.
+        let share = 0.998_696 * (1.0 - 1.023 / 2.6 / 3.0);
+        assert!((folded.share - share).abs() < 1e-4, "{}", folded.share);
     }
 
     #[test]
@@ -324,7 +325,8 @@ mod tests {
         }
         // Where the peak is shared, a neighbour may replace it: more are found than in the nearest cell
         // alone.
-        let shared = Model { lag_chips: 0.4, doppler_step_hz: 500.0, cn0_dbhz: 36.0, ..model };
+        let kept_db = 10.0 * libm::log10(1.0 - model.sample_chips / 3.0);
+        let shared = Model { lag_chips: 0.4, doppler_step_hz: 500.0, cn0_dbhz: 36.0 - kept_db, ..model };
         let lambda = detection::noncentrality(10, 1e-3, libm::pow(10.0, 3.6), detection::frequency_loss(250.0, 1e-3));
         let alone = detection::detection(model.threshold, 10, lambda);
         let found = shared.probability(&[250.0], &none, DRAWS, 2);

@@ -93,8 +93,10 @@ fn effective_cn0_is_that_of_spectral_separation_from_0_to_50_db() {
     let clean = correlate(&generated(&quiet), &periods, &code);
     let data: Vec<f64> = clean.iter().map(|(re, _)| 1_f64.copysign(*re)).collect();
     let alone_dbhz = cn0_dbhz(&clean, &data);
-    // 45 less what a square replica loses on averaged edges; 2000 periods know it to 0.1 dB.
-    assert!((alone_dbhz - 45.0).abs() < 0.6, "{alone_dbhz}");
+    // A square replica finds (1 − d/4)² of what averaged edges of d chips a sample leave, −0.46 dB; 2000
+    // periods know it to 0.1 dB.
+    let expected_dbhz = 45.0 + 20.0 * libm::log10(1.0 - 1.023e6 / rate_hz / 4.0);
+    assert!((alone_dbhz - expected_dbhz).abs() < 0.4, "{alone_dbhz}");
     // Separations for smooth spectra (theory: J. W. Betz), dB of seconds; computed outside this project.
     let kinds = [
         ("matched", "kind = \"matched\"", -61.86),
@@ -214,10 +216,12 @@ fn the_receiver_measures_the_cn0_that_spectral_separation_leaves() {
         values.iter().sum::<f64>() / values.len() as f64
     };
     let linear = |db: f64| libm::pow(10.0, db / 10.0);
-    // What noise and the other satellites' codes are, in units of the noise.
-    let quiet = linear(45.0 - measured_dbhz(9.4));
+    // Means over samples leave 1 − d/3 of C/A; then what noise and the other satellites' codes are, in units
+    // of the noise.
+    let kept_dbhz = 45.0 + 10.0 * libm::log10(1.0 - 1.023 / 2.6 / 3.0);
+    let quiet = linear(kept_dbhz - measured_dbhz(9.4));
     for (from_s, js_db, kappa_db) in [(16.4, 22.0, -63.55), (25.4, 25.0, -63.45)] {
-        let expected = 45.0 - 10.0 * libm::log10(quiet + linear(45.0 + js_db + kappa_db));
+        let expected = kept_dbhz - 10.0 * libm::log10(quiet + linear(45.0 + js_db + kappa_db));
         let found = measured_dbhz(from_s);
         println!("receiver at J/S {js_db} dB: {found:.2} dB-Hz, by separation {expected:.2}");
         assert!((found - expected).abs() < 0.5, "{js_db}: {found} {expected}");

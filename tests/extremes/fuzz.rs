@@ -204,9 +204,8 @@ fn departures(text: &str, share: f64) -> Result<Option<[f64; 4]>, TestCaseError>
     let prompt = period.prompt(&alone, sv, &i, &q);
     let rate_hz = alone.clock.rate.hz();
     let width = 1.023e6 / rate_hz;
-    // Mean waveform over a sample, brought to unit power, against the chip at its middle; a real one keeps
-    // half.
-    let edges = (1.0 - width / 4.0) / (1.0 - width / 3.0).sqrt();
+    // Mean waveform over a sample against the chip at its middle; a real one keeps half.
+    let edges = 1.0 - width / 4.0;
     let real = if alone.metadata.format.is_complex() { 1.0 } else { 0.5_f64.sqrt() };
     let amplitude = real * edges * f64::from(alone.noise_lsb) * (2.0 * period.cn0_hz / rate_hz).sqrt();
     let cn0_db = 20.0 * libm::log10(prompt.norm() / amplitude);

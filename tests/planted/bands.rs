@@ -1,6 +1,7 @@
 //! Laws of two bands, of layers and of the files that a run writes, against documents.
 
 use gnss_twin::generator::synth::Edge;
+use gnss_twin::generator::synth::band::Filter;
 use gnss_twin::generator::synth::waveform::Waveform;
 use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss_twin::gnss::exchange::{ObservationFile, Version};
@@ -48,6 +49,21 @@ fn composite_chips_have_a_tenth_as_much_power_in_the_quick_layer_as_in_the_slow_
         let [slow, quick] = amplitudes[..] else { panic!("{amplitudes:?}") };
         let (alpha, beta) = ((10.0_f64 / 11.0).sqrt(), (1.0_f64 / 11.0).sqrt());
         assert!((slow - alpha).abs() < 1e-6 && (quick - beta).abs() < 1e-6, "{component}: {amplitudes:?}");
+    }
+}
+
+#[test]
+fn what_edges_take_from_a_component_is_not_put_back() {
+    let filter = Filter::new(0.45);
+    let sv = Sv { system: System::Galileo, number: 11 };
+    for component in 0..2 {
+        let waveform = Waveform::new(E1.link(sv), component).unwrap().unwrap();
+        let amplitudes = |edge: Edge<'_>| {
+            let voices = waveform.voices(Layers::Whole, edge, 1e8).unwrap();
+            voices.iter().map(|voice| voice.amplitude).collect::<Vec<f64>>()
+        };
+        let sent = amplitudes(Edge::Nearest);
+        assert_eq!((amplitudes(Edge::Area), amplitudes(Edge::BandLimited(&filter))), (sent.clone(), sent));
     }
 }
 

@@ -125,7 +125,7 @@ const JPOS: &str = "judge::figures_of_the_position_are_those_of_its_rows";
 const JOBS: &str = "judge::figures_of_the_observations_are_those_of_their_rows";
 const JDAM: &str = "judge::damaged_tables_fail_by_the_row_that_names_the_damage";
 const JSPEC: &str = "judge::the_spectrum_of_faultless_samples_keeps_its_limits";
-const SHARES: &str = "laws::components_of_a_signal_share_the_power_of_its_samples_as_they_are_sent";
+const SHARES: &str = "bands::what_edges_take_from_a_component_is_not_put_back";
 const POLES: &str = "laws::a_butterworth_filter_passes_half_of_the_power_at_the_edges_of_its_band";
 const JALL: &str = "judge::deviations_of_a_clock_are_those_that_sp_1065_prints";
 
@@ -342,6 +342,7 @@ pub const FAULTS: &[Fault] = &[
     fault("receiver.position.share", "codes are weighted as if all power were in the pilot", SHARE),
     fault("receiver.nco.channel", "codes of GLONASS are aided by the middle channel", FDMA),
     fault("generator.synth.layers", "BOC(6,1) has eight tenths of its amplitude", LAYERS),
+    fault("generator.synth.edge_share", "what edges take from a component is put back", SHARES),
     fault("gnss.exchange.satellites", "epochs of observation files count observations", WRITTEN_OBS),
     fault("gnss.exchange.slips", "observation files flag no slip", WRITTEN_OBS),
     fault("gnss.exchange.channels", "headers name GLONASS's channels with the other sign", WRITTEN_OBS),
@@ -362,7 +363,6 @@ pub const FAULTS: &[Fault] = &[
     fault("analysis.multiple_access.others", "other satellites count ten times", JOBS),
     fault("analysis.samples.floor", "the noise under a spectrum is 0.13 dB too high", JSPEC),
     fault("analysis.samples.codes", "satellites count half in a spectrum", JSPEC),
-    fault("analysis.waveform.share", "components lose to edges what they do not in the samples", SHARES),
     fault("analysis.response.poles", "the poles of a Butterworth filter are turned", POLES),
     fault("analysis.theory.pll", "theory of the phase loop has the wrong constant", JIT),
     fault("analysis.theory.dll", "theory of the code loop has the wrong constant", JIT),

@@ -4,7 +4,6 @@
 use gnss_twin::analysis::expect::theory::{dll, pll};
 use gnss_twin::analysis::response::Response;
 use gnss_twin::analysis::statistics;
-use gnss_twin::analysis::waveform::{Sampler, Waveform};
 use gnss_twin::generator::catalogue::Catalogue;
 use gnss_twin::generator::clock::ReceiverClock;
 use gnss_twin::generator::effect::ionosphere::KlobucharIonosphere;
@@ -15,15 +14,14 @@ use gnss_twin::generator::ray::{Effect, Ray};
 use gnss_twin::generator::sky::{Emission, emission};
 use gnss_twin::generator::vehicle::Motion;
 use gnss_twin::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use gnss_twin::gnss::facts::{self, FilterShape, FilterSpec};
-use gnss_twin::gnss::gps::l1c::L1C;
+use gnss_twin::gnss::facts::{FilterShape, FilterSpec};
 use gnss_twin::gnss::gps::l1ca::L1_CA;
 use gnss_twin::gnss::ionosphere::Coefficients;
 use gnss_twin::gnss::klobuchar::Klobuchar;
 use gnss_twin::gnss::record::Observation;
 use gnss_twin::gnss::rinex;
 use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::{Carrier, Layers, Signal};
+use gnss_twin::gnss::signal::{Carrier, Signal};
 use gnss_twin::gnss::time::{Epoch, Rate, SampleClock, TimePolynomial, TimeScale};
 use gnss_twin::receiver::correlate::sums::{RunningSums, Samples};
 use gnss_twin::receiver::correlate::{Arithmetic, Edge, Nco, Replica, chips_to_units};
@@ -539,16 +537,6 @@ fn running_sums_give_what_every_sample_by_itself_does() {
     // Noise of the sum is 25 LSB · √4000 = 1600. The carrier, of 3e-5 turns a sample, stands still over up to
     // 12 of them: errors of 1e-3 rad at most make 2 of that; tables and places are finer.
     assert!(fast.iter().zip(&slow).all(|(a, b)| (a - b).norm() < 16.0), "{fast:?} {slow:?}");
-}
-
-#[test]
-fn components_of_a_signal_share_the_power_of_its_samples_as_they_are_sent() {
-    // A filter at 0.45 of 5.2 Msps takes the sixth harmonic of the pilot's weak layer, not its share.
-    for edge in [facts::Edge::Nearest, facts::Edge::Area, facts::Edge::BandLimited] {
-        let sampler = Sampler::new(edge, 5.2e6);
-        let power = Waveform::in_samples(&L1C, Layers::Whole, &sampler).unwrap().power(&sampler);
-        assert!((power - 1.0).abs() < 1e-9, "{edge:?}: {power}");
-    }
 }
 
 #[test]

@@ -88,8 +88,6 @@ pub(crate) struct Followed {
     pub assumed: Waveform,
     /// Autocorrelation of the replica.
     pub own: Waveform,
-    /// Autocorrelation of the whole waveform.
-    pub whole: Waveform,
     /// The sub-carrier, of which both sidebands are followed: what is found, assumed and the replica's own
     /// are those of the chips then.
     pub sides: Option<Tone>,
@@ -135,7 +133,6 @@ impl Followed {
             found: of(found),
             assumed: of(assumed),
             own: of(own),
-            whole: of(component.shape()),
             sides,
             share: component.power_share + other.map_or(0.0, |other| other.power_share),
             spacing_chips: entry.as_ref().map(|entry| entry.spacing_chips),

@@ -3,8 +3,9 @@
 //! A periodic waveform has lines at the multiples of its repetition rate, powers |c_k|² of its Fourier
 //! series, found here by a transform of one period; noise and random chips have densities. Interference of
 //! power J adds J·κ to the noise density, κ = ∫ G_J·G_S df with the code's spectrum G_S (J. W. Betz,
-//! NAVIGATION 48(4), 2001). Limits: a code's own lines, 1 kHz apart, are left out of κ (a CW on a line is
-//! worth up to 9 dB more or nothing); recordings count as flat.
+//! NAVIGATION 48(4), 2001). Random chips come through the sampler as a code does. Limits: a code's own lines,
+//! 1 kHz apart, are left out of κ (a CW on a line is worth up to 9 dB more or nothing); recordings count as
+//! flat.
 
 use std::collections::BTreeMap;
 
@@ -124,6 +125,20 @@ impl Spectrum {
             }
         }
     }
+
+    /// Density off the lines in samples, per hertz, `f_hz` from the source's own frequency: chips have the
+    /// edges of the satellites', and what lies beyond the samples' band folds back.
+    fn sampled(&self, sampler: &Sampler, f_hz: f64) -> f64 {
+        let Some(Density::Chips { .. }) = self.density else { return self.density(f_hz) };
+        let rate_hz = sampler.rate_hz();
+        let within_hz = f_hz - rate_hz * (f_hz / rate_hz).round();
+        let met = |alias: i32| {
+            let hz = within_hz + f64::from(alias) * rate_hz;
+            let amplitude = sampler.amplitude(hz);
+            self.density(hz) * amplitude * amplitude
+        };
+        sampler.aliases().map(met).sum()
+    }
 }
 
 /// Interference of a run on average, in the samples.
@@ -159,7 +174,7 @@ pub fn separation_s(source: &Source, signal: &Waveform, signal_hz: f64, sampler:
     let (mut power, mut shared) = (0.0, 0.0);
     for f_hz in middles {
         power += step_hz * code(f_hz);
-        shared += step_hz * code(f_hz) * source.spectrum.density(f_hz - source.frequency_hz);
+        shared += step_hz * code(f_hz) * source.spectrum.sampled(sampler, f_hz - source.frequency_hz);
     }
     let inside = |f_hz: &f64| f_hz.abs() <= 0.5 * rate_hz;
     let lines = source.spectrum.lines.iter().map(|(offset_hz, power)| (source.frequency_hz + offset_hz, *power));
@@ -169,12 +184,12 @@ pub fn separation_s(source: &Source, signal: &Waveform, signal_hz: f64, sampler:
 
 /// Density of the interference at a frequency of the samples as a Hann window of bins `bin_hz` apart shows
 /// it, over N0.
-pub fn density(source: &Source, f_hz: f64, bin_hz: f64) -> f64 {
+pub fn density(source: &Source, f_hz: f64, bin_hz: f64, sampler: &Sampler) -> f64 {
     let from_hz = f_hz - source.frequency_hz;
     // Lines as far as eight bins; the window's side lobes are 100 dB down there.
     let lines = source.spectrum.lines.iter().filter(|(line_hz, _)| (line_hz - from_hz).abs() < 8.0 * bin_hz);
     let lines: f64 = lines.map(|(line_hz, power)| power * hann((from_hz - line_hz) / bin_hz) / bin_hz).sum();
-    source.jn0_hz * (lines + source.spectrum.density(from_hz))
+    source.jn0_hz * (lines + source.spectrum.sampled(sampler, from_hz))
 }
 
 /// A line's share of density times bin width, `x` bins from it, after a Hann window: its transform squared

@@ -336,9 +336,8 @@ impl Theory {
         let own = Peak::new(&followed.own, width_chips, 2 * of_replica).between(followed.sides);
         let dll_gain = found.steepness(settings.spacing_chips) / assumed.steepness(settings.spacing_chips);
         let dll = PhaseLoop { gains: made_for.gains.map(|gain| dll_gain * gain), ..made_for };
-        // Of the component's power in the samples, which is whole whatever their averages leave of a layer.
+        // Of the component's power at the antenna.
         let efficiency = found.value(0.0) * found.value(0.0) / own.value(0.0);
-        let efficiency = efficiency / Peak::new(&followed.whole, width_chips, 2 * of_signal).value(0.0);
         let efficiency = if run.scene.code_edge == Edge::BandLimited {
             // What a filter leaves of layers is no average's.
             let (nominal, own) = (followed.assumed.correlation(0.0), followed.own.correlation(0.0));

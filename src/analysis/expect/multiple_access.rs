@@ -5,7 +5,8 @@
 //! 48(4), 2001; [`Waveform::separation_s`]). Rectangular chips of duration T have 2T/3 from their own kind. A
 //! sampler that averages over its interval, and a replica that does too, narrow the spectra and raise κ.
 //! Every pair of signals counts whose carriers are within the sample rate, each component by its share of
-//! power. Interference adds its own power times its own separation ([`super::jamming`]). Limits: components
+//! power at the antenna, of which the sampler leaves its part. Interference adds its own power times its own
+//! separation ([`super::jamming`]). Limits: components
 //! of one signal do not disturb each other (what data make of the C/N0 beside a pilot is in
 //! [`super::stated`]); what folds back from beyond the band is left out.
 
@@ -24,6 +25,8 @@ pub struct MultipleAccess<'r> {
     run: &'r Run,
     /// κ of the emissions that a signal meets, its own among them.
     kappa_s: HashMap<Emission, Vec<(Emission, f64)>>,
+    /// Share of each signal's power at the antenna that samples have.
+    kept: HashMap<&'static Signal, f64>,
     sums_hz: RefCell<LevelFinder<'r, Emission>>,
     jammed: Jammed,
 }
@@ -49,11 +52,13 @@ impl<'r> MultipleAccess<'r> {
         let emissions = Emission::all(run.truth.keys());
         let signals: BTreeSet<&'static Signal> = emissions.iter().map(|one| one.signal).collect();
         let (layers, sampler) = (run.scene.waveform, run.sampler(0));
-        let waveform = |signal| Some((signal, Waveform::in_samples(signal, layers, &sampler)?));
-        let waveforms: HashMap<&Signal, Waveform> = signals.into_iter().filter_map(waveform).collect();
+        let waveform = |signal| Some((signal, Waveform::sent(signal, layers)?));
+        let waveforms: HashMap<&'static Signal, Waveform> = signals.into_iter().filter_map(waveform).collect();
+        let kept = waveforms.iter().map(|(signal, waveform)| (*signal, waveform.power(&sampler))).collect();
         Self {
             run,
-            kappa_s: separations(run, &emissions, &waveforms),
+            kappa_s: separations(run, &emissions, &waveforms, &kept),
+            kept,
             sums_hz: RefCell::new(run.cn0_sums_hz.finder()),
             jammed: jammed(run, &emissions, &waveforms),
         }
@@ -84,7 +89,11 @@ impl<'r> MultipleAccess<'r> {
     pub fn white_hz(&self, sample: u64, link: Link, own_hz: f64) -> f64 {
         let own = Emission::of(link);
         let met = self.kappa_s.get(&own).map_or(&[][..], Vec::as_slice).iter().map(|(emission, _)| *emission);
-        let all_hz: f64 = met.filter_map(|emission| self.sums_hz.borrow_mut().get(sample, emission)).sum();
+        let in_samples = |emission: Emission| {
+            let kept = self.kept.get(emission.signal).copied().unwrap_or(1.0);
+            Some(kept * self.sums_hz.borrow_mut().get(sample, emission)?)
+        };
+        let all_hz: f64 = met.filter_map(in_samples).sum();
         let thermal = if self.run.scene.noise { 1.0 } else { 0.0 };
         let jammed = self.jammed.get(sample, own);
         own_hz / (thermal + all_hz / self.run.rate_hz(link.signal) + jammed)
@@ -95,11 +104,10 @@ impl<'r> MultipleAccess<'r> {
 fn separations(
     run: &Run,
     emissions: &BTreeSet<Emission>,
-    waveforms: &HashMap<&Signal, Waveform>,
+    waveforms: &HashMap<&'static Signal, Waveform>,
+    kept: &HashMap<&'static Signal, f64>,
 ) -> HashMap<Emission, Vec<(Emission, f64)>> {
     let (sampler, rate_hz) = (run.sampler(0), run.scene.sample_rate_hz);
-    let kept: HashMap<&Signal, f64> =
-        waveforms.keys().map(|signal| (*signal, Waveform::kept(signal, run.scene.waveform, &sampler))).collect();
     // Spectra are even: κ depends on the size of the distance, and on the pair in either order.
     let mut known: HashMap<(&str, &str, u64), f64> = HashMap::new();
     let mut all: HashMap<Emission, Vec<(Emission, f64)>> = HashMap::new();
@@ -120,7 +128,7 @@ fn separations(
     all
 }
 
-fn jammed(run: &Run, emissions: &BTreeSet<Emission>, waveforms: &HashMap<&Signal, Waveform>) -> Jammed {
+fn jammed(run: &Run, emissions: &BTreeSet<Emission>, waveforms: &HashMap<&'static Signal, Waveform>) -> Jammed {
     if run.interference.is_empty() {
         return Jammed::default();
     }

@@ -260,7 +260,7 @@ fn smooth(run: &Run, front_end: &FrontEnd<'_>, sent: &[Sent], points: usize, n0:
         let lines_hz: f64 = (one.signal.components.iter())
             .map(|component| component.power_share * component.power_share / component.period_s())
             .sum();
-        let waveform = Waveform::in_samples(one.signal, run.scene.waveform, &front_end.sampler)?;
+        let waveform = Waveform::sent(one.signal, run.scene.waveform)?;
         // Over half a period of the samples' spectrum, which is even.
         let step_hz = rate_hz / points as f64;
         let at = |index: usize| waveform.sampled(&front_end.sampler, index as f64 * step_hz);
@@ -371,8 +371,8 @@ fn jammers<'a>(
         let one = Source { jn0_hz: 1.0, ..source.clone() };
         let mirrored = front_end.is_real();
         let unit = |row: &PsdRow| {
-            let image = if mirrored { jamming::density(&one, -row.frequency_hz, bin_hz) } else { 0.0 };
-            jamming::density(&one, row.frequency_hz, bin_hz) + image
+            let at = |f_hz: f64| jamming::density(&one, f_hz, bin_hz, &front_end.sampler);
+            at(row.frequency_hz) + if mirrored { at(-row.frequency_hz) } else { 0.0 }
         };
         Some(Jammer {
             source,

@@ -49,6 +49,12 @@ impl Stated {
         edges_db + 10.0 * libm::log10(1.0 + data_s * libm::pow(10.0, 0.1 * effective_dbhz))
     }
 
+    /// C/N0 that a receiver should state, dB-Hz, for the one at the antenna with all other noise.
+    pub fn expected_dbhz(&self, link: Link, effective_dbhz: f64) -> f64 {
+        let passed_dbhz = effective_dbhz - self.front_end_db(link.signal);
+        passed_dbhz - self.cost_db(link, passed_dbhz)
+    }
+
     /// The C/N0 with all other noise of which a satellite's is stated: what its loops have.
     pub fn effective_dbhz(&self, link: Link, stated_dbhz: f64) -> f64 {
         // Costs grow by less than a tenth of what C/N0 does.

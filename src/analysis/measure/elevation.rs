@@ -12,6 +12,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::error::JudgeError;
+use crate::expect::stated::Stated;
 use crate::measure::errors::{Errors, Link, SignalError};
 use crate::read::{Numbers, Run};
 use crate::statistics::Sum;
@@ -107,7 +108,7 @@ pub struct Elevations {
 /// [`JudgeError::Read`] where spilled rows cannot be read, and those of `see`.
 pub fn points(
     run: &Run,
-    errors: &Errors,
+    (errors, stated): (&Errors, &Stated),
     link: Link,
     mut see: impl FnMut(Point) -> Result<(), JudgeError>,
 ) -> Result<(), JudgeError> {
@@ -126,7 +127,7 @@ pub fn points(
             code_m: common.of_several(row.sample).map(|common_m| row.code_m - common_m),
             carrier_cycles: row.carrier_cycles,
             doppler_hz: row.doppler_hz,
-            cn0_db: row.cn0_dbhz - row.cn0_effective_dbhz,
+            cn0_db: row.cn0_dbhz - stated.expected_dbhz(link, row.cn0_effective_dbhz),
             multipath_m,
         })?;
     }
@@ -138,13 +139,13 @@ impl Elevations {
     ///
     /// # Errors
     /// As [`points`].
-    pub fn measure(run: &Run, errors: &Errors) -> Result<Self, JudgeError> {
+    pub fn measure(run: &Run, errors: &Errors, stated: &Stated) -> Result<Self, JudgeError> {
         let directory = errors.signals.directory();
         let mut satellites = Vec::new();
         let mut layers: BTreeMap<i64, Layer> = BTreeMap::new();
         for link in errors.signals.keys() {
             let mut values = Values::new(directory);
-            points(run, errors, link, |point| {
+            points(run, (errors, stated), link, |point| {
                 let number = (point.elevation_deg / BAND_DEG).floor() as i64;
                 layers.entry(number).or_insert_with(|| Layer::new(directory)).add(&point)?;
                 values.add(&point)

@@ -17,6 +17,7 @@ use serde::Serialize;
 use crate::error::JudgeError;
 use crate::expect::loops::{self, update_s};
 use crate::expect::multiple_access::MultipleAccess;
+use crate::expect::stated::Stated;
 use crate::expect::theory::pll;
 use crate::measure::errors::{Errors, Link, SLIP_CYCLES, SignalError, first_jump_of};
 use crate::measure::jitter::{Settings, motion_error_deg};
@@ -240,6 +241,7 @@ fn undeclared(all: &[Carrier], declared: &[u64]) -> Vec<(u64, f64)> {
 struct Evidence<'r> {
     run: &'r Run,
     access: MultipleAccess<'r>,
+    stated: Stated,
     settings: Option<Settings>,
     least_dbhz: f64,
     interval_s: f64,
@@ -287,6 +289,7 @@ impl<'r> Evidence<'r> {
         Self {
             run,
             access: MultipleAccess::new(run),
+            stated: Stated::of(run),
             settings: Settings::of(run),
             least_dbhz: run.tracking_setting("cn0_threshold_dbhz").unwrap_or(f64::NEG_INFINITY),
             interval_s: run.truth_interval_s(),
@@ -334,10 +337,10 @@ impl<'r> Evidence<'r> {
         slip.motion_deg = inside.map(|(_, error)| error.abs()).reduce(f64::max);
         let carrier = self.settings.map(|_| loops::Carrier::in_run(run, link.signal));
         let three_deg = |rad: f64| 3.0 * rad.to_degrees();
-        slip.noise_3sigma_deg = slip
-            .cn0_dbhz
-            .zip(carrier)
-            .map(|(dbhz, carrier)| three_deg(carrier.jitter_rad(libm::pow(10.0, 0.1 * dbhz))));
+        slip.noise_3sigma_deg = slip.cn0_dbhz.zip(carrier).map(|(dbhz, carrier)| {
+            let stated_dbhz = self.stated.expected_dbhz(link, dbhz);
+            three_deg(carrier.jitter_rad(libm::pow(10.0, 0.1 * stated_dbhz)))
+        });
         // No row within an interval and a half before: it has set, or something obstructs it.
         let before = rows.iter().rev().find(|row| row.sample <= sample);
         let absent = before.is_none_or(|row| time_s - run.time_s(row.sample) > 1.5 * self.interval_s);

@@ -57,14 +57,14 @@ impl Summary {
             writeln!(f, "              {} issue {}: {} decoded as {}", row.sv, row.issue, row.parameter, row.raw)?;
         }
         let details = &self.details;
-        if let (Some(measured), Some(effective), Some(set)) =
-            (details.cn0_measured_dbhz, details.cn0_effective_dbhz, details.cn0_true_dbhz)
+        if let (Some(measured), Some(expected), Some(set)) =
+            (details.cn0_measured_dbhz, details.cn0_expected_dbhz, details.cn0_true_dbhz)
         {
             writeln!(
                 f,
-                "C/N0          {measured:.2} dB-Hz measured, {effective:.2} expected: {set:.2} set, less the other \
-                 satellites' codes{}",
-                if self.jammed { " and interference" } else { "" }
+                "C/N0          {measured:.2} dB-Hz measured, {expected:.2} expected: {set:.2} at the antenna, less \
+                 front end{} and the other satellites' codes",
+                if self.jammed { ", interference" } else { "" }
             )?;
         }
         if self.details.unmatched_observations > 0 {

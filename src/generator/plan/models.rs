@@ -2,10 +2,11 @@
 
 use super::Model;
 use crate::scene::{CodeEdge, Scene, is_outside};
+use crate::stream::Kept;
 use gnss::signal::SIGNALS;
 
 /// Everything that a scenario can switch on, and whether this one does.
-pub(super) fn models(scene: &Scene) -> Vec<Model> {
+pub(super) fn models(scene: &Scene, kept: &Kept) -> Vec<Model> {
     let mut models: Vec<Model> = scene
         .effects
         .iter()
@@ -79,13 +80,15 @@ pub(super) fn models(scene: &Scene) -> Vec<Model> {
     }
     let rounds = scene.metadata.format.full_scale_lsb().is_some();
     add("quantiser", rounds, format!("format {}", scene.metadata.format));
+    let losses: Vec<String> = kept.losses_db().map(|(name, db)| format!("{db:.2} dB of {name}")).collect();
+    let losses = format!("takes from the C/N0 at the antenna {}", losses.join(", "));
     add(
         "chip edges",
         scene.fidelity.code_edge != CodeEdge::Nearest,
         match scene.fidelity.code_edge {
             CodeEdge::Nearest => "nearest sample: biased by up to half a sample".to_owned(),
-            CodeEdge::Area => "mean of the chip over the sample's interval".to_owned(),
-            CodeEdge::BandLimited => "through a low-pass filter below half the rate".to_owned(),
+            CodeEdge::Area => format!("mean of the chip over the sample's interval: {losses}"),
+            CodeEdge::BandLimited => format!("through a low-pass filter below half the rate: {losses}"),
         },
     );
     models

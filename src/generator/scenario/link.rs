@@ -19,7 +19,7 @@ use gnss::signal::Signal;
 pub enum Power {
     /// One C/N0 for all satellites except those listed.
     Fixed {
-        /// C/N0 of all satellites without a value of their own, in dB-Hz.
+        /// C/N0 at the antenna of all satellites without a value of their own, in dB-Hz.
         cn0_dbhz: f64,
         /// Satellites with a C/N0 of their own, in dB-Hz.
         satellites: Vec<(Sv, f64)>,

@@ -10,7 +10,9 @@ use crate::scene::{CodeEdge, Scene};
 use crate::stage::Block;
 use crate::synth::band::Filter;
 use crate::synth::isa::Level;
-use crate::synth::{Kernel, RUN_SAMPLES};
+use crate::synth::waveform::Waveform;
+use crate::synth::{Edge, Kernel, RUN_SAMPLES};
+use gnss::signal::{Component, Signal};
 
 /// Statistics of a segment of the scene's samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -25,13 +27,51 @@ pub(crate) struct Stretch {
     pub sample_s: f64,
 }
 
+/// Share of each signal's power at the antenna that a scene's chip edges keep in the samples.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Kept(Vec<(&'static Signal, f64)>);
+
+impl Kept {
+    /// Of the first satellite that sends each signal: others differ by what their codes do, 0.05 dB of C/A.
+    pub fn of(scene: &Scene) -> Self {
+        let filter = limiting(scene);
+        let (edge, rate_hz) = (edge(scene, filter.as_ref()), scene.clock.rate.hz());
+        let all = scene.signals.iter().map(|&signal| (signal, kept(signal, edge, rate_hz).unwrap_or(1.0)));
+        Self(all.collect())
+    }
+
+    /// That share of a signal.
+    pub fn share(&self, signal: &Signal) -> f64 {
+        self.0.iter().find(|(own, _)| own.name == signal.name).map_or(1.0, |(_, share)| *share)
+    }
+
+    /// Names of the signals with what edges take of them, in dB.
+    pub fn losses_db(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
+        self.0.iter().map(|(signal, share)| (signal.name, -10.0 * libm::log10(*share)))
+    }
+}
+
+/// Each component keeps its own share; `None` where no satellite has a code.
+fn kept(signal: &'static Signal, edge: Edge<'_>, rate_hz: f64) -> Option<f64> {
+    let sv = signal.satellites().next()?;
+    let component = |(index, component): (usize, &Component)| {
+        let waveform = Waveform::new(signal.link(sv), index).ok()??;
+        Some(component.power_share * waveform.kept(edge, rate_hz))
+    };
+    signal.components.iter().enumerate().map(component).sum()
+}
+
+/// The filter of a scene's band-limited edges.
+fn limiting(scene: &Scene) -> Option<Filter> {
+    (scene.fidelity.code_edge == CodeEdge::BandLimited).then(|| Filter::new(scene.cutoff_cps()))
+}
+
 /// Makes the samples of `stretches`, which ascend, as the stream does, and measures them.
 ///
 /// # Errors
 /// Those of [`super::Stream::next`].
 pub(crate) fn measured(scene: &Scene, stretches: &[Range<u64>]) -> Result<Vec<Stretch>, GenerateError> {
-    let limited = scene.fidelity.code_edge == CodeEdge::BandLimited;
-    let filter = limited.then(|| Filter::new(scene.cutoff_cps()));
+    let filter = limiting(scene);
     let edge = edge(scene, filter.as_ref());
     let mut transmitters = transmitters(scene, edge)?;
     let kernel = Kernel { edge, arithmetic: scene.fidelity.carrier, level: Level::detect() };

@@ -112,13 +112,8 @@ pub struct Kernel<'a> {
 }
 
 impl Edge<'_> {
-    /// Factor that brings the mean power of the waveform to one: 1/√[`Edge::power`].
-    pub fn gain(&self, correlation: &[f64], step: f64) -> f64 {
-        1.0 / self.power(correlation, step).sqrt()
-    }
-
-    /// Mean power of a waveform of autocorrelation `correlation` (by whole steps, its power at lag 0) at
-    /// `step` code steps per sample.
+    /// Mean power in samples of a waveform of autocorrelation `correlation` (by whole steps, its power at lag
+    /// 0) at `step` code steps per sample.
     pub fn power(&self, correlation: &[f64], step: f64) -> f64 {
         match self {
             Edge::Nearest => correlation.first().copied().unwrap_or(1.0),

@@ -165,7 +165,7 @@ impl Waveform {
     }
 
     /// The sequences of some of its layers for samples at `rate_hz`, as they are in the whole waveform when
-    /// that has a mean power of one behind `edge`.
+    /// that has a mean power of one as sent. What `edge` takes of it ([`Waveform::kept`]) is lost.
     ///
     /// # Errors
     /// [`WaveformError`] for more than 15 steps per sample, and for a code whose periods cannot be counted.
@@ -178,7 +178,8 @@ impl Waveform {
                 return Err(WaveformError::Rate { signal, component, layer: number, steps_hz, rate_hz, least_hz });
             }
         }
-        let gain = 1.0 / self.power(edge, rate_hz).sqrt();
+        let sent = self.power(Edge::Nearest, rate_hz);
+        let gain = 1.0 / planted!("generator.synth.edge_share", sent, self.power(edge, rate_hz)).sqrt();
         let made = match edge {
             Edge::BandLimited(filter) => self.filtered(layers, filter, rate_hz),
             Edge::Nearest | Edge::Area => self.sequences(layers),
@@ -285,6 +286,13 @@ impl Waveform {
     pub fn power(&self, edge: Edge<'_>, rate_hz: f64) -> f64 {
         let step = self.component.chip_rate_hz * self.component.steps_per_chip() as f64 / rate_hz;
         edge.power(&self.correlation(edge.lags(step)), step)
+    }
+
+    /// Share of its power as sent that samples have behind `edge`: all with edges at the nearest sample,
+    /// 1 − d/3 of a random code of d ≤ 1 steps a sample with means, with band-limited ones what lies below
+    /// the filter's cut-off.
+    pub fn kept(&self, edge: Edge<'_>, rate_hz: f64) -> f64 {
+        self.power(edge, rate_hz) / self.power(Edge::Nearest, rate_hz)
     }
 
     /// Cyclic correlation of the waveform with itself at its first `lags` lags of whole steps that all layers

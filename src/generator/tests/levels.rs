@@ -67,8 +67,12 @@ fn a_satellite_and_a_jammer_have_the_levels_that_their_powers_over_noise_have_in
     assert!(found.noise_dbfs.is_none() && found.strongest.is_some_and(|(_, cn0)| (cn0 - 70.0).abs() < 1e-9), "{found}");
     assert!((found.satellite_dbfs(70.0) + 7.283).abs() < 1e-3, "{}", found.satellite_dbfs(70.0));
     let file_dbfs = 20.0 * libm::log10(file_rms_lsb(&scene(one)) / 127.0);
-    // Area edges keep the mean power of random chips; a code's own transitions differ by 0.05 dB.
-    assert!((file_dbfs + 7.283).abs() < 0.1 && (found.sum_dbfs - file_dbfs).abs() < 0.05, "{file_dbfs} {found}");
+    // Area edges leave 1 − d/3 of random chips, −0.610 dB; a code's own transitions differ by 0.05 dB.
+    let kept_db = 10.0 * libm::log10(1.0 - 1.023 / 2.6 / 3.0);
+    assert!(
+        (file_dbfs + 7.283 - kept_db).abs() < 0.1 && (found.sum_dbfs - file_dbfs).abs() < 0.05,
+        "{file_dbfs} {found}"
+    );
     // A tone 20 dB over 45 dB-Hz: 28 · √(10^6.5 / 2.6e6) = 30.88 LSB, −12.282 dB.
     let jammed = format!(
         "{NO_SATELLITE}[power]\ncn0_dbhz = 45\n[front_end]\nsample_rate_hz = 2.6e6\nformat = \"ci8\"\nnoise_lsb = 28\n\

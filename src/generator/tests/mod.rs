@@ -1,6 +1,7 @@
 //! Laws that need the whole generator: rooms below compose scenes and generate samples here.
 
 mod dynamics;
+mod edges;
 mod exchange;
 mod fronts;
 mod levels;

@@ -59,7 +59,7 @@ static LAYERED: Signal = Signal {
     }],
 };
 
-fn name(edge: Edge<'_>) -> &'static str {
+pub(super) fn name(edge: Edge<'_>) -> &'static str {
     match edge {
         Edge::Nearest => "nearest",
         Edge::Area => "area",
@@ -72,7 +72,7 @@ fn every_signal() -> impl Iterator<Item = &'static Signal> {
 }
 
 /// A component as its tables define it, on steps that divide all pulses.
-struct Definition {
+pub(super) struct Definition {
     component: &'static Component,
     behind_s: i64,
     per_chip: i128,
@@ -85,7 +85,7 @@ struct Definition {
 }
 
 impl Definition {
-    fn new(signal: &'static Signal, index: usize, number: u8) -> Self {
+    pub(super) fn new(signal: &'static Signal, index: usize, number: u8) -> Self {
         let component = &signal.components[index];
         let mut definition = Self {
             component,
@@ -134,7 +134,7 @@ impl Definition {
     }
 
     /// The sample that `edge` makes at `at`, before its gain, and the distance of the next edge in steps.
-    fn sample(&self, edge: Edge<'_>, at: Epoch, rate_hz: f64) -> (Complex64, f64) {
+    pub(super) fn sample(&self, edge: Edge<'_>, at: Epoch, rate_hz: f64) -> (Complex64, f64) {
         let (step, fraction) = self.place(at);
         let per_sample = self.rate_hz() / rate_hz;
         let value = match edge {
@@ -159,9 +159,9 @@ impl Definition {
     }
 }
 
-/// A waveform's sequences behind an edge, and the gain that they have there.
+/// A waveform's sequences behind an edge, and the gain that they have.
 fn voices(waveform: &Waveform, edge: Edge<'_>, rate_hz: f64) -> (Vec<Voice>, f64) {
-    (waveform.voices(Layers::Whole, edge, rate_hz).unwrap(), 1.0 / waveform.power(edge, rate_hz).sqrt())
+    (waveform.voices(Layers::Whole, edge, rate_hz).unwrap(), 1.0 / waveform.power(Edge::Nearest, rate_hz).sqrt())
 }
 
 /// The sequences' sum at `samples` instants `1 / rate_hz` apart from `start` on, without gain.
@@ -282,7 +282,7 @@ fn kernel(edge: Edge<'_>) -> Kernel<'_> {
 }
 
 #[test]
-fn every_component_has_unit_mean_power_with_every_edge() {
+fn every_component_has_the_mean_power_that_its_edges_keep() {
     let filter = Filter::new(0.45);
     for signal in every_signal() {
         for index in 0..signal.components.len() {
@@ -300,7 +300,8 @@ fn every_component_has_unit_mean_power_with_every_edge() {
                     Edge::Nearest => 0.02,
                     _ => 0.04,
                 };
-                assert!((mean - 1.0).abs() < allowed, "{signal} {index} {} {rate_hz}: {mean}", name(edge));
+                let kept = waveform.kept(edge, rate_hz);
+                assert!((mean / kept - 1.0).abs() < allowed, "{signal} {index} {} {rate_hz}: {mean}", name(edge));
             }
         }
     }
@@ -326,8 +327,6 @@ fn the_spectrum_of_samples_is_that_of_the_component() {
     for signal in SYNTHETIC.into_iter().chain([&L1_CA]) {
         for (index, component) in signal.components.iter().enumerate() {
             let waveform = Waveform::new(signal.link(Sv { system: signal.system, number: 3 }), index).unwrap().unwrap();
-            // The density counts where the code is not zero.
-            let power = waveform.power(Edge::Area, RATE_HZ) / waveform.power(Edge::Nearest, RATE_HZ);
             let made = stretches(&waveform, kernel(Edge::Area), RATE_HZ, STRETCHES, 7.317_31e-3);
             // Of one side of a sub-carrier the shape is the mean of this side and the other.
             let sides: &[f64] = if component.tone().is_some() { &[1.0, -1.0] } else { &[1.0] };
@@ -336,7 +335,7 @@ fn the_spectrum_of_samples_is_that_of_the_component() {
                 let (mut found, mut expected) = (0.0, 0.0);
                 for line in 0..LINES {
                     let hz = width_hz * (f64::from(band) + (f64::from(line) + 0.37) / f64::from(LINES));
-                    expected += folded_density(&shape, hz, RATE_HZ) / power / f64::from(LINES);
+                    expected += folded_density(&shape, hz, RATE_HZ) / f64::from(LINES);
                     let windows = || made.iter().filter_map(|samples| samples.get(..WINDOW));
                     for (side, window) in sides.iter().flat_map(|side| windows().map(move |window| (side, window))) {
                         let turn = Complex64::from_polar(1.0, -TAU * side * hz / RATE_HZ);
@@ -360,7 +359,7 @@ fn the_spectrum_of_samples_is_that_of_the_component() {
                 // too.
                 let spread =
                     shape.chip_s() / window_s * folded_density(&shape, 0.4 / shape.step_s(), RATE_HZ).max(expected);
-                let allowed = 5.0 / (times * lines).sqrt() * expected + spread / power;
+                let allowed = 5.0 / (times * lines).sqrt() * expected + spread;
                 let error = (found - expected).abs();
                 assert!(error < allowed, "{signal} {index}, band {band}: {found} for {expected} ± {allowed}");
             }
@@ -462,7 +461,7 @@ fn catalogue(signal: &'static Signal) -> Catalogue {
 }
 
 /// A scene with that signal alone in the middle of its band.
-fn scene(signal: &'static Signal, edge: &str, rate_hz: f64) -> Scene {
+pub(super) fn scene(signal: &'static Signal, edge: &str, rate_hz: f64) -> Scene {
     let text = format!(
         "name = \"signals\"\nstart = 2010-07-01T08:12:30\nseed = 3\nduration_s = 0.1\n[motion]\nkind = \"static\"\n\
          latitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n[front_end]\nsample_rate_hz = {rate_hz:e}\n\
@@ -479,7 +478,7 @@ fn scene(signal: &'static Signal, edge: &str, rate_hz: f64) -> Scene {
 }
 
 /// The samples of a part of a scene, and the satellites that it reports.
-fn samples(scene: &Scene, part: std::ops::Range<u64>) -> (Vec<Complex64>, Vec<Sv>) {
+pub(super) fn samples(scene: &Scene, part: std::ops::Range<u64>) -> (Vec<Complex64>, Vec<Sv>) {
     let directory = tempfile::tempdir().unwrap();
     let mut writer = truth::Writer::create(directory.path()).unwrap();
     let mut bytes = Vec::new();
@@ -512,12 +511,8 @@ fn a_scene_is_the_sum_of_its_satellites_definitions() {
                     let components = signal.components.iter().enumerate();
                     components
                         .map(|(index, component)| {
-                            let waveform = Waveform::new(signal.link(*sv), index).unwrap().unwrap();
                             let definition = Definition::new(signal, index, sv.number);
-                            // Unit power behind the edge; the definition has it before.
-                            let before = waveform.power(Edge::Nearest, RATE_HZ);
-                            let gain = (component.power_share * before / waveform.power(edge, RATE_HZ)).sqrt();
-                            (definition, gain)
+                            (definition, component.power_share.sqrt())
                         })
                         .collect()
                 })

@@ -23,6 +23,7 @@ use crate::correlator::Case;
 use crate::{expect, limits};
 use analysis::JudgeError;
 use analysis::Summary;
+use analysis::expect::spectrum::edge_cost_db;
 use analysis::expect::theory::pll;
 use analysis::measure::clock::Clock;
 use analysis::measure::errors::Errors;
@@ -208,7 +209,9 @@ fn figures(here: &Path, truth: &Path, ear: &Ear, keep: &[String]) -> Result<Vec<
     let fixes = Fixes::of(&run, &errors)?;
     // Theory is of one channel: where signals or components differ it has nothing to say.
     let channel = alone(&run).map(|signal| {
-        limits::channel_of(signal, &ear.settings.tracking, Mode::Phase, summary.details.cn0_effective_dbhz)
+        let edges_db = edge_cost_db(&run, signal);
+        let cn0_dbhz = summary.details.cn0_effective_dbhz.map(|dbhz| dbhz - edges_db);
+        limits::channel_of(signal, &ear.settings.tracking, Mode::Phase, cn0_dbhz)
     });
     let of = |name: &String| match name.as_str() {
         "acquisition.detected_share" => first_search(&run).0,

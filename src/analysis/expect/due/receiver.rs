@@ -5,10 +5,14 @@
 //! states none is taken to have the defaults of a common one. Losses of the search are its worst: half a cell
 //! of code, half a step of Doppler, and signs that turn within its sums.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use serde_json::Value;
 
 use crate::expect::followed::{Entry, efficiency};
 use crate::expect::loops::Carrier;
+use crate::expect::spectrum;
 use crate::expect::theory::clock::PowerLaw;
 use crate::expect::theory::detection;
 use crate::read::Run;
@@ -57,8 +61,9 @@ pub struct Receiver {
     pub ionosphere_wait_s: f64,
     /// True if the receiver uses satellites by their reduced elements.
     pub reduced_elements: bool,
-    /// Loss of every signal in the front end, dB.
+    /// Loss of the signal in the front end by filter, converter and edges between samples, dB.
     pub cost_db: f64,
+    costs_db: Arc<BTreeMap<&'static Signal, f64>>,
 }
 
 impl Receiver {
@@ -66,12 +71,19 @@ impl Receiver {
     /// the truth's first one.
     pub fn of(run: &Run) -> Self {
         let oscillator = run.scene.oscillator.map(|noise| PowerLaw { h: noise.h });
-        Self { cost_db: front_end_cost_db(run), ..Self::new(&run.receiver, oscillator, run.signals.first().copied()) }
+        let costs_db = front_end_costs_db(run);
+        let first = run.signals.first().copied();
+        Self::new(&run.receiver, oscillator, first).with(Arc::new(costs_db), first)
     }
 
     /// Expectations for another signal.
     pub fn of_signal(&self, signal: &'static Signal) -> Self {
-        Self { cost_db: self.cost_db, ..Self::new(&self.stated, self.oscillator, Some(signal)) }
+        Self::new(&self.stated, self.oscillator, Some(signal)).with(Arc::clone(&self.costs_db), Some(signal))
+    }
+
+    fn with(self, costs_db: Arc<BTreeMap<&'static Signal, f64>>, signal: Option<&'static Signal>) -> Self {
+        let cost_db = signal.and_then(|signal| costs_db.get(signal).copied()).unwrap_or(0.0);
+        Self { cost_db, costs_db, ..self }
     }
 
     fn new(stated: &Value, oscillator: Option<PowerLaw>, signal: Option<&'static Signal>) -> Self {
@@ -116,6 +128,7 @@ impl Receiver {
             requires_ionosphere: broadcast && required,
             reduced_elements: value("position", "reduced_elements").and_then(Value::as_bool).unwrap_or(false),
             cost_db: 0.0,
+            costs_db: Arc::default(),
             ionosphere_wait_s: if broadcast { number("position", "ionosphere_wait_s", 0.0) } else { 0.0 },
         }
     }
@@ -228,15 +241,22 @@ fn turns(signal: &'static Signal, component: &Component, coherent_s: f64) -> (f6
     }
 }
 
-/// Loss of every signal in a converter of few bits (Van Vleck; optimal steps, white noise), in dB.
-fn front_end_cost_db(run: &Run) -> f64 {
-    let bits = run.scene.converter().map(|converter| converter.bits);
-    match bits {
-        Some(1) => 1.96,
-        Some(2) => 0.55,
-        Some(3) => 0.17,
-        _ => 0.0,
+/// What filter, converter and edges between samples take from each signal, in dB; of a truth that does not
+/// state its noise, the loss of a converter of few bits (Van Vleck; optimal steps, white noise).
+fn front_end_costs_db(run: &Run) -> BTreeMap<&'static Signal, f64> {
+    let mut costs_db = spectrum::costs_db(run);
+    for (signal, cost_db) in &mut costs_db {
+        *cost_db += spectrum::edge_cost_db(run, *signal);
+        if run.scene.noise_lsb.is_none() {
+            *cost_db += match run.scene.converter().map(|converter| converter.bits) {
+                Some(1) => 1.96,
+                Some(2) => 0.55,
+                Some(3) => 0.17,
+                _ => 0.0,
+            };
+        }
     }
+    costs_db
 }
 
 #[cfg(test)]

@@ -172,10 +172,10 @@ pub struct Observables {
     pub carrier_rms_cycles: Option<f64>,
     /// Root mean square of the Doppler errors, Hz.
     pub doppler_rms_hz: Option<f64>,
-    /// Mean of measured minus expected: the scene's C/N0 with other satellites and interference counted as
-    /// noise (see [`crate::expect::multiple_access`]), less what edges between samples and the
-    /// replica cost ([`crate::expect::spectrum::edge_cost_db`]) and what data in phase with a pilot
-    /// do. Losses of filter and quantiser are not counted.
+    /// Mean of measured minus expected: the scene's C/N0, which is at the antenna, with other satellites and
+    /// interference counted as noise (see [`crate::expect::multiple_access`]), less what filter and converter
+    /// ([`crate::expect::spectrum::costs_db`]), edges between samples and the replica cost
+    /// ([`crate::expect::spectrum::edge_cost_db`]) and what data in phase with a pilot do.
     pub cn0_bias_db: Option<f64>,
 }
 
@@ -250,10 +250,12 @@ pub struct Details {
     pub doppler_hz: Option<Spread>,
     /// Errors of C/N0, dB.
     pub cn0_db: Option<Spread>,
-    /// Mean of the C/N0 that the scene sets, dB-Hz.
+    /// Mean of the C/N0 that the scene sets at the antenna, dB-Hz.
     pub cn0_true_dbhz: Option<f64>,
     /// Mean C/N0 with other satellites and interference counted as noise, dB-Hz.
     pub cn0_effective_dbhz: Option<f64>,
+    /// Mean of the C/N0 that the receiver should measure, less what front end and replica cost too, dB-Hz.
+    pub cn0_expected_dbhz: Option<f64>,
     /// Mean of the C/N0 that the receiver measures, dB-Hz.
     pub cn0_measured_dbhz: Option<f64>,
     /// Errors of the fixes to the east, metres.
@@ -486,22 +488,24 @@ fn observables(
     let doppler_rms_hz = doppler.rms()?;
     details.doppler_hz = doppler.spread()?;
     drop(doppler);
-    let expected_dbhz = |link: &Link, dbhz: f64| dbhz - stated.cost_db(*link, dbhz);
-    let cn0 = errors.pooled_by(signal, |link, error| error.cn0_dbhz - expected_dbhz(link, error.cn0_effective_dbhz))?;
+    let expected_dbhz = |link: &Link, error: &SignalError| stated.expected_dbhz(*link, error.cn0_effective_dbhz);
+    let cn0 = errors.pooled_by(signal, |link, error| error.cn0_dbhz - expected_dbhz(link, error))?;
     details.cn0_db = cn0.spread()?;
-    let (mut means, [mut truth, mut effective, mut measured]) = (Vec::new(), [Sum::default(); 3]);
+    let (mut means, [mut truth, mut effective, mut expected, mut measured]) = (Vec::new(), [Sum::default(); 4]);
     for link in errors.signals.keys().filter(|link| signal.is_none_or(|signal| link.signal == signal)) {
         let mut code_m = Sum::default();
         errors.signals.each(link, |row| {
             code_m.add(row.code_m);
             truth.add(row.cn0_true_dbhz);
             effective.add(row.cn0_effective_dbhz);
+            expected.add(expected_dbhz(&link, &row));
             measured.add(row.cn0_dbhz);
         })?;
         means.extend(code_m.mean());
     }
     details.cn0_true_dbhz = truth.mean();
     details.cn0_effective_dbhz = effective.mean();
+    details.cn0_expected_dbhz = expected.mean();
     details.cn0_measured_dbhz = measured.mean();
     Ok(Observables {
         pseudorange_rms_m,

@@ -127,10 +127,13 @@ fn what_signals_differ_by_is_no_error_and_each_disturbs_the_other() {
         let row = both.signals.rows(link).unwrap()[0];
         let mut levels = run.cn0_sums_hz.finder();
         let mut sum_hz = |signal: &'static Signal| levels.get(row.sample, Emission::of(signal.link(link.sv))).unwrap();
-        let sums_hz = sum_hz(&L1_CA) + sum_hz(&LONG_BOC);
+        let [own_kept, kept] = [own, other].map(|one| one.power(&sampler));
+        let of_both = [(&L1_CA, &code), (&LONG_BOC, &boc)];
+        let sums_hz: f64 = of_both.map(|(signal, one)| one.power(&sampler) * sum_hz(signal)).iter().sum();
         let sum_hz = sum_hz(signal);
         let own_hz = linear_hz(row.cn0_true_dbhz);
-        let lost = 1.0 + kappa(own, own) * (sum_hz - own_hz) + kappa(own, other) * sum_hz;
+        // Of the powers at the antenna the samples have what edges leave.
+        let lost = 1.0 + own_kept * kappa(own, own) * (sum_hz - own_hz) + kept * kappa(own, other) * sum_hz;
         let found = linear_hz(row.cn0_true_dbhz - row.cn0_effective_dbhz);
         assert!((found / lost - 1.0).abs() < 1e-9, "{signal}: {found} {lost}");
         // In units of all power in the samples its spectrum does not matter.

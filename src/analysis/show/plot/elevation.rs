@@ -11,7 +11,7 @@ use crate::show::plot::sketch::Sketch;
 pub fn elevation(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let links = observed(judged);
     let points = |link, of: &dyn Fn(&Point) -> (f64, f64), see: See<'_>| {
-        points(judged.run, judged.errors, link, |point| {
+        points(judged.run, (judged.errors, &judged.summary.details.stated), link, |point| {
             let (x, y) = of(&point);
             see(x, y);
             Ok(())

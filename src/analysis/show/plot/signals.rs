@@ -138,32 +138,33 @@ pub(super) fn of_observations(
     judged.errors.signals.each(link, |row| see(row.time_s, of(&row)))
 }
 
-/// C/N0 over time as measured and as it was, and the means side by side.
+/// C/N0 over time as measured and as expected, and the means side by side.
 pub fn cn0(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let links = observed(judged);
-    // Under interference what is expected is far from what is set.
-    let (word, reference): (&str, fn(&SignalError) -> f64) = if judged.summary.jammed {
-        ("expected", |row| row.cn0_effective_dbhz)
-    } else {
-        ("set", |row| row.cn0_true_dbhz)
+    // The C/N0 that a scene sets is at the antenna: front end and interference take their part.
+    let stated = &judged.summary.details.stated;
+    let reference = |link: Link, row: &SignalError| stated.expected_dbhz(link, row.cn0_effective_dbhz);
+    let chart = |title: &str, y_label, least, of: &dyn Fn(Link, &SignalError) -> f64| {
+        over_time(judged, &links, &Frame { title, y_label, least }, |link, see| {
+            of_observations(judged, link, |row| of(link, row), see)
+        })
     };
-    let chart = |title: &str, y_label, least, of: &dyn Fn(&SignalError) -> f64| {
-        over_time(judged, &links, &Frame { title, y_label, least }, |link, see| of_observations(judged, link, of, see))
-    };
-    let title = format!("C/N0 as measured (points) and as {word} (lines)");
-    let mut above = chart(&title, "C/N0 (dB-Hz)", 4.0, &|row| row.cn0_dbhz)?;
+    let title = "C/N0 as measured (points) and as expected (lines)";
+    let mut above = chart(title, "C/N0 (dB-Hz)", 4.0, &|_, row| row.cn0_dbhz)?;
     let mut all = Ends::none();
     for (index, link) in links.iter().enumerate() {
         of_observations(judged, *link, |row| row.cn0_dbhz, &mut |_, dbhz| all.add(dbhz))?;
-        let shown = Shown::among(links.len(), Mark::Line, |see| of_observations(judged, *link, reference, see))?;
+        let shown = Shown::among(links.len(), Mark::Line, |see| {
+            of_observations(judged, *link, |row| reference(*link, row), see)
+        })?;
         all = all.with(shown.y);
         let mut line = Series::numbered(judged.run.name(*link), index, shown.points);
         line.mark = Mark::Line;
         above.series.push(line);
     }
     above.y = Axis::around("C/N0 (dB-Hz)", all.values(), 4.0);
-    let title = format!("C/N0 measured minus {word}");
-    let below = chart(&title, "difference (dB)", 1.0, &|row| row.cn0_dbhz - reference(row))?;
+    let title = "C/N0 measured minus expected";
+    let below = chart(title, "difference (dB)", 1.0, &|link, row| row.cn0_dbhz - reference(link, row))?;
     Ok(Some(Sketch::charts((WIDTH_PX, 430), 1, [above, below], legend(judged, &links))))
 }
 

@@ -132,7 +132,7 @@ fn satellites(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeError
     let columns = [
         ("satellite", Side::Left),
         ("elevation (°)", Side::Right),
-        ("C/N0 set, expected, measured (dB-Hz)", Side::Right),
+        ("C/N0 at the antenna, expected, measured (dB-Hz)", Side::Right),
         ("code mean, σ (m)", Side::Right),
         ("carrier σ (cycles)", Side::Right),
         ("Doppler σ (Hz)", Side::Right),
@@ -142,14 +142,14 @@ fn satellites(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeError
     let mut table =
         Table::new("By satellite: mean elevation and C/N0; errors of its observations, the clock's included.", columns);
     for link in judged.errors.signals.keys() {
-        let [mut elevation, mut truth, mut effective, mut measured] = [Sum::default(); 4];
+        let [mut elevation, mut truth, mut expected, mut measured] = [Sum::default(); 4];
         judged.run.seen(link.sv, |row| elevation.add(row.elevation_deg))?;
         let [mut code, mut carrier, mut doppler] =
             std::array::from_fn(|_| Numbers::new(judged.errors.signals.directory()));
         for row in judged.errors.signals.cursor(link) {
             let row = row?;
             truth.add(row.cn0_true_dbhz);
-            effective.add(row.cn0_effective_dbhz);
+            expected.add(judged.summary.details.stated.expected_dbhz(link, row.cn0_effective_dbhz));
             measured.add(row.cn0_dbhz);
             code.push(row.code_m)?;
             carrier.push(row.carrier_cycles)?;
@@ -159,7 +159,7 @@ fn satellites(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeError
         table.row([
             judged.run.name(link),
             fixed(elevation.mean(), 1),
-            [truth, effective, measured].map(|values| fixed(values.mean(), 1)).join(" / "),
+            [truth, expected, measured].map(|values| fixed(values.mean(), 1)).join(" / "),
             format!("{} / {}", fixed(code.mean()?, 2), fixed(std(&code)?, 2)),
             fixed(std(&carrier)?, 4),
             fixed(std(&doppler)?, 3),

@@ -127,8 +127,13 @@ const SATELLITE_CHOICE: &[Key] = &[
 
 const FIDELITY: &[Key] = &[
     word("level", || Grade::NAMES.map(|(name, _)| name).to_vec(), "level, which sets every knob").or_else("balanced"),
-    word("code_edge", || CodeEdge::NAMES.map(|(name, _)| name).to_vec(), "treatment of chip edges between samples")
-        .or_else("the level's, for the rate, motion and noise"),
+    word(
+        "code_edge",
+        || CodeEdge::NAMES.map(|(name, _)| name).to_vec(),
+        "treatment of chip edges between samples: nearest folds all power back into the band, area and band_limited \
+         lose the power outside it",
+    )
+    .or_else("the level's, for the rate, motion and noise"),
     word(
         "waveform",
         || Layers::NAMES.map(|(name, _)| name).to_vec(),

@@ -117,7 +117,15 @@ pub(crate) const POWER: &[Key] = &[
         "equal C/N0 for all satellites, or a link budget by range, elevation and antennas",
     )
     .or_else("fixed if cn0_dbhz is there, else link_budget"),
-    number("cn0_dbhz", 0.0, 100.0, "dB-Hz", "C/N0 of all satellites").required().of(FIXED),
+    number(
+        "cn0_dbhz",
+        0.0,
+        100.0,
+        "dB-Hz",
+        "C/N0 of all satellites at the antenna; chip edges and filters reduce it in the samples",
+    )
+    .required()
+    .of(FIXED),
     by_satellite("satellites", &CN0, "C/N0 by satellite, with kind = \"fixed\".").of(FIXED),
     word("transmit", transmits, "transmit antenna patterns: one block for all satellites, or the blocks of that date")
         .or_else("typical")

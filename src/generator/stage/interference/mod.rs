@@ -4,7 +4,8 @@
 //! time and arrives at RF, so the receiver's oscillator shifts it as it shifts satellites. Phases are
 //! anchored at every run of 4096 samples and linear within it (a Doppler rate of 1000 Hz/s leaves 3e-4 cycle
 //! at 2.6 Msps); where the antenna's motion is pushed, at its ticks too. Power is that at the antenna's port
-//! in the waveform's whole band. Limits: no polarisation, no pattern, one straight path.
+//! in the waveform's whole band; of matched chips the samples have what their edges keep, as of satellites.
+//! Limits: no polarisation, no pattern, one straight path.
 
 pub mod arrival;
 
@@ -43,6 +44,16 @@ pub enum ChipEdge {
     Area,
     /// Through a low-pass filter.
     BandLimited(Arc<Filter>),
+}
+
+impl ChipEdge {
+    fn edge(&self) -> Edge<'_> {
+        match self {
+            Self::Nearest => Edge::Nearest,
+            Self::Area => Edge::Area,
+            Self::BandLimited(filter) => Edge::BandLimited(filter),
+        }
+    }
 }
 
 /// Waveform of an interferer.
@@ -178,6 +189,14 @@ impl Interferer {
             let nearer = path.first_travel_s() / self.travel_s(n);
             jn0_hz * nearer * nearer
         })
+    }
+
+    /// Share of its power at the antenna that samples have: chip edges take from a matched one.
+    pub fn kept(&self, rate_hz: f64) -> f64 {
+        match &self.waveform {
+            Waveform::Matched { chips, edge } => edge.edge().power(&[1.0], chips.hz() / rate_hz),
+            _ => 1.0,
+        }
     }
 
     /// Describes the waveform, as far as its spectrum needs it.
@@ -388,18 +407,14 @@ impl Interferer {
         let start = (chip - MARGIN_STEPS as i64).div_euclid(64);
         let span = (step * i.len() as u64 / CODE_ONE) as i64 + 2 * MARGIN_STEPS as i64 + 2;
         let bits: Vec<u64> = (start..=start + span / 64 + 2).map(|word| mix(self.seed ^ mix(word as u64))).collect();
-        let edge = match edge {
-            ChipEdge::Nearest => Edge::Nearest,
-            ChipEdge::Area => Edge::Area,
-            ChipEdge::BandLimited(filter) => Edge::BandLimited(filter),
-        };
+        let edge = edge.edge();
         let run = Run {
             bits: &bits,
             position: (chip - start * 64) as u64 * CODE_ONE + ((place as u64) >> 16),
             step,
             turns: anchor.turns.wrapping_add(anchor.turns_step.wrapping_mul(from)),
             turns_step: anchor.turns_step,
-            amplitude: anchor.amplitude * edge.gain(&[1.0], step as f64 / CODE_ONE as f64),
+            amplitude: anchor.amplitude,
             pulse: None,
         };
         isa::accumulate(level, edge, &[&[run]], i, q, &mut Buffers::default());
