@@ -47,7 +47,7 @@ pub(crate) const MOTION: &[Key] = &[
     number("turn_radius_m", 0.1, 1e6, "m", "radius of turns").of(ROUTE),
     number("acceleration_mps2", 1e-3, 1e5, "m/s2", "largest acceleration along the path").or(2.0).of(ROUTE),
     number("jerk_mps3", 1e-3, 1e6, "m/s3", "largest jerk").or(2.0).of(ROUTE),
-    text("file", A_PATH, "trajectory: CSV (`t_s` and a position per row) or NMEA GGA").required().of(FROM_FILE),
+    text("file", A_PATH, "trajectory: CSV (`time_s` and a position per row) or NMEA GGA").required().of(FROM_FILE),
     word("format", || vec!["csv", "nmea"], "format of the file").or_else("by the file's name").of(FROM_FILE),
     number("max_gap_s", 0.001, 3600.0, "s", "longest time between rows that is interpolated").or(2.0).of(FROM_FILE),
     number(
