@@ -141,7 +141,7 @@ def faults_of_row(row, figure):
     faults = [f"{name}: {key} is {row[key]!r}, declared {text!r}; {again}" for key, text in declared.items() if row[key] != text]
     if row["met"] != met(row["value"], row["bar"]):
         faults.append(f"{name}: met says {row['met']} of {row['value']} against {row['bar']}; {again}")
-    if isinstance(source, (make.Count, make.Page)):
+    if isinstance(source, (make.Count, make.Asserted, make.Page)):
         try:
             made = source.make()
         except (make.NotMade, OSError) as error:

@@ -4,23 +4,9 @@ A figure is declared here and measured nowhere else; `reports/evidence.csv` has 
 allows: whatever in them changes makes the figure stale.
 """
 
-from dataclasses import dataclass
-
 import make
-
-
-@dataclass(frozen=True)
-class Figure:
-    """One figure. `digits` are significant ones; None leaves the text as its source has it."""
-
-    id: str
-    what: str
-    unit: str
-    source: object
-    rooms: tuple = ()
-    bar: str = ""
-    digits: int | None = None
-    scale: float = 1.0
+import witness
+from figure import Figure
 
 
 ALL_SAMPLES = ("src/fft", "src/gnss", "src/generator", "src/receiver")
@@ -108,6 +94,49 @@ def speed():
                      make.Page(BENCH, RECEIVER, row=row, mark="receiver", runs="15"), rooms, bar, 2)
 
 
+    where = "Only what the scene requires, noise-free unless named"
+    for name, what, row, less, per in [
+        ("satellite_ns", "each satellite more", "8 of the satellites, bare", "1 of the satellites, bare", 7),
+        ("tone_ns", "a tone more", "bare + a tone", "bare", 1),
+        ("chirp_ns", "a chirp more", "bare + a chirp", "bare", 1),
+        ("band_noise_ns", "noise of 1 MHz more", "bare + noise of 1 MHz", "bare", 1),
+    ]:
+        yield Figure(f"speed.{name}", f"generator, time of a sample: {what} ({where})", "ns",
+                     make.Page(BENCH, GENERATOR, row=row, less=less, per=per, mark="generator"),
+                     ("src/generator/synth", "src/generator/stage", "src/fft"), "", 2)
+    for name, part, words in [
+        ("generate_satellites", "generate, satellites", "over satellites"),
+        ("generate_rate", "generate, rate", "over the rate in Msps"),
+        ("generate_rays", "generate, rays", "over rays of a satellite"),
+        ("receive_satellites", "receive, satellites", "over satellites from four on"),
+        ("receive_rate", "receive, rate", "over the rate in Msps"),
+    ]:
+        rooms = ("src/generator", "src/fft") if part.startswith("generate") else ("src/receiver", "src/fft")
+        pattern = rf"\*\*{part}\*\*.*?\nLine[^:]*: ([\d.]+) \+ ([\d.]+) x"
+        yield Figure(f"speed.{name}", f"processor time of {part.split(',')[0]}, line {words}: seconds a second of signal", "",
+                     make.Page(BENCH, "cargo bench --bench growth -- --write", pattern=f"(?s){pattern}", text=r"\1 + \2", mark="growth"), rooms)
+
+
+TRADE = "cargo bench --bench trade"
+
+
+def trade():
+    number = r"(\S+) \([^)]*\)(?: \w+)? \| (\S+)"
+    for name, row, rate in [("l1ca", "GPS L1 C/A", "2.6"), ("e1", "Galileo E1", "4.1"), ("l5", "GPS L5", "25")]:
+        for place, level in enumerate(("fast", "balanced", "reference")):
+            pattern = rf"^\| {row} \| {rate} \| " + r"[^|]*\|[^|]*\| " * place + number
+            yield Figure(f"trade.{name}.{level}", f"{row} at {rate} Msps, {level}: time of a sample of a satellite, error of its code", "",
+                         make.Page("reports/trade.md", TRADE, pattern=pattern, text=r"\1 ns, \2 m", runs="15"),
+                         ("src/generator/synth", "src/fft"))
+    for level in ("fast", "balanced", "reference"):
+        pattern = rf"(?s)^### `static`.*?^\| `{level}` \| (\S+) \| \S+ \| \d+ \| \S+ / (\S+) \| (\S+) \| (\S+) \|"
+        for group, name, unit, what in [(1, "generator", "", "generator, seconds a second of signal"), (2, "position", "m", "position error, 95 %"),
+                                        (3, "code", "m", "pseudorange error, rms"), (4, "loss", "dB", "loss of C/N0")]:
+            yield Figure(f"trade.static.{level}.{name}", f"scene static, 50 s, {level}: {what}", unit,
+                         make.Page("reports/trade.md", TRADE, pattern=pattern, text=rf"\{group}", runs="3"),
+                         ("src/generator", "src/receiver", "src/fft"))
+
+
 def validation():
     both = ("src/gnss", "src/generator", "scenarios/static.toml")
     script = "bash tests/interop.sh \"$GNSS_TWIN\""
@@ -143,6 +172,10 @@ def counts():
     for name, what, pattern, page, test, rooms in rows:
         command = f"GNSS_TWIN_LONG=1 GNSS_TWIN_WRITE_{test.upper()}=$PWD/{page} cargo test --test {test}"
         yield Figure(f"validation.{name}", what, "", make.Page(page, command, pattern=pattern), rooms, "all")
+        if name == "sabotage":
+            for part, words, group in [("kinds", "kinds of damage", 2), ("tolerable", "of them with a size that is tolerable", 1)]:
+                source = make.Page(page, command, pattern=r"(\d+) of (\d+) kinds have a tolerable", text=rf"\{group}")
+                yield Figure(f"sabotage.{part}", words, "", source, rooms)
     extremes = "GNSS_TWIN_LONG=1 GNSS_TWIN_WRITE_STABILITY=$PWD/reports/stability.md cargo test --test extremes"
     rooms = ("tests/extremes", "src/gnss", "src/generator", "src/receiver")
     yield Figure("validation.extremes", "extreme cases with measured figures", "",
@@ -173,6 +206,26 @@ def studies():
             yield Figure(f"studies.starts.{name}.{short}", f"{what}, {words} of 200 starts", unit,
                          make.Page(page, command, row=row, column=column, runs="200"),
                          (*ALL_SAMPLES, "studies/starts.toml"), "", 3 if unit == "s" else 2)
+    yield Figure("studies.starts.slips_per_hour.mean", "cycle slips an hour, mean of 200 starts", "",
+                 make.Page(page, command, row="tracking.slips_per_hour", column="mean", runs="200"), (*ALL_SAMPLES, "studies/starts.toml"), "", 2)
+    for column in ("mean", "low", "high"):
+        words = {"mean": "mean of 40 starts", "low": "lower end of its 95 % interval", "high": "upper end of its 95 % interval"}[column]
+        yield Figure(f"studies.starts_thermal.nees.{column}", f"normalised error squared of a run's last fix, {words}", "",
+                     make.Page("reports/studies/starts_thermal/report.md", "\"$GNSS_TWIN\" study studies/starts_thermal.toml",
+                               row="broadcast.last_nees", column=column, runs="40"), (*ALL_SAMPLES, "studies/starts_thermal.toml"), "", 3)
+    for study, figure, name in [
+        ("pll_jitter", "phase_sigma_deg", ""), ("dll_jitter", "code_sigma_m", ""), ("pll_jitter_e1", "phase_sigma_deg", ""),
+        ("dll_jitter_e1", "code_sigma_m", ""), ("jitter_maps", "phase_sigma_deg", "phase_"), ("jitter_maps", "code_sigma_m", "code_"),
+        ("loss_of_lock", "phase_sigma_deg", ""), ("pll_samples", "tracking.pll_sigma_deg", "phase_"),
+        ("pll_samples", "tracking.dll_sigma_chips", "code_"),
+    ]:
+        sampled = study == "pll_samples"
+        rooms = (*(ALL_SAMPLES if sampled else ("src/receiver/track", "src/study")), f"studies/{study}.toml")
+        pattern = rf"^{figure}: (\d+ of \d+) cells.*?\(ratios ([\d.]+ to [\d.]+)"
+        report, command = f"reports/studies/{study}/report.md", f"\"$GNSS_TWIN\" study studies/{study}.toml"
+        for part, group, words in [("cells", 1, "cells within 5 % of theory"), ("ratio", 2, "measured to theory, least to most")]:
+            yield Figure(f"study.{study}.{name}{part}", f"study {study}, {figure}, T·C/N0 ≥ 10: {words}", "",
+                         make.Page(report, command, pattern=pattern, text=rf"\{group}"), rooms)
     yield Figure("studies.loops.cells", "cells with T·C/N0 ≥ 10 and B·T ≤ 0.36 whose jitter is within 5 % of theory", "",
                  make.Page("reports/loops.md", "cargo bench --bench loops", pattern=r"(\d+ of \d+) cells are within 5 %"),
                  ("src/receiver/track", "src/study"))
@@ -181,4 +234,4 @@ def studies():
                  ("src/receiver/acquire", "src/fft"))
 
 
-FIGURES = {figure.id: figure for part in (accuracy, speed, validation, counts, studies) for figure in part()}
+FIGURES = {figure.id: figure for part in (accuracy, speed, trade, validation, counts, studies, witness.figures) for figure in part()}

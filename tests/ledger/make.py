@@ -118,13 +118,15 @@ class Script:
 
     command: str
     pattern: str
+    text: str = r"\1"
 
     def make(self):
-        twin()
-        found = re.search(self.pattern, printed(self.command))
+        if "GNSS_TWIN" in self.command:
+            twin()
+        found = re.search(self.pattern, printed(self.command), re.S if "(?s)" in self.pattern else 0)
         if not found:
             raise NotMade(f"{self.command} printed nothing like {self.pattern}")
-        return Made(found[1], bar=f"≤ {found[2]}")
+        return Made(found.expand(self.text), bar=f"≤ {found[2]}" if found.re.groups > 1 and self.text == r"\1" else None)
 
 
 @functools.cache
@@ -153,6 +155,25 @@ class Count:
         return Made(captured[0] if captured else str(len(found)), "", "")
 
 
+@dataclass(frozen=True)
+class Asserted:
+    """A bound that a test of `.ci/run` asserts, as its source has it: it holds while the test passes."""
+
+    test: str
+    pattern: str
+    text: str = r"\1"
+
+    @property
+    def command(self):
+        return f"asserted by {self.test}"
+
+    def make(self):
+        found = re.search(self.pattern, (ROOT / self.test).read_text(), re.M)
+        if not found:
+            raise NotMade(f"{self.test} has nothing like {self.pattern}")
+        return Made(found.expand(self.text), "", "")
+
+
 STAMP = re.compile(r"^Measured at commit (?P<commit>[0-9a-f]{7,}\+?) on (?P<date>[\d-]{10}), (?P<processor>.*)\.$", re.M)
 # The line of benches (`benches/shared/machine.rs`).
 BENCHED = re.compile(r"^(?P<processor>[^;\n]*); rustc [^;\n]*;.*?(?P<date>\d{4}-\d\d-\d\d); commit (?P<commit>[0-9a-f]{7,}\+?)", re.M)
@@ -165,7 +186,10 @@ class Page:
     page: str
     command: str
     pattern: str = ""
+    text: str = r"\1"
     row: str = ""
+    less: str = ""
+    per: int = 1
     column: str = "value"
     mark: str = ""
     counted: str = ""
@@ -173,7 +197,7 @@ class Page:
     runs: str = "1"
 
     def value(self):
-        text = self.text()
+        text = self.part()
         if self.counted:
             return str(len(re.findall(self.counted, text, re.M)))
         if self.summed:
@@ -182,22 +206,25 @@ class Page:
             found = re.search(self.pattern, text, re.M)
             if not found:
                 raise NotMade(f"{self.page} has nothing like {self.pattern}")
-            return found[1]
+            return found.expand(self.text)
+        return (self.cell(text, self.row) - (self.cell(text, self.less) if self.less else 0.0)) / self.per
+
+    def cell(self, text, name):
         head = []
         for row in rows(text):
-            if row[0].strip("`") == self.row and self.column in head:
+            if row[0].strip("`") == name and self.column in head:
                 return float(row[head.index(self.column)].split(" ")[0])
             head = row if self.column in row else head
-        raise NotMade(f"{self.page} has no row {self.row!r} with a column {self.column!r}")
+        raise NotMade(f"{self.page} has no row {name!r} with a column {self.column!r}")
 
-    def text(self):
+    def part(self):
         text = (ROOT / self.page).read_text()
         if not self.mark:
             return text
         return text.split(f"<!-- {self.mark} -->\n", 1)[1].split(f"<!-- end of {self.mark} -->", 1)[0]
 
     def make(self):
-        found = STAMP.search(self.text()) or BENCHED.search(self.text())
+        found = STAMP.search(self.part()) or BENCHED.search(self.part())
         if not found:
             raise NotMade(f"{self.page} does not say at which commit it was measured; if {self.command} just wrote it: --make")
         return Made(self.value(), found["processor"], self.runs, commit=found["commit"], date=found["date"])

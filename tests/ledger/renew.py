@@ -19,11 +19,12 @@ def chosen(figures, prefixes):
 
 
 def stamp(path):
-    """Says in a page that its command just wrote at which commit, when and on what."""
+    """Says in a page that its command just wrote at which commit, when and on what. A page as it is in git is not new."""
     text = path.read_text(encoding="utf8")
-    if not make.STAMP.search(text) and not make.BENCHED.search(text):
+    is_new = make.output("git", "status", "--porcelain", "--", str(path)).strip() != ""
+    if is_new and not make.STAMP.search(text) and not make.BENCHED.search(text):
         title, rest = text.split("\n\n", 1)
-        today = datetime.datetime.now(datetime.UTC).date()
+        today = datetime.datetime.now(datetime.timezone.utc).date()
         line = f"Measured at commit {make.head_commit(('src', 'tests'))} on {today}, {make.processor()}."
         path.write_text(f"{title}\n\n{line}\n\n{rest}", encoding="utf8")
 
@@ -44,7 +45,7 @@ def row_of(figure, old):
     source = figure.source
     if isinstance(source, make.Page) and not source.mark and (make.ROOT / source.page).is_file():
         stamp(make.ROOT / source.page)
-    if isinstance(source, (make.Run, make.Timing, make.Script)):
+    if isinstance(source, (make.Run, make.Timing)):
         make.warn_of_old_program([path for room in figure.rooms for path in digest.files(make.ROOT, room)])
     made = source.make()
     value, bar = check.rounded(made.value, figure.digits), made.bar if made.bar is not None else figure.bar
@@ -56,7 +57,7 @@ def row_of(figure, old):
         code = digest_at(made.commit, figure.rooms)
     else:
         code = digest.of(make.ROOT, figure.rooms) if figure.rooms else ""
-    today = str(datetime.datetime.now(datetime.UTC).date()) if figure.rooms else ""
+    today = str(datetime.datetime.now(datetime.timezone.utc).date()) if figure.rooms else ""
     cells = (figure.id, figure.what, value, figure.unit, bar, check.met(value, bar), source.command, commit, made.date or today,
              made.processor, made.runs, rooms, code)
     return dict(zip(check.COLUMNS, cells))
@@ -84,7 +85,7 @@ def make_all(figures, prefixes):
 def compare(figures, prefixes):
     table, failed = check.read(make.ROOT), 0
     for figure in chosen(figures, prefixes):
-        if isinstance(figure.source, (make.Run, make.Count)):
+        if isinstance(figure.source, (make.Run, make.Count, make.Asserted)):
             value = check.rounded(figure.source.make().value, figure.digits)
             if value != table[figure.id]["value"]:
                 failed += 1
