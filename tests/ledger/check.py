@@ -61,7 +61,7 @@ def met(value, bar):
 
 
 def shown(row, kind):
-    number = row["value"].replace("-", "−")
+    number = re.sub(r"^-", "−", row["value"])
     return f"{number} {row['unit']}" if kind == "=" and row["unit"] else number
 
 
