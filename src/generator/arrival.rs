@@ -22,9 +22,9 @@ use gnss::time::Epoch;
 pub struct Seen {
     /// Time and position of emission, and the line of sight.
     pub emission: Emission,
-    /// The satellite's clock minus GPS time at emission, for this signal.
+    /// Satellite clock minus GPS time at emission, for this signal, in seconds.
     pub satellite_clock_s: f64,
-    /// The rays as effects leave them, the direct one first.
+    /// Rays after all effects, the direct one first.
     pub rays: Vec<Ray>,
     /// Delay, carrier phase and power of each ray at the antenna.
     pub arrivals: Vec<Arrival>,
@@ -62,7 +62,7 @@ pub fn seen_from(
     seen_by(scene, from, (sv, signal), local, None)
 }
 
-/// [`seen_from`] where what all signals of the satellite have in common may be known.
+/// Like [`seen_from`], with the geometry that all signals of the satellite share, if it is stored.
 ///
 /// # Errors
 /// Those of the orbit.
@@ -97,7 +97,8 @@ pub(super) fn seen_near(
     Ok(found.map(|found| arriving(scene, signal, found)))
 }
 
-/// [`seen_from`] of a satellite on a short arc of its orbit; where the antenna is may be known.
+/// Like [`seen_from`], for a satellite on a short arc of its orbit, with the antenna's position if it is
+/// stored.
 ///
 /// # Errors
 /// None by itself; the type is that of [`seen_from`].

@@ -86,13 +86,13 @@ pub struct Ground {
     pub start: Epoch,
     /// True if the network reports test mode.
     pub is_test: bool,
-    /// Satellites that an operator has put out of use.
+    /// Satellites that an operator has declared unusable.
     pub do_not_use: Vec<Sv>,
-    /// The ionosphere; absent means that there is none and no grid either.
+    /// Ionosphere; absent means that there is none, and no grid either.
     pub ionosphere: Option<Arc<dyn Effect>>,
 }
 
-/// The network over a region.
+/// Ground network over a region.
 pub struct GroundNetwork {
     ground: Ground,
     numbers: Vec<u8>,

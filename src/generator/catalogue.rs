@@ -73,7 +73,7 @@ pub struct Catalogue {
 }
 
 impl Catalogue {
-    /// Arranges `sets`, whose order does not matter, and reports in words which were left out.
+    /// Arranges `sets`, in any order, and reports in words which ones were left out.
     ///
     /// Repeated ephemerides count once. Two ephemerides of a satellite contradict each other when, half way
     /// between their reference times, their positions differ by more than 2 km or their clocks by more than
@@ -113,8 +113,8 @@ impl Catalogue {
         self.departures = departures;
     }
 
-    /// Sets by how much the time of a system, which its satellites' clocks follow, is ahead of GPS
-    /// time, whole seconds apart.
+    /// Sets the offset ahead of GPS time of a system's time, which its satellites' clocks follow, in seconds.
+    /// Whole seconds between both are excluded.
     pub fn set_time_offset(&mut self, system: System, offset_s: f64) {
         self.time_offsets_s.insert(system, offset_s);
     }
@@ -209,8 +209,8 @@ impl Catalogue {
         self.sent_at(sv, at).is_some_and(|set| set.is_healthy())
     }
 
-    /// Orbit (in the ECEF axes of `at`) and L1 C/A clock, T_GD included, taken for true at GPS time
-    /// `at`; `None` where [`Self::sent_at`] is, or where precise orbits are taken for true and have none.
+    /// True orbit (in the ECEF axes of `at`) and true L1 C/A clock, T_GD included, at GPS time `at`. `None`
+    /// where [`Self::sent_at`] is, or where precise orbits are used and have none.
     ///
     /// # Errors
     /// [`OrbitError`] from the elements.

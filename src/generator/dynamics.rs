@@ -25,7 +25,7 @@ const INSTANTS: u32 = 240;
 /// Positions between two knots at which the body's acceleration is taken.
 const PLACES: u32 = 10;
 
-/// The largest that a satellite's range does while it is in view.
+/// Largest rates of change of a satellite's range while it is in view.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct LineOfSight {
     /// The satellite.
@@ -59,7 +59,7 @@ struct Pull {
     jerk_mps3: Vector3<f64>,
 }
 
-/// The lines of sight of the satellites that are in view for some of the scene, in their order.
+/// Computes the lines of sight of the satellites that are in view for some of the scene, in their order.
 ///
 /// # Errors
 /// Those of the orbit.

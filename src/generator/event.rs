@@ -20,7 +20,7 @@ const MOST_DB: f64 = 100.0;
 /// Largest range error of a satellite in metres, and its largest rate in m/s.
 const MOST_ASTRAY: f64 = 1e7;
 
-/// A change of a source.
+/// Event that changes a source.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
     /// Power over that of the scene in decibels; `None` is off.

@@ -1,4 +1,4 @@
-//! Choices that trade speed for accuracy, each with the error and the cost that were measured for it.
+//! Fidelity choices that trade speed for accuracy, each with its measured error and cost.
 //!
 //! A scene names a level or single knobs ([`Wishes`]); [`choices`] states what was picked and what it is
 //! worth: errors of codes by the signals' waveforms ([`code_bias_m`]), costs as multiples that the kernels'
@@ -17,7 +17,7 @@ use bias::{LARGEST_BIAS_M, standing_bias_m};
 pub use bias::{LOOP_HZ, allowed_m, code_bias_m, moving_bias_m};
 pub use costs::kernel_ns;
 
-/// A name for a value of every knob.
+/// Level of fidelity: a name for a value of every knob.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grade {
     /// Nearest chips, carrier within 1e-3 cycle and spurs below −70 dBc.
@@ -51,10 +51,10 @@ pub enum Arithmetic {
     F64,
 }
 
-/// Every knob, with the level that they were taken from.
+/// Value of every knob, with the level from which they were taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fidelity {
-    /// The level that it was chosen by.
+    /// Level from which the knobs were taken.
     pub grade: Grade,
     /// Model of code edges between samples.
     pub code_edge: CodeEdge,
@@ -72,7 +72,7 @@ pub struct Fidelity {
 }
 
 impl Grade {
-    /// Every level and its name in a scenario.
+    /// Levels and their names in a scenario.
     pub const NAMES: [(&'static str, Self); 3] =
         [("fast", Self::Fast), ("balanced", Self::Balanced), ("reference", Self::Reference)];
 
@@ -83,7 +83,7 @@ impl Grade {
 }
 
 impl CodeEdge {
-    /// Every edge and its name in a scenario.
+    /// Edge models and their names in a scenario.
     pub const NAMES: [(&'static str, Self); 3] =
         [("nearest", Self::Nearest), ("area", Self::Area), ("band_limited", Self::BandLimited)];
 
@@ -103,7 +103,7 @@ impl CodeEdge {
 }
 
 impl Arithmetic {
-    /// Both and their names in a scenario.
+    /// Arithmetics and their names in a scenario.
     pub const NAMES: [(&'static str, Self); 2] = [("f32", Self::F32), ("f64", Self::F64)];
 
     /// Name of the arithmetic in a scenario.
@@ -117,7 +117,7 @@ fn name_of<T: PartialEq>(names: &[(&'static str, T)], value: T) -> &'static str 
 }
 
 impl Fidelity {
-    /// The knobs of a level.
+    /// Returns the knobs of a level.
     pub const fn of(grade: Grade) -> Self {
         match grade {
             // Half the tolerance is the secant's within a run, a parabola of that height A (cycles) that
@@ -154,9 +154,9 @@ impl Fidelity {
         }
     }
 
-    /// The knobs of a level for `signals` at `rate_hz`. `balanced` takes area edges, which cost less than
-    /// band-limited ones at every rate, where the error of every signal's code is below `allowed_m`, for
-    /// which see [`allowed_m`]; never nearest ones, whose spurs are those of `fast`.
+    /// Returns the knobs of a level for `signals` at `rate_hz`. `balanced` takes area edges if the code error
+    /// of every signal is below `allowed_m` (see [`allowed_m`]), because they cost less than band-limited
+    /// ones at every rate. It never takes nearest edges, whose spurs are those of `fast`.
     pub fn suited(grade: Grade, rate_hz: f64, allowed_m: f64, signals: &[&Signal]) -> Self {
         let level = Self { allowed_m, ..Self::of(grade) };
         let too_much = |signal: &&Signal| code_bias_m(level.code_edge, signal, rate_hz) >= allowed_m;
@@ -207,7 +207,7 @@ pub struct Wishes {
 }
 
 impl Wishes {
-    /// A level as it is.
+    /// Creates the settings of a level without own knobs.
     pub fn of(grade: Grade, allowed_m: f64) -> Self {
         Self {
             grade,
@@ -220,7 +220,7 @@ impl Wishes {
         }
     }
 
-    /// The knobs for `signals` at `rate_hz`.
+    /// Returns the knobs for `signals` at `rate_hz`.
     pub fn suited(&self, rate_hz: f64, signals: &[&Signal]) -> Fidelity {
         let level = Fidelity::suited(self.grade, rate_hz, self.allowed_m, signals);
         Fidelity {
@@ -234,7 +234,7 @@ impl Wishes {
     }
 }
 
-/// One knob as a plan shows it.
+/// Choice of one knob as a plan shows it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choice {
     /// Key of the knob in `[fidelity]`.

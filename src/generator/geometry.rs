@@ -33,7 +33,7 @@ pub struct Arriving {
 /// the light time: the last digit of an emission may depend on that.
 type Key = (i64, u64, u64);
 
-/// The instants of one satellite that are known.
+/// Stored arrivals of one satellite.
 #[derive(Debug, Default)]
 pub struct Geometry {
     known: Mutex<BTreeMap<Key, Option<Arriving>>>,

@@ -1,4 +1,4 @@
-//! Delay and carrier of a satellite between knots: cubic polynomials on an absolute grid of samples.
+//! Knots of a satellite's delay and carrier: cubic polynomials between them, on an absolute grid of samples.
 //!
 //! The grid's roots are 2^r samples, 8 to 16 s long. A root is halved until the cubic through four nodes of
 //! each part misses the truth at three further points by less than half the tolerance, so the knots follow
@@ -15,10 +15,10 @@ use gnss::time::Rate;
 
 /// Parts of the grid are not halved below this; what error remains is reported.
 const SHORTEST_SAMPLES: u64 = 1024;
-/// Error of a ray's amplitude between knots at most, of its largest in the part: 0.0087 dB.
+/// Largest error of a ray's amplitude between knots, relative to its largest in the part: 0.0087 dB.
 pub const AMPLITUDE_ERROR: f64 = 1e-3;
-/// Half the step of the amplitude from run to run at most, of its largest in the part: a run keeps the power
-/// of its middle, so the staircase does not bias it, and its rms error is 45 dB below the ray.
+/// Half of the largest amplitude step from run to run, relative to the ray's largest in the part. A run keeps
+/// the power of its middle, so the staircase has no bias, and its rms error is 45 dB below the ray.
 pub const AMPLITUDE_STEP: f64 = 1e-2;
 
 /// Signal of one ray at one time of the receiver's clock.
@@ -26,7 +26,7 @@ pub const AMPLITUDE_STEP: f64 = 1e-2;
 pub struct Arrival {
     /// Time of the receiver's clock minus the transmission time, by the code, in seconds.
     pub delay_s: f64,
-    /// Pseudorange of the carrier in cycles at RF, absolute: `rho_phi / lambda`.
+    /// Absolute pseudorange of the carrier in cycles at RF: `rho_phi / lambda`.
     pub carrier_cycles: f64,
     /// Carrier power over noise density, in Hz.
     pub cn0_hz: f64,
@@ -54,32 +54,32 @@ pub struct Grid {
     carrier_hz: f64,
 }
 
-/// A cubic in the fraction (0..1) of its part.
+/// Cubic polynomial in the fraction (0..1) of its part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cubic([f64; 4]);
 
-/// One ray within a part.
+/// Delay, carrier and amplitude of one ray within a part.
 #[derive(Clone, Copy, Debug)]
 pub struct Path {
     /// Seconds.
     pub delay: Cubic,
-    /// Cycles, with whole ones left out at the start of the part.
+    /// Carrier phase in cycles, without the whole cycles at the start of the part.
     pub carrier: Cubic,
     /// Linear C/N0 (Hz).
     pub cn0_hz: Cubic,
-    /// Longest power of two of samples on which a secant of the carrier stays within the tolerance and the
-    /// amplitude within [`AMPLITUDE_STEP`].
+    /// Longest run in samples, a power of two. A secant of the carrier then stays within the tolerance, and
+    /// the amplitude within [`AMPLITUDE_STEP`].
     pub run_samples: u64,
 }
 
-/// One part of the grid with the rays that are there all the time.
+/// Part of the grid, with the rays that exist throughout it.
 #[derive(Clone, Debug)]
 pub struct Part {
     /// First sample.
     pub start: u64,
-    /// The sample after the last one.
+    /// Number of the sample after the last one.
     pub end: u64,
-    /// A polynomial for each ray.
+    /// Polynomials of each ray.
     pub paths: Vec<Path>,
     /// Largest error met at the points of comparison, in cycles.
     pub error_cycles: f64,
@@ -109,7 +109,7 @@ impl Cubic {
         a + u * (b + u * (c + u * d))
     }
 
-    /// Value at `v` minus value at `u`, without their common part.
+    /// Value at `v` minus value at `u`, computed without their common part.
     pub fn change(&self, u: f64, v: f64) -> f64 {
         let [_, b, c, d] = self.0;
         planted!("generator.knots.change", v - u, 1.01 * (v - u)) * (b + c * (u + v) + d * (u * u + u * v + v * v))
@@ -136,7 +136,7 @@ impl Part {
 }
 
 impl Grid {
-    /// A grid for `rate` whose carrier error stays below `tolerance_cycles`.
+    /// Creates a grid for `rate` whose carrier error stays below `tolerance_cycles`.
     pub fn new(rate: Rate, mut breaks: Vec<u64>, tolerance_cycles: f64, carrier_hz: f64) -> Self {
         breaks.sort_unstable();
         breaks.dedup();
@@ -149,7 +149,7 @@ impl Grid {
         Self { root_samples: samples.map_or(self.root_samples, |samples| samples.max(1)), ..self }
     }
 
-    /// Samples of a root part.
+    /// Number of samples in a root part.
     pub fn root_samples(&self) -> u64 {
         self.root_samples
     }

@@ -29,7 +29,7 @@ const STRETCH_SAMPLES: u64 = 16_384;
 /// Instants between start and end at which sources are looked at.
 const INSTANTS: u64 = 60;
 
-/// Smallest and largest of a quantity.
+/// Smallest and largest value of a quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Span {
     /// The smallest.
@@ -55,26 +55,27 @@ impl Span {
 pub struct Source {
     /// Kind of the source as a scenario writes it.
     pub kind: &'static str,
-    /// While it is on, at the antenna; of pulses the mean. `None` when it is never on in the scene.
+    /// Power over noise density at the antenna in dB-Hz while the source is on, averaged over pulses. `None`
+    /// if the source is never on in the scene.
     pub jn0_dbhz: Option<Span>,
-    /// While a pulse is on, above the mean.
+    /// Peak power of a pulse relative to the mean, in dB.
     pub peak_db: f64,
-    /// What the samples have of it over that, in dB: chip edges take from a matched one.
+    /// Gain in dB from that power to the one in the samples: chip edges reduce a matched waveform.
     pub kept_db: f64,
 }
 
-/// A spoofer's weakest and strongest signal.
+/// Weakest and strongest signal of a spoofer.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Spoofed {
     /// Number of the spoofer, from 1.
     pub number: usize,
-    /// C/N0 of its signals, in dB-Hz; `None` where none is in view.
+    /// C/N0 of the spoofer's signals in dB-Hz; `None` if none is in view.
     pub cn0_dbhz: Option<Span>,
-    /// The same in the samples, of which chip edges take.
+    /// C/N0 of the spoofer's signals in the samples, which chip edges reduce, in dB-Hz.
     pub sampled_dbhz: Option<Span>,
 }
 
-/// The parts of a scene against full scale.
+/// Power of the parts of a scene relative to full scale.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Levels {
     /// Full scale in LSB of the scene's gain.
@@ -85,15 +86,15 @@ pub struct Levels {
     unit_dbfs: f64,
     /// Attenuation in dB that a playback applies to satellites and spoofers.
     attenuation_db: f64,
-    /// Level of the thermal noise; `None` without noise.
+    /// Power of the thermal noise in dBFS; `None` without noise.
     pub noise_dbfs: Option<f64>,
     /// Sources of interference, in the scene's order.
     pub sources: Vec<Source>,
-    /// The spoofers, in the scene's order.
+    /// Spoofers, in the scene's order.
     pub spoofers: Vec<Spoofed>,
-    /// The satellite that J/S counts from, and its C/N0: the strongest at the scene's start.
+    /// Reference satellite of J/S and its C/N0 in dB-Hz: the strongest at the scene's start.
     pub strongest: Option<(Sv, f64)>,
-    /// The sum before it is rounded.
+    /// Power of the sum before rounding, in dBFS.
     pub sum_dbfs: f64,
     /// Share of components that are clipped over all segments.
     pub clipped_share: f64,
@@ -145,13 +146,13 @@ impl Levels {
         })
     }
 
-    /// Level of a power over noise density in the samples.
+    /// Converts a power over noise density in the samples to dBFS.
     pub fn dbfs(&self, over_noise_dbhz: f64) -> f64 {
         over_noise_dbhz + self.unit_dbfs
     }
 
-    /// Level of what the samples have of a satellite or a spoofer's signal, behind the playback that a scene
-    /// may have.
+    /// Level in dBFS of a satellite's or spoofer's signal in the samples, behind the playback that a scene may
+    /// have.
     pub fn satellite_dbfs(&self, sampled_dbhz: f64) -> f64 {
         self.dbfs(sampled_dbhz) - self.attenuation_db
     }

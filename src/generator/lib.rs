@@ -1,4 +1,4 @@
-//! The physical world: real ephemerides, a user's motion and a described environment become IF samples.
+//! Generator of IF samples from real ephemerides, a user's motion and a described environment.
 //!
 //! A [`scenario`] as written becomes a [`scene`] as meant. For each satellite, [`sky`] finds where it was
 //! when it sent what arrives now; effects ([`ray`], [`effect`]) act on the rays that reach the antenna, and

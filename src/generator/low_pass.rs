@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 /// Cut-off of band-limited edges, in cycles per sample.
 pub(crate) const CUTOFF_CPS: f64 = 0.45;
-/// Half width of that filter in samples.
+/// Half width of the low-pass filter in samples.
 pub const HALF_WIDTH: usize = 8;
 /// Kaiser's shape parameter: 60 dB in the stop band.
 const BETA: f64 = 5.65;

@@ -46,7 +46,7 @@ impl Senders {
     }
 }
 
-/// One fault of the messages of some satellites.
+/// Fault in the messages of some satellites.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MessageFault {
     /// `None` for all.
@@ -104,24 +104,23 @@ impl Kind {
     }
 }
 
-/// The symbols of a unit.
+/// Symbols of a unit, before and after faults.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Sent {
     /// Symbols as encoded, with correct checks.
     pub encoded: Vec<bool>,
     /// Symbols as they left the antenna.
     pub symbols: Vec<bool>,
-    /// Other units that its redundancy restores.
+    /// Other units that the redundancy of this one restores.
     pub restored: Vec<Vec<bool>>,
 }
 
-/// A unit that a satellite sends: its form of message, by whose clock, and its number since that clock's
-/// beginning.
+/// Unit that a satellite sends, identified by form of message, clock and number.
 #[derive(Clone, Copy, Debug)]
 pub struct Slot {
     /// Form of message.
     pub message: &'static Message,
-    /// The scale of the sender's clock.
+    /// Time scale of the sender's clock.
     pub time: &'static TimeScale,
     /// Number of the unit since the beginning of the clock's scale.
     pub unit: i64,
@@ -249,5 +248,5 @@ impl MessageFault {
     }
 }
 
-/// A time beyond every scene.
+/// Time in seconds beyond every scene.
 pub const FOREVER_S: f64 = 1e9;

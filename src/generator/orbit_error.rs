@@ -12,7 +12,7 @@ use gnss::earth::EARTH_ROTATION_RADPS;
 use gnss::satellite::Sv;
 use gnss::time::Epoch;
 
-/// An offset of some satellites.
+/// Displacement of some satellites from their orbits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Displacement {
     /// The satellites concerned.
@@ -27,7 +27,8 @@ pub struct Displacement {
     pub growth: Option<(Epoch, f64)>,
 }
 
-/// A share that goes from 0 to 1 while `u` does, and its derivative by `u`: the quintic of least jerk.
+/// Quintic of least jerk: a share that goes from 0 to 1 while `u` does, and its derivative with respect to
+/// `u`.
 pub fn minimum_jerk(u: f64) -> (f64, f64) {
     if u <= 0.0 {
         (0.0, 0.0)
@@ -39,7 +40,7 @@ pub fn minimum_jerk(u: f64) -> (f64, f64) {
 }
 
 impl Displacement {
-    /// The state at `at` (in the ECEF axes of that instant) with the offset.
+    /// Returns the state at `at` (in the ECEF axes of that instant) with the displacement.
     pub fn apply(&self, state: State, at: Epoch) -> State {
         let (share, rate) = match self.growth {
             None => (1.0, 0.0),

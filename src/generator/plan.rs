@@ -30,7 +30,7 @@ use gnss::time::Epoch;
 /// Instants between start and end at which the sky is looked at.
 const INSTANTS: u32 = 240;
 
-/// A satellite that is in view for some of the scene.
+/// Satellite that is in view for some of the scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct InView {
     /// The satellite.
@@ -53,10 +53,10 @@ pub struct InView {
     pub leaves: Option<(f64, PassEnd)>,
 }
 
-/// A thing that the scene has, or has not.
+/// Model that the scene contains, or does not contain.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Model {
-    /// Table or thing, as a scenario calls it.
+    /// Name of the model as a scenario calls it.
     pub name: String,
     /// True if the scene contains the model.
     pub present: bool,
@@ -77,7 +77,7 @@ pub struct Plan {
     pub duration_s: f64,
     /// Names of the signals.
     pub signals: Vec<&'static str>,
-    /// Elevation below which satellites are left out.
+    /// Elevation mask in degrees.
     pub mask_deg: f64,
     /// True if the scene begins so high that the Earth's limb replaces the elevation mask.
     pub in_space: bool,
@@ -89,11 +89,11 @@ pub struct Plan {
     pub satellites: Vec<InView>,
     /// Models that are computed, and models that are not.
     pub models: Vec<Model>,
-    /// The parts of the sum against full scale.
+    /// Levels of the parts of the sum relative to full scale.
     pub levels: Levels,
     /// The level of fidelity.
     pub level: &'static str,
-    /// Time for a sample of all that is sent, in ns on one core of this machine, measured.
+    /// Time in ns per sample for the whole scene on one core of this machine, measured.
     #[serde(skip)]
     pub sample_ns: f64,
     /// Time in ns per sample for each signal of each satellite, on one core of this machine, measured.
@@ -101,15 +101,15 @@ pub struct Plan {
     pub signal_sample_ns: f64,
     /// Chosen value of each fidelity knob.
     pub knobs: Vec<Choice>,
-    /// Rate, format and tuning, in words.
+    /// Rate, format and tuning of the samples, in words.
     pub sampling: String,
     /// Samples of the scene.
     pub samples: u64,
-    /// Bytes of all of them.
+    /// Number of bytes of all samples.
     pub bytes: u64,
-    /// Memory of a batch and of the motion.
+    /// Memory of a batch and of the motion, in bytes.
     pub memory_bytes: u64,
-    /// Processor time to generate them, from what was measured.
+    /// Processor time in seconds for all samples, from the measured speed.
     #[serde(skip)]
     pub time_s: f64,
     /// Work of the synthesiser.
@@ -117,7 +117,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Plans `scene` for a machine.
+    /// Computes the plan of `scene` for a machine.
     ///
     /// # Errors
     /// [`OrbitError`] from the ephemerides.
@@ -331,7 +331,7 @@ impl fmt::Display for Plan {
     }
 }
 
-/// Several front ends of a scene at one time, before the plan of each.
+/// Plans of several front ends of one scene, shown together.
 pub struct Together<'p>(pub &'p [Plan]);
 
 impl fmt::Display for Together<'_> {

@@ -1,5 +1,5 @@
-//! True orbits and clocks out of precise products: a polynomial through the tabulated positions, a line
-//! between clocks.
+//! True orbits and clocks from precise products: a polynomial through the tabulated positions, a line between
+//! clocks.
 //!
 //! A position is the polynomial of degree 11 through the twelve epochs around it, in ECEF. Neighbouring
 //! polynomials meet at an epoch of the table, so the position is continuous; velocity is the polynomial's
@@ -25,7 +25,7 @@ use gnss::satellite::Sv;
 use gnss::sp3::{Precise, Sample};
 use gnss::time::Epoch;
 
-/// Epochs that a position is taken through; half of them lie before it.
+/// Number of epochs for the interpolation of a position; half of them lie before it.
 pub const NODES: usize = 12;
 const HALF: usize = NODES / 2;
 /// Epochs of a table at most: more than a year every 15 minutes.
@@ -36,7 +36,7 @@ const MOST_EPOCHS: i64 = 50_000;
 pub struct Hardware {
     /// Group delay of L1 C/A against the combination that clocks belong to, in seconds.
     pub tgd_s: f64,
-    /// Antenna's phase centre below the centre of mass, towards the Earth.
+    /// Distance in metres of the antenna's phase centre from the centre of mass, towards the Earth.
     pub antenna_m: f64,
 }
 
@@ -46,7 +46,7 @@ struct Track {
     hardware: Hardware,
 }
 
-/// Orbits and clocks on an even grid of epochs.
+/// Orbits and clocks on a uniform grid of epochs.
 #[derive(Clone, Debug)]
 pub struct Orbits {
     first_s: i64,
@@ -55,8 +55,8 @@ pub struct Orbits {
 }
 
 impl Orbits {
-    /// The orbits of those satellites of `precise` that `hardware` knows; `None` with fewer than twelve
-    /// epochs between first and last, or more than 50 000.
+    /// Creates the orbits of those satellites of `precise` that `hardware` knows. `None` with fewer than
+    /// twelve epochs between first and last, or more than 50 000.
     pub fn new(precise: &Precise, hardware: impl Fn(Sv) -> Option<Hardware>) -> Option<Self> {
         let mut epochs: Vec<i64> = precise.satellites.values().flat_map(BTreeMap::keys).copied().collect();
         epochs.sort_unstable();
@@ -97,7 +97,8 @@ impl Orbits {
         (index(from)..=index(to)).all(|cell| window(track, cell).is_some())
     }
 
-    /// Orbit of the antenna (in the ECEF axes of `at`) and L1 C/A clock, T_GD included, at GPS time `at`.
+    /// True orbit of the antenna (in the ECEF axes of `at`) and L1 C/A clock, T_GD included, at GPS time
+    /// `at`.
     pub fn truth(&self, sv: Sv, at: Epoch) -> Option<(State, ClockState)> {
         let track = self.satellites.get(&sv)?;
         let cell = (at.seconds() - self.first_s).div_euclid(self.step_s);

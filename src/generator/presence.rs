@@ -66,16 +66,16 @@ pub fn presence(scene: &Scene, sv: Sv, time: Epoch, motion: &Motion) -> Result<P
     })
 }
 
-/// A satellite that would be in view while it has nothing to send.
+/// Satellite that would be in view while it has nothing to send.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Missing {
-    /// The satellite that has nothing to send.
+    /// Satellite that has nothing to send.
     pub sv: Sv,
     /// End and new beginning of the ephemerides, as far as the navigation file has any there.
     pub silence: Silence,
 }
 
-/// The satellites that the scene, which lasts `end_s`, misses for want of an ephemeris.
+/// Finds the satellites that the scene, of length `end_s`, lacks because there is no ephemeris.
 ///
 /// # Errors
 /// Those of the orbit.
@@ -112,7 +112,7 @@ fn would_be_seen(scene: &Scene, sv: Sv, silence: &Silence, end_s: f64) -> Result
     Ok(false)
 }
 
-/// The warning that the navigation file does not cover the scene, which begins at `start`.
+/// Warning text if the navigation file does not cover the scene, which begins at `start`.
 pub fn warning(missing: &[Missing], start: Epoch) -> Option<String> {
     let mut groups: Vec<(Silence, Vec<String>)> = Vec::new();
     for Missing { sv, silence } in missing {
@@ -143,7 +143,7 @@ pub fn warning(missing: &[Missing], start: Epoch) -> Option<String> {
     })
 }
 
-/// The times in which one satellite was in view, gathered second by second.
+/// Intervals in which one satellite was in view, collected second by second.
 #[derive(Clone, Debug, Default)]
 pub struct Passes {
     /// First sample in view and what came before, of the pass that lasts; the others are whole.
@@ -154,7 +154,7 @@ pub struct Passes {
 }
 
 impl Passes {
-    /// Takes what is found at the next `sample`; whether the satellite is in view.
+    /// Records the presence at the next `sample`. Returns true if the satellite is in view.
     pub fn look(&mut self, sample: u64, presence: &Presence) -> bool {
         match (presence.end(), self.open) {
             (None, None) => self.open = Some((sample, self.absent.unwrap_or(PassEnd::Scene))),
@@ -168,7 +168,7 @@ impl Passes {
         presence.end().is_none()
     }
 
-    /// The rows of `part` of the scene, counted from its first sample.
+    /// Rows of `part` of the scene, counted from its first sample.
     pub fn rows(&self, sv: Sv, part: &Range<u64>) -> impl Iterator<Item = PassRow> {
         let open = self.open.map(|(since, begin)| (since, u64::MAX, begin, PassEnd::Scene));
         let all = self.whole.iter().copied().chain(open);

@@ -8,20 +8,20 @@ use gnss::satellite::Sv;
 use gnss::signal::Signal;
 use gnss::time::Epoch;
 
-/// The geometry between one satellite and the antenna at one instant of reception.
+/// Geometry between one satellite and the antenna at one instant of reception.
 #[derive(Clone, Debug)]
 pub struct Sight {
     /// The satellite.
     pub sv: Sv,
     /// True GPS time of reception.
     pub received: Epoch,
-    /// Antenna, in the ECEF axes of `received`.
+    /// Position of the antenna, in the ECEF axes of `received`.
     pub user: Geodetic,
     /// Antenna, ECEF.
     pub user_m: Vector3<f64>,
-    /// Velocity of the antenna, ECEF.
+    /// Velocity of the antenna in ECEF, in m/s.
     pub user_mps: Vector3<f64>,
-    /// Satellite when it sent what is received now, in the ECEF axes of `received`.
+    /// State of the satellite at emission, in the ECEF axes of `received`.
     pub satellite: State,
     /// Geometric range between the two, in metres.
     pub range_m: f64,
@@ -31,14 +31,14 @@ pub struct Sight {
     pub off_nadir_rad: f64,
 }
 
-/// One path from the satellite to the antenna.
+/// Path from the satellite to the antenna.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Additional delay of the code along the path, in seconds, beyond the geometric delay.
     pub code_delay_s: f64,
     /// Additional delay of the carrier along the path, in seconds, beyond the geometric delay.
     pub carrier_delay_s: f64,
-    /// Carrier phase that comes from no delay (wind-up, reflection), in cycles.
+    /// Carrier phase that is not due to a delay (wind-up, reflection), in cycles.
     pub phase_cycles: f64,
     /// Carrier power over noise density of the whole signal, all components together, linear (Hz).
     pub cn0_hz: f64,
@@ -59,7 +59,7 @@ impl<E: Effect + ?Sized> Effect for std::sync::Arc<E> {
     }
 }
 
-/// Something that nature or hardware does to the rays of a satellite.
+/// Effect of nature or hardware on the rays of a satellite.
 ///
 /// Laws: an effect of zero strength gives the same bits as its absence; the result depends on the
 /// arguments alone; effects commute, or the scene fixes their order.

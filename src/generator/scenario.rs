@@ -1,4 +1,4 @@
-//! A scenario as written: TOML in which a table is present only when the scene has the thing.
+//! Scenario as written: TOML in which a table is present only if the scene has the feature.
 //!
 //! [`Scenario::parse`] holds each key and each value against its declaration ([`keys::SCENARIO`]) and
 //! collects what is wrong; [`Scenario::compose`] checks what concerns several of them, loads files and makes
@@ -181,7 +181,7 @@ impl ScenarioError {
         }
     }
 
-    /// Each thing that is wrong.
+    /// Lists the single errors.
     pub fn each(&self) -> &[Self] {
         match self {
             Self::Several(errors) => errors,
@@ -190,7 +190,7 @@ impl ScenarioError {
     }
 }
 
-/// A scenario whose every value is within its range. What is absent is `None` or not in the scene.
+/// Scenario in which every value is within its range. What is absent is `None`, and is not in the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scenario {
     /// Path of the scenario, for error messages.
@@ -201,28 +201,28 @@ pub struct Scenario {
     pub name: String,
     /// Time of sample 0 by the receiver's clock, from which the scene's true time also counts.
     pub start: Epoch,
-    /// Length of the scene by the receiver's clock.
+    /// Length of the scene by the receiver's clock, in seconds.
     pub duration_s: f64,
-    /// Seed of all that is random.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// The signals that satellites send.
+    /// Signals that satellites send.
     pub signals: Vec<&'static Signal>,
-    /// Relative to the scenario's directory; none means the embedded file.
+    /// Navigation files, relative to the scenario's directory; empty means the embedded file.
     pub navigation: Vec<PathBuf>,
-    /// The day to which the first day of the files is moved; none leaves them as they are.
+    /// Day to which the first day of the files is moved; absent leaves them as they are.
     pub moved_to: Option<Epoch>,
     /// Offset of Galileo's time ahead of GPS time, in seconds. Absent means the value of the navigation file,
     /// or zero.
     pub galileo_ahead_s: Option<f64>,
-    /// Elevation below which satellites are left out.
+    /// Elevation mask in radians.
     pub mask_rad: f64,
-    /// The satellites that are computed; absent means all of the navigation files.
+    /// Satellites that alone are computed; absent means all of the navigation files.
     pub only: Option<Vec<Sv>>,
     /// Satellites that are left out.
     pub excluded: Vec<Sv>,
     /// True if satellites that report themselves unhealthy are transmitted too.
     pub include_unhealthy: bool,
-    /// True orbits and clocks; absent means those that are broadcast.
+    /// True orbits and clocks; absent means the broadcast ones.
     pub orbits: Option<OrbitsSpec>,
     /// Content of augmentation messages about other satellites; absent means none.
     pub sbas: Option<SbasSpec>,
@@ -240,11 +240,11 @@ pub struct Scenario {
     pub power: Power,
     /// Reflections.
     pub multipath: Vec<Echo>,
-    /// The ionosphere; absent means none.
+    /// Ionosphere; absent means none.
     pub ionosphere: Option<Ionosphere>,
-    /// The troposphere; absent means none.
+    /// Troposphere; absent means none.
     pub troposphere: Option<NeutralAtmosphere>,
-    /// Obstructions; buildings are measured from where the motion starts.
+    /// Obstructions. Buildings are measured from the position where the motion starts.
     pub obstacles: Vec<Obstacle>,
     /// Scintillation; absent means none.
     pub scintillation: Option<Strength>,
@@ -258,7 +258,7 @@ pub struct Scenario {
     pub interference: Vec<InterferenceSpec>,
     /// Spoofers.
     pub spoofers: Vec<SpooferSpec>,
-    /// Spacing of the truth's ticks.
+    /// Interval of the truth's ticks, in seconds.
     pub truth_interval_s: f64,
     /// Expectations about a receiver, for the judge.
     pub expect: Expect,

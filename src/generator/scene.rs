@@ -1,4 +1,4 @@
-//! A scene as meant: validated, in SI units, with everything that it needs loaded.
+//! Scene as meant: validated, in SI units, with all its files loaded.
 
 use std::sync::Arc;
 
@@ -30,19 +30,19 @@ use gnss::satellite::Sv;
 use gnss::signal::{Link, Signal};
 use gnss::time::SampleClock;
 
-/// Height from which on the Earth hides satellites, and no longer the mask.
+/// Height in metres from which the Earth hides satellites instead of the elevation mask.
 pub const SPACE_M: f64 = 100e3;
 /// Height below which no ray to a user in space may pass: the neutral atmosphere, which is modelled for rays
 /// that come down through it once.
 const LIMB_M: f64 = 50e3;
 
-/// Everything that the generator computes for the samples of one front end, and nothing that it does not.
+/// Description of everything that the generator computes for the samples of one front end.
 pub struct Scene {
     /// Name of the scene.
     pub name: String,
     /// Name of the front end, where the scenario gives it one.
     pub front_end_name: Option<String>,
-    /// Seed of all that is random.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// Number of samples.
     pub samples: u64,
@@ -64,17 +64,17 @@ pub struct Scene {
     pub message_faults: Vec<MessageFault>,
     /// Satellite clock errors that are not broadcast.
     pub satellite_clocks: Arc<SatelliteClocks>,
-    /// The signals that satellites send.
+    /// Signals that satellites send.
     pub signals: Vec<&'static Signal>,
     /// Satellites that the scene leaves out.
     pub excluded: Vec<Sv>,
-    /// Satellites below this elevation are not computed for a user below [`SPACE_M`].
+    /// Elevation mask in radians, for a user below [`SPACE_M`].
     pub mask_rad: f64,
     /// Effects on rays, in order.
     pub effects: Vec<Box<dyn Effect>>,
     /// Quick fading of satellites.
     pub scintillation: Option<Arc<Scintillation>>,
-    /// A transmitter that plays the satellites' signals back, before anything else is added.
+    /// Transmitter that plays the satellites' signals back, before anything else is added.
     pub playback: Option<Playback>,
     /// Sources of interference, in order.
     pub interference: Vec<Interferer>,
@@ -86,8 +86,8 @@ pub struct Scene {
     pub noise: bool,
     /// Front-end stages that act on the sum, in the order of the hardware.
     pub front_end: Vec<Box<dyn Stage>>,
-    /// Standard deviation of the noise per component, in LSB of the sample format (the gain). Without noise
-    /// the same gain scales the signals: a ray has amplitude `sqrt(cn0_hz / rate) * sqrt(2) * noise_lsb`.
+    /// Standard deviation of the noise per component, in LSB of the sample format (the gain). The gain also
+    /// applies without noise: a ray has amplitude `sqrt(cn0_hz / rate) * sqrt(2) * noise_lsb`.
     pub noise_lsb: f32,
     /// Fidelity with which samples are made.
     pub fidelity: Fidelity,
@@ -100,7 +100,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Shows `visit` everything that acts on blocks of samples, in order.
+    /// Calls `visit` for each stage that acts on blocks of samples, in order.
     pub fn stages(&self, mut visit: impl FnMut(&dyn Stage)) {
         self.playback.iter().for_each(|stage| visit(stage));
         self.interference.iter().for_each(|stage| visit(stage));
@@ -117,7 +117,7 @@ impl Scene {
         self.front_end_name.as_ref().map_or(self.seed, own)
     }
 
-    /// The scene's signals that a satellite sends and of which the samples can hold anything.
+    /// Signals of the scene that a satellite sends and that lie at least partly in the samples' band.
     pub fn signals_of(&self, sv: Sv) -> impl Iterator<Item = &'static Signal> {
         let start = self.clock.start;
         let sent = move |signal: &&Signal| signal.system == sv.system && (signal.sent)(sv.number, start);
@@ -168,7 +168,7 @@ impl Scene {
         self.switches.as_ref().map_or_else(Switched::default, switched)
     }
 
-    /// True seconds since the scene's start when sample `n` is taken, without the clock's fast noise.
+    /// True seconds since the scene's start at sample `n`, without the clock's fast noise.
     pub fn elapsed_s(&self, n: u64) -> f64 {
         self.receiver_clock.true_elapsed_s(self.clock.start, self.clock.epoch(n))
     }
@@ -179,7 +179,7 @@ impl Scene {
         Tuning::new(&self.metadata, clocks, &self.signals, f64::from(self.noise_lsb))
     }
 
-    /// Samples before a block that its stages must see.
+    /// Number of samples before a block that its stages need.
     pub fn memory_samples(&self) -> usize {
         let mut sum = 0;
         self.stages(|stage| sum += stage.memory_samples());
@@ -187,8 +187,8 @@ impl Scene {
     }
 }
 
-/// Every source of interference once, with the number of the first of the scenes that receives it: what
-/// several front ends receive is one source.
+/// Lists every source of interference once, with the number of the first scene that receives it. Several
+/// front ends may receive the same source.
 pub fn sources<'s>(scenes: impl Iterator<Item = &'s Scene>) -> Vec<(usize, &'s Interferer)> {
     let mut found: Vec<(usize, &Interferer)> = Vec::new();
     for (number, scene) in scenes.enumerate() {
@@ -230,7 +230,7 @@ pub fn is_outside(metadata: &IfMetadata, signal: &Signal) -> bool {
     is_beyond(metadata, main_lobe_hz(metadata, signal))
 }
 
-/// [`is_outside`] of one satellite's signal.
+/// True if the main lobes of one satellite's signal lie wholly outside the band, like [`is_outside`].
 pub fn is_link_outside(metadata: &IfMetadata, link: Link) -> bool {
     let (if_hz, half_hz) = (metadata.if_hz(link.carrier_hz()), link.signal.lobe_hz());
     is_beyond(metadata, (if_hz - half_hz, if_hz + half_hz))

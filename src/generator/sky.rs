@@ -26,20 +26,20 @@ const PASSES: u32 = 4;
 /// Ranges that have no direction.
 const LEAST_RANGE_M: f64 = 1.0;
 
-/// Geometry and satellite clock behind what is received at one instant.
+/// Geometry and satellite clock for a signal that is received at one instant.
 #[derive(Clone, Debug)]
 pub struct Emission {
-    /// The line of sight at reception.
+    /// Line of sight at reception.
     pub sight: Sight,
     /// Geometric light time, in seconds.
     pub travel_s: f64,
-    /// Satellite's L1 C/A clock minus GPS time at emission (relativity and T_GD in).
+    /// Satellite's L1 C/A clock minus GPS time at emission in seconds, with relativity and T_GD included.
     pub satellite_clock_s: f64,
     /// Rate of the satellite clock against GPS time, in s/s.
     pub satellite_clock_drift: f64,
 }
 
-/// The antenna at one instant, as all satellites see it.
+/// Antenna at one instant, as all satellites see it.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
     /// True GPS time.
@@ -54,7 +54,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// The antenna with `motion` at `time`, `elapsed_s` after the scene's start.
+    /// Creates the antenna with `motion` at `time`, `elapsed_s` after the scene's start.
     pub fn new(time: Epoch, elapsed_s: f64, motion: Motion) -> Self {
         let user = Geodetic::from_ecef(&motion.position_m);
         Self { time, elapsed_s, motion, user, axes: user.ecef_to_enu() }
@@ -79,7 +79,7 @@ pub fn emission(
     emission_near(catalogue, sv, received, motion, LIGHT_TIME_S)
 }
 
-/// [`emission`] with a guess of the light time, which it depends on by no more than rounding.
+/// Like [`emission`], with a guess of the light time, on which the result depends only by rounding.
 ///
 /// # Errors
 /// As [`emission`].
@@ -163,7 +163,7 @@ const ARC_LEAD_S: f64 = 0.3;
 /// Position, velocity, clock and its rate.
 type Row = SVector<f64, 8>;
 
-/// A satellite's orbit and clock over some seconds: the polynomial of degree five through six states of the
+/// Orbit and clock of a satellite over some seconds: the polynomial of degree five through six states of the
 /// catalogue.
 ///
 /// The remainder is `r (ω h)⁶ / (32 · 6!)` with half a span h and ω below 3e-4 rad/s in ECEF: 1e-12 m over 16

@@ -31,7 +31,7 @@ pub enum Place {
 /// Drag of the claimed position away from where it began.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drag {
-    /// True time since the scene's start.
+    /// Start of the drag in true seconds since the scene's start.
     pub start_s: f64,
     /// Unit vector, ECEF.
     pub direction: Vector3<f64>,
@@ -48,14 +48,14 @@ pub struct Advantage {
     pub start_db: f64,
     /// Power advantage after the ramp, in dB.
     pub end_db: f64,
-    /// Time from one to the other after switching on, linear in decibels.
+    /// Duration in seconds of the ramp after switching on, linear in decibels.
     pub ramp_s: f64,
 }
 
-/// A set of satellites' signals that have one origin.
+/// Constellation of satellite signals that have one origin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Constellation {
-    /// 0 for the true satellites; spoofers count from 1.
+    /// Number of the constellation: 0 for the true satellites; spoofers count from 1.
     pub number: usize,
     /// The position that its signals are made for.
     pub place: Place,
@@ -67,9 +67,9 @@ pub struct Constellation {
     pub clock_drift: f64,
     /// `None` for all in view of the claimed position.
     pub satellites: Option<Vec<Sv>>,
-    /// `None` for the true satellites.
+    /// Power advantage over the true signals; `None` for the true satellites.
     pub advantage: Option<Advantage>,
-    /// True time since the scene's start in which it sends.
+    /// Interval of transmission, in true seconds since the scene's start.
     pub on_s: Range<f64>,
 }
 
@@ -94,7 +94,7 @@ impl Drag {
 }
 
 impl Constellation {
-    /// The true satellites as the antenna receives them.
+    /// Creates the constellation of the true satellites as the antenna receives them.
     pub fn authentic() -> Self {
         Self {
             number: 0,
@@ -108,7 +108,7 @@ impl Constellation {
         }
     }
 
-    /// The motion that its signals are made for, where the antenna's is `antenna`.
+    /// Motion for which the signals are made, if the antenna's is `antenna`.
     pub fn motion(&self, antenna: &Trajectory, t_s: f64) -> Motion {
         let mut motion = match &self.place {
             Place::Antenna => antenna.at(t_s),
@@ -123,8 +123,8 @@ impl Constellation {
         motion
     }
 
-    /// A bound on the speed of that motion until `until_s`; `None` where motion comes from outside as it
-    /// flows.
+    /// Upper bound in m/s of the speed of that motion until `until_s`. `None` if the motion is pushed while
+    /// the scene runs.
     pub fn fastest_mps(&self, antenna: &Trajectory, until_s: f64) -> Option<f64> {
         let trajectory = match &self.place {
             Place::Antenna => antenna,
@@ -154,12 +154,12 @@ impl Constellation {
         self.satellites.as_ref().is_none_or(|list| list.contains(&sv))
     }
 
-    /// The satellite whose path through the ionosphere a signal takes: none for a spoofer's.
+    /// Satellite whose path through the ionosphere a signal takes: `None` for a spoofer's.
     pub fn fading(&self, sv: Sv) -> Option<Sv> {
         self.advantage.is_none().then_some(sv)
     }
 
-    /// Times at which the motion's acceleration or its slope jumps, ascending.
+    /// Times in seconds at which the motion's acceleration or its slope jumps, ascending.
     pub fn motion_breaks_s(&self, antenna: &Trajectory) -> Vec<f64> {
         let mut breaks = match &self.place {
             Place::Antenna => antenna.breaks_s().to_vec(),
@@ -183,7 +183,7 @@ impl Constellation {
         breaks
     }
 
-    /// Samples in which it sends, of those that the receiver's clock numbers.
+    /// Samples during which the constellation is on, as the receiver's clock numbers them.
     pub fn on(&self, clock: SampleClock, receiver_clock: &ReceiverClock) -> Range<u64> {
         let sample = |t_s: f64| {
             let reading_s = receiver_clock.reading_elapsed_s(clock.start, t_s);

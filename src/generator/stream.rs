@@ -1,4 +1,4 @@
-//! A scene becomes a stream of packed IF samples, with the truth beside it.
+//! Conversion of a scene to a stream of packed IF samples, with the truth beside it.
 //!
 //! [`Generator`] iterates batches of samples with their truth as values. [`Stream`] gives the truth to a
 //! [`Sink`] and the samples to a buffer of the caller's, [`generate`] writes both to their ends,
@@ -39,7 +39,7 @@ use gnss::satellite::Sv;
 /// Partition of the work; no option changes a byte of the output.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
-    /// Runs of 4096 samples in a block.
+    /// Number of runs of 4096 samples in a block.
     pub block_runs: u32,
     /// Blocks in a batch.
     pub batch_blocks: u32,
@@ -60,7 +60,7 @@ pub struct Generated {
     pub samples: u64,
     /// Satellites that were in view at some time.
     pub satellites: Vec<Sv>,
-    /// Components that the format could not hold.
+    /// Number of components that exceeded the format's range.
     pub clipped: u64,
     /// Polynomials made.
     pub knots: u64,
@@ -89,8 +89,8 @@ impl fmt::Display for Generated {
     }
 }
 
-/// Writes the samples of `scene` and gives `truth` what is true; `progress` is called with the number of
-/// samples done after each batch.
+/// Writes the samples of `scene` and passes the true values to `truth`. `progress` is called with the number
+/// of finished samples after each batch.
 ///
 /// # Errors
 /// [`GenerateError`]; what was written before stays.
@@ -117,8 +117,8 @@ pub fn generate_with(
     generate_part(scene, 0..scene.samples, samples, truth, progress, options)
 }
 
-/// The samples of `part` of the scene, the same bits as those of the whole; the truth counts from the part's
-/// first sample.
+/// Generates the samples of `part` of the scene, with the same bits as in the whole. The truth counts from
+/// the part's first sample.
 ///
 /// # Errors
 /// As [`generate`], and [`GenerateError::Part`] for a part that the scene does not have.
@@ -139,14 +139,14 @@ pub fn generate_part(
     stream.finish(truth)
 }
 
-/// A scene on its way to samples, batch by batch.
+/// Stream of a scene's samples, batch by batch.
 pub struct Stream<'a> {
     front: Front<'a>,
     ticks: Ticks,
 }
 
 impl<'a> Stream<'a> {
-    /// The stream of `scene` from its first sample on; gives `truth` what the scene is.
+    /// Creates the stream of `scene` from its first sample on, and passes the scene's facts to `truth`.
     ///
     /// # Errors
     /// A rate that the scene's signals cannot have, a sink that does not take the truth.
@@ -154,7 +154,7 @@ impl<'a> Stream<'a> {
         Self::of(scene, 0..scene.samples, truth, options)
     }
 
-    /// The stream of a part of `scene`.
+    /// Creates the stream of a part of `scene`.
     ///
     /// # Errors
     /// As [`Stream::new`], and [`GenerateError::Part`].
@@ -178,8 +178,8 @@ impl<'a> Stream<'a> {
         self.front.samples()
     }
 
-    /// Replaces what `packed` holds by the next batch, and gives `truth` what is true of it; `false` after
-    /// the last sample.
+    /// Replaces the content of `packed` by the next batch, and passes its true values to `truth`. Returns
+    /// `false` after the last sample.
     ///
     /// # Errors
     /// [`GenerateError`] of orbits, messages and truth.
@@ -203,7 +203,7 @@ impl<'a> Stream<'a> {
         Ok(true)
     }
 
-    /// Gives `truth` the rest, and reports what was done.
+    /// Passes the remaining truth to `truth`, and returns the summary of the run.
     ///
     /// # Errors
     /// A sink that does not take the truth.

@@ -13,7 +13,7 @@ use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::satellite::Sv;
 use gnss::time::Rate;
 
-/// Changes of a scene at most.
+/// Largest number of changes in a scene.
 pub const MOST: usize = 100_000;
 
 /// Source that can be switched.
@@ -36,7 +36,7 @@ pub struct Switched {
     pub astray_m: f64,
     /// Growth of the range error, in m/s.
     pub astray_mps: f64,
-    /// First sample of the tick from which that counts.
+    /// First sample of the tick from which the state applies.
     pub since: u64,
 }
 
@@ -83,7 +83,7 @@ pub struct Stray {
     pub step_m: f64,
 }
 
-/// The switches of a scene; clones of their `Arc` share them.
+/// Switches of a scene; clones of their `Arc` share them.
 #[derive(Debug)]
 pub struct Switches {
     tick_samples: u64,
@@ -101,13 +101,13 @@ impl Switches {
         self.tick_samples
     }
 
-    /// The tick in which a sample lies.
+    /// Number of the tick in which a sample lies.
     pub fn tick_of(&self, sample: u64) -> u64 {
         sample / self.tick_samples
     }
 
-    /// Changes a source from `tick` on, which must not be before its last change; `false` where there are too
-    /// many changes.
+    /// Changes a source from `tick` on, which must not be before its last change. Returns `false` if there
+    /// are too many changes.
     pub fn set(&self, source: Source, tick: u64, change: impl FnOnce(&mut Switched)) -> bool {
         let mut rows = self.rows.write().unwrap_or_else(PoisonError::into_inner);
         if rows.values().map(Vec::len).sum::<usize>() >= MOST {

@@ -22,16 +22,16 @@ pub struct ReceiverClock {
     pub bias_s: f64,
     /// Gain at the start, in seconds per second.
     pub drift: f64,
-    /// Growth of the drift a second.
+    /// Growth of the drift per second, in 1/s.
     pub ageing_per_s: f64,
-    /// Frequency that the acceleration of the antenna adds.
+    /// Frequency shift by the acceleration of the antenna.
     pub shaking: Option<Arc<Shaking>>,
     /// Noise of the oscillator.
     pub oscillator: Option<Arc<Oscillator>>,
 }
 
 impl ReceiverClock {
-    /// A clock of constant drift.
+    /// Creates a clock of constant drift.
     pub const fn steady(bias_s: f64, drift: f64) -> Self {
         Self { bias_s, drift, ageing_per_s: 0.0, shaking: None, oscillator: None }
     }

@@ -7,12 +7,12 @@
 
 use gnss::time::{Rate, SampleClock};
 
-/// Samples between nodes: the largest power of two within a millisecond.
+/// Number of samples between nodes: the largest power of two within a millisecond.
 pub fn node_samples(rate: Rate) -> u64 {
     1 << ((rate.hz() * 1e-3) as u64).max(64).ilog2()
 }
 
-/// Nodes less than a millisecond apart: every so many ticks of a rate.
+/// Nodes that are less than a millisecond apart, on a grid of ticks of a rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Nodes {
     rate: Rate,
@@ -30,7 +30,7 @@ impl Nodes {
         Self::of(Rate::MEGAHERTZ)
     }
 
-    /// The rate of their ticks.
+    /// Rate of the ticks.
     pub fn rate(self) -> Rate {
         self.rate
     }
@@ -54,12 +54,12 @@ impl Nodes {
         sample.max(0.0) * (self.rate.hz() / rate.hz()) / self.ticks as f64
     }
 
-    /// Samples of a run that ends at nodes, where those are samples.
+    /// Samples of a run that ends at nodes, if nodes coincide with samples.
     pub fn run_samples(self, rate: Rate) -> Option<u64> {
         (rate == self.rate).then_some(self.ticks)
     }
 
-    /// The first sample behind the node before `sample` and at or after the next one, where nodes lie between
+    /// First sample behind the node before `sample` and at or after the next one, if nodes lie between
     /// samples.
     pub fn until(self, rate: Rate, sample: u64) -> Option<u64> {
         if rate == self.rate {
@@ -80,7 +80,7 @@ impl Nodes {
         SampleClock { rate: self.rate, ..clock }
     }
 
-    /// The tick of a node.
+    /// Number of a node's tick.
     pub fn tick(self, node: u64) -> u64 {
         node.saturating_mul(self.ticks)
     }

@@ -1,4 +1,4 @@
-//! The phase noise of an oscillator: power-law spectra of fractional frequency, S_y(f) = Σ h_a f^a.
+//! Phase noise of an oscillator: power-law spectra of fractional frequency, S_y(f) = Σ h_a f^a.
 //!
 //! Definitions and levels: NIST SP 1065, section 3; presets: Winkel 2003, table 2.1 (h2 and h1 are not given
 //! there and are zero). The noise is drawn at nodes less than a millisecond apart on a grid of samples and is
@@ -86,7 +86,7 @@ impl PowerLaw {
     }
 }
 
-/// An oscillator's phase noise over the samples of a scene.
+/// Phase noise of an oscillator over the samples of a scene.
 #[derive(Debug)]
 pub struct Oscillator {
     /// Power law of the fractional frequency.
@@ -113,7 +113,7 @@ struct Known {
 }
 
 impl Oscillator {
-    /// Noise of `law` at `rate`, drawn from `stream`.
+    /// Creates the noise of `law` at `rate`, drawn from `stream`.
     pub fn new(law: PowerLaw, rate: Rate, stream: Stream) -> Self {
         let node_samples = node_samples(rate);
         let node_s = rate.elapsed_s(node_samples);
@@ -136,8 +136,8 @@ impl Oscillator {
         }
     }
 
-    /// The part of the phase that knots can follow, `elapsed_s` after the first sample, in s: a spline with
-    /// continuous slope through the noise at coarse nodes, some 0.8 s apart.
+    /// Slow part of the phase in seconds, `elapsed_s` after the first sample, which knots can follow. It is a
+    /// spline with continuous slope through the noise at coarse nodes, some 0.8 s apart.
     pub fn slow_s(&self, elapsed_s: f64) -> f64 {
         let place = elapsed_s / self.cell_s;
         // Before the first sample the first piece goes on.
@@ -147,7 +147,8 @@ impl Oscillator {
         a + u * (b + u * (c + u * d))
     }
 
-    /// The rest of the phase at node number `node`, in s. With [`Self::slow_s`] it is the whole.
+    /// Fast part of the phase in seconds at node number `node`. The sum with [`Self::slow_s`] is the whole
+    /// phase.
     pub fn quick_s(&self, node: u64) -> f64 {
         let (cell, index) = (node / CELL_NODES as u64, (node % CELL_NODES as u64) as usize);
         self.cell(cell).get(index).copied().unwrap_or(0.0)

@@ -1,4 +1,4 @@
-//! The receiving antenna: gain and phase over direction, in the axes of the body that carries it.
+//! Receiving antenna: gain and phase over direction, in the axes of the body that carries it.
 //!
 //! Patterns are a function of azimuth from the antenna's north over its east and of elevation above its
 //! plane. On a body with an attitude north leans towards the nose; else antenna and local axes are the same.
@@ -94,7 +94,7 @@ pub(super) fn gain_db(curve: &Curve, angle_deg: f64) -> f64 {
     }
 }
 
-/// An antenna, and the body that turns it.
+/// Antenna and the attitude of its body.
 #[derive(Clone, Debug)]
 pub struct Antenna {
     /// Gain and phase by direction.
@@ -104,7 +104,7 @@ pub struct Antenna {
 }
 
 impl Antenna {
-    /// An antenna that looks up.
+    /// Creates an antenna that looks up.
     pub fn level(pattern: Pattern) -> Self {
         Self { pattern, body: None }
     }

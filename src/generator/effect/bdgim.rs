@@ -1,4 +1,4 @@
-//! BDGIM taken for the true ionosphere: group delay on the code, the same as advance on the carrier.
+//! BDGIM as the true ionosphere: a group delay of the code, and an equal advance of the carrier.
 //!
 //! The coefficients of the model's forecast change every two hours, at once, by up to a few TECU. Nature does
 //! not: here one interval passes into the next over [`MIDNIGHT_S`]. Limits: where the model's least content
@@ -11,7 +11,7 @@ use gnss::earth::{Geodetic, Look};
 use gnss::signal::Signal;
 use gnss::time::Epoch;
 
-/// BDGIM with smooth ends of its intervals.
+/// BDGIM with smooth transitions between its intervals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BdgimIonosphere {
     /// The model's coefficients.

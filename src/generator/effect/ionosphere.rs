@@ -1,4 +1,4 @@
-//! The ionosphere: group delay on the code, the same as advance on the carrier.
+//! Klobuchar's model as the true ionosphere: a group delay of the code, and an equal advance of the carrier.
 //!
 //! Klobuchar's model (IS-GPS-200N, 20.3.3.5.2.5) taken for true, so that a receiver that applies the
 //! broadcast coefficients removes it. As printed the model steps by 2 % of its bulge (6 to 20 cm) where the
@@ -19,7 +19,7 @@ use gnss::time::Epoch;
 /// Phase over which the bulge fades: 0.03 rad is 6 min at the shortest period. The delay then differs from
 /// the printed one by less than 3 % of the bulge's amplitude, little more than the step itself.
 pub const FADE_RAD: f64 = 0.03;
-/// Time over which one day's bulge passes into the next at local midnight.
+/// Duration in seconds of the transition from one day's bulge to the next, at local midnight.
 pub const MIDNIGHT_S: f64 = 1200.0;
 /// Heights between which the delay fades, in metres.
 const SHELL_M: f64 = 350e3;
@@ -40,8 +40,8 @@ impl KlobucharIonosphere {
         Self { model, defined_hz: L1_HZ }
     }
 
-    /// Group delay in seconds on `carrier_hz` from `user` towards `look` at GPS time `at`; twice
-    /// continuously differentiable in time wherever the printed model's limits on φ, AMP and PER do not act.
+    /// Group delay in seconds on `carrier_hz` from `user` towards `look` at GPS time `at`. It is twice
+    /// continuously differentiable in time, except where the printed model's limits on φ, AMP and PER act.
     pub fn delay_s(&self, user: Geodetic, look: Look, at: Epoch, carrier_hz: f64) -> f64 {
         let bulge = self.model.bulge(user, look, at);
         let scale = self.defined_hz / carrier_hz;

@@ -27,11 +27,12 @@ const ZENITH_RANGE_M: f64 = 1.965e7;
 /// of QZSS.
 const FARTHEST: f64 = 0.1;
 
-/// A link budget; [`LinkBudget::default`] is a GPS L1 C/A satellite and an ordinary receiver.
+/// Link budget from transmitter to receiver. [`LinkBudget::default`] is a GPS L1 C/A satellite and an
+/// ordinary receiver.
 #[derive(Clone, Debug)]
 pub struct LinkBudget {
-    /// Power of L1 C/A into the satellite's antenna, dBW; other signals' are as much more as their documents'
-    /// minima on the ground.
+    /// Power of L1 C/A into the satellite's antenna, in dBW. Other signals differ from it as their documents'
+    /// minima on the ground do.
     pub transmit_dbw: f64,
     /// Block of all satellites without one of their own.
     pub block: Block,
@@ -41,7 +42,7 @@ pub struct LinkBudget {
     pub path_loss_db: f64,
     /// The receiving antenna.
     pub antenna: Antenna,
-    /// Noise figure of the receiver, against 290 K.
+    /// Noise figure of the receiver in dB, against 290 K.
     pub noise_figure_db: f64,
     /// Losses in the receiver, in dB.
     pub implementation_loss_db: f64,

@@ -61,7 +61,7 @@ impl Coefficients {
 }
 
 impl Mapping {
-    /// Hydrostatic and wet mapping factors; below the horizon those of the horizon.
+    /// Hydrostatic and wet mapping factors; below the horizon they are those of the horizon.
     pub fn factors(&self, user: Geodetic, elevation_rad: f64, at: Epoch) -> (f64, f64) {
         let day = season_day(at);
         match self {
@@ -197,8 +197,8 @@ fn herring(sin: f64, [a, b, c]: [f64; 3]) -> f64 {
     (1.0 + a / (1.0 + b / (1.0 + c))) / (sin + a / (sin + b / (sin + c)))
 }
 
-/// Days into a mean year, 1.0 on the first of January of 1980. Within 0.8 days of the calendar, and without
-/// its step at the turn of the year; VMF3's factors at 5° change by 1.4e-4 in that time, which is 0.3 mm of
+/// Days into a mean year, 1.0 on the first of January 1980. It is within 0.8 days of the calendar, without
+/// its step at the turn of the year. VMF3's factors at 5° change by 1.4e-4 in that time, which is 0.3 mm of
 /// delay.
 pub fn season_day(at: Epoch) -> f64 {
     (at.seconds() as f64 / 86_400.0 + 6.0).rem_euclid(YEAR_DAYS)

@@ -1,4 +1,4 @@
-//! Multipath: copies of the direct ray that come later, with an amplitude and a phase of their own.
+//! Multipath: delayed copies of the direct ray, with an amplitude and a phase of their own.
 //!
 //! A reflected ray's code and carrier are delayed by the same excess δ, so its carrier is −δ/λ cycles against
 //! the direct one and fading, at δ̇/λ, is coherent with the code; what the surface adds to the phase stays
@@ -52,7 +52,7 @@ pub struct Echo {
     pub satellites: Vec<Sv>,
 }
 
-/// Every reflected ray of a scene.
+/// Reflected rays of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Multipath {
     /// The reflections.

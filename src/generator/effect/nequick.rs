@@ -1,4 +1,4 @@
-//! NeQuick-G taken for the true ionosphere: group delay on the code, the same as advance on the carrier.
+//! NeQuick-G as the true ionosphere: a group delay of the code, and an equal advance of the carrier.
 //!
 //! The model as its document has it steps at 0 h UT: by a day of the Sun's declination, up to 2 cm, and at
 //! the end of a month by the next month's maps, by metres and at night severalfold. Nature does neither: here

@@ -46,7 +46,7 @@ pub enum Obstacle {
     Building(Building),
 }
 
-/// A box on the ground, by metres east, north and up of where the motion starts.
+/// Box on the ground, in metres east, north and up of the scene's first position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Building {
     /// West and east end in metres east of the scene's first position.
@@ -55,11 +55,11 @@ pub struct Building {
     pub north_m: [f64; 2],
     /// Height of the roof above the scene's first position, in metres.
     pub top_m: f64,
-    /// Power that goes through it, 0 to 1.
+    /// Share of the power that penetrates the building, 0 to 1.
     pub share: f64,
 }
 
-/// Everything that obstructs the direct ray.
+/// Obstructions of the direct ray.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Obstruction {
     /// The obstructions.
@@ -76,7 +76,7 @@ impl Obstruction {
         Self { obstacles, origin_m, ecef_to_enu }
     }
 
-    /// Share of power that is left of a ray that arrives at `user_m` (ECEF) from `look`.
+    /// Share of the power that remains of a ray that arrives at `user_m` (ECEF) from `look`.
     pub fn left(&self, user_m: &Vector3<f64>, look: Look, carrier_hz: f64) -> f64 {
         let here_m = self.ecef_to_enu * (user_m - self.origin_m);
         self.obstacles.iter().map(|obstacle| obstacle.left(&here_m, look, carrier_hz)).product()
@@ -130,7 +130,8 @@ fn horizon(points_rad: &[(f64, f64)], azimuth_rad: f64) -> f64 {
 }
 
 impl Building {
-    /// Diffraction loss in dB of the wall that shades most, for an antenna at `here_m` (east, north, up).
+    /// Diffraction loss in dB of the wall that obstructs most, for an antenna at `here_m` (east, north, up,
+    /// in metres).
     pub fn loss_db(&self, here_m: &Vector3<f64>, look: Look, carrier_hz: f64) -> f64 {
         let ([west, east], [south, north]) = (self.east_m, self.north_m);
         let walls = [
@@ -176,8 +177,7 @@ fn screen_db(a: [f64; 2], b: [f64; 2], top_m: f64, here_m: &Vector3<f64>, look: 
     knife_edge_db(edges.into_iter().map(nu).fold(f64::INFINITY, f64::min))
 }
 
-/// Loss in dB behind a knife edge by Fresnel's parameter ν (ITU-R P.526-15, equation 31), none where it is
-/// below −0.78.
+/// Loss in dB behind a knife edge by Fresnel's parameter ν (ITU-R P.526-15, equation 31); zero below −0.78.
 pub fn knife_edge_db(nu: f64) -> f64 {
     if nu <= -0.78 {
         return 0.0;

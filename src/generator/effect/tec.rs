@@ -1,4 +1,4 @@
-//! The ionosphere by its electron content: on one thin shell, constant or from IONEX maps.
+//! Ionosphere given by its electron content: on one thin shell, constant or from IONEX maps.
 //!
 //! A column of TEC electrons/m² delays the code by 40.3·TEC/f² metres and advances the carrier by as much
 //! (IS-GPS-200N, 20.3.3.3.3.3 rests on the same 1/f²). The vertical column is taken where the straight line
@@ -32,7 +32,7 @@ pub enum Mapping {
     ModifiedSingleLayer,
 }
 
-/// A sphere that holds all electrons.
+/// Sphere that contains all electrons.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shell {
     /// Radius of the Earth, in metres.
@@ -98,7 +98,7 @@ pub enum Content {
     },
 }
 
-/// An ionosphere of given electron content.
+/// Ionosphere of given electron content.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShellIonosphere {
     /// Vertical content by position and time.
@@ -108,7 +108,7 @@ pub struct ShellIonosphere {
 }
 
 impl ShellIonosphere {
-    /// Slant electron content of a whole crossing in TEC units.
+    /// Slant electron content of a complete crossing, in TEC units.
     pub fn slant_tecu(&self, user: Geodetic, look: Look, at: gnss::time::Epoch) -> f64 {
         let pierce = self.shell.pierce(user, look);
         let vertical_tecu = match &self.content {

@@ -26,7 +26,7 @@ pub enum Block {
 }
 
 impl Block {
-    /// Blocks as a scenario writes them.
+    /// Satellite blocks and their names in a scenario.
     pub const NAMES: [(&'static str, Self); 4] =
         [("typical", Self::Typical), ("IIA", Self::Iia), ("IIR", Self::Iir), ("IIR-M", Self::IirM)];
 
@@ -46,8 +46,9 @@ impl Block {
     }
 }
 
-/// The block of each satellite from the launch of the first of Block IIF to that of the second (2010-05-28 to
-/// 2011-07-16), of which PRN 25 has no published mean pattern here and is typical; `None` at other times.
+/// Block of each satellite between the launches of the first and the second satellite of Block IIF
+/// (2010-05-28 to 2011-07-16). PRN 25 has no published mean pattern here and is typical. `None` at other
+/// times.
 pub fn constellation(at: Epoch) -> Option<Vec<(Sv, Block)>> {
     let (first, last) = (Epoch::parse("2010-05-28T00:00:00").ok()?, Epoch::parse("2011-07-16T00:00:00").ok()?);
     if at.since(first) < 0.0 || at.since(last) > 0.0 {

@@ -1,5 +1,4 @@
-//! The neutral atmosphere: hydrostatic and wet zenith delays, each brought to the line of sight by its
-//! mapping function.
+//! Neutral atmosphere: hydrostatic and wet zenith delays, each mapped to the line of sight.
 //!
 //! Sources: Davis et al. 1985 (hydrostatic, with Saastamoinen's gravity term), Saastamoinen 1972 (wet), the
 //! Magnus formula with 237.3 °C; mapping functions are in [`super::mapping`]. Weather is the scene's, which
@@ -37,18 +36,18 @@ const BENT_RAD: f64 = 8.7e-3;
 /// Weather at a height, from which that at every other height follows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weather {
-    /// Height at which the next three were measured, below 44 km.
+    /// Height in metres of pressure, temperature and humidity, below 44 km.
     pub height_m: f64,
     /// Total pressure, in hPa.
     pub pressure_hpa: f64,
     /// Temperature.
     pub temperature_k: f64,
-    /// 0 to 1, the same at every height.
+    /// Relative humidity, 0 to 1, equal at every height.
     pub relative_humidity: f64,
 }
 
 impl Weather {
-    /// Sea level of the standard atmosphere, half saturated.
+    /// Weather of the standard atmosphere at sea level, half saturated.
     pub const STANDARD: Self =
         Self { height_m: 0.0, pressure_hpa: 1013.25, temperature_k: 288.15, relative_humidity: 0.5 };
 
@@ -94,10 +93,10 @@ pub enum Air {
     Gpt3(Box<Gpt3>),
 }
 
-/// Zenith delays × mapping functions, the same for code and carrier.
+/// Effect of zenith delays times mapping functions, equal for code and carrier.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Troposphere {
-    /// Zenith delays of the air.
+    /// Source of the zenith delays.
     pub air: Air,
     /// Mapping function from zenith to slant delays.
     pub mapping: Mapping,
@@ -122,7 +121,7 @@ impl Troposphere {
         }
     }
 
-    /// Slant delay in metres. `elevation_rad` is that of the straight line, also below the horizon.
+    /// Slant delay in metres. `elevation_rad` is the elevation of the straight line, also below the horizon.
     pub fn delay_m(&self, user: Geodetic, elevation_rad: f64, at: Epoch) -> f64 {
         if elevation_rad >= 0.0 {
             return self.upward_m(user, elevation_rad, at);

@@ -52,7 +52,7 @@ pub struct WindUp {
 }
 
 impl WindUp {
-    /// Wind-up on the body of `trajectory`; `None` if that has no attitude.
+    /// Creates the wind-up on the body of `trajectory`; `None` if it has no attitude.
     ///
     /// # Errors
     /// [`OrbitError`] from the elements.

@@ -49,7 +49,7 @@ pub struct Sources<'a> {
     pub nodes: Nodes,
     /// Sample numbers as times of the receiver's clock.
     pub clock: SampleClock,
-    /// The receiver's clock, whose oscillator may be noisy.
+    /// Receiver's clock, whose oscillator may be noisy.
     pub receiver_clock: &'a ReceiverClock,
     /// Scintillation of satellites.
     pub scintillation: Option<&'a Scintillation>,
@@ -127,7 +127,7 @@ pub struct FastPhases {
 }
 
 impl FastPhases {
-    /// Gathers what samples `from..=to` need; nothing where no source moves the signal.
+    /// Prepares the data for samples `from..=to`; nothing if no source changes the signal.
     pub fn prepare(&mut self, sources: Sources<'_>, fading: Option<Sv>, carrier_hz: f64, from: u64, to: u64) {
         if !sources.any(fading) {
             return;
@@ -149,12 +149,12 @@ impl FastPhases {
         self.grid.and_then(|(nodes, rate)| nodes.run_samples(rate))
     }
 
-    /// The sample at which a run from `sample` on has to end, where nodes lie between samples.
+    /// Sample at which a run from `sample` on has to end, if nodes lie between samples.
     pub fn until(&self, sample: u64) -> Option<u64> {
         self.grid.and_then(|(nodes, rate)| nodes.until(rate, sample))
     }
 
-    /// The fast phase at the ends of a run between two nodes.
+    /// Fast phase at the ends of a run between two nodes.
     pub fn ends(&self, from: u64, to: u64) -> [FastPhase; 2] {
         let Some((nodes, rate)) = self.grid else { return [FastPhase::STILL; 2] };
         let (node, share) = nodes.at(rate, from);

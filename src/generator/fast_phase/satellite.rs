@@ -11,7 +11,7 @@ use super::Sources;
 use crate::clock::oscillator::Oscillator;
 use gnss::satellite::Sv;
 
-/// A change of a clock between two nodes; the end is `u64::MAX` where there is none.
+/// Change of a clock between two nodes; the end is `u64::MAX` if there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Change {
     /// Number of the node at which it begins.
@@ -37,12 +37,12 @@ pub enum ChangeKind {
     },
 }
 
-/// One satellite's clock against what it broadcasts.
+/// Error of one satellite's clock relative to its broadcast value.
 #[derive(Debug, Default)]
 pub struct SatelliteClock {
-    /// Steps and ramps, which add up.
+    /// Steps and ramps, which are added up.
     pub changes: Vec<Change>,
-    /// Noise beyond that of the broadcast clock, which adds up too.
+    /// Noise beyond that of the broadcast clock; its parts are added up.
     pub noise: Vec<Oscillator>,
 }
 
@@ -69,8 +69,8 @@ fn elapsed_s(sources: &Sources<'_>, node: u64) -> f64 {
 }
 
 impl SatelliteClock {
-    /// Clock minus what is broadcast of it, between node number `node` and the next: at its beginning and at
-    /// its end.
+    /// Clock minus its broadcast value in seconds, at the beginning and at the end of the interval from node
+    /// number `node` to the next.
     pub fn cell_s(&self, sources: &Sources<'_>, node: u64) -> [f64; 2] {
         [node, node + 1].map(|at| {
             let changed = self.changes.iter().map(|change| change.offset_s(sources, node, at));
@@ -88,7 +88,7 @@ impl SatelliteClock {
         from_s + (to_s - from_s) * (place - node)
     }
 
-    /// True times since the scene's start at which offset or drift jumps.
+    /// True times in seconds since the scene's start at which offset or drift jumps.
     pub fn breaks_s(&self, sources: &Sources<'_>) -> impl Iterator<Item = f64> {
         let nodes = self.changes.iter().flat_map(|change| [change.from_node, change.until_node]);
         nodes.filter(|node| *node != u64::MAX).map(|node| elapsed_s(sources, node))

@@ -65,9 +65,9 @@ pub struct Strength {
     pub s4: f64,
     /// Standard deviation of the phase, in radians; absent means what comes with `s4` of a carrier.
     pub sigma_phi_rad: Option<f64>,
-    /// Time after which the autocorrelation of ξ is 1/e.
+    /// Time in seconds after which the autocorrelation of ξ is 1/e.
     pub decorrelation_s: f64,
-    /// Satellites behind the structures; absent means all.
+    /// Satellites that scintillate; absent means all.
     pub satellites: Option<Vec<Sv>>,
 }
 
@@ -146,7 +146,7 @@ impl Fade {
     }
 }
 
-/// The fading of every satellite in a scene.
+/// Fading of every satellite in a scene.
 #[derive(Debug)]
 pub struct Scintillation {
     /// Strength of the scintillation on L1.
@@ -174,7 +174,7 @@ struct Fade {
 }
 
 impl Scintillation {
-    /// Fading of `strength` at nodes of the fast phase at `rate`.
+    /// Creates the fading of `strength` at nodes of the fast phase at `rate`.
     pub fn new(strength: Strength, rate: Rate, stream: Stream) -> Self {
         let node_s = rate.elapsed_s(node_samples(rate));
         let most = (strength.decorrelation_s / NODES_PER_TIME / node_s).max(1.0);
@@ -188,8 +188,8 @@ impl Scintillation {
         Self { strength, step, response, stream, fades: Mutex::new(BTreeMap::new()) }
     }
 
-    /// Amplitude factor and phase in rad of `sv` on a carrier at node number `node`; `None` for a satellite
-    /// that does not scintillate.
+    /// Amplitude factor and phase in radians of `sv` on a carrier at node number `node`. `None` for a
+    /// satellite that does not scintillate.
     pub fn at(&self, sv: Sv, carrier_hz: f64, node: u64) -> Option<(f64, f64)> {
         if self.strength.satellites.as_ref().is_some_and(|satellites| !satellites.contains(&sv)) {
             return None;

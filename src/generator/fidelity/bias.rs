@@ -19,8 +19,8 @@ pub const LOOP_HZ: f64 = 0.5;
 /// chip.
 const CHIP_HZ: f64 = 1.023e6;
 
-/// Error of a signal's code whose phase is at rest on the sampling grid, root mean square over codes and
-/// phases, in metres, of the component for which it is largest.
+/// Code error in metres at rest on the sampling grid, for the component with the largest one. It is the root
+/// mean square over codes and phases.
 pub fn code_bias_m(edge: CodeEdge, signal: &Signal, rate_hz: f64) -> f64 {
     signal
         .components
@@ -37,7 +37,8 @@ pub fn moving_bias_m(edge: CodeEdge, signal: &Signal, rate_hz: f64, doppler_hz: 
     code_bias_m(edge, signal, rate_hz) / libm::hypot(1.0, std::f64::consts::TAU * samples_per_s / (4.0 * LOOP_HZ))
 }
 
-/// Error of the code that a scene's own noise hides, in metres: that of a delay loop on its strongest signal,
+/// Code error in metres that a scene's own noise hides: that of a delay loop on the strongest signal, 0.2 m
+/// at most.
 /// 0.2 m at most.
 ///
 /// Thermal noise of a loop of bandwidth B with correlators d chips apart is √(B·d / (2·C/N0)) chips where

@@ -30,8 +30,9 @@ fn row(line: &'static str) -> Option<Row> {
     Some(Row { signal, rate_hz, ns })
 }
 
-/// Nanoseconds of one core for a sample of a satellite, by the measured rates around `rate_hz`; beyond them
-/// the nearest one's. The processor is that of `reports/trade.md`: ratios hold on others about as they are.
+/// Time in ns on one core for a sample of a satellite, interpolated between the measured rates around
+/// `rate_hz`. Beyond them the nearest rate counts. The processor is that of `reports/trade.md`; ratios are
+/// similar on others.
 pub fn kernel_ns(signal: &Signal, rate_hz: f64, edge: CodeEdge, arithmetic: Arithmetic) -> Option<f64> {
     let at = CodeEdge::NAMES.iter().position(|(_, one)| *one == edge)?;
     let double = usize::from(arithmetic == Arithmetic::F64);

@@ -22,9 +22,9 @@ pub struct Machinery {
     pub longest_knot_spacing_s: f64,
     /// Reason for the knot spacing.
     pub knot_reason: String,
-    /// Memory of the generator's blocks, which does not grow with the scene.
+    /// Memory of the generator's blocks in bytes, which does not grow with the scene.
     pub block_bytes: u64,
-    /// Time of this machine for all knots of the scene, on one core.
+    /// Time in seconds on one core of this machine for all knots of the scene.
     #[serde(skip)]
     pub knots_s: f64,
 }

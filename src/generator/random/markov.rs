@@ -1,4 +1,4 @@
-//! The parts of a power-law clock noise that are linear Gauss–Markov processes of (phase, frequency).
+//! Linear Gauss–Markov processes of (phase, frequency), as parts of a power-law clock noise.
 //!
 //! White and random-walk frequency noise are such processes exactly; flicker is a sum of first-order ones
 //! whose time constants are a factor of four apart, which leaves a ripple of 2 sech(π²/ln 4) = 0.3 % on
@@ -11,7 +11,7 @@ use crate::random::Stream;
 /// Phase in s and fractional frequency.
 pub type State = [f64; 2];
 
-/// One Gauss–Markov process; its output is its phase.
+/// Gauss–Markov process whose output is its phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Process {
     /// Phase that walks; `level` is its variance per second, h0 / 2.
@@ -52,7 +52,7 @@ struct Covariance {
 type Matrix = [[f64; 2]; 2];
 
 impl Process {
-    /// The state at the beginning.
+    /// Returns the state at the beginning.
     pub fn begin(self, (a, _): (f64, f64)) -> State {
         match self {
             Self::WhiteFrequency { .. } | Self::FrequencyWalk { .. } => [0.0, 0.0],
@@ -148,7 +148,7 @@ pub fn apply(matrix: &Matrix, [x, y]: State) -> State {
     [matrix[0][0] * x + matrix[0][1] * y, matrix[1][0] * x + matrix[1][1] * y]
 }
 
-/// A step of fixed length.
+/// Step of fixed length.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
     transition: Matrix,
@@ -159,7 +159,7 @@ pub struct Step {
 }
 
 impl Step {
-    /// The state a step later, with two standard normals.
+    /// Returns the state a step later, with two standard normals as input.
     pub fn take(&self, state: State, (a, b): (f64, f64)) -> State {
         let [x, y] = apply(&self.transition, state);
         let gained = self.frequency * a;
@@ -167,7 +167,7 @@ impl Step {
     }
 }
 
-/// A process in coarse steps, each with a path of fine ones between its ends.
+/// Process in coarse steps, each with a path of fine ones between its ends.
 #[derive(Clone, Debug)]
 pub struct Track {
     process: Process,
@@ -180,7 +180,7 @@ pub struct Track {
 }
 
 impl Track {
-    /// `process` with `steps` fine steps of `dt_s` in a coarse one.
+    /// Creates the track of `process` with `steps` fine steps of `dt_s` in a coarse one.
     pub fn new(process: Process, dt_s: f64, steps: usize, stream: Stream) -> Self {
         Self {
             process,
@@ -192,12 +192,12 @@ impl Track {
         }
     }
 
-    /// The state before the first step.
+    /// Returns the state before the first step.
     pub fn begin(&self) -> State {
         self.process.begin(self.ends.normals(0))
     }
 
-    /// The state at the end of coarse step `cell` from that at its beginning.
+    /// Returns the state at the end of coarse step `cell` from that at its beginning.
     pub fn next(&self, state: State, cell: u64) -> State {
         self.coarse.take(state, self.ends.normals(cell + 1))
     }

@@ -18,29 +18,29 @@ pub fn mix(x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-/// The random numbers of one process.
+/// Stream of the random numbers of one process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stream {
     key: u64,
 }
 
 impl Stream {
-    /// The stream of `purpose` in a scene with `seed`.
+    /// Creates the stream of `purpose` in a scene with `seed`.
     pub fn new(seed: u64, purpose: &str) -> Self {
         Self { key: mix(seed ^ GOLDEN) }.named(purpose)
     }
 
-    /// The stream of a part that has a name.
+    /// Derives the stream of a part that has a name.
     pub fn named(self, name: &str) -> Self {
         Self { key: name.bytes().fold(self.key, |key, byte| mix(key ^ u64::from(byte)).wrapping_add(GOLDEN)) }
     }
 
-    /// The stream of a part that has a number.
+    /// Derives the stream of a part that has a number.
     pub fn part(self, index: u64) -> Self {
         Self { key: mix(self.key ^ mix(index.wrapping_add(GOLDEN))) }
     }
 
-    /// The stream of a satellite.
+    /// Derives the stream of a satellite.
     pub fn satellite(self, sv: Sv) -> Self {
         // Numbers of GPS satellites are their own; those of other systems follow in blocks of 256.
         let block = match sv.system {
@@ -60,7 +60,7 @@ impl Stream {
         mix(self.key.wrapping_add(index.wrapping_mul(GOLDEN)))
     }
 
-    /// Two independent standard normals, pair number `index`.
+    /// Returns two independent standard normals, pair number `index`.
     pub fn normals(self, index: u64) -> (f64, f64) {
         // Open at zero, so that the logarithm is finite: the largest normal is 8.6.
         let unit = |word: u64| ((word >> 11) as f64 + 0.5) / 9_007_199_254_740_992.0;

@@ -1,4 +1,4 @@
-//! `[attitude]`: how the body that carries the antenna is turned.
+//! Table `[attitude]`: the attitude of the body that carries the antenna.
 
 use nalgebra::{Unit, Vector3};
 

@@ -1,4 +1,4 @@
-//! `[sbas]` as written, and the network that it becomes.
+//! Table `[sbas]` as written, and the network that it becomes.
 
 use std::sync::Arc;
 

@@ -74,8 +74,7 @@ struct Band<'s> {
 }
 
 impl Scenario {
-    /// Makes the scene of a scenario with one front end, as it is written. What [`Scenario::compose`] would
-    /// warn of is left out.
+    /// Composes the scene of a scenario with one front end. Warnings of [`Scenario::compose`] are dropped.
     ///
     /// # Errors
     /// As [`Scenario::compose`].
@@ -83,8 +82,8 @@ impl Scenario {
         self.compose(&self.directory, &Overrides::default()).map(|(scene, _)| scene)
     }
 
-    /// Makes the scene of a scenario with one front end, reading files relative to `directory`; also returns
-    /// what the user should know of.
+    /// Composes the scene of a scenario with one front end, with files relative to `directory`. It also
+    /// returns warnings for the user.
     ///
     /// # Errors
     /// What cannot be, or not together; several front ends, of which [`Scenario::with_front_end`] chooses
@@ -100,7 +99,7 @@ impl Scenario {
         scenes.into_iter().next().map(|scene| (scene, warnings)).ok_or_else(none)
     }
 
-    /// Makes the scenes of all front ends, each the one that its front end has alone.
+    /// Composes the scenes of all front ends. Each equals the scene that its front end has alone.
     ///
     /// # Errors
     /// What cannot be, or not together.

@@ -1,4 +1,4 @@
-//! `[expect]`: what a scene expects of its receiver, where physics alone would expect something else.
+//! Table `[expect]`: expectations about a receiver, where they differ from those by physics alone.
 
 use super::read::Table;
 use super::{Scenario, ScenarioError, satellite_list};

@@ -1,4 +1,4 @@
-//! Files that a scenario names: where they are, and what may be read of them.
+//! Files that a scenario names: their location, and the permission to read them.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! `[front_end]` as written: one table, or a list of them that listen to one sky by one clock.
+//! Table `[front_end]` as written: one table, or a list of front ends that share one antenna and one clock.
 //!
 //! In a list each has its `name`, and its own centre, rate, format, gain and stages. What is random about it
 //! is keyed by its name alone, never by its position in the list.
@@ -31,10 +31,10 @@ pub enum Tuned {
     },
 }
 
-/// A front end: what the samples of one file are.
+/// Front end, which defines the samples of one file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrontEnd {
-    /// Names its files and keys its random numbers; required in a list of several.
+    /// Name of the front end's files and key of its random numbers; required in a list of several.
     pub name: Option<String>,
     /// The sample rate.
     pub rate: Rate,
@@ -44,9 +44,9 @@ pub struct FrontEnd {
     pub inverted: bool,
     /// Packing of the samples.
     pub format: Format,
-    /// The gain, if the scenario sets it.
+    /// Gain as the standard deviation of the noise in LSB, if the scenario sets it.
     pub noise_lsb: Option<f32>,
-    /// The signals that it is for; absent means those of the scene's that reach into its band.
+    /// Signals of the front end; absent means those of the scene that reach into its band.
     pub signals: Option<Vec<&'static Signal>>,
     /// Hardware stages that act on the samples.
     pub stages: Stages,
@@ -75,7 +75,8 @@ impl FrontEnd {
 }
 
 impl Scenario {
-    /// The scenario with one front end of its list alone, which makes the same bytes as in the list.
+    /// Returns the scenario with one front end of its list alone, which generates the same bytes as in the
+    /// list.
     ///
     /// # Errors
     /// A name that no front end has, with those that there are.
@@ -89,7 +90,7 @@ impl Scenario {
         Ok(Self { front_ends: vec![own.clone()], ..self.clone() })
     }
 
-    /// The names of its front ends, in their order.
+    /// Names of the front ends, in order.
     pub fn front_end_names(&self) -> Vec<&str> {
         self.front_ends.iter().filter_map(|front_end| front_end.name.as_deref()).collect()
     }

@@ -11,18 +11,18 @@ use crate::vehicle::Trajectory;
 use crate::vehicle::shaking::Shaking;
 use gnss::time::Rate;
 
-/// The receiver's clock as written.
+/// Receiver's clock as written.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ClockSpec {
     /// Clock minus GPS time at the scene's start, in seconds.
     pub bias_s: f64,
     /// Gain at the start, in seconds per second.
     pub drift: f64,
-    /// Growth of the drift a second.
+    /// Growth of the drift per second, in 1/s.
     pub ageing_per_s: f64,
-    /// Fractional frequency a g of acceleration.
+    /// Fractional frequency shift for 1 g of acceleration.
     pub per_g: f64,
-    /// Noise of its oscillator; absent means none.
+    /// Noise of the oscillator; absent means none.
     pub noise: Option<PowerLaw>,
 }
 

@@ -1,4 +1,5 @@
-//! `[[interference]]` and `[[spoofer]]`: what reaches the antenna besides the satellites, as written.
+//! Tables `[[interference]]` and `[[spoofer]]` as written: waves that reach the antenna besides the
+//! satellites.
 
 use std::path::PathBuf;
 
@@ -139,9 +140,9 @@ pub struct InterferenceSpec {
 pub struct DragSpec {
     /// Start of the drag, in true seconds since the scene's start.
     pub start_s: f64,
-    /// Direction of the drag, clockwise from north.
+    /// Azimuth of the drag's direction in radians, clockwise from north.
     pub azimuth_rad: f64,
-    /// Direction of the drag, upwards.
+    /// Elevation of the drag's direction in radians, positive upwards.
     pub elevation_rad: f64,
     /// Final speed, in m/s.
     pub speed_mps: f64,
@@ -152,7 +153,7 @@ pub struct DragSpec {
 /// One `[[spoofer]]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SpooferSpec {
-    /// Power over the true signals'.
+    /// Power advantage over the true signals.
     pub advantage: Advantage,
     /// Time of switching on, in true seconds since the scene's start.
     pub on_s: f64,
@@ -164,7 +165,7 @@ pub struct SpooferSpec {
     pub clock_bias_s: f64,
     /// Gain of its clock, in seconds per second.
     pub clock_drift: f64,
-    /// The claimed motion; absent means that of the antenna.
+    /// Claimed motion; absent means that of the antenna.
     pub motion: Option<MotionSpec>,
     /// Drag of the claimed position; absent means that it stays.
     pub drag: Option<DragSpec>,

@@ -41,7 +41,7 @@ pub enum Power {
     },
 }
 
-/// The antennas of the satellites that a scene does not name.
+/// Transmit antennas of the satellites that a scene does not name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transmit {
     /// Antenna of one block for all satellites.
@@ -50,7 +50,7 @@ pub enum Transmit {
     Constellation,
 }
 
-/// The receiving antenna, with its file not yet read.
+/// Receiving antenna, whose file is not yet read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum AntennaSpec {
     /// Antenna with equal gain in every direction.

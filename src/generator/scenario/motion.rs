@@ -1,4 +1,4 @@
-//! `[motion]`: which vehicle, and its numbers.
+//! Table `[motion]`: the kind of vehicle, and its parameters.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ pub enum FileKind {
     Nmea,
 }
 
-/// The motion as meant, with its file not yet read.
+/// Motion as meant, with its file not yet read.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MotionSpec {
     /// Antenna at rest at a position.
@@ -81,7 +81,7 @@ enum Kind {
 }
 
 impl MotionSpec {
-    /// The kind as a scenario writes it.
+    /// Name of the kind as a scenario writes it.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Static(_) => "static",

@@ -1,4 +1,4 @@
-//! `[[multipath]]`: reflected rays.
+//! Table `[[multipath]]`: reflected rays.
 
 use super::read::Table;
 use super::{Scenario, ScenarioError};

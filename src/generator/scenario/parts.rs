@@ -1,4 +1,4 @@
-//! The scene's sky: navigation data, orbits, what the satellites send, and the effects on the way.
+//! Parts of a scene: navigation data, orbits, messages, and the effects of propagation.
 
 use std::path::Path;
 

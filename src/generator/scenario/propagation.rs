@@ -27,7 +27,8 @@ use gnss::vmf3::Vmf3;
 pub struct Ionosphere {
     /// Electrons that delay the signals.
     pub truth: Electrons,
-    /// Coefficients that the satellites send; absent means those of `truth`, or else the navigation file's.
+    /// Coefficients that the satellites broadcast; absent means those of `truth`, or else the navigation
+    /// file's.
     pub broadcast: Option<Klobuchar>,
     /// Coefficients of NeQuick-G that are sent instead of the true ones or the file's.
     pub broadcast_ai: Option<[f64; 3]>,
@@ -202,10 +203,10 @@ impl Ionosphere {
     }
 }
 
-/// The neutral atmosphere as written.
+/// Neutral atmosphere as written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NeutralAtmosphere {
-    /// The weather at the ground.
+    /// Weather at the ground.
     pub weather: Weather,
     /// File of GPT3, for the weather, and for a mapping function that needs coefficients.
     pub gpt3_file: Option<PathBuf>,

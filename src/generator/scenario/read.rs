@@ -17,7 +17,7 @@ use toml::de::{DeTable, DeValue};
 use super::ScenarioError;
 use super::schema::{Absent, Key, Value};
 
-/// One table of the scenario.
+/// Table of the scenario.
 #[derive(Clone)]
 pub struct Table<'t> {
     source: &'t Source<'t>,
@@ -32,7 +32,7 @@ pub struct Table<'t> {
 }
 
 impl<'t> Table<'t> {
-    /// A table with the keys that it may hold.
+    /// Creates a table with the keys that it may contain.
     pub fn new(source: &'t Source<'t>, path: &str, at: usize, table: &'t DeTable<'t>, keys: &'static [Key]) -> Self {
         let decides = |key: &&Key| ["kind", "model"].contains(&key.name) && matches!(key.value, Value::Word(_));
         let kind =
@@ -99,8 +99,8 @@ impl<'t> Table<'t> {
         })
     }
 
-    /// Holds the table and those in it against their declarations: unknown keys, values of a wrong type or
-    /// out of their range, required keys that are absent.
+    /// Checks the table and those in it against their declarations: unknown keys, values of a wrong type or
+    /// out of range, required keys that are absent.
     pub fn check(&self, refusals: &mut Refusals) {
         let known = self.known();
         if self.each.is_none() {
@@ -151,7 +151,7 @@ impl<'t> Table<'t> {
         refusals.take(held);
     }
 
-    /// The full name of a key.
+    /// Full name of a key.
     pub fn key(&self, name: &str) -> String {
         if self.path.is_empty() { name.to_owned() } else { format!("{}.{name}", self.path) }
     }
@@ -167,7 +167,7 @@ impl<'t> Table<'t> {
         self.table.get(name)
     }
 
-    /// The refusal of a value.
+    /// Creates the refusal of a value.
     pub fn bad(&self, name: &str, expected: impl Display) -> ScenarioError {
         ScenarioError::Value {
             place: self.place(name),
@@ -182,7 +182,7 @@ impl<'t> Table<'t> {
         self.get(name).is_some()
     }
 
-    /// A number within its range.
+    /// Reads a number within its range.
     pub fn number(&self, name: &str) -> Result<Option<f64>, ScenarioError> {
         let Some(value) = self.get(name) else { return Ok(None) };
         let bad = || self.bad(name, self.expected(name));
@@ -191,7 +191,7 @@ impl<'t> Table<'t> {
         number.map(Some).ok_or_else(bad)
     }
 
-    /// A number within its range, its default, or a refusal where it has none.
+    /// Reads a number within its range, or returns its default, or a refusal if it has none.
     pub fn need(&self, name: &str) -> Result<f64, ScenarioError> {
         let default = match self.declared(name).map(|key| key.absent) {
             Some(Absent::Number(number)) => Some(number),
@@ -200,13 +200,13 @@ impl<'t> Table<'t> {
         self.number(name)?.or(default).ok_or_else(|| self.bad(name, self.expected(name)))
     }
 
-    /// An array of `N` numbers within the key's bounds.
+    /// Reads an array of `N` numbers within the key's bounds.
     pub fn numbers<const N: usize>(&self, name: &str) -> Result<Option<[f64; N]>, ScenarioError> {
         let Some(numbers) = self.list(name)? else { return Ok(None) };
         numbers.try_into().map(Some).map_err(|_| self.bad(name, self.expected(name)))
     }
 
-    /// An array of numbers, of any length unless one is declared.
+    /// Reads an array of numbers, of any length unless one is declared.
     pub fn list(&self, name: &str) -> Result<Option<Vec<f64>>, ScenarioError> {
         let Some(value) = self.get(name) else { return Ok(None) };
         let bad = || self.bad(name, self.expected(name));
@@ -221,7 +221,7 @@ impl<'t> Table<'t> {
         numbers.filter(|list| length.is_none_or(|length| list.len() == length)).map(Some).ok_or_else(bad)
     }
 
-    /// An integer within its range.
+    /// Reads an integer within its range.
     pub fn integer(&self, name: &str) -> Result<Option<u64>, ScenarioError> {
         let Some(value) = self.get(name) else { return Ok(None) };
         let bad = || self.bad(name, self.expected(name));
@@ -233,7 +233,7 @@ impl<'t> Table<'t> {
         number.filter(|x| (*least..=*most).contains(x)).map(Some).ok_or_else(bad)
     }
 
-    /// An integer, its default, or a refusal where it has none.
+    /// Reads an integer, or returns its default, or a refusal if it has none.
     pub fn need_integer(&self, name: &str) -> Result<u64, ScenarioError> {
         let default = match self.declared(name).map(|key| key.absent) {
             Some(Absent::Number(number)) => Some(number as u64),
@@ -242,7 +242,7 @@ impl<'t> Table<'t> {
         self.integer(name)?.or(default).ok_or_else(|| self.bad(name, self.expected(name)))
     }
 
-    /// A text as the key's kind allows it.
+    /// Reads a text as the key's kind allows it.
     pub fn text(&self, name: &str) -> Result<Option<&'t str>, ScenarioError> {
         match self.get(name).map(Spanned::get_ref) {
             None => Ok(None),
@@ -251,12 +251,12 @@ impl<'t> Table<'t> {
         }
     }
 
-    /// A text that must be there.
+    /// Reads a text that is required.
     pub fn need_text(&self, name: &str) -> Result<&'t str, ScenarioError> {
         self.text(name)?.ok_or_else(|| self.bad(name, self.expected(name)))
     }
 
-    /// A time: a string, or TOML's own date and time.
+    /// Reads a time: a string, or TOML's own date and time.
     pub fn instant(&self, name: &str) -> Result<Option<String>, ScenarioError> {
         match self.get(name).map(Spanned::get_ref) {
             Some(DeValue::Datetime(time)) => Ok(Some(time.to_string())),
@@ -273,7 +273,7 @@ impl<'t> Table<'t> {
         }
     }
 
-    /// One word out of a list, which is the declared one.
+    /// Reads one word of a list, which is the declared one.
     pub fn choice<T: Copy>(&self, name: &str, choices: &[(&str, T)]) -> Result<Option<T>, ScenarioError> {
         let names: Vec<&str> = choices.iter().map(|(word, _)| *word).collect();
         debug_assert!(
@@ -287,7 +287,7 @@ impl<'t> Table<'t> {
         found.map(Some).ok_or_else(|| self.bad(name, self.expected(name) + &hint))
     }
 
-    /// One word out of a list, which must be there.
+    /// Reads one word of a list, which is required.
     pub fn need_choice<T: Copy>(&self, name: &str, choices: &[(&str, T)]) -> Result<T, ScenarioError> {
         self.choice(name, choices)?.ok_or_else(|| self.bad(name, self.expected(name)))
     }
@@ -306,7 +306,7 @@ impl<'t> Table<'t> {
         words.map(Some).ok_or_else(|| self.bad(name, expected))
     }
 
-    /// A string, or an array of them.
+    /// Reads a string, or an array of them.
     pub fn texts(&self, name: &str) -> Result<Option<Vec<&'t str>>, ScenarioError> {
         match self.get(name).map(Spanned::get_ref) {
             Some(DeValue::Array(_)) => self.words(name, &self.expected(name)),
@@ -314,7 +314,7 @@ impl<'t> Table<'t> {
         }
     }
 
-    /// A table with the keys that are declared for it.
+    /// Reads a table with the keys that are declared for it.
     pub fn table(&self, name: &str) -> Result<Option<Table<'t>>, ScenarioError> {
         let Some(value) = self.get(name) else { return Ok(None) };
         let DeValue::Table(table) = value.get_ref() else { return Err(self.bad(name, "a table")) };
@@ -326,7 +326,7 @@ impl<'t> Table<'t> {
         Ok(Some(Self { each, ..Self::new(self.source, &self.key(name), value.span().start, table, keys) }))
     }
 
-    /// An array of tables with the key's own keys.
+    /// Reads an array of tables with the key's own keys.
     pub fn tables(&self, name: &str) -> Result<Option<Vec<Table<'t>>>, ScenarioError> {
         let Some(value) = self.get(name) else { return Ok(None) };
         let expected = "an array of tables";
@@ -344,7 +344,7 @@ impl<'t> Table<'t> {
         Ok(Some(tables))
     }
 
-    /// A table by itself, or every table of an array.
+    /// Reads a single table, or every table of an array.
     pub fn one_or_more(&self, name: &str) -> Result<Option<Vec<Table<'t>>>, ScenarioError> {
         match self.get(name).map(Spanned::get_ref) {
             Some(DeValue::Array(_)) => self.tables(name),
@@ -354,7 +354,7 @@ impl<'t> Table<'t> {
         }
     }
 
-    /// The names of the keys that are there.
+    /// Names of the keys that are present.
     pub fn names(&self) -> impl Iterator<Item = &'t str> + use<'t> {
         self.table.keys().map(|key| key.get_ref().as_ref())
     }
@@ -362,7 +362,7 @@ impl<'t> Table<'t> {
 
 /// Values of any type, for those who pass them on.
 impl Table<'_> {
-    /// An array of plain values: numbers, texts, truth values, times and arrays of them.
+    /// Reads an array of plain values: numbers, texts, truth values, times and arrays of them.
     pub fn values(&self, name: &str) -> Result<Option<Vec<toml::Value>>, ScenarioError> {
         let Some(value) = self.get(name) else { return Ok(None) };
         let expected = "an array of at least one number, text or truth value";
@@ -387,7 +387,7 @@ impl Table<'_> {
         Ok(whole)
     }
 
-    /// A plain value of any type.
+    /// Reads a plain value of any type.
     pub fn value(&self, name: &str) -> Option<toml::Value> {
         self.get(name).and_then(|value| plain(value.get_ref()))
     }
@@ -416,7 +416,7 @@ pub fn plain(value: &DeValue<'_>) -> Option<toml::Value> {
     })
 }
 
-/// The candidate most like `word`, if any is like it at all.
+/// Candidate most similar to `word`, if any is similar.
 pub fn nearest(word: &str, candidates: &[&str]) -> Option<String> {
     let lower = word.to_lowercase();
     candidates

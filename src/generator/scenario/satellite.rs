@@ -1,5 +1,5 @@
-//! The satellites' side as written: `[orbits]`, `[[satellite_fault]]` and `[[message_fault]]`, and what
-//! becomes of them.
+//! Tables `[orbits]`, `[[satellite_fault]]` and `[[message_fault]]` as written, and the faults that they
+//! become.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -31,15 +31,15 @@ const MARGIN_S: f64 = 2.0;
 /// `[orbits]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OrbitsSpec {
-    /// SP3 files, in the order of time.
+    /// SP3 files, in order of time.
     pub files: Vec<PathBuf>,
     /// Offset in metres of the antenna from the centre of mass towards the Earth, for all satellites.
     pub antenna_m: f64,
-    /// Offset of the antenna from the centre of mass towards the Earth, by satellite.
+    /// Offset in metres of the antenna from the centre of mass towards the Earth, by satellite.
     pub antennas_m: Vec<(Sv, f64)>,
 }
 
-/// One `[[satellite_fault]]`. Times are true ones since the scene's start.
+/// Table `[[satellite_fault]]`. Times are true ones since the scene's start.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SatelliteFault {
     /// A clock that jumps and, at the end, jumps back.
@@ -92,7 +92,7 @@ pub enum SatelliteFault {
 /// One `[[message_fault]]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MessageSpec {
-    /// The satellites concerned; absent means all.
+    /// Satellites with the fault; absent means all.
     pub satellites: Option<Vec<Sv>>,
     /// Start of the fault, in seconds of true time since the scene's start.
     pub on_s: f64,

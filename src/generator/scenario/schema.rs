@@ -85,7 +85,7 @@ pub enum Absent {
     Means(&'static str),
 }
 
-/// One key of a table.
+/// Key of a table, with its type, range, default and meaning.
 #[derive(Clone, Copy, Debug)]
 pub struct Key {
     /// Name of the key as a scenario writes it.
@@ -94,7 +94,7 @@ pub struct Key {
     pub value: Value,
     /// Meaning if the key is absent.
     pub absent: Absent,
-    /// Kinds of the table that know it; empty for all.
+    /// Kinds of the table that have the key; empty for all.
     pub kinds: &'static [&'static str],
     /// Meaning of the key, for the reference.
     pub meaning: &'static str,
@@ -104,12 +104,12 @@ const fn key(name: &'static str, value: Value, meaning: &'static str) -> Key {
     Key { name, value, absent: Absent::Optional, kinds: &[], meaning }
 }
 
-/// A number within two bounds, with its unit.
+/// Declares a number within two bounds, with its unit.
 pub const fn number(name: &'static str, least: f64, most: f64, unit: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Number { least, most, unit }, meaning)
 }
 
-/// An array of `count` numbers within the same bounds, with their unit.
+/// Declares an array of `count` numbers within the same bounds, with their unit.
 pub const fn numbers(
     name: &'static str,
     count: usize,
@@ -120,12 +120,12 @@ pub const fn numbers(
     key(name, Value::Numbers { count, least, most, unit }, meaning)
 }
 
-/// An array of any length of numbers within two bounds, with their unit.
+/// Declares an array of any length of numbers within two bounds, with their unit.
 pub const fn list(name: &'static str, least: f64, most: f64, unit: &'static str, meaning: &'static str) -> Key {
     key(name, Value::List { least, most, unit }, meaning)
 }
 
-/// A whole number within two bounds.
+/// Declares a whole number within two bounds.
 pub const fn integer(name: &'static str, least: u64, most: u64, meaning: &'static str) -> Key {
     key(name, Value::Integer { least, most }, meaning)
 }
@@ -140,12 +140,12 @@ pub const fn text(name: &'static str, expected: &'static str, meaning: &'static 
     key(name, Value::Text(expected), meaning)
 }
 
-/// An instant, as TOML or as text.
+/// Declares an instant, as TOML or as text.
 pub const fn time(name: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Time, meaning)
 }
 
-/// One word of a list.
+/// Declares one word of a list.
 pub const fn word(name: &'static str, words: fn() -> Vec<&'static str>, meaning: &'static str) -> Key {
     key(name, Value::Word(words), meaning)
 }
@@ -160,12 +160,12 @@ pub const fn texts(name: &'static str, expected: &'static str, meaning: &'static
     key(name, Value::Texts(expected), meaning)
 }
 
-/// An array of plain values of any type.
+/// Declares an array of plain values of any type.
 pub const fn values(name: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Values, meaning)
 }
 
-/// A table with an entry `each` for every satellite that it names.
+/// Declares a table with an entry `each` for every satellite that it names.
 pub const fn by_satellite(name: &'static str, each: &'static Key, meaning: &'static str) -> Key {
     key(name, Value::BySatellite(each), meaning)
 }
@@ -175,12 +175,12 @@ pub const fn table(name: &'static str, keys: &'static [Key], meaning: &'static s
     key(name, Value::Table(keys), meaning)
 }
 
-/// An array of tables with the same keys.
+/// Declares an array of tables with the same keys.
 pub const fn tables(name: &'static str, keys: &'static [Key], meaning: &'static str) -> Key {
     key(name, Value::Tables(keys), meaning)
 }
 
-/// A table or an array of tables with the same keys.
+/// Declares a table or an array of tables with the same keys.
 pub const fn one_or_more(name: &'static str, keys: &'static [Key], meaning: &'static str) -> Key {
     key(name, Value::OneOrMore(keys), meaning)
 }
@@ -196,7 +196,7 @@ impl Key {
         Self { absent: Absent::Required, ..self }
     }
 
-    /// The number that holds if the key is absent.
+    /// Sets the number that holds if the key is absent.
     pub const fn or(self, number: f64) -> Self {
         Self { absent: Absent::Number(number), ..self }
     }
@@ -265,13 +265,13 @@ impl Key {
     }
 }
 
-/// A number without a tail of zeros.
+/// Writes a number without trailing zeros.
 pub fn short(number: f64) -> String {
     let size = number.abs();
     if size != 0.0 && !(1e-3..1e6).contains(&size) { format!("{number:e}") } else { format!("{number}") }
 }
 
-/// One table of the reference, without the tables in it.
+/// Table of the reference, without the tables in it.
 #[derive(Clone, Debug)]
 pub struct Listed {
     /// Heading as a file writes it: `[front_end]`, `[[interference]]`; empty for the top level.
@@ -284,7 +284,7 @@ pub struct Listed {
     pub keys: Vec<&'static Key>,
 }
 
-/// A tree of tables, the top first, each table once.
+/// Lists a tree of tables, the top first, each table once.
 pub fn tables_of(top: &'static [Key], above: &str, meaning: &str) -> Vec<Listed> {
     let mut found = Vec::new();
     walk(&mut found, top, (above, false), meaning);
@@ -322,7 +322,7 @@ fn same(listed: &[&'static Key], keys: &'static [Key]) -> bool {
 }
 
 impl Listed {
-    /// The table as Markdown, its heading one of `level` signs.
+    /// Writes the table as Markdown, with a heading of `level` signs.
     pub fn markdown(&self, level: usize) -> String {
         let mut out = String::new();
         if !self.heading.is_empty() {

@@ -19,11 +19,11 @@ pub struct FilterSpec {
     pub bandwidth_hz: f64,
 }
 
-/// A local oscillator as written.
+/// Local oscillator as written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OscillatorSpec {
     pub offset_hz: f64,
-    /// Size in rad and bandwidth in Hz.
+    /// Standard deviation in rad and bandwidth in Hz of the phase noise.
     pub noise: Option<(f64, f64)>,
 }
 
@@ -39,12 +39,12 @@ pub struct ConverterSpec {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlaybackSpec {
     pub bits: u32,
-    /// Full scale against the deviation of what is played.
+    /// Full scale relative to the standard deviation of the signals that are played.
     pub load_sigma: f64,
     pub attenuation_db: f64,
 }
 
-/// Everything between the antenna's connector and the file.
+/// Stages between the antenna's connector and the file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stages {
     pub oscillator: Option<OscillatorSpec>,

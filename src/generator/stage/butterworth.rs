@@ -1,4 +1,4 @@
-//! A Butterworth filter with the analogue filter's response, amplitude and phase, within the samples' band.
+//! Butterworth filter with the analogue filter's response, amplitude and phase, within the samples' band.
 //!
 //! The taps are the inverse Fourier transform of the analogue response over the samples' band, under a Kaiser
 //! window (Kaiser 1974) as far as they differ from the analogue impulse response: what lies beyond half the

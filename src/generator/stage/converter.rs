@@ -15,23 +15,23 @@ use gnss::facts::{ConverterSpec, StageSpec};
 const BEST_STEP: [(u32, f64); 7] =
     [(1, 1.0), (2, 0.9957), (3, 0.586), (4, 0.335), (8, 0.0308), (12, 0.003), (16, 2.5e-4)];
 
-/// A converter, behind a gain control or a fixed gain.
+/// Converter behind a gain control or a fixed gain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Converter {
-    /// Bits of a component, 1 to 16.
+    /// Number of bits per component, 1 to 16.
     pub bits: u32,
-    /// Step in units of the standard deviation of a component.
+    /// Quantiser step in units of the standard deviation of a component.
     pub step_sigma: f64,
-    /// Runs of samples over which gain control measures the deviation; absent means a fixed gain.
+    /// Number of runs over which gain control measures the deviation; absent means a fixed gain.
     pub window_runs: Option<u32>,
-    /// Deviation for which a fixed gain is made, in LSB.
+    /// Standard deviation for which a fixed gain is set, in LSB.
     pub nominal_lsb: f32,
     /// True if levels are the format's integers; otherwise they are odd ones.
     pub whole: bool,
 }
 
 impl Converter {
-    /// The step of least loss for Gaussian noise.
+    /// Quantiser step of least loss for Gaussian noise, in standard deviations.
     pub fn best_step_sigma(bits: u32) -> f64 {
         let (_, step) = BEST_STEP.iter().rev().find(|(b, _)| *b <= bits).unwrap_or(&BEST_STEP[0]);
         *step

@@ -1,4 +1,4 @@
-//! The front end's band-pass filter, as a finite response around the signal's IF.
+//! Band-pass filter of the front end, as a finite response around the signal's IF.
 //!
 //! A `brick_wall` is a sinc under a Kaiser window of 80 dB (Kaiser 1974), of linear phase; a `butterworth`
 //! has the analogue filter's response, amplitude and phase, within the samples' band. In a real format the
@@ -15,7 +15,7 @@ use crate::stage::butterworth::{self, Analogue};
 use crate::stage::{Block, Stage};
 use gnss::facts::{FilterShape, FilterSpec, StageSpec};
 
-/// Shapes of filters, by the name that a scenario uses.
+/// Shape of a filter, by the name that a scenario uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
     /// A long symmetric filter with steep edges.
@@ -78,7 +78,7 @@ pub enum FilterError {
 }
 
 impl Filter {
-    /// A filter around `if_hz`. `real` for a format without quadrature.
+    /// Designs a filter around `if_hz`. `real` is true for a format without quadrature.
     ///
     /// # Errors
     /// [`FilterError`] if the band does not fit into that of the samples, or needs too long a response.
@@ -112,7 +112,7 @@ impl Filter {
         self.re.len()
     }
 
-    /// Gain at `cycles` a sample.
+    /// Complex gain at `cycles` per sample.
     pub fn response(&self, cycles: f64) -> Complex64 {
         let im = self.im.iter().copied().chain(std::iter::repeat(0.0));
         self.re.iter().zip(im).enumerate().fold(Complex64::ZERO, |sum, (k, (re, im))| {

@@ -1,5 +1,5 @@
-//! The faults of a down-converter: oscillator offset and phase noise, I and Q out of balance, a residue of
-//! direct current.
+//! Imperfections of a down-converter: oscillator offset and phase noise, imbalance of I and Q, and direct
+//! current.
 //!
 //! Phase noise is that of a synthesiser locked to its reference: flat up to the loop's bandwidth and falling
 //! by 20 dB a decade above (a first-order process), known at nodes a twentieth of its time constant apart and
@@ -18,7 +18,7 @@ const RESPONSE_TIMES: f64 = 12.0;
 /// Nodes that follow from one another.
 const GROUP_NODES: u64 = 1024;
 
-/// A local oscillator that is off its frequency, or noisy.
+/// Local oscillator with a frequency offset or with noise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Oscillator {
     /// Offset in Hz by which the oscillator is tuned too low: carriers lie higher by this offset.
@@ -33,7 +33,7 @@ pub struct Oscillator {
 pub struct PhaseNoise {
     /// Standard deviation of the phase, in radians.
     pub rms_rad: f64,
-    /// Half-power bandwidth of the noise, that of the synthesiser's loop.
+    /// Half-power bandwidth of the noise in Hz, that of the synthesiser's loop.
     pub bandwidth_hz: f64,
     spacing: u64,
     response: Vec<f64>,
@@ -44,7 +44,7 @@ pub struct PhaseNoise {
 }
 
 impl PhaseNoise {
-    /// Noise at nodes on a grid of samples.
+    /// Creates noise at nodes on a grid of samples.
     pub fn new(rms_rad: f64, bandwidth_hz: f64, rate: Rate, stream: Stream) -> Self {
         let samples_per_time = rate.hz() / (std::f64::consts::TAU * bandwidth_hz);
         let spacing = 1 << ((samples_per_time / NODES_PER_TIME).max(1.0) as u64).ilog2();
@@ -80,7 +80,7 @@ impl PhaseNoise {
 }
 
 impl Oscillator {
-    /// An oscillator for samples at `rate`, `offset_hz` too low.
+    /// Creates an oscillator for samples at `rate`, `offset_hz` too low.
     pub fn new(offset_hz: f64, noise: Option<PhaseNoise>, rate: Rate) -> Self {
         Self { offset_hz, noise, rate }
     }
@@ -121,10 +121,10 @@ impl Stage for Oscillator {
     }
 }
 
-/// Gain, phase and direct current of I and Q.
+/// Imbalance of I and Q in gain and phase, and their direct current.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Balance {
-    /// Amplitude of Q over that of I, less one.
+    /// Amplitude of Q relative to that of I, less one.
     pub gain: f64,
     /// Phase error in radians: 90 degrees minus the angle by which Q lags I.
     pub phase_rad: f64,
@@ -135,7 +135,7 @@ pub struct Balance {
 }
 
 impl Balance {
-    /// Image over signal, in dB: the power that a tone leaves at the negative of its frequency.
+    /// Power of the image relative to the signal in dB, which a tone leaves at the negative of its frequency.
     pub fn image_db(&self) -> f64 {
         let g = 1.0 + self.gain;
         let cos = libm::cos(self.phase_rad);

@@ -24,25 +24,25 @@ pub struct Block<'a> {
     pub i: &'a mut [f32],
     /// Quadrature components.
     pub q: &'a mut [f32],
-    /// Samples at the front that only serve the memory of stages and are not sent on.
+    /// Number of samples at the front that only serve the memory of stages and are not sent on.
     pub lead: usize,
-    /// Samples at the end that are not sent on: the rest of the scene's first run, which gain control
-    /// measures whole.
+    /// Number of samples at the end that are not sent on: the rest of the scene's first run, which gain
+    /// control measures completely.
     pub tail: usize,
-    /// Components between lead and tail that a stage could not hold.
+    /// Number of components between lead and tail that exceeded a stage's range.
     pub clipped: u64,
     /// Instruction set of the kernels.
     pub level: Level,
 }
 
 impl<'a> Block<'a> {
-    /// Samples that are all sent on, for the widest instruction set of this processor.
+    /// Creates a block whose samples are all sent on, for the widest instruction set of this processor.
     pub fn whole(start: u64, i: &'a mut [f32], q: &'a mut [f32]) -> Self {
         Self { start, i, q, lead: 0, tail: 0, clipped: 0, level: Level::detect() }
     }
 }
 
-/// Something that acts on all samples of the scene.
+/// Stage that acts on all samples of the scene.
 ///
 /// Laws: a stage of zero strength gives the same bits as its absence; sample n depends on n, on the scene and
 /// on samples n − [`Stage::memory_samples`] to n alone.

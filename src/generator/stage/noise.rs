@@ -8,7 +8,7 @@ use crate::synth::noise::{BLOCK_SAMPLES, add_block_exact};
 /// Thermal noise of the receiver, white over the band of the samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thermal {
-    /// Seed of its random numbers.
+    /// Seed of the random numbers.
     pub seed: u64,
     /// Standard deviation per component, in LSB.
     pub sigma_lsb: f32,

@@ -1,4 +1,5 @@
-//! A transmitter that plays the signals back over a cable: a converter of few bits, and an attenuator.
+//! Playback: a transmitter that sends the signals over a cable through a converter of few bits, and an
+//! attenuator.
 //!
 //! What is played is the sum of all signals without the receiver's noise, rounded to uniform levels around
 //! zero; full scale is a multiple of the sum's deviation at the scene's start. Limits: images of the
@@ -8,12 +9,12 @@
 use crate::stage::converter::level;
 use crate::stage::{Block, Stage};
 
-/// A converter and what lies behind it.
+/// Converter and attenuator of a playback.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Playback {
     /// Bits of a component.
     pub bits: u32,
-    /// Width of a level, in LSB of the scene.
+    /// Width of a quantiser level, in LSB of the scene.
     pub step_lsb: f32,
     /// Attenuation beyond the scene's own link, in dB.
     pub attenuation_db: f64,

@@ -1,4 +1,5 @@
-//! One block of samples: satellites are rendered, stages act on their sum, and the format rounds it.
+//! Rendering of one block of samples: satellites are added, stages act on their sum, and the format rounds
+//! it.
 //!
 //! A block is a pure function of the scene and of what transmitters have prepared, so blocks are made side by
 //! side. What stages look back at is rendered before it and not sent on.

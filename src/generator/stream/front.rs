@@ -1,4 +1,4 @@
-//! The samples of one front end, batch by batch.
+//! Samples of one front end, batch by batch.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -28,7 +28,7 @@ pub(super) struct Front<'a> {
     filter: Option<Filter>,
     level: Level,
     pub transmitters: Vec<Transmitter>,
-    /// Samples of the scene that are asked for, and the next of them.
+    /// Samples of the scene that are requested.
     pub part: Range<u64>,
     next: u64,
     /// Samples that a block's stages look back at, of a block and of a batch.
@@ -60,7 +60,7 @@ impl Drop for Lent<'_> {
 }
 
 impl<'a> Front<'a> {
-    /// The samples of `part` of `scene`.
+    /// Creates the front end's samples of `part` of `scene`.
     ///
     /// # Errors
     /// A rate that the scene's signals cannot have.
@@ -115,7 +115,7 @@ impl<'a> Front<'a> {
         self.next < to
     }
 
-    /// Gathers what the samples up to `to` need.
+    /// Prepares the data for the samples up to `to`.
     ///
     /// # Errors
     /// Those of orbits and messages.
@@ -133,7 +133,7 @@ impl<'a> Front<'a> {
         self.transmitters.par_iter_mut().try_for_each(|t| t.prepare(scene, needed, made))
     }
 
-    /// Replaces what `packed` holds by the samples up to `to`, which were prepared.
+    /// Replaces the content of `packed` by the samples up to `to`, which were prepared.
     pub fn render(&mut self, to: u64, packed: &mut Vec<u8>) {
         let (scene, from) = (self.scene, self.next);
         let sample_bytes = scene.metadata.format.bytes();

@@ -1,4 +1,4 @@
-//! Several front ends at one time: the samples of each, and the truth of all of them once.
+//! Several front ends at once: the samples of each, and one common truth.
 //!
 //! Slices of time are made one after the other, of every front end the samples that lie in them. The bytes of
 //! a front end are those that it has alone, since each keeps to the grid of its own samples. The truth counts
@@ -16,7 +16,7 @@ use crate::synth::RUN_SAMPLES;
 use crate::truth::Sink;
 use gnss::record::PassRow;
 
-/// The front ends of a scene on their way to samples.
+/// Streams of the front ends of a scene.
 pub struct Fronts<'a> {
     fronts: Vec<Front<'a>>,
     ticks: Ticks,
@@ -31,7 +31,8 @@ struct Ends {
 }
 
 impl<'a> Fronts<'a> {
-    /// The streams of `scenes`, which were composed from one scenario; gives `truth` what they are.
+    /// Creates the streams of `scenes`, which were composed from one scenario, and passes their facts to
+    /// `truth`.
     ///
     /// # Errors
     /// A rate that signals cannot have, a sink that does not take the truth.
@@ -52,13 +53,13 @@ impl<'a> Fronts<'a> {
         Ok(Self { ticks: Ticks::new(first, 0)?, fronts, slice })
     }
 
-    /// Samples of the first front end that were made so far.
+    /// Number of samples of the first front end that were made so far.
     pub fn samples(&self) -> u64 {
         self.fronts.first().map_or(0, Front::samples)
     }
 
-    /// Makes the next slice of time: hands the bytes of each front end, by its number, to `sink`, and gives
-    /// `truth` what is true of it. `false` after the last sample.
+    /// Makes the next slice of time. It passes the bytes of each front end, by its number, to `sink`, and the
+    /// true values to `truth`. Returns `false` after the last sample.
     ///
     /// # Errors
     /// [`GenerateError`] of orbits, messages and truth, and what `sink` meets.
@@ -104,7 +105,7 @@ impl<'a> Fronts<'a> {
         first.is_before(to).then_some(ends)
     }
 
-    /// Gives `truth` the rest, and reports what was done for each front end.
+    /// Passes the remaining truth to `truth`, and returns the summary of each front end.
     ///
     /// # Errors
     /// A sink that does not take the truth.

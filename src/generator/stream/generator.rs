@@ -1,18 +1,18 @@
-//! The generator as an iterator: batches of samples with the truth of each.
+//! Generator as an iterator: batches of samples with the truth of each.
 
 use super::{GenerateError, Generated, Options, Stream};
 use crate::scene::Scene;
 use crate::truth::Record;
 
-/// Consecutive samples of a scene, and what is true of them.
+/// Batch of consecutive samples of a scene, with their true values.
 #[derive(Clone, Debug)]
 pub struct Batch {
     /// Number of the first of them in the scene.
     pub first_sample: u64,
-    /// The samples as the scene's metadata describe them.
+    /// Packed samples as the scene's metadata describe them.
     pub samples: Vec<u8>,
-    /// The truth at the ticks within these samples. The last batch ends with the messages that were sent and
-    /// the times in view.
+    /// Truth records at the ticks within the batch. The last batch ends with the messages that were sent and
+    /// the passes.
     pub truth: Vec<Record>,
 }
 
@@ -55,7 +55,7 @@ pub struct Generator<'a> {
 }
 
 impl<'a> Generator<'a> {
-    /// The batches of `scene` from its first sample on.
+    /// Creates an iterator over the batches of `scene` from its first sample on.
     ///
     /// # Errors
     /// A rate that the scene's signals cannot have.

@@ -17,13 +17,15 @@ use gnss::signal::{Component, Signal};
 /// Statistics of a segment of the scene's samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Stretch {
-    /// Components: two a sample, one of real samples.
+    /// Number of components: two per sample, or one of real samples.
     pub components: u64,
-    /// Sum of their squares before a converter or the format rounds them, in LSB of the scene's gain.
+    /// Sum of the squared components before a converter or the format rounds them, in LSB² of the scene's
+    /// gain.
     pub square_lsb2: f64,
     /// Number of components that were clipped.
     pub clipped: u64,
-    /// Time for a sample of all that is made, with what stages look back at.
+    /// Time in seconds per sample for everything that is made, including the samples that stages look back
+    /// at.
     pub sample_s: f64,
 }
 

@@ -36,8 +36,8 @@ impl Ticks {
         Ok(Self { next, interval_us, origin })
     }
 
-    /// Gives `truth` every tick before sample `to` of the first of `fronts`, all of which have prepared as
-    /// much.
+    /// Passes every tick before sample `to` of the first of `fronts` to `truth`. All front ends must have
+    /// prepared as much.
     ///
     /// # Errors
     /// Those of orbits, and of a sink that does not take a record.

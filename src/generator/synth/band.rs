@@ -28,7 +28,7 @@ pub(super) const UNITS: i32 = 1 << 29;
 /// count it.
 const COUNTER: f32 = 1.5 * (1 << 23) as f32;
 
-/// A low-pass filter, known by its response to a unit step.
+/// Low-pass filter, given by its response to a unit step.
 #[derive(Debug)]
 pub struct Filter {
     fine: Vec<f64>,
@@ -178,7 +178,7 @@ impl Filter {
         &self.unit_cells
     }
 
-    /// Mean power of a stepped waveform behind the filter, for its autocorrelation by whole steps.
+    /// Mean power of a stepped waveform behind the filter, from its autocorrelation by whole steps.
     ///
     /// The pulse of one step is `g(x) = H(x) − H(x − 1/step)`; the power is
     /// `step · Σ_lag ρ(lag) ∫ g(x) g(x + lag/step) dx`, with lags as far as pulses overlap.

@@ -11,11 +11,11 @@ use gnss::time::{Epoch, TimeScale};
 
 use super::{CODE_BITS, CODE_ONE};
 
-/// Code steps that a strip keeps before its first sample and after its last.
+/// Number of code steps that a strip keeps before its first sample and after its last.
 pub const MARGIN_STEPS: u64 = 160;
 
-/// Most code steps in a sample: 4096 of them and both margins stay below 2^16, and nine samples within a
-/// margin.
+/// Largest number of code steps in a sample. 4096 of them and both margins stay below 2^16, and nine samples
+/// stay within a margin.
 pub const MAX_STEP: f64 = 15.0;
 
 /// Timing of a sequence.
@@ -32,7 +32,7 @@ pub struct Pace {
     time: &'static TimeScale,
 }
 
-/// One sequence of ±1 of a satellite, ready to be cut into strips.
+/// Sequence of ±1 of a satellite, ready to be cut into strips.
 #[derive(Clone, Debug)]
 pub struct Spreading {
     /// Signs, most significant bit first, continued cyclically for two words; a set bit is −1.
@@ -42,20 +42,20 @@ pub struct Spreading {
     secondary_code: Arc<[bool]>,
 }
 
-/// A position in a code: whole periods since 1980-01-06T00:00:00 as the satellite's clock shows its system's
-/// time, whole steps, and a fraction of a step in 2^-48.
+/// Position in a code: whole periods since 1980-01-06T00:00:00 by the satellite's clock in its system's time,
+/// whole steps, and a fraction of a step in 2^-48.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CodeTime {
     /// Whole periods.
     pub period: i64,
     /// Whole steps of the period.
     pub step: u32,
-    /// The rest, in 2^-48 step.
+    /// Fraction of a step, in 2^-48 step.
     pub fraction: u64,
 }
 
 impl CodeTime {
-    /// `phase` in 2^-48 steps after the beginning of a period.
+    /// Creates the position `phase` (in 2^-48 steps) after the beginning of a period.
     pub fn new(period: i64, phase: u64) -> Self {
         Self { period, step: (phase / CODE_ONE) as u32, fraction: phase % CODE_ONE }
     }
@@ -72,9 +72,9 @@ impl CodeTime {
 }
 
 impl Pace {
-    /// `steps` in a period at `step_rate_hz`, by the time of the signal's system. `None` for a rate that is
-    /// not of whole thousandths of a hertz, or whose periods fill no whole seconds below 2^63 thousandths of
-    /// a step.
+    /// Creates the timing of `steps` in a period at `step_rate_hz`, by the time of the signal's system.
+    /// `None` for a rate that is not in whole thousandths of a hertz, or whose periods fill no whole seconds
+    /// below 2^63 thousandths of a step.
     pub fn new(steps: usize, step_rate_hz: f64, time: &'static TimeScale) -> Option<Self> {
         let steps = u32::try_from(steps).ok().filter(|&steps| steps > 0)?;
         let exact_mhz = step_rate_hz * 1000.0;
@@ -134,7 +134,8 @@ fn greatest_common_divisor(a: i64, b: i64) -> i64 {
 }
 
 impl Spreading {
-    /// A sequence of signs, −1 where `negative`, and whether the secondary code inverts each of its periods.
+    /// Creates a sequence of signs, −1 where `negative`, with the inversion of each period by the secondary
+    /// code.
     pub fn new(negative: &[bool], pace: Pace, secondary_code: Arc<[bool]>) -> Self {
         Self { words: packed(negative, negative.len() + 128), pace, secondary_code }
     }

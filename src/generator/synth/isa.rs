@@ -10,7 +10,7 @@ use crate::synth::resample::{self, Interpolator, Position};
 use crate::synth::tone::{self, Tone};
 use gnss::samples::Format;
 
-/// An instruction set for which kernels are compiled.
+/// Instruction set for which kernels are compiled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {
     /// Instructions that every processor of the target has.
@@ -25,7 +25,7 @@ impl Level {
     /// All levels from the narrowest vectors to the widest.
     pub const ALL: [Self; 3] = [Self::Baseline, Self::Avx2, Self::Avx512];
 
-    /// The widest that this processor has.
+    /// Widest level that this processor has.
     pub fn detect() -> Self {
         Self::ALL.into_iter().rev().find(|level| level.is_available()).unwrap_or(Self::Baseline)
     }

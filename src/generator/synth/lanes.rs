@@ -106,7 +106,7 @@ impl Carrier {
         }
     }
 
-    /// Adds `amplitude` times a wave in phase with it over a group, its earlier half backwards.
+    /// Adds `amplitude` times a wave in phase with the carrier over a group, its earlier half backwards.
     #[inline(always)]
     pub fn turn(&self, group: usize, amplitude: f32, [before, after]: &[Side; 2], sums: &mut Sums) {
         let Self { cos, sin, re, im } = self;
@@ -186,7 +186,7 @@ impl Sums {
         Self { i_before, q_before, i_after, q_after }
     }
 
-    /// Adds them to a group, or to as much of it as there is.
+    /// Adds the sums to a group, or to as much of it as exists.
     #[inline(always)]
     pub fn add_to(&self, i: &mut [f32], q: &mut [f32]) {
         let forwards = |before: &Side, after: &Side| -> [f32; GROUP] {

@@ -1,4 +1,4 @@
-//! Rays and waveforms become samples: spreading codes, chip edges, carrier rotation.
+//! Synthesis of samples from rays and waveforms: spreading codes, chip edges, carrier rotation.
 //!
 //! A [`Run`] is up to 4096 samples of one sequence of a ray with constant carrier and code steps, both phases
 //! as fixed-point integers anchored at its first sample, so nothing accumulates from run to run.

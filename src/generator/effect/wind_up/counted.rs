@@ -1,4 +1,4 @@
-//! Whole turns of wind-up on a body that turns as it is pushed: no axis is known about which to count.
+//! Whole turns of wind-up on a body with pushed attitude: there is no known axis about which to count them.
 //!
 //! Geometry gives the phase modulo one. Within a tick it is unwrapped from the tick's beginning on, and from
 //! one beginning to the next the whole turns are counted, satellite by satellite, in the order of ticks. So a
@@ -29,7 +29,7 @@ struct Beginning {
 }
 
 impl Counted {
-    /// The phase of `sv` at `t_s` with its whole turns, of which `raw` gives what is left modulo one at any
+    /// Wind-up of `sv` at `t_s` in cycles with its whole turns. `raw` gives the phase modulo one cycle at any
     /// instant.
     pub fn cycles(&self, grown: &Grown, sv: Sv, t_s: f64, raw: impl Fn(f64) -> f64) -> f64 {
         let (tick, begins_s) = grown.tick_of(t_s);

@@ -1,4 +1,4 @@
-//! The error of a code from its spectral lines and from pairs of its chips.
+//! Code error from the spectral lines of a code and from pairs of its chips.
 //!
 //! A sample is the waveform behind what an edge stands for: a mean over the sample's interval, a low-pass
 //! filter, or nothing at all. What that leaves above half the rate folds back onto the code's own lines. An

@@ -1,4 +1,4 @@
-//! Every key of a scenario, declared once: see [`super::schema`].
+//! Keys of a scenario, each declared once: see [`super::schema`].
 
 pub(crate) mod hardware;
 pub(crate) mod motion;
@@ -16,7 +16,7 @@ pub(super) const SATELLITES: &str = "an array of satellites like [\"G01\", \"G12
 /// Seconds since the scene's start: 31 days.
 pub(super) const LONGEST_S: f64 = 2_678_400.0;
 
-/// The top of a scenario.
+/// Keys at the top of a scenario.
 pub const SCENARIO: &[Key] = &[
     text(
         "name",

@@ -1,4 +1,4 @@
-//! Keys of what lies between satellites and antenna.
+//! Keys of propagation between satellites and antenna.
 
 use super::{A_PATH, SATELLITES};
 use crate::scenario::schema::{Key, list, number, numbers, text, time, word, words};

@@ -8,7 +8,7 @@ use crate::scenario::ScenarioError;
 /// Placeholder for the value of an absent key; a text would have quotes.
 pub(super) const ABSENT: &str = "absent";
 
-/// The text of a scenario and where it came from.
+/// Text of a scenario, and its origin.
 pub struct Source<'t> {
     /// Name of the text in messages.
     pub origin: &'t str,
@@ -23,7 +23,7 @@ pub struct Place {
     pub origin: String,
     /// Line, from 1.
     pub line: usize,
-    /// Character of the line, from 1.
+    /// Number of the character in the line, from 1.
     pub column: usize,
 }
 
@@ -34,7 +34,7 @@ impl Display for Place {
 }
 
 impl Source<'_> {
-    /// Line and character of a byte of the text.
+    /// Line and column of a byte of the text.
     pub fn place(&self, byte: usize) -> Place {
         let before = self.text.get(..byte).unwrap_or(self.text);
         let line_start = before.rfind('\n').map_or(0, |i| i + 1);
@@ -45,7 +45,7 @@ impl Source<'_> {
         }
     }
 
-    /// The text of a value, shortened and without control characters.
+    /// Text of a value, shortened and without control characters.
     pub fn excerpt(&self, span: &Range<usize>) -> String {
         let text = self.text.get(span.clone()).unwrap_or("");
         let mut short: String = text.chars().take(60).flat_map(char::escape_debug).collect();
@@ -56,7 +56,7 @@ impl Source<'_> {
     }
 }
 
-/// Refusals as they are met, each once.
+/// Refusals in the order of their occurrence, each once.
 #[derive(Debug, Default)]
 pub struct Refusals(Vec<ScenarioError>);
 
@@ -78,7 +78,7 @@ impl Refusals {
         }
     }
 
-    /// The value, or `None` and one refusal more.
+    /// Returns the value, or records a refusal and returns `None`.
     pub fn take<T>(&mut self, result: Result<T, ScenarioError>) -> Option<T> {
         result.map_err(|error| self.add(error)).ok()
     }

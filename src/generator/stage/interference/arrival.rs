@@ -21,7 +21,7 @@ pub struct Tuning {
     pub clock: SampleClock,
     /// Receiver's clock, with its offset from GPS time.
     pub receiver_clock: ReceiverClock,
-    /// Radio frequency at 0 Hz in the samples.
+    /// Radio frequency in Hz that appears at 0 Hz in the samples.
     pub center_hz: f64,
     /// True if the spectrum is mirrored.
     pub inverted: bool,
@@ -54,7 +54,7 @@ impl Tuning {
         }
     }
 
-    /// −1 where the spectrum is mirrored.
+    /// Sign of frequencies: −1 if the spectrum is mirrored.
     pub fn sign(&self) -> f64 {
         if self.inverted { -1.0 } else { 1.0 }
     }
@@ -64,13 +64,13 @@ impl Tuning {
         self.sign() * (carrier_hz - self.center_hz)
     }
 
-    /// The frequencies that samples can hold.
+    /// Lowest and highest frequency in Hz that the samples can contain.
     pub fn band_hz(&self) -> (f64, f64) {
         let half_hz = 0.5 * self.clock.rate.hz();
         if self.real { (self.low_hz, self.low_hz + half_hz) } else { (-half_hz, half_hz) }
     }
 
-    /// Peak amplitude, in LSB, of a carrier of that power over noise density.
+    /// Peak amplitude in LSB of a carrier with this power over noise density.
     pub fn amplitude_lsb(&self, jn0_hz: f64) -> f64 {
         let real = if self.real { std::f64::consts::SQRT_2 } else { 1.0 };
         real * (2.0 * jn0_hz.max(0.0) / self.clock.rate.hz()).sqrt() * self.noise_lsb
@@ -81,13 +81,13 @@ impl Tuning {
         self.receiver_clock.true_elapsed_s(self.clock.start, self.clock.epoch(n))
     }
 
-    /// The first sample at or after a true time.
+    /// Number of the first sample at or after a true time.
     pub fn sample_at(&self, t_s: f64) -> u64 {
         let reading_s = self.receiver_clock.reading_elapsed_s(self.clock.start, t_s);
         (reading_s * self.clock.rate.hz()).ceil().max(0.0) as u64
     }
 
-    /// Phase of a carrier at sample `n`, in 2^-64 turn, `behind_s` after it was sent.
+    /// Phase at sample `n`, in 2^-64 turn, of a carrier that was sent `behind_s` before.
     pub fn turns(&self, carrier_hz: f64, n: u64, behind_s: f64) -> u64 {
         let tone = tone_turns(carrier_hz - self.center_hz, self.clock.rate, n);
         let turns = tone.wrapping_sub(fraction_turns(carrier_hz * behind_s));
@@ -127,7 +127,8 @@ pub struct Path {
 }
 
 impl Path {
-    /// Time on the way of what arrives `t_s` true seconds after the scene's start; a straight line in vacuum.
+    /// Travel time in seconds of the wave that arrives `t_s` true seconds after the scene's start, on a
+    /// straight line in vacuum.
     pub fn travel_s(&self, t_s: f64) -> f64 {
         self.travel_to_s(&self.antenna.at(t_s).position_m)
     }
@@ -152,7 +153,7 @@ pub struct Repetition {
 }
 
 impl Repetition {
-    /// Once in `period_s`, to the picosecond.
+    /// Creates the rate of one repetition in `period_s`, to the picosecond.
     pub fn every_s(period_s: f64) -> Self {
         Self { count: 1_000_000_000_000, seconds: (period_s * 1e12).round().max(1.0) as u64 }
     }
@@ -167,8 +168,8 @@ impl Repetition {
         self.count as f64 / self.seconds as f64
     }
 
-    /// Whole periods, and the phase in 2^-64 period, at sample `n` of what was sent `behind_s` before its
-    /// reading.
+    /// Whole periods, and the phase in 2^-64 period, at sample `n`, of a wave that was sent `behind_s`
+    /// before.
     pub fn at(self, rate: Rate, n: u64, behind_s: f64) -> (i64, u64) {
         let (whole, fraction) = rate.turns(n, self.count, self.seconds);
         let behind = behind_s * self.hz();

@@ -1,4 +1,4 @@
-//! Interference: waveforms that reach the antenna beside the satellites.
+//! Interference: waves that reach the antenna in addition to those of the satellites.
 //!
 //! An [`Interferer`] is a waveform on a carrier with a power, a time and perhaps a position. It lives in true
 //! time and arrives at RF, so the receiver's oscillator shifts it as it shifts satellites. Phases are
@@ -131,7 +131,7 @@ pub struct Recorded {
     pub q: Vec<f32>,
 }
 
-/// One source of interference in a scene.
+/// Source of interference in a scene.
 #[derive(Clone, Debug)]
 pub struct Interferer {
     /// Number of the source in the scenario, from 1.
@@ -140,15 +140,15 @@ pub struct Interferer {
     pub kind: &'static str,
     /// Waveform of the source.
     pub waveform: Waveform,
-    /// Carrier, or middle of the band, as sent.
+    /// Carrier or middle of the band in Hz, as sent.
     pub carrier_hz: f64,
-    /// Power over noise density at the antenna when the scene starts; of a pulse while it is on.
+    /// Power over noise density at the antenna in Hz when the scene starts; for pulses, while a pulse is on.
     pub jn0_hz: f64,
     /// Path to the antenna; `None` for a source without a position.
     pub path: Option<Path>,
-    /// Samples in which it is on, at the antenna.
+    /// Samples in which the source is on, at the antenna.
     pub on: Range<u64>,
-    /// Seed of its random numbers.
+    /// Seed of the random numbers.
     pub seed: u64,
     /// Receiver's effect on the wave.
     pub tuning: Tuning,
@@ -223,7 +223,7 @@ impl Interferer {
         }
     }
 
-    /// Share of the time in which it sends while it is on: below one of pulses.
+    /// Duty cycle while the source is on: below one for pulses.
     pub fn duty(&self) -> f64 {
         match &self.waveform {
             Waveform::Pulse { width_s, repetition, .. } => width_s * repetition.hz(),
