@@ -34,8 +34,8 @@ const DELAY_S: f64 = 600.0;
 /// Largest plausible difference in seconds between the clocks of two ephemerides, 300 m: beyond it they
 /// contradict each other.
 const CONTRADICTION_S: f64 = 1e-6;
-/// Half of what distances to satellites in round orbits vary by: those of GLONASS have eccentricities below
-/// 0.01.
+/// Half of the variation in metres of distances to satellites in round orbits, for eccentricities below 0.01
+/// as in GLONASS.
 const ROUND_M: f64 = 3e5;
 
 /// Interval in which one ephemeris is sent.

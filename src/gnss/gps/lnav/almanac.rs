@@ -114,7 +114,6 @@ pub struct UtcData {
     pub leap_s: i64,
     /// Remainder of the offset beyond whole seconds. Its reference time is a multiple of 4096 s inside its
     /// week (IS-GPS-200N, 20.3.3.5.2.4). Absent means none, referred to the almanac's time.
-    /// 20.3.3.5.2.4); absent means none, referred to the almanac's time.
     pub polynomial: Option<TimePolynomial>,
     /// The last change of the whole seconds, or the next one: those after it, and the week and day at whose
     /// end it comes.
