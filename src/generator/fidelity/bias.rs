@@ -39,7 +39,6 @@ pub fn moving_bias_m(edge: CodeEdge, signal: &Signal, rate_hz: f64, doppler_hz: 
 
 /// Code error in metres that a scene's own noise hides: that of a delay loop on the strongest signal, 0.2 m
 /// at most.
-/// 0.2 m at most.
 ///
 /// Thermal noise of a loop of bandwidth B with correlators d chips apart is √(B·d / (2·C/N0)) chips where
 /// T·C/N0 is far above one (Kaplan & Hegarty, equation 5.23, first branch). With 1 Hz and half a chip of
