@@ -1,7 +1,7 @@
 //! All sequences of one ray in one pass: components and layers that share a carrier.
 //!
 //! Data and pilot of CBOC are four sequences on one carrier, half a turn apart at most; those of QMBOC and of
-//! data and pilot at right angles are a quarter apart. Waves in phase are added first, so are those in
+//! data and pilot in quadrature are a quarter apart. Waves in phase are added first, so are those in
 //! quadrature, and both are turned by one carrier. Sequences that step together (*a layer*) share their
 //! positions and, for area edges, the shares of a sample that its steps have. Each half of a group begins its
 //! window again, so that a sample may span two steps: BOC(6,1) from 6.4 Msps on. Longer ones are read sample

@@ -1,5 +1,5 @@
 //! The waves of a ray in `f64`, a tile of samples at a time: its sequences with their amplitudes, those in
-//! phase with the first and those at right angles to it, before a carrier turns them.
+//! phase with the first and those in quadrature to it, before a carrier turns them.
 //!
 //! Values of a sequence are those of [`super::reference`]: to the last bit with nearest and area edges, and
 //! as [`super::responses`] and [`super::pulse`] state behind a filter.

@@ -88,23 +88,23 @@ pub fn ageing_of(indicator: u8) -> Ageing {
     AGEING.get(usize::from(indicator)).copied().unwrap_or(AGEING[15])
 }
 
-/// Variance of a corrected range in m²; `None` where the satellite is not monitored or not to be used.
+/// Variance of a corrected range in m²; `None` if the satellite is not monitored or must not be used.
 pub fn range_variance_m2(udrei: u8) -> Option<f64> {
     RANGES.get(usize::from(udrei)).map(|(_, variance_m2)| *variance_m2)
 }
 
-/// Variance of a vertical delay in m²; `None` where it is not monitored.
+/// Variance of a vertical delay in m²; `None` if it is not monitored.
 pub fn delay_variance_m2(givei: u8) -> Option<f64> {
     DELAYS.get(usize::from(givei)).map(|(_, variance_m2)| *variance_m2)
 }
 
-/// The least indicator whose bound holds an error of a corrected range; 15 where none does.
+/// Smallest indicator whose bound covers an error of a corrected range; 15 if there is none.
 pub fn udrei_of(error_m: f64) -> u8 {
     let fits = RANGES.iter().position(|(bound_m, _)| error_m <= *bound_m);
     fits.map_or(DO_NOT_USE, |place| place as u8)
 }
 
-/// The least indicator whose bound holds an error of a vertical delay; 15 where none does.
+/// Smallest indicator whose bound covers an error of a vertical delay; 15 if there is none.
 pub fn givei_of(error_m: f64) -> u8 {
     let fits = DELAYS.iter().position(|(bound_m, _)| error_m <= *bound_m);
     fits.map_or(DO_NOT_USE, |place| place as u8)

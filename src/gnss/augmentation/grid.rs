@@ -10,7 +10,7 @@ use crate::earth::{Geodetic, Look};
 /// Height of the shell and radius of the Earth below it, in metres (A.4.4.10.1).
 const SHELL_M: f64 = 350e3;
 const EARTH_M: f64 = 6_378_136.3;
-/// Bands whose points are listed by meridians, and how many of these each has.
+/// Number of bands whose points are listed by meridians.
 pub const BANDS: u8 = 9;
 const MERIDIANS: i16 = 8;
 /// Degrees between meridians, and between points up to [`EDGE_DEG`].
@@ -18,7 +18,7 @@ pub const STEP_DEG: i16 = 5;
 /// Latitude up to which cells are of five degrees.
 pub const EDGE_DEG: i16 = 55;
 
-/// Latitude and longitude of a point in whole degrees, the longitude from −180 on.
+/// Grid point: latitude and longitude in whole degrees, the longitude from −180 on.
 pub type Point = (i16, i16);
 
 /// Points of a meridian from south to north: every five degrees to 55°, on every second one those at 65° and
@@ -39,8 +39,8 @@ fn meridian(longitude_deg: i16) -> Vec<Point> {
     latitudes.into_iter().map(|latitude_deg| (latitude_deg, longitude_deg)).collect()
 }
 
-/// The points of a band in the order in which its mask counts them, west to east and south to north; none of
-/// bands that are left out.
+/// Points of a band in the order in which its mask counts them, west to east and south to north. Empty for
+/// bands that are not implemented.
 pub fn points(band: u8) -> Vec<Point> {
     if band >= BANDS {
         return Vec::new();
@@ -49,7 +49,7 @@ pub fn points(band: u8) -> Vec<Point> {
     (0..MERIDIANS).flat_map(|count| meridian(west_deg + STEP_DEG * count)).collect()
 }
 
-/// The band of a longitude, whole degrees from −180 on.
+/// Number of the band of a longitude, which is in whole degrees from −180 on.
 pub fn band_of(longitude_deg: i16) -> u8 {
     ((longitude_deg + 180).rem_euclid(360) / (MERIDIANS * STEP_DEG)) as u8
 }
@@ -85,11 +85,11 @@ pub fn pierce(user: Geodetic, look: Look) -> Pierce {
     }
 }
 
-/// A point's vertical delay in metres on L1, and the variance of its error in m².
+/// Vertical delay of a point in metres on L1, and the variance of its error in m².
 pub type Vertical = (f64, f64);
 
-/// Vertical delay at a pierce point and its variance, between those of the corners of its cell of five
-/// degrees, four or three of them; `known` gives those of a point (A.4.4.10.2, A.4.4.10.3).
+/// Vertical delay at a pierce point and its variance, interpolated from four or three corners of its cell of
+/// five degrees. `known` gives the values of a point (A.4.4.10.2, A.4.4.10.3).
 pub fn vertical(at: Pierce, known: impl Fn(Point) -> Option<Vertical>) -> Option<Vertical> {
     let step_deg = f64::from(STEP_DEG);
     let corner = |deg: f64| (deg / step_deg).floor() as i16 * STEP_DEG;

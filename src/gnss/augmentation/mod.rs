@@ -12,20 +12,20 @@ use accuracy::NOT_MONITORED;
 pub mod accuracy;
 pub mod grid;
 
-/// Numbers that a mask of satellites has bits for, and how many of them it may name.
+/// Largest number for which a mask of satellites has a bit.
 pub const NUMBERS: u8 = 210;
-/// The most satellites of a mask.
+/// Largest number of satellites in a mask.
 pub const MASKED: usize = 51;
-/// Satellites of a block of fast corrections, of one of type 24, points of a block of delays.
+/// Number of satellites in a block of fast corrections.
 pub const FAST_SLOTS: usize = 13;
-/// Satellites of the fast half of a block of type 24.
+/// Number of satellites in the fast half of a block of type 24.
 pub const MIXED_SLOTS: usize = 6;
-/// Points of a block of delays.
+/// Number of points in a block of delays.
 pub const DELAY_SLOTS: usize = 15;
 /// Issue of fast corrections that states that an alarm is on (A.4.4.4).
 pub const ALARM: u8 = 3;
 
-/// Type 1: which satellites are corrected.
+/// Mask of the corrected satellites (type 1).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mask {
     /// Issue of the mask.
@@ -34,7 +34,7 @@ pub struct Mask {
     pub numbers: Vec<u8>,
 }
 
-/// Types 2 to 5, and 0: fast corrections of thirteen satellites.
+/// Fast corrections of thirteen satellites (types 2 to 5, and 0).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Fast {
     /// Index of a group of thirteen satellites in the mask, from 0.
@@ -51,16 +51,16 @@ pub struct Fast {
     pub udrei: [u8; FAST_SLOTS],
 }
 
-/// Type 6: integrity of all satellites of the mask.
+/// Integrity of all satellites of the mask (type 6).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Integrity {
-    /// Issues of the fast corrections that they belong to, of types 2 to 5.
+    /// Issues of the fast corrections of types 2 to 5 to which the integrity belongs.
     pub iodf: [u8; 4],
     /// Indicators of the accuracy.
     pub udrei: [u8; MASKED],
 }
 
-/// Type 7: how fast corrections age.
+/// Degradation of the fast corrections (type 7).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Degradation {
     /// Latency of the system in seconds.
@@ -76,7 +76,7 @@ pub struct Degradation {
 pub struct LongTerm {
     /// Position in the mask from 1; 0 for none.
     pub place: u8,
-    /// Issue of the elements that they correct.
+    /// Issue of the corrected ephemeris.
     pub iode: u8,
     /// Correction of the satellite's position in ECEF, in metres.
     pub place_m: [f64; 3],
@@ -86,7 +86,7 @@ pub struct LongTerm {
     pub af0_s: f64,
     /// Correction of the satellite's clock drift, in s/s.
     pub af1_sps: f64,
-    /// Second of the day at which all that holds, a multiple of 16 s.
+    /// Second of the day to which the corrections refer, a multiple of 16 s.
     pub second_of_day: f64,
 }
 
@@ -109,16 +109,16 @@ pub enum Half {
     },
 }
 
-/// Type 24: fast corrections of six satellites, and half a block of long-term ones.
+/// Mixed block (type 24): fast corrections of six satellites, and half a block of long-term ones.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mixed {
-    /// The fast ones, the others of their thirteen zero and not monitored.
+    /// Fast corrections. The other satellites of their thirteen are zero and not monitored.
     pub fast: Fast,
     /// The long-term ones.
     pub half: Half,
 }
 
-/// Type 18: which points of a band have delays.
+/// Mask of the points of a band that have delays (type 18).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GridMask {
     /// Bands that are sent.
@@ -131,7 +131,7 @@ pub struct GridMask {
     pub points: Vec<u8>,
 }
 
-/// Type 26: vertical delays at fifteen points of a band.
+/// Vertical delays at fifteen points of a band (type 26).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Delays {
     /// The band.
@@ -140,7 +140,7 @@ pub struct Delays {
     pub part: u8,
     /// Issue of the masks.
     pub iodi: u8,
-    /// Delays on L1, in metres.
+    /// Vertical delays on L1, in metres.
     pub vertical_m: [f64; DELAY_SLOTS],
     /// Indicators of their accuracy.
     pub givei: [u8; DELAY_SLOTS],
@@ -188,7 +188,7 @@ impl Half {
 }
 
 impl Fast {
-    /// Corrections of none of the satellites of a part of the mask.
+    /// Creates corrections without satellites for a part of the mask.
     pub fn unmonitored(part: u8) -> Self {
         Self { part, udrei: [NOT_MONITORED; FAST_SLOTS], ..Self::default() }
     }
@@ -197,11 +197,11 @@ impl Fast {
 /// Network's estimate of a satellite at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Known {
-    /// Fast correction: what is added to ranges beside the long-term correction, in metres.
+    /// Fast correction in metres, which is added to ranges beside the long-term correction.
     pub correction_m: f64,
-    /// Indicator of the accuracy after both.
+    /// Indicator of the accuracy after both corrections.
     pub udrei: u8,
-    /// Indicator of how fast the correction ages.
+    /// Indicator of the fast correction's degradation.
     pub degradation: u8,
     /// Long-term correction; its position in the mask is 0.
     pub long_term: LongTerm,
@@ -216,7 +216,7 @@ impl Known {
     }
 }
 
-/// A network of ground stations whose knowledge satellites send.
+/// Network of ground stations that supplies the corrections which satellites send.
 pub trait Network: fmt::Debug + Send + Sync {
     /// True if the network reports that it must not be used for safety.
     fn is_test(&self) -> bool;

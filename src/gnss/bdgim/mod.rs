@@ -1,4 +1,4 @@
-//! BDGIM: the global ionosphere of which BeiDou's third generation broadcasts nine coefficients.
+//! BDGIM: the global ionosphere model for which BeiDou's third generation broadcasts nine coefficients.
 //!
 //! Source: BDS-SIS-ICD-B1C 1.0, section 7.8 (7.8 of BDS-SIS-ICD-B2a 1.0 and 7.7 of BDS-SIS-ICD-B2b 1.0 have
 //! the same). The vertical content is a sum of normalised spherical harmonics of the geomagnetic position,
@@ -136,14 +136,14 @@ fn norm(n: usize, m: usize) -> f64 {
     (both * (2 * n + 1) as f64 * ratio).sqrt()
 }
 
-/// Number of the interval of two hours in which a time lies, since modified Julian date 0 of BDT, and the
-/// seconds of it that are over.
+/// Number of the two-hour interval in which a time lies, since modified Julian date 0 of BDT, and the seconds
+/// since its beginning.
 pub fn interval(at: Epoch) -> (i64, f64) {
     let seconds = BDT.label(at).seconds() + FIRST_MJD * DAY_S;
     (seconds.div_euclid(INTERVAL_S), seconds.rem_euclid(INTERVAL_S) as f64 + at.fraction())
 }
 
-/// Coefficients β₁ to β₁₇ of the forecast, in TECU, of an interval of two hours: those of its middle, an odd
+/// Forecast coefficients β₁ to β₁₇ in TECU of an interval of two hours. They are those of its middle, an odd
 /// hour (7-15).
 pub fn forecast_tecu(interval: i64) -> [f64; 17] {
     // Half intervals are hours.
@@ -183,8 +183,7 @@ impl Bdgim {
         sum(&self.alpha_tecu, &BROADCAST) + sum(forecast_tecu, &FORECAST)
     }
 
-    /// The least vertical content, in TECU, as the authors' program has it: a share of α₁, the mean over the
-    /// sphere.
+    /// Least vertical content in TECU as in the authors' program: a share of α₁, the mean over the sphere.
     pub fn least_tecu(&self) -> f64 {
         let [mean, ..] = self.alpha_tecu;
         let part = match mean {
@@ -209,7 +208,7 @@ impl Bdgim {
     }
 }
 
-/// Group delay of so many electrons on a carrier, in seconds (7-6).
+/// Group delay in seconds of a slant electron content in TECU on a carrier (7-6).
 pub fn delay_s(tecu: f64, carrier_hz: f64) -> f64 {
     DELAY_M_HZ2_PTECU * tecu / (carrier_hz * carrier_hz) / SPEED_OF_LIGHT_MPS
 }

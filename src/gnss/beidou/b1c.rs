@@ -21,10 +21,10 @@ use crate::weil::Legendre;
 pub const CARRIER_HZ: f64 = 1_575.42e6;
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 10_230;
-/// Chips of a secondary code, one a code period.
+/// Chips of a secondary code, one per code period.
 pub const SECONDARY_CODE_CHIPS: u32 = 1800;
 
-/// The signal: the pilot, and data with B-CNAV1.
+/// Definition of the signal: the pilot, and data with B-CNAV1.
 pub static B1C: Signal = Signal {
     name: "BeiDou B1C",
     rinex: "1P",
@@ -61,9 +61,8 @@ pub static B1C: Signal = Signal {
     ],
 };
 
-/// First and last number that satellites of the third generation in medium and inclined orbits have been
-/// given (BDS-SIS-ICD-B1C 1.0, 4.2, and navigation files up to 2026). Those of other numbers have codes and
-/// do not send it.
+/// First and last number of third-generation satellites in medium and inclined orbits (BDS-SIS-ICD-B1C 1.0,
+/// 4.2, and navigation files up to 2026). Satellites of other numbers have codes, but do not send the signal.
 pub const THIRD_GENERATION: [u8; 2] = [19, 50];
 
 /// First dates of transmission by satellite number.
@@ -88,7 +87,7 @@ pub enum Code {
 static LONG: LazyLock<Legendre> = LazyLock::new(|| Legendre::new(10_243));
 static SHORT: LazyLock<Legendre> = LazyLock::new(|| Legendre::new(3607));
 
-/// The chips of a satellite by its number, 1 to 63, as ±1; `None` beyond.
+/// Chips of a satellite by its number, 1 to 63, as ±1; `None` beyond.
 pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     let (data, pilot, _) = *CODES.get(usize::from(number).checked_sub(1)?)?;
     let own = match which {
@@ -98,7 +97,7 @@ pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     Some(piece(&LONG, own, CODE_CHIPS))
 }
 
-/// The secondary code of a satellite by its number, 1 to 63, as ±1; `None` beyond.
+/// Secondary code of a satellite by its number, 1 to 63, as ±1; `None` beyond.
 pub fn secondary_code(number: u8) -> Option<Vec<i8>> {
     let (.., own) = *CODES.get(usize::from(number).checked_sub(1)?)?;
     Some(piece(&SHORT, own, SECONDARY_CODE_CHIPS))

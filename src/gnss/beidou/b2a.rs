@@ -1,4 +1,4 @@
-//! BeiDou B2a: data and pilot at right angles with codes of 10 230 chips at 10.23 Mchip/s, BPSK(10) on
+//! BeiDou B2a: data and pilot in quadrature with codes of 10 230 chips at 10.23 Mchip/s, BPSK(10) on
 //! 1176.45 MHz.
 //!
 //! Source: BDS-SIS-ICD-B2a 1.0, 4.2 (modulation: the pilot leads by a quarter of a cycle), 5.2 and 5.3
@@ -18,10 +18,10 @@ use crate::weil::Legendre;
 
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 10_230;
-/// Chips of the pilot's secondary code, one a code period.
+/// Chips of the pilot's secondary code, one per code period.
 pub const SECONDARY_CODE_CHIPS: u32 = 100;
 
-/// The signal: the pilot, and data with B-CNAV2. Satellites that send B1C send it.
+/// Definition of the signal: the pilot, and data with B-CNAV2. Satellites that send B1C send it.
 pub static B2A: Signal = Signal {
     name: "BeiDou B2a",
     rinex: "5P",
@@ -66,7 +66,7 @@ pub enum Code {
 
 static LEGENDRE: LazyLock<Legendre> = LazyLock::new(|| Legendre::new(1021));
 
-/// The chips of a satellite by its number, 1 to 63, as ±1; `None` beyond.
+/// Chips of a satellite by its number, 1 to 63, as ±1; `None` beyond.
 pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     let (data, pilot, _) = *CODES.get(usize::from(number).checked_sub(1)?)?;
     let chips = match which {
@@ -76,7 +76,7 @@ pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     Some(chips)
 }
 
-/// The secondary code of a satellite's pilot by its number, 1 to 63, as ±1; `None` beyond.
+/// Secondary code of a satellite's pilot by its number, 1 to 63, as ±1; `None` beyond.
 pub fn secondary_code(number: u8) -> Option<Vec<i8>> {
     let (.., own) = *CODES.get(usize::from(number).checked_sub(1)?)?;
     Some(piece(&LEGENDRE, own, SECONDARY_CODE_CHIPS))

@@ -20,7 +20,7 @@ pub const CARRIER_HZ: f64 = 1_207.14e6;
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 10_230;
 
-/// The signal: data with B-CNAV3.
+/// Definition of the signal: data with B-CNAV3.
 pub static B2B: Signal = Signal {
     name: "BeiDou B2b",
     rinex: "7D",
@@ -45,7 +45,7 @@ pub static B2B: Signal = Signal {
 /// The first number that has a code.
 const FIRST: u8 = 6;
 
-/// The chips of a satellite by its number, 6 to 58, as ±1; `None` beyond.
+/// Chips of a satellite by its number, 6 to 58, as ±1; `None` beyond.
 pub fn code(number: u8) -> Option<Vec<i8>> {
     let start = *G2_STARTS.get(usize::from(number.checked_sub(FIRST)?))?;
     let last = planted!("gnss.b2b.register", 10, 11);

@@ -1,5 +1,5 @@
-//! Files for other programs: RINEX 3.05 and 4.02, observations row by row and navigation messages at the
-//! end, and tracks for maps.
+//! Files for other programs: RINEX 3.05 and 4.02 with observations and navigation messages, and tracks for
+//! maps.
 //!
 //! Source: RINEX 3.05, tables A2 to A8 (navigation) and A2, A3 (observations), section 5.2; RINEX 4.02,
 //! section 5.4 and tables A9 to A36, whose observations are those of 3.05 and whose navigation messages have
@@ -26,7 +26,7 @@ use thiserror::Error;
 use crate::satellite::System;
 use crate::time::Epoch;
 
-/// A version of RINEX that is written.
+/// Version of RINEX in which files are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Version {
     /// 3.05.
@@ -36,7 +36,7 @@ pub enum Version {
     Four,
 }
 
-/// A version that is not written.
+/// Error for a version that is not written.
 #[derive(Debug, Error, PartialEq)]
 #[error("RINEX {0}: expected 3.05 or 4.02")]
 pub struct VersionError(String);

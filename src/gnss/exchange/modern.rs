@@ -27,8 +27,9 @@ pub fn transmitted_s(set: &Ephemeris) -> f64 {
     set.transmitted.since(set.toe) + set.toe.tow_s()
 }
 
-/// The lines of CNAV and CNAV-2: time and week of the prediction, accuracies of clock and orbit, the group
-/// delay and the corrections of `delays`, a line for every four; `health` is that of the record.
+/// Record lines of CNAV and CNAV-2: time and week of the prediction, accuracies of clock and orbit, the group
+/// delay, and the corrections of `delays`. Corrections have one line for every four. `health` is that of the
+/// record.
 pub fn of_gps(set: &Ephemeris, raw: Raw<'_>, health: u16, delays: &[usize]) -> Vec<RecordLine> {
     let value = |name: &str| raw(name).map(|raw| raw as f64);
     // Five bits, of which the highest is the sign.

@@ -1,4 +1,4 @@
-//! Observation files, written while the observations come.
+//! Observation files, which are written as observations arrive.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -22,7 +22,7 @@ const TICKS_A_SECOND: f64 = 1e7;
 /// Largest difference between two values of one time, in seconds.
 const SAME_TIME_S: f64 = 1e-6;
 
-/// A file in the making: the rows of one epoch are kept, nothing else.
+/// Observation file that is being written. Only the rows of one epoch are kept in memory.
 ///
 /// An epoch is labelled with the time of the receiver's clock. A carrier that was not locked all the time
 /// since the epoch before has its loss-of-lock flag set.

@@ -66,8 +66,8 @@ pub(super) fn offsets(records: &Records, system: System, raw: Raw<'_>, near: Epo
 }
 
 impl Offset {
-    /// The line in the header of a file of version 3 (RINEX 3.05, table A5); its weeks are those that the
-    /// system counts, Galileo's as GPS does.
+    /// Header line of a file of version 3 (RINEX 3.05, table A5). Weeks are those that the system counts,
+    /// Galileo's as GPS does.
     pub fn line(&self, system: System) -> String {
         let [a0_s, a1_sps, _] = self.polynomial;
         let weeks = if system == System::BeiDou { self.reference.week() - BDT_WEEK } else { self.reference.week() };

@@ -20,7 +20,7 @@ pub enum TrackForm {
     Gpx,
 }
 
-/// A track in the making; nothing is kept but the time of the newest point.
+/// Track that is being written. Only the time of the newest point is kept in memory.
 pub struct Track<W> {
     writer: W,
     form: TrackForm,
@@ -28,7 +28,7 @@ pub struct Track<W> {
 }
 
 impl<W: Write> Track<W> {
-    /// Begins a track of that name.
+    /// Begins a track with this name.
     ///
     /// # Errors
     /// What the writer reports.

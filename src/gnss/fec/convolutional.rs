@@ -1,4 +1,4 @@
-//! The convolutional code of rate 1/2 and constraint length 7, and Viterbi's decoder of soft symbols.
+//! Convolutional code of rate 1/2 and constraint length 7, with Viterbi's decoder of soft symbols.
 //!
 //! Polynomials 171 and 133 octal, that of 171 first (Galileo OS SIS ICD 2.1, 4.1.4; IS-GPS-200N, 3.3.3.1.1).
 //! Encoder and decoder begin in the state of zeros; blocks end there by six zero bits.
@@ -8,7 +8,7 @@ const MEMORY: u32 = 6;
 const STATES: usize = 1 << MEMORY;
 const POLYNOMIALS: [u32; 2] = [0o171, 0o133];
 
-/// A code of this family.
+/// Convolutional code of this family.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Convolutional {
     /// True if the second symbol of each pair is sent inverted, as in Galileo.
@@ -16,7 +16,7 @@ pub struct Convolutional {
 }
 
 impl Convolutional {
-    /// Two symbols a bit, from the state of zeros.
+    /// Encodes bits to two symbols each, from the zero state.
     pub fn encode(self, bits: &[bool]) -> Vec<bool> {
         let mut memory = 0;
         bits.iter()
@@ -34,8 +34,8 @@ impl Convolutional {
         [first, second ^ self.second_inverted]
     }
 
-    /// The most likely bits of a piece of a code that runs on: neither its first nor its last state is known,
-    /// and bits near either end are less sure.
+    /// Decodes a segment of a continuous code to its most likely bits. Neither its first nor its last state
+    /// is known, and bits near either end are less reliable.
     pub fn decode_open(self, symbols: &[f32]) -> Vec<bool> {
         self.search(symbols, [0.0; STATES], |metrics| {
             let best = metrics.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
@@ -43,8 +43,8 @@ impl Convolutional {
         })
     }
 
-    /// The most likely bits of a block that ends in the state of zeros: one for each pair of symbols, which
-    /// are positive for a logical 0 and as large as they are sure.
+    /// Decodes a block that ends in the zero state to its most likely bits, one for each pair of symbols.
+    /// Symbols are positive for a logical 0, and their size is their reliability.
     pub fn decode(self, symbols: &[f32]) -> Vec<bool> {
         let mut metrics = [f32::NEG_INFINITY; STATES];
         metrics[0] = 0.0;

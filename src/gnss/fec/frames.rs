@@ -1,5 +1,5 @@
-//! Finds frames of one length, whose first symbols show where one may begin and whose checks decide, in a
-//! stream of soft symbols.
+//! Search for frames of one length in a stream of soft symbols. The first symbols show a possible start, and
+//! the checks decide.
 
 use std::collections::VecDeque;
 
@@ -61,7 +61,7 @@ impl Frames {
         found
     }
 
-    /// Symbols are missing before the next one.
+    /// Informs the search that symbols are missing before the next one.
     pub fn skip(&mut self) {
         self.symbols.clear();
         self.doubt();

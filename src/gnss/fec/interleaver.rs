@@ -15,14 +15,14 @@ impl Interleaver {
         self.columns * self.rows
     }
 
-    /// The order in which coded symbols are sent. What is beyond a whole block is left out.
+    /// Reorders coded symbols for transmission. Symbols beyond a whole block are dropped.
     pub fn interleave<T: Copy>(self, coded: &[T]) -> Vec<T> {
         let places = (0..self.rows).flat_map(|row| (0..self.columns).map(move |column| column * self.rows + row));
         let places = places.map(|place| planted!("gnss.fec.interleaver", place, place ^ 1));
         places.filter_map(|place| coded.get(place).copied()).collect()
     }
 
-    /// The coded symbols of those that were sent.
+    /// Restores the coded order of received symbols.
     pub fn deinterleave<T: Copy>(self, sent: &[T]) -> Vec<T> {
         let places = (0..self.columns).flat_map(|column| (0..self.rows).map(move |row| row * self.columns + column));
         places.filter_map(|place| sent.get(place).copied()).collect()

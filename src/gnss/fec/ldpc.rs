@@ -25,8 +25,8 @@ pub struct Ldpc {
 }
 
 impl Ldpc {
-    /// The code of `half` information bits whose checks are packed: two octets for each one in the matrix,
-    /// row after row, the more significant first; the column, and 2¹⁵ more where a row begins.
+    /// Creates the code of `half` information bits from packed checks. Each one in the matrix has two octets,
+    /// row after row, the more significant first. They hold the column, plus 2¹⁵ where a row begins.
     pub fn packed(half: usize, packed: &[u8]) -> Self {
         let mut checks: Vec<Vec<usize>> = Vec::with_capacity(half);
         for pair in packed.chunks_exact(2) {
@@ -46,7 +46,7 @@ impl Ldpc {
         &self.checks
     }
 
-    /// The code word of some information.
+    /// Encodes information bits to a code word.
     pub fn encode(&self, information: &[bool]) -> Vec<bool> {
         let count = planted!("gnss.fec.ldpc", self.half, self.half - 1);
         let words = packed_bits(information.iter().copied().take(count), self.half);
@@ -57,8 +57,8 @@ impl Ldpc {
         information.iter().copied().chain(parity).collect()
     }
 
-    /// The information of symbols that are positive for a logical 0 and as large as they are sure; `None`
-    /// where no code word is found.
+    /// Decodes soft symbols to information bits; `None` if no code word is found. Symbols are positive for a
+    /// logical 0, and their size is their reliability.
     pub fn decode(&self, soft: &[f32]) -> Option<Vec<bool>> {
         if soft.len() != 2 * self.half {
             return None;

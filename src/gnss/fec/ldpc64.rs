@@ -53,7 +53,7 @@ fn products() -> &'static [[u8; ORDER]; ORDER] {
     })
 }
 
-/// The product of two elements.
+/// Multiplies two elements of GF(64).
 pub fn product(a: u8, b: u8) -> u8 {
     products()[usize::from(a) % ORDER][usize::from(b) % ORDER]
 }
@@ -84,7 +84,7 @@ impl Ldpc64 {
         &self.checks
     }
 
-    /// The code word of some information, as bits.
+    /// Encodes information bits to the bits of a code word.
     pub fn encode(&self, information: &[bool]) -> Vec<bool> {
         let own: Vec<u8> = elements(information).take(self.half).collect();
         let parity = self.generator.iter().map(|row| {
@@ -95,8 +95,8 @@ impl Ldpc64 {
         information.iter().copied().chain(parity).collect()
     }
 
-    /// The information of symbols that are positive for a logical 0 and as large as they are sure; `None`
-    /// where no code word is found.
+    /// Decodes soft symbols to information bits; `None` if no code word is found. Symbols are positive for a
+    /// logical 0, and their size is their reliability.
     pub fn decode(&self, soft: &[f32]) -> Option<Vec<bool>> {
         if soft.len() != 2 * self.half * BITS {
             return None;

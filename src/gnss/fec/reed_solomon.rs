@@ -65,7 +65,7 @@ fn generator() -> &'static [u8; PARITY] {
     })
 }
 
-/// The parity octets of information octets.
+/// Computes the parity octets of information octets.
 pub fn parity(information: &[u8]) -> [u8; PARITY] {
     let mut rest = [0; PARITY];
     for &octet in information.iter().rev() {
@@ -77,8 +77,8 @@ pub fn parity(information: &[u8]) -> [u8; PARITY] {
     rest
 }
 
-/// The information with its missing octets found from parity octets; `None` where those are too few, or do
-/// not agree.
+/// Recovers missing octets of the information from parity octets. `None` if those are too few, or do not
+/// agree.
 pub fn recovered(information: &[Option<u8>], parity_octets: &[Option<u8>; PARITY]) -> Option<Vec<u8>> {
     let missing: Vec<usize> = (0..information.len()).filter(|&place| information[place].is_none()).collect();
     let mut whole: Vec<u8> = information.iter().map(|octet| octet.unwrap_or(0)).collect();

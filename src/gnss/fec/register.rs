@@ -7,16 +7,16 @@
 /// A code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RegisterCode {
-    /// Stages: bits of a word.
+    /// Number of stages: bits of a word.
     pub stages: u32,
-    /// The stages whose sum is fed back; the oldest is the most significant bit.
+    /// Stages whose sum is fed back; the oldest is the most significant bit.
     pub feedback: u32,
-    /// Symbols of a code word.
+    /// Number of symbols in a code word.
     pub symbols: usize,
 }
 
 impl RegisterCode {
-    /// The symbols of a word.
+    /// Encodes a word to symbols.
     pub fn encode(self, word: u32) -> impl Iterator<Item = bool> {
         let mut state = word;
         (0..self.symbols).map(move |_| {
@@ -27,7 +27,7 @@ impl RegisterCode {
         })
     }
 
-    /// The sum of soft symbols, positive for a logical 0, with the signs of a word.
+    /// Correlation of soft symbols, positive for a logical 0, with the symbols of a word.
     pub fn correlation(self, word: u32, soft: &[f32]) -> f32 {
         self.encode(word).zip(soft).map(|(one, value)| if one { -value } else { *value }).sum()
     }

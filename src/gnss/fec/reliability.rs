@@ -1,4 +1,4 @@
-//! Error rates of binary codes of rate one half in noise: what tests of messages ask of theirs.
+//! Error rates of binary codes of rate one half in noise, with which tests of messages compare.
 
 use super::ldpc::Ldpc;
 

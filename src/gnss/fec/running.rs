@@ -29,7 +29,7 @@ pub struct Running {
     failures: u32,
 }
 
-/// A message that was found.
+/// Message that was found, with its position and sign.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Found {
     /// Bits of the message as sent.
@@ -89,7 +89,7 @@ impl Running {
         Some(Found { bits, inverted, symbols: self.next - first })
     }
 
-    /// Symbols are missing before the next one.
+    /// Informs the search that symbols are missing before the next one.
     pub fn skip(&mut self) {
         self.symbols.clear();
         self.doubt();

@@ -19,7 +19,7 @@ pub struct Subframes {
     pub time: RegisterCode,
     /// True if the time has one more bit, the highest, which is sent before the code word and added to it.
     pub has_high_bit: bool,
-    /// The times that there are.
+    /// Range of the times that occur.
     pub times: RangeInclusive<u32>,
     /// Code of the first block, and its bits with their check.
     pub two: (&'static LazyLock<Ldpc>, usize),
@@ -31,7 +31,7 @@ pub struct Subframes {
     pub is_right: fn(&[bool]) -> bool,
 }
 
-/// A frame as decoded: the check of the first block is right.
+/// Decoded frame in which the check of the first block is right.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Blocks {
     /// The time.
@@ -50,7 +50,7 @@ impl Subframes {
         self.time.symbols + usize::from(self.has_high_bit)
     }
 
-    /// The symbols of a time.
+    /// Encodes a time to symbols.
     pub fn time_word(&self, time: u32) -> Vec<bool> {
         if !self.has_high_bit {
             return self.time.encode(time).collect();
@@ -60,13 +60,13 @@ impl Subframes {
         std::iter::once(high).chain(self.time.encode(low).map(|one| one ^ high)).collect()
     }
 
-    /// The symbols of a frame before they are interleaved, of a time and of bits with their checks.
+    /// Encodes a frame from a time and from bits with their checks, without interleaving.
     pub fn coded(&self, time: u32, two: &[bool], three: &[bool]) -> Vec<bool> {
         let blocks = self.two.0.encode(two).into_iter().chain(self.three.0.encode(three));
         self.time_word(time).into_iter().chain(blocks).collect()
     }
 
-    /// The order in which the symbols of a frame are sent.
+    /// Interleaves the symbols of a frame for transmission.
     pub fn interleaved(&self, coded: &[bool]) -> Vec<bool> {
         let (first, rest) = coded.split_at(self.time_symbols().min(coded.len()));
         first.iter().copied().chain(self.interleaver.interleave(rest)).collect()

@@ -1,4 +1,4 @@
-//! Galileo E5 as one signal: AltBOC(15,10) on 1191.795 MHz, whose lower side is E5a and whose upper E5b.
+//! Galileo E5 as one signal: AltBOC(15,10) on 1191.795 MHz. Its lower sideband is E5a and its upper one E5b.
 //!
 //! Source: Galileo OS SIS ICD 2.1, 2.3.1 (eq. 3 to 7, tables 6 and 7). Each side is data and pilot at right
 //! angles, times S(t) ∓ jS(t − Ts/4) with a sub-carrier of 15.345 MHz in four levels, constant over eighths
@@ -14,7 +14,7 @@
 use super::e5::{self, Code};
 use crate::signal::{Carrier, Component, Layer, Signal};
 
-/// E5 with I/NAV on its upper side and F/NAV on its lower.
+/// Definition of E5 with I/NAV on its upper and F/NAV on its lower sideband.
 pub static E5: Signal = Signal {
     name: "Galileo E5",
     rinex: "8Q",
@@ -58,16 +58,16 @@ const fn pulse(pulse: &'static [i8]) -> Layer {
     Layer { pulse, ..Layer::BPSK }
 }
 
-/// S(t) − jS(t − Ts/4): what turns with the lower side.
+/// Layers of the lower sideband, S(t) − jS(t − Ts/4).
 pub static DOWN: [Layer; 4] =
     [SIGNS, LEVELS, Layer { phase_cycles: -0.25, ..SIGNS_LATER }, Layer { phase_cycles: -0.25, ..LEVELS_LATER }];
 
-/// S(t) + jS(t − Ts/4): what turns with the upper side.
+/// Layers of the upper sideband, S(t) + jS(t − Ts/4).
 pub static UP: [Layer; 4] =
     [SIGNS, LEVELS, Layer { phase_cycles: 0.25, ..SIGNS_LATER }, Layer { phase_cycles: 0.25, ..LEVELS_LATER }];
 
-/// The chips of a satellite by its number, 1 to 50, as ±1, every second one with the sign of the sub-carrier,
-/// which has one and a half periods in a chip; `None` beyond.
+/// Chips of a satellite by its number, 1 to 50, as ±1; `None` beyond. Every second chip has the sign of the
+/// subcarrier, which has one and a half periods in a chip.
 pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     let sign = |index: usize| planted!("gnss.altboc.odd_chips", if index % 2 == 1 { -1 } else { 1 }, 1);
     let chips = e5::code(which, number)?;

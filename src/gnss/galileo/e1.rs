@@ -15,7 +15,8 @@ use crate::time::GST;
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 4092;
 
-/// The signal: s = (e_B (a sc₁ + b sc₆) − e_C (a sc₁ − b sc₆)) / √2, with a² = 10/11 and b² = 1/11.
+/// Definition of the signal: s = (e_B (a sc₁ + b sc₆) − e_C (a sc₁ − b sc₆)) / √2, with a² = 10/11 and b² =
+/// 1/11.
 pub static E1: Signal = Signal {
     name: "Galileo E1",
     rinex: "1C",
@@ -73,7 +74,7 @@ const fn secondary_code(word: u32) -> [i8; 25] {
 /// The codes of numbers 1 to 50: those of E1-B, then those of E1-C, each in 512 bytes.
 static CODES: &[u8; 2 * COUNT * 512] = include_bytes!("e1_codes.bin");
 
-/// The chips of a satellite by its number, 1 to 50, as ±1; `None` beyond.
+/// Chips of a satellite by its number, 1 to 50, as ±1; `None` beyond.
 pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     memory::chips(CODES, CODE_CHIPS, which, number)
 }

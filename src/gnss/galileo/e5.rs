@@ -1,4 +1,4 @@
-//! Galileo E5a and E5b, each received alone: data and pilot at right angles with codes of 10 230 chips at
+//! Galileo E5a and E5b, each received alone: data and pilot in quadrature with codes of 10 230 chips at
 //! 10.23 Mchip/s, BPSK(10) on 1176.45 and 1207.14 MHz.
 //!
 //! Source: Galileo OS SIS ICD 2.1, 2.3.1 (modulation; a receiver of one side sees quadrature phase shift
@@ -129,7 +129,7 @@ fn register(feedback: u32, start: u32) -> impl Iterator<Item = bool> {
     })
 }
 
-/// The chips of a satellite by its number, 1 to 50, as ±1; `None` beyond. The first register starts with
+/// Chips of a satellite by its number, 1 to 50, as ±1; `None` beyond. The first register starts with
 /// ones, and neither starts again before the code's end.
 pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     let start = STARTS.get(usize::from(number).checked_sub(1)?)?.get(which.column())?;

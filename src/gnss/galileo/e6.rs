@@ -18,7 +18,7 @@ use crate::time::GST;
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 5115;
 
-/// The signal: s = (e_B − e_C) / √2.
+/// Definition of the signal: s = (e_B − e_C) / √2.
 pub static E6: Signal = Signal {
     name: "Galileo E6",
     rinex: "6C",
@@ -55,7 +55,7 @@ pub static E6: Signal = Signal {
 /// The codes of numbers 1 to 50: those of E6-B, then those of E6-C, each in 640 bytes.
 static CODES: &[u8; 2 * COUNT * 640] = include_bytes!("e6_codes.bin");
 
-/// The chips of a satellite by its number, 1 to 50, as ±1; `None` beyond.
+/// Chips of a satellite by its number, 1 to 50, as ±1; `None` beyond.
 pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     memory::chips(CODES, CODE_CHIPS, which, planted!("gnss.e6.codes", number, number ^ 1))
 }

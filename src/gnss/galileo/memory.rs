@@ -1,4 +1,4 @@
-//! Codes that have no generator: the document prints their chips, and a file holds them bit by bit.
+//! Memory codes: the document prints their chips, and a file contains them bit by bit.
 
 /// Numbers that have codes.
 pub(super) const COUNT: usize = 50;
@@ -12,7 +12,7 @@ pub enum Code {
     Pilot,
 }
 
-/// The chips of a satellite by its number, 1 to 50, as ±1; `None` beyond. `table` has the codes of the data's
+/// Chips of a satellite by its number, 1 to 50, as ±1; `None` beyond. `table` has the codes of the data's
 /// numbers, then those of the pilot's, each from a new byte on, first chip in the highest bit.
 pub(super) fn chips(table: &[u8], chips: u32, which: Code, number: u8) -> Option<Vec<i8>> {
     let index = usize::from(number).checked_sub(1).filter(|&index| index < COUNT)?;

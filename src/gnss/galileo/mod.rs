@@ -1,4 +1,4 @@
-//! Galileo: one file a signal, one a message.
+//! Galileo: one file for each signal and one for each message.
 
 pub mod altboc;
 pub mod cnav;

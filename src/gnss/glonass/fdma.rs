@@ -14,7 +14,7 @@ use crate::satellite::System;
 use crate::signal::{Carrier, Component, Layer, SecondaryCode, Signal, always};
 use crate::time::GLONASST;
 
-/// The band around 1602 MHz.
+/// Definition of the signal in the band around 1602 MHz.
 pub static G1: Signal = Signal {
     name: "GLONASS G1",
     rinex: "1C",
@@ -36,7 +36,7 @@ pub static G1: Signal = Signal {
     }],
 };
 
-/// The band around 1246 MHz: the same code and message.
+/// Definition of the signal in the band around 1246 MHz, with the same code and message.
 pub static G2: Signal = Signal {
     name: "GLONASS G2",
     rinex: "2C",

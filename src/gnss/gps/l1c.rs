@@ -19,14 +19,14 @@ use crate::weil::Legendre;
 
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 10_230;
-/// Chips of an overlay, one a code period.
+/// Chips of an overlay, one per code period.
 pub const SECONDARY_CODE_CHIPS: u32 = 1800;
 
 /// Phase of both components against L1 C/A. An antenna's recording has 0.243 to 0.253 cycles between pilot
 /// and C/A, modulo half a cycle, of J02, J03, J07, G04 and G18.
 const AHEAD_OF_CA_CYCLES: f64 = 0.25;
 
-/// The signal: L1C-P, and L1C-D with CNAV-2.
+/// Definition of the signal: L1C-P, and L1C-D with CNAV-2.
 pub static L1C: Signal = Signal {
     name: "GPS L1C",
     rinex: "1L",
@@ -104,7 +104,7 @@ fn origin(number: u8) -> Option<Origin> {
     Some((data, pilot, [polynomial, start, 0]))
 }
 
-/// The chips of a satellite by its number, 1 to 63 or 193 to 202, as ±1; `None` beyond.
+/// Chips of a satellite by its number, 1 to 63 or 193 to 202, as ±1; `None` beyond.
 pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     let (data, pilot, _) = origin(number)?;
     let [later, inserted_at] = match which {
@@ -119,7 +119,7 @@ pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     Some(chips.map(sign).collect())
 }
 
-/// The overlay of a satellite by its number, 1 to 63 or 193 to 202, as ±1; `None` beyond (3.2.2.1.2). A
+/// Overlay of a satellite by its number, 1 to 63 or 193 to 202, as ±1; `None` beyond (3.2.2.1.2). A
 /// second register that has no start stays at zeros and adds none.
 pub fn secondary_code(number: u8) -> Option<Vec<i8>> {
     let (.., [polynomial, start, second]) = origin(number)?;

@@ -12,7 +12,7 @@ use crate::time::GPST;
 /// Chips in a C/A code period.
 pub const CODE_CHIPS: u32 = 1023;
 
-/// The signal.
+/// Definition of the signal.
 pub static L1_CA: Signal = Signal {
     name: "GPS L1 C/A",
     rinex: "1C",

@@ -1,4 +1,4 @@
-//! GPS L2C: data (CM) and pilot (CL) whose chips take turns on 1227.60 MHz.
+//! GPS L2C: data (CM) and pilot (CL), whose chips alternate on 1227.60 MHz.
 //!
 //! Source: IS-GPS-200N, 3.2.1.4 and 3.2.1.5 (CM of 10 230 chips in 20 ms with CNAV, CL of 767 250 in 1.5 s),
 //! 3.3.2.4 (one register of 27 stages for both), tables 3-IIa and 6-I (its first states). Each code has
@@ -12,12 +12,12 @@ use crate::satellite::System;
 use crate::signal::{Carrier, Component, Layer, SecondaryCode, Signal};
 use crate::time::GPST;
 
-/// Chips of CM and of CL.
+/// Number of chips of CM.
 pub const MODERATE_CHIPS: u32 = 10_230;
-/// Chips of CL, 75 times those of CM.
+/// Number of chips of CL, 75 times those of CM.
 pub const LONG_CHIPS: u32 = 767_250;
 
-/// The signal: CM with CNAV, and CL.
+/// Definition of the signal: CM with CNAV, and CL.
 pub static L2C: Signal = Signal {
     name: "GPS L2C",
     rinex: "2L",
@@ -56,7 +56,7 @@ fn gps(number: u8) -> Option<u8> {
     (number <= 63).then_some(number)
 }
 
-/// The chips of a satellite by its number where they have their turn, those of CM first.
+/// Chips of a satellite by its number where they have their turn, those of CM first.
 pub(crate) fn placed(which: Code, number: u8) -> Option<Vec<i8>> {
     let first = match which {
         Code::Moderate => 0,
@@ -88,7 +88,7 @@ pub enum Code {
 /// octal 1112225171).
 const FEEDBACK: u32 = 0o445_112_474;
 
-/// The chips of a satellite by its number, 1 to 63 or 159 to 210, as ±1; `None` beyond.
+/// Chips of a satellite by its number, 1 to 63 or 159 to 210, as ±1; `None` beyond.
 pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     let place = match number {
         1..=63 => number - 1,

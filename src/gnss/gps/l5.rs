@@ -1,4 +1,4 @@
-//! GPS L5: data (I5) and pilot (Q5) at right angles with codes of 10 230 chips at 10.23 Mchip/s, BPSK(10) on
+//! GPS L5: data (I5) and pilot (Q5) in quadrature with codes of 10 230 chips at 10.23 Mchip/s, BPSK(10) on
 //! 1176.45 MHz.
 //!
 //! Source: IS-GPS-705J, 3.2.1 (codes), 3.3.1 (modulation: Q5 lags), tables 3-Ia and 6-I (advances). XA starts
@@ -16,7 +16,7 @@ use crate::time::GPST;
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 10_230;
 
-/// The signal: I5 with CNAV, and Q5.
+/// Definition of the signal: I5 with CNAV, and Q5.
 pub static L5: Signal = Signal {
     name: "GPS L5",
     rinex: "5Q",
@@ -93,7 +93,7 @@ fn register(taps: &[u32], chips: usize) -> Vec<bool> {
 static XA: LazyLock<Vec<bool>> = LazyLock::new(|| register(&XA_TAPS, XA_CHIPS));
 static XB: LazyLock<Vec<bool>> = LazyLock::new(|| register(&XB_TAPS, XB_CHIPS));
 
-/// The chips of a satellite by its number, 1 to 210, as ±1; `None` beyond.
+/// Chips of a satellite by its number, 1 to 210, as ±1; `None` beyond.
 pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     let [data, pilot] = *ADVANCES.get(usize::from(number).checked_sub(1)?)?;
     let advance = match which {

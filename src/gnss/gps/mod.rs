@@ -1,4 +1,4 @@
-//! GPS: one file a signal, one a message.
+//! GPS: one file for each signal and one for each message.
 
 pub mod cnav;
 pub mod cnav2;

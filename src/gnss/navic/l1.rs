@@ -18,10 +18,10 @@ use crate::time::{Epoch, IRNSST};
 
 /// Chips in a code period.
 pub const CODE_CHIPS: u32 = 10_230;
-/// Chips of a secondary code, one a code period.
+/// Chips of a secondary code, one per code period.
 pub const SECONDARY_CODE_CHIPS: u32 = 1800;
 
-/// The signal: the pilot, and data with the message of L1.
+/// Definition of the signal: the pilot, and data with the message of L1.
 pub static L1: Signal = Signal {
     name: "NavIC L1",
     rinex: "1P",
@@ -77,7 +77,7 @@ pub enum Code {
     Pilot,
 }
 
-/// The chips of a satellite by its number, 1 to 14, as ±1; `None` beyond.
+/// Chips of a satellite by its number, 1 to 14, as ±1; `None` beyond.
 pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     let (data, pilot, _) = *STARTS.get(usize::from(number).checked_sub(1)?)?;
     let [first, second, turning] = match which {
@@ -90,7 +90,7 @@ pub fn code(which: Code, number: u8) -> Option<Vec<i8>> {
     Some(chips.take(CODE_CHIPS as usize).map(sign).collect())
 }
 
-/// The secondary code of a satellite by its number, 1 to 14, as ±1; `None` beyond.
+/// Secondary code of a satellite by its number, 1 to 14, as ±1; `None` beyond.
 pub fn secondary_code(number: u8) -> Option<Vec<i8>> {
     let (.., starts) = *STARTS.get(usize::from(number).checked_sub(1)?)?;
     Some(SECONDARY_CODES.chips(starts).take(SECONDARY_CODE_CHIPS as usize).map(sign).collect())

@@ -1,4 +1,4 @@
-//! The tables of NeQuick-G: the grid of the modified dip and the ITU's monthly maps of the F2 layer.
+//! Tables of NeQuick-G: the grid of the modified dip, and the ITU's monthly maps of the F2 layer.
 //!
 //! Source: the document's annexes; the maps are those of ITU-R P.1239. `maps.bin` holds, little-endian, for
 //! every month the F2 layer's critical frequency (quiet and active Sun, 76 functions of the position, 13 of
@@ -51,7 +51,8 @@ pub struct Maps {
 }
 
 impl Maps {
-    /// `month` from 1 to 12, `ut_h` hours, `sunspots` the effective number of sunspots (2.5.5.3.2.1).
+    /// Creates the maps of a `month` (1 to 12) at `ut_h` hours for an effective number of sunspots
+    /// (2.5.5.3.2.1).
     pub fn new(month: u8, ut_h: f64, sunspots: f64) -> Self {
         let month = usize::from(month.clamp(1, 12)) - 1;
         let turn_rad = (15.0 * ut_h - 180.0).to_radians();

@@ -1,4 +1,4 @@
-//! NeQuick-G: the ionosphere of which Galileo broadcasts three coefficients.
+//! NeQuick-G: the ionosphere model for which Galileo broadcasts three coefficients.
 //!
 //! Source: European GNSS (Galileo) Open Service, Ionospheric Correction Algorithm for Galileo Single
 //! Frequency Users, issue 1.2 (2016). The electrons at a position are three Epstein layers below a peak whose
@@ -38,8 +38,8 @@ const RULE: [(f64, f64); 4] = [
     (0.960_289_856_497_536_3, 0.101_228_536_290_376_26),
 ];
 
-/// The three broadcast coefficients of the effective ionisation: solar flux units, per degree of modified dip
-/// and per degree squared.
+/// Three broadcast coefficients of the effective ionisation: solar flux units, per degree of modified dip and
+/// per degree squared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NequickG {
     /// ai0, ai1 and ai2.
@@ -56,7 +56,7 @@ impl NequickG {
         (a0 + modip_deg * (a1 + modip_deg * a2)).clamp(0.0, LARGEST_AZ_SFU)
     }
 
-    /// Electrons along the line from `user` to `satellite` in a month and at an hour of UT, in TECU.
+    /// Electron content in TECU along the line from `user` to `satellite`, in a month and at an hour of UT.
     pub fn stec_tecu(&self, user: Geodetic, satellite: Geodetic, month: u8, ut_h: f64) -> f64 {
         let modip_deg = maps::modip_deg(user.latitude_rad, user.longitude_rad);
         let sun = Sun::new(month, ut_h, self.ionisation_sfu(modip_deg));
@@ -73,7 +73,7 @@ impl NequickG {
     }
 }
 
-/// Group delay of so many electrons on a carrier, in seconds.
+/// Group delay in seconds of a slant electron content in TECU on a carrier.
 pub fn delay_s(tecu: f64, carrier_hz: f64) -> f64 {
     DELAY_M3PS2 * TECU * tecu / (carrier_hz * carrier_hz) / crate::earth::SPEED_OF_LIGHT_MPS
 }

@@ -27,7 +27,8 @@ pub struct Sun {
 }
 
 impl Sun {
-    /// `month` from 1 to 12, `ut_h` hours of the day, effective ionisation in solar flux units.
+    /// Creates the state for a `month` (1 to 12), `ut_h` hours of the day, and the effective ionisation in
+    /// solar flux units.
     pub fn new(month: u8, ut_h: f64, ionisation_sfu: f64) -> Self {
         // ITU-R P.371 (2.5.4.4).
         let sunspots = (167_273.0 + (ionisation_sfu - 63.7) * 1123.6).max(0.0).sqrt() - 408.99;

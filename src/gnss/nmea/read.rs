@@ -1,4 +1,4 @@
-//! Sentences of NMEA 0183 as they are read: GGA, RMC, VTG and ZDA of any talker.
+//! Parser of NMEA 0183 sentences: GGA, RMC, VTG and ZDA of any talker.
 //!
 //! Source: NMEA 0183, version 4.11; fields may be empty, and the checksum of versions before 2.0 is optional.
 //! A sentence without a checksum is taken where all its fields are there, since one that was cut off has
@@ -62,8 +62,8 @@ fn field<T>(found: Option<T>, what: &'static str, text: &str, expected: &'static
     found.ok_or_else(|| SentenceError::Field { what, text: text.chars().take(40).collect(), expected })
 }
 
-/// The sentences of a line, each from its `$`. What stands before the first one is of another protocol or of
-/// a logger; a sentence that another one cuts off has no checksum and is left out.
+/// Splits a line into sentences, each from its `$`. Text before the first one belongs to another protocol or
+/// to a logger. A sentence that another one interrupts has no checksum and is dropped.
 pub fn sentences(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     let next = |from: usize| line.iter().skip(from).position(|byte| *byte == b'$').map(|at| from + at);
     std::iter::successors(next(0), move |from| next(from + 1)).filter_map(move |from| {
@@ -72,7 +72,7 @@ pub fn sentences(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     })
 }
 
-/// A sentence whose checksum holds, or that has none.
+/// Sentence with a correct checksum, or without a checksum.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sentence<'t> {
     /// Talker identifier, such as `GN`.
@@ -93,13 +93,13 @@ pub struct Gga<'t> {
     pub latitude_deg: f64,
     /// Longitude, degrees, east positive.
     pub longitude_deg: f64,
-    /// Altitude above mean sea level, metres.
+    /// Altitude above mean sea level, in metres.
     pub altitude_m: f64,
-    /// Separation of geoid and ellipsoid, metres, where the sentence has it.
+    /// Separation of geoid and ellipsoid in metres, if the sentence has it.
     pub separation_m: Option<f64>,
-    /// Satellites used; 0 where the field is empty.
+    /// Number of satellites used; 0 if the field is empty.
     pub satellites: u32,
-    /// Digits after the point of the minutes of latitude.
+    /// Number of digits after the point in the minutes of latitude.
     pub decimals: u32,
 }
 
@@ -120,19 +120,19 @@ pub struct Rmc<'t> {
     pub time: &'t str,
     /// True if the status is A; V is the receiver's warning.
     pub valid: bool,
-    /// Year, month and day, where the date is there.
+    /// Year, month and day, if the sentence has the date.
     pub date: Option<[u32; 3]>,
-    /// Latitude and longitude, degrees, where the status is A.
+    /// Latitude and longitude in degrees, if the status is A.
     pub place_deg: Option<[f64; 2]>,
     /// Speed over ground, m/s.
     pub speed_mps: Option<f64>,
-    /// Course from north over east, radians.
+    /// Course from north over east, in radians.
     pub course_rad: Option<f64>,
 }
 
 impl<'t> Sentence<'t> {
-    /// Splits a sentence that begins with `$` and is of one of these kinds; `None` of another one, whose
-    /// checksum is not looked at. What follows the checksum is not read.
+    /// Splits a sentence that begins with `$` and is of one of these kinds. Returns `None` for other kinds,
+    /// whose checksum is not tested. Text after the checksum is ignored.
     ///
     /// # Errors
     /// [`SentenceError`]: a wrong checksum, bytes that are not ASCII.
@@ -212,8 +212,8 @@ impl<'t> Sentence<'t> {
         Ok(Some(Rmc { time: time(self.get(1))?, valid, date, place_deg, speed_mps, course_rad }))
     }
 
-    /// Speed over ground in m/s and course from north over east in radians of a VTG sentence, where it has
-    /// them.
+    /// Reads speed over ground in m/s and course from north over east in radians from a VTG sentence, if it
+    /// has them.
     ///
     /// # Errors
     /// [`SentenceError`]: too few fields, one that has not its form.
@@ -223,7 +223,8 @@ impl<'t> Sentence<'t> {
         Ok(speed_mps.zip(course_rad))
     }
 
-    /// Time of day, `hhmmss.ss` as written, and year, month and day of a ZDA sentence, where it has them.
+    /// Reads time of day, `hhmmss.ss` as written, and year, month and day from a ZDA sentence, if it has
+    /// them.
     ///
     /// # Errors
     /// [`SentenceError`]: too few fields, one that has not its form.

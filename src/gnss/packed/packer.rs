@@ -1,4 +1,4 @@
-//! Samples of whole bytes written as packed ones: what [`Layout::unpack`] reads again.
+//! Packing of samples in whole bytes into the form that [`Layout::unpack`] reads.
 
 use std::io::{self, Write};
 
@@ -11,7 +11,7 @@ use crate::samples::Format;
 const LEAST: i32 = -256;
 const MOST: i32 = 255;
 
-/// A value that no code has.
+/// Error for a value that has no code.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("a sample has the value {value}, which {bits} bits of {encoding} do not: expected {expected}")]
 pub struct CodeError {

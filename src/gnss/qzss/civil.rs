@@ -13,7 +13,7 @@ use crate::qzss::lnav::{LNAV_SETS, unhealthy};
 use crate::qzss::own::{OwnReader, as_gps, like, named};
 use crate::satellite::System;
 
-/// CNAV as L5 of QZSS names it.
+/// Definition of CNAV for L5 of QZSS.
 pub static CNAV: Message = Message {
     name: "CNAV of QZSS",
     sender: |common| Ok(cnav::sender(common, &CNAV)),
@@ -39,7 +39,7 @@ pub static CNAV_L2C: Message = Message {
     ..cnav::CNAV_L2C
 };
 
-/// CNAV-2 as L1C of QZSS names it.
+/// Definition of CNAV-2 for L1C of QZSS.
 pub static CNAV2: Message = Message {
     name: "CNAV-2 of QZSS",
     // Almanacs have health by carrier, as CNAV has.
@@ -90,7 +90,7 @@ fn form(set: &Ephemeris, gps: &Message, message: &Message) -> Ephemeris {
     Ephemeris { health, ..named(made, message) }
 }
 
-/// Adds to a parameter of an ephemeris of one of these messages; whether there is one.
+/// Adds to a parameter of an ephemeris of one of these messages. Returns false if there is none.
 fn adjust(set: &mut Ephemeris, parameter: &str, by: f64, gps: &Message, message: &Message) -> bool {
     let mut own = as_gps(&(message.form)(set));
     let found = (gps.adjust)(&mut own, parameter, by);

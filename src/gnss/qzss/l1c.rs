@@ -12,7 +12,7 @@ use crate::satellite::System;
 use crate::signal::{Component, SecondaryCode, Signal, always};
 use crate::time::QZSST;
 
-/// The signal: L1C-P, and L1C-D with CNAV-2.
+/// Definition of the signal: L1C-P, and L1C-D with CNAV-2.
 pub static L1C: Signal = Signal {
     name: "QZSS L1C",
     system: System::Qzss,

@@ -10,7 +10,7 @@ use crate::satellite::System;
 use crate::signal::{Component, Signal};
 use crate::time::QZSST;
 
-/// The signal.
+/// Definition of the signal.
 pub static L1_CA: Signal = Signal {
     name: "QZSS L1 C/A",
     system: System::Qzss,

@@ -9,7 +9,7 @@ use crate::satellite::System;
 use crate::signal::{Component, Signal};
 use crate::time::QZSST;
 
-/// The signal: CM with CNAV, and CL.
+/// Definition of the signal: CM with CNAV, and CL.
 pub static L2C: Signal = Signal {
     name: "QZSS L2C",
     system: System::Qzss,

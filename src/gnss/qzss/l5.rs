@@ -9,7 +9,7 @@ use crate::satellite::System;
 use crate::signal::{Component, Signal, always};
 use crate::time::QZSST;
 
-/// The signal: I5 with CNAV, and Q5.
+/// Definition of the signal: I5 with CNAV, and Q5.
 pub static L5: Signal = Signal {
     name: "QZSS L5",
     system: System::Qzss,

@@ -13,7 +13,7 @@ use crate::qzss::own::{OwnReader, as_gps, like, named};
 use crate::qzss::{l1c, l2c, l5};
 use crate::signal::Signal;
 
-/// LNAV as signals of QZSS name it.
+/// Definition of LNAV as QZSS sends it.
 pub static LNAV: Message = Message {
     name: "LNAV of QZSS",
     sender: |common| Ok(Box::new(Broadcast::of(&Common { almanac: Vec::new(), ..common.clone() })?)),

@@ -11,10 +11,10 @@ use crate::sbas::message::SBAS;
 use crate::signal::{Component, Signal, always};
 use crate::time::GPST;
 
-/// First and last number of a satellite.
+/// First and last number of SBAS satellites.
 pub const SATELLITES: [u8; 2] = [20, 58];
 
-/// The signal.
+/// Definition of the signal.
 pub static L1: Signal = Signal {
     name: "SBAS L1",
     system: System::Sbas,

@@ -69,7 +69,7 @@ pub(super) struct Accuracies {
 }
 
 impl Accuracies {
-    /// Takes those of a unit. What is new of the issue, if something is.
+    /// Takes the coefficients of a unit. Returns those of the issue that are new, if any.
     pub fn take(&mut self, issue: u32, found: &Parameters) -> Option<Parameters> {
         if issue != self.issue {
             *self = Self { issue, said: Parameters::new() };
@@ -91,7 +91,7 @@ pub(super) fn check(common: &Common) -> Result<(), FieldError> {
 /// Tables with the parameters of an ephemeris.
 pub(super) type Tables = [&'static [Of]];
 
-/// Every field by the table that has it.
+/// Lists every field by the table that has it.
 pub(super) fn fields(all: &[(&'static str, &'static Tables)]) -> Vec<(&'static str, Vec<&'static Field>)> {
     let of = |tables: &'static Tables| tables.iter().flat_map(|table| table.iter()).map(|own| &own.field).collect();
     all.iter().map(|(name, tables)| (*name, of(tables))).collect()
@@ -256,7 +256,7 @@ pub(super) fn adjustable(tables: &Tables) -> Vec<&'static str> {
     names
 }
 
-/// Adds `by` to a parameter in the unit of the tables; whether there is one.
+/// Adds `by` to a parameter in the unit of the tables. Returns false if there is none.
 pub(super) fn adjust(tables: &Tables, ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     let mut content = blank(ephemeris.clone());
     let found = tables.iter().any(|table| add_to(table, parameter, &mut content, by));

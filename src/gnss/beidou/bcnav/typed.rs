@@ -1,5 +1,5 @@
-//! Messages of one length, each with a type, coded as one word over GF(64): what B-CNAV2 and B-CNAV3 have
-//! alike.
+//! Messages of one length, each with a type, coded as one word over GF(64): the common part of B-CNAV2 and
+//! B-CNAV3.
 //!
 //! Source: BDS-SIS-ICD-B2a 1.0 and BDS-SIS-ICD-B2b 1.0, 6.2. A message begins with a preamble and the
 //! satellite's number, whose symbols the code leaves as they are. Messages state their second of the week,
@@ -32,21 +32,21 @@ const LEAST_SHARE: f32 = 0.65;
 /// Layout of the messages of one kind.
 pub(in crate::beidou) struct Layout {
     pub message: &'static Message,
-    /// First symbols of a message, and how many.
+    /// Preamble of a message, and its number of symbols.
     pub preamble: (u32, usize),
-    /// Symbols between the preamble and the word of the code: the number's and reserved ones; none where the
-    /// number is in the word.
+    /// Number of symbols between the preamble and the code word: the satellite's number and reserved ones. It
+    /// is zero if the number is in the code word.
     pub plain: usize,
-    /// Bits of a message with its check.
+    /// Number of bits of a message with its check.
     pub bits: usize,
     pub code: &'static LazyLock<Ldpc64>,
-    /// The number in the word, if it is there, the type, and the second of the week in the message's seconds.
+    /// Field of the satellite's number in the code word, if it is there.
     pub number: Option<Field>,
     pub kind: Field,
     pub second: Field,
-    /// The messages in the order in which they are sent.
+    /// Types of the messages in the order of transmission.
     pub order: &'static [u8],
-    /// The tables of each type.
+    /// Tables of each message type.
     pub tables: &'static [(u8, &'static Tables)],
     /// Types that make up an ephemeris, beginning with the one that is sent first when an ephemeris is new.
     pub set: &'static [u8],
@@ -94,7 +94,7 @@ impl Layout {
         bits_of(u128::from(preamble), self.preamble.1).chain(bits_of(u128::from(number), NUMBER_BITS))
     }
 
-    /// The symbols of a satellite's message of that many bits.
+    /// Encodes a satellite's message of `bits` to symbols.
     pub fn encode(&self, number: u8, bits: &[bool]) -> Vec<bool> {
         let first = self.first(number).chain(std::iter::repeat(false)).take(self.preamble.1 + self.plain);
         first.chain(self.code.encode(bits)).collect()
@@ -121,7 +121,7 @@ impl Layout {
         self.number.as_ref().map_or_else(plain, |field| field.read(bits))
     }
 
-    /// The parameters of a message's symbols.
+    /// Decodes the parameters from a message's symbols.
     pub fn opened(&self, symbols: &[bool]) -> Option<(bool, Parameters)> {
         let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
         let (bits, _) = self.decode(&soft)?;
@@ -216,7 +216,7 @@ pub(in crate::beidou) struct TypedReader {
 }
 
 impl TypedReader {
-    /// A reader that has read nothing.
+    /// Creates a reader that has received no symbols.
     pub fn new(layout: &'static Layout, sv: Sv) -> Self {
         let frames = Frames::new(layout.symbols());
         Self { layout, sv, frames, parts: Vec::new(), complete: None, accuracies: Accuracies::default() }

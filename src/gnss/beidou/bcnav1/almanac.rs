@@ -1,4 +1,4 @@
-//! Almanacs in pages 2 and 4 of subframe 3, and the turn in which pages are sent.
+//! Almanacs in pages 2 and 4 of subframe 3, and the order in which pages are sent.
 //!
 //! Source: BDS-SIS-ICD-B1C 1.0, 6.2.3, 7.9 (medium) and 7.10 (reduced). Page 2 has four reduced almanacs,
 //! page 4 one of medium length; the document leaves the order of the pages open. Where BDGIM's coefficients
@@ -37,7 +37,7 @@ pub(in crate::beidou) struct Entry {
     pub m0_rad: f64,
     pub af0_s: f64,
     pub af1_sps: f64,
-    /// Eight bits, of which the first is the satellite's and the last three are those of B1C, B2a and B2b.
+    /// Health in eight bits: the first is the satellite's, and the last three are those of B1C, B2a and B2b.
     pub health: f64,
     pub delta_a_m: f64,
     /// Argument of latitude, in radians.
@@ -90,7 +90,7 @@ impl Almanacs {
         Self { toa, entries: entries.collect() }
     }
 
-    /// The page of the frame that begins then, and the satellites in it.
+    /// Number of the page in the frame that begins at `start`, and the satellites in it.
     pub fn page_at(&self, has_electrons: bool, start: Epoch) -> (u8, [Entry; PLACES]) {
         let mut entries = [Entry::default(); PLACES];
         if has_electrons && (self.entries.is_empty() || is_first(start)) {

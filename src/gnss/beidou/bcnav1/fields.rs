@@ -49,7 +49,7 @@ pub(super) static SET: &Tables = &[&BEGIN, &FIRST_HALF, &SECOND_HALF, &CLOCK, &D
 /// Fields of page 1 of subframe 3 that do not belong to the ephemeris.
 pub(super) static BESIDE: &Tables = &[&ALONG, &ACCURACIES, &ELECTRONS, &UTC];
 
-/// Every field by the subframe that carries it.
+/// Lists every field by the subframe that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
     bcnav::fields(&[
         ("subframe 2", TWO),

@@ -40,7 +40,7 @@ pub use fields::tables;
 use fields::{BESIDE, SET, THREE, TWO};
 pub use reader::BCnav1Reader;
 
-/// B-CNAV1 as B1C names it.
+/// Definition of B-CNAV1 for B1C.
 pub static B_CNAV1: Message = Message {
     name: "B-CNAV1",
     symbol_s: 0.01,
@@ -132,10 +132,10 @@ const INTERLEAVER: Interleaver = Interleaver { columns: 36, rows: 48 };
 pub(super) static CODE_2: LazyLock<Ldpc64> = LazyLock::new(|| Ldpc64::packed(BITS_2 / 6, include_bytes!("ldpc_2.bin")));
 pub(super) static CODE_3: LazyLock<Ldpc64> = LazyLock::new(|| Ldpc64::packed(BITS_3 / 6, include_bytes!("ldpc_3.bin")));
 
-/// A frame as decoded: its checks are right.
+/// Decoded frame with correct checks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
-    /// Eighteen seconds of the hour at its beginning.
+    /// Time of the frame's beginning within the hour, in units of eighteen seconds.
     pub time: u32,
     /// True if the symbols were inverted.
     pub inverted: bool,
@@ -159,7 +159,7 @@ impl Frame {
     }
 }
 
-/// The 72 symbols of a satellite's number and a time.
+/// Encodes a satellite's number and a time to 72 symbols.
 pub fn first_symbols(number: u8, time: u32) -> Vec<bool> {
     NUMBER_CODE.encode(u32::from(number)).chain(TIME_CODE.encode(time)).collect()
 }
@@ -175,7 +175,7 @@ fn row_of(row: usize) -> usize {
     }
 }
 
-/// The symbols of a frame as they are sent, of bits with their checks.
+/// Encodes a frame, from bits with their checks to symbols as they are sent.
 pub fn encoded(number: u8, time: u32, two: &[bool], three: &[bool]) -> Vec<bool> {
     let both = [CODE_2.encode(two), CODE_3.encode(three)].concat();
     let rows = (0..36).flat_map(|row| both.iter().copied().skip(48 * row_of(row)).take(48));
@@ -279,7 +279,7 @@ fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
     Some((true, found))
 }
 
-/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
 ///
 /// # Errors
 /// A value that the message cannot carry.

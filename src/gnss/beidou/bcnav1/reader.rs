@@ -29,7 +29,7 @@ pub struct BCnav1Reader {
 }
 
 impl BCnav1Reader {
-    /// A reader that has read nothing.
+    /// Creates a reader that has received no symbols.
     pub fn new(sv: Sv) -> Self {
         Self { sv, frames: Frames::new(SYMBOLS), complete: None, electrons: None, accuracies: Accuracies::default() }
     }

@@ -24,7 +24,7 @@ use crate::broadcast::{Ephemeris, SetForm};
 use crate::fec::ldpc64::Ldpc64;
 use crate::message::{Message, Records};
 
-/// B-CNAV2 as B2a names it.
+/// Definition of B-CNAV2 for B2a.
 pub static B_CNAV2: Message = Message {
     name: "B-CNAV2",
     symbol_s: 0.005,
@@ -129,7 +129,7 @@ fn form(set: &Ephemeris) -> Ephemeris {
     bcnav::carried(set, &B_CNAV2_SETS, &[&B1C, &B2A], Some(["5D", "5P"]))
 }
 
-/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
 ///
 /// # Errors
 /// A value that the message cannot carry.
@@ -148,7 +148,7 @@ pub fn decode(soft: &[f32]) -> Option<(Vec<bool>, bool)> {
     LAYOUT.decode(soft)
 }
 
-/// Every field by the message that carries it.
+/// Lists every field by the message that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
     bcnav::fields(&[("message 10", TEN), ("message 11", ELEVEN), ("message 30", THIRTY), ("message 34", THIRTY_FOUR)])
 }

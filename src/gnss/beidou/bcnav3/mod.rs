@@ -23,7 +23,7 @@ use crate::broadcast::{Ephemeris, SetForm};
 use crate::fec::ldpc64::Ldpc64;
 use crate::message::{Message, Records};
 
-/// B-CNAV3 as B2b names it.
+/// Definition of B-CNAV3 for B2b.
 pub static B_CNAV3: Message = Message {
     name: "B-CNAV3",
     symbol_s: 0.001,
@@ -120,7 +120,7 @@ fn form(set: &Ephemeris) -> Ephemeris {
     bcnav::carried(set, &B_CNAV3_SETS, &[&B2B], None)
 }
 
-/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
 ///
 /// # Errors
 /// A value that the message cannot carry.
@@ -139,7 +139,7 @@ pub fn decode(soft: &[f32]) -> Option<(Vec<bool>, bool)> {
     LAYOUT.decode(soft)
 }
 
-/// Every field by the message that carries it.
+/// Lists every field by the message that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
     bcnav::fields(&[("message 10", TEN), ("message 30", THIRTY)])
 }

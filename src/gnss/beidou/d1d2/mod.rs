@@ -329,7 +329,7 @@ fn parameters(symbols: &[bool]) -> Option<Vec<(&'static str, i64)>> {
     Some(integers(&D2_SET, &D2Set::joined(parts.iter().map(|part| &part.0))))
 }
 
-/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays. Times are BDT's.
+/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays. Times are BDT's.
 ///
 /// # Errors
 /// A value that the message cannot carry.
@@ -351,7 +351,7 @@ fn adjustable() -> Vec<&'static str> {
     names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
 }
 
-/// Adds `by` to a parameter of an ephemeris in the unit of the tables; whether there is one.
+/// Adds `by` to a parameter of an ephemeris in the unit of the tables. Returns false if there is none.
 pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     let mut orbit = Orbit { ephemeris: ephemeris.clone(), ..Orbit::blank(ephemeris.sv, ephemeris.toe) };
     let found = add_to(&D1_SET, parameter, &mut orbit, by);

@@ -47,7 +47,7 @@ pub struct D1D2Reader {
 }
 
 impl D1D2Reader {
-    /// A reader that has read nothing.
+    /// Creates a reader that has received no symbols.
     pub fn new(sv: Sv) -> Self {
         let per_bit = if sv.is_geostationary() { D2_SYMBOLS } else { D1_SYMBOLS };
         Self {

@@ -27,7 +27,7 @@ use crate::message::{IonosphereForm, Message, Parameters, Sender};
 use crate::time::Epoch;
 pub use reader::CnavReader;
 
-/// C/NAV as E6 names it.
+/// Definition of C/NAV for E6.
 pub static CNAV: Message = Message {
     name: "C/NAV",
     symbol_s: 0.001,
@@ -128,7 +128,7 @@ const BODY: [Field; 8] = [
 const TIME_OF_HOUR: Field = Field::new("has_time_of_hour_s", &[(38, 12)], Whole, 0, "HAS message type 1, header");
 const FOLLOWING: (u16, u8) = (50, 20);
 
-/// Every field by the part of the page that has it.
+/// Lists every field by the part of the page that has it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
     vec![("header", HEAD.iter().collect()), ("encoded", BODY.iter().collect()), ("type 1", vec![&TIME_OF_HOUR])]
 }

@@ -20,7 +20,7 @@ pub struct CnavReader {
 }
 
 impl CnavReader {
-    /// A reader that has read nothing.
+    /// Creates a reader that has received no symbols.
     pub fn new(sv: Sv) -> Self {
         Self { sv, pages: Frames::new(PAGE_SYMBOLS) }
     }

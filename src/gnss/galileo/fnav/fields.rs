@@ -224,7 +224,7 @@ pub(super) static PAGE_6: [Element<Triple>; 18] = [
     of!(2, health, 209),
 ];
 
-/// Every field by the page that carries it.
+/// Lists every field by the page that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
     fn of<T>(table: &'static [Element<T>]) -> Vec<&'static Field> {
         table.iter().map(|element| &element.field).collect()

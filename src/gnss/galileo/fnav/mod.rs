@@ -28,7 +28,7 @@ pub use fields::tables;
 use fields::{PAGE_1, PAGE_2, PAGE_3, PAGE_4, PAGE_4_GPS, PAGE_4_UTC, PAGE_5, PAGE_6};
 pub use reader::FnavReader;
 
-/// F/NAV as signals name it.
+/// Definition of F/NAV.
 pub static FNAV: Message = Message {
     name: "F/NAV",
     symbol_s: 0.02,
@@ -231,8 +231,8 @@ fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
     Some(Coefficients::NequickG(NequickG { coefficients: found }))
 }
 
-/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays, and so does what the
-/// message does not state.
+/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays, and so does what
+/// the message does not state.
 ///
 /// # Errors
 /// A value that the message cannot carry.
@@ -251,7 +251,7 @@ fn adjustable() -> Vec<&'static str> {
     names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
 }
 
-/// Adds `by` to a parameter of pages 1 to 4 in the unit of the tables; whether there is one.
+/// Adds `by` to a parameter of pages 1 to 4 in the unit of the tables. Returns false if there is none.
 fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     let mut sent = Orbit { ephemeris: ephemeris.clone(), nequick: [0.0; 3] };
     let found = of_set().into_iter().any(|table| add_to(table, parameter, &mut sent, by));

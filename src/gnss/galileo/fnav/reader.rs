@@ -33,7 +33,7 @@ pub struct FnavReader {
 }
 
 impl FnavReader {
-    /// A reader that has read nothing.
+    /// Creates a reader that has received no symbols.
     pub fn new(sv: Sv) -> Self {
         Self {
             sv,

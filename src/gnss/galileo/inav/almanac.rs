@@ -96,7 +96,7 @@ impl Triple {
         Self::of(turn, sets, reference, offset)
     }
 
-    /// The satellites of that turn, counted from 0, of the twelve of an almanac.
+    /// Creates the almanacs of three of twelve satellites, by their turn, counted from 0.
     pub fn of(turn: u8, sets: &[Ephemeris], reference: Epoch, offset: Option<TimePolynomial>) -> Self {
         let toa_s = ((reference.tow_whole_s() + TOA_STEP_S / 2) / TOA_STEP_S * TOA_STEP_S).min(TOA_LAST_S);
         let toa = Epoch::new(reference.week() * WEEK_S + toa_s, 0.0);

@@ -33,7 +33,8 @@ pub(in crate::galileo) struct Utc {
 }
 
 impl Utc {
-    /// UTC as a scene has it: GPS time's offset, and by how much the system's own time is ahead of that.
+    /// Collects the UTC parameters of a scene: the offset of GPS time, and the offset of the system's own
+    /// time ahead of GPS time.
     pub fn of(common: &Common, start: Epoch) -> Self {
         let utc = &common.utc;
         let reference = utc.polynomial.map_or(common.reference.unwrap_or(start), |polynomial| polynomial.reference);
@@ -177,8 +178,8 @@ pub(super) static WORD_6: [Element<Utc>; 9] = [
         |u| (u.sent_s % WEEK_S) as f64, |u, v| u.sent_s = v as i64),
 ];
 
-/// The index of the signal in space accuracy nearest to one in metres (5.1.12, table 90); 255, no prediction,
-/// without one or above 6 m.
+/// Index of the signal-in-space accuracy nearest to one in metres (5.1.12, table 90). It is 255, no
+/// prediction, without an accuracy or above 6 m.
 pub fn sisa_index(accuracy_m: Option<f64>) -> u8 {
     // First index, its metres, and the step to the next one, of each range.
     const RANGES: [(f64, f64, f64); 4] = [(0.0, 0.0, 0.01), (50.0, 0.5, 0.02), (75.0, 1.0, 0.04), (100.0, 2.0, 0.16)];
@@ -187,7 +188,7 @@ pub fn sisa_index(accuracy_m: Option<f64>) -> u8 {
     range.map_or(255, |(first, least, step)| (first + ((metres - least) / step).round()) as u8)
 }
 
-/// Every field by the word that carries it.
+/// Lists every field by the word that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
     fn of<T>(table: &'static [Element<T>]) -> Vec<&'static Field> {
         table.iter().map(|element| &element.field).collect()

@@ -38,7 +38,7 @@ use reduced::{Reduced, WORD_16};
 use redundancy::REDUNDANT;
 pub use redundancy::redundancy;
 
-/// I/NAV as signals name it.
+/// Definition of I/NAV.
 pub static INAV: Message = Message {
     name: "I/NAV",
     symbol_s: 0.004,
@@ -157,8 +157,8 @@ fn of_issue() -> Vec<&'static str> {
     words.flat_map(|(_, fields)| fields).map(|field| field.name).collect()
 }
 
-/// Type of the word that begins at a time: the nominal sequence of E1-B (4.3.5, table 38). Before 2023 spare
-/// words are where redundancy is since.
+/// Type of the word that begins at a time, by the nominal sequence of E1-B (4.3.5, table 38). Before 2023,
+/// spare words replace the redundancy words.
 pub fn word_at(start: Epoch) -> u8 {
     let redundant = start.week() >= REDUNDANT_SINCE_WEEK;
     // Almanac words 7 and 8 alternate with 9 and 10 from sub-frame to sub-frame.
@@ -417,7 +417,7 @@ fn of_set() -> [&'static [Element<Orbit>]; 5] {
     [&WORD_1, &WORD_2, &WORD_3, &WORD_4, &WORD_5]
 }
 
-/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
 ///
 /// # Errors
 /// A value that the message cannot carry.
@@ -436,7 +436,7 @@ fn adjustable() -> Vec<&'static str> {
     names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
 }
 
-/// Adds `by` to a parameter of words 1 to 5 in the unit of the tables; whether there is one.
+/// Adds `by` to a parameter of words 1 to 5 in the unit of the tables. Returns false if there is none.
 pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     let mut sent = Orbit { ephemeris: ephemeris.clone(), nequick: [0.0; 3] };
     let found = of_set().into_iter().any(|table| add_to(table, parameter, &mut sent, by));

@@ -40,7 +40,7 @@ pub struct InavReader {
 }
 
 impl InavReader {
-    /// A reader of E1-B that has read nothing.
+    /// Creates a reader of E1-B that has received no symbols.
     pub fn new(sv: Sv) -> Self {
         Self::of(&INAV, sv)
     }

@@ -1,4 +1,4 @@
-//! The sender's elements in short: word 16, whole in two seconds.
+//! Reduced elements of the sender: word 16, which a receiver has completely in two seconds.
 //!
 //! Source: Galileo OS SIS ICD 2.1, 5.1.11. Eight coarse numbers give orbit and clock from the sub-frame's
 //! beginning on for ten minutes; rates, harmonics, health and group delays are zero or not stated. Satellites

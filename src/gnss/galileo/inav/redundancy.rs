@@ -1,4 +1,4 @@
-//! Words 17 to 20: octets by which any of words 1 to 4 are found that were not read.
+//! Redundancy words 17 to 20: octets from which missing ones of words 1 to 4 are recovered.
 //!
 //! Source: Galileo OS SIS ICD 2.1, 5.1.13. The 58 octets of the code's information are the type of word 1
 //! with the two low bits of the issue of data, its other eight bits, and the 112 bits that follow the issue
@@ -36,7 +36,7 @@ fn head(issue: u32) -> [u8; HEAD] {
     [(1 << 2 | issue & 0b11) as u8, (issue >> 2) as u8]
 }
 
-/// Words 17 to 20 of words 1 to 4.
+/// Computes words 17 to 20 from words 1 to 4.
 pub fn redundancy(words: [&u128; 4]) -> [u128; 4] {
     let issue = issue(words[0]);
     let information: Vec<u8> = head(issue).into_iter().chain(words.into_iter().flat_map(octets)).collect();

@@ -131,9 +131,9 @@ pub(super) static STRING_4: [Of; 6] = [
 pub(super) struct SystemTime {
     /// Number of the four years, from 1996 on.
     pub four_years: f64,
-    /// UTC(SU) less GLONASS time, three hours apart.
+    /// UTC(SU) minus GLONASS time in seconds, without the three hours between both.
     pub tau_c_s: f64,
-    /// GPS time less GLONASS time, whole seconds apart, in days.
+    /// GPS time minus GLONASS time in days, without the whole seconds between both.
     pub tau_gps_days: f64,
 }
 
@@ -144,7 +144,7 @@ pub(super) static STRING_5: [Element<SystemTime>; 3] = [
     plain!("tau_gps_days", [(54, 22)], Magnitude, -30, SYSTEM, tau_gps_days),
 ];
 
-/// Every field by its string.
+/// Lists every field by its string.
 pub fn tables() -> Vec<(u8, Vec<&'static Field>)> {
     fn of<T>(table: &'static [Element<T>]) -> Vec<&'static Field> {
         table.iter().map(|element| &element.field).collect()

@@ -30,7 +30,7 @@ pub use fields::{GlonassString, STRING_BITS, tables};
 use fields::{STRING_1, STRING_2, STRING_3, STRING_4, STRING_5, SystemTime, date, midnight};
 pub use reader::GnavReader;
 
-/// The message as signals name it.
+/// Definition of the message GNAV.
 pub static GNAV: Message = Message {
     name: "GNAV",
     symbol_s: 0.01,
@@ -330,7 +330,7 @@ fn check(ephemeris: &Ephemeris) -> Result<(), FieldError> {
     }
 }
 
-/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
 ///
 /// # Errors
 /// A value that the message cannot carry.
@@ -350,7 +350,7 @@ fn adjustable() -> Vec<&'static str> {
     names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
 }
 
-/// Adds `by` to a parameter of strings 1 to 4 in the unit of the tables; whether there is one.
+/// Adds `by` to a parameter of strings 1 to 4 in the unit of the tables. Returns false if there is none.
 pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     of_set().into_iter().any(|table| add_to(table, parameter, ephemeris, by))
 }

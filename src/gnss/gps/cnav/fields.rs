@@ -162,7 +162,7 @@ pub(super) static TIME: [Of; 9] = [
     plain!("utc_leap_after_s", [(217, 8)], Signed, 0, UTC, utc.leap_after_s),
 ];
 
-/// Every field by the message that carries it.
+/// Lists every field by the message that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
     fn of(tables: &[&'static [Of]]) -> Vec<&'static Field> {
         tables.iter().flat_map(|table| table.iter()).map(|element| &element.field).collect()

@@ -35,7 +35,7 @@ pub(super) use fields::{L1, L2, L5, REFERENCE_NODE_RADPS, STEP_S, reference_axis
 pub use on_l2c::CNAV_L2C;
 pub use reader::CnavReader;
 
-/// CNAV as L5 names it.
+/// Definition of CNAV for L5.
 pub static CNAV: Message = Message {
     name: "CNAV",
     symbol_s: 0.01,
@@ -334,7 +334,7 @@ fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
     Some(Coefficients::Klobuchar(Klobuchar { alpha, beta }))
 }
 
-/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
 ///
 /// # Errors
 /// A value that the message cannot carry.
@@ -369,7 +369,7 @@ fn adjustable() -> Vec<&'static str> {
     names.filter(|name| !FIXED_PARAMETERS.contains(name) && !name.starts_with("ura_ned")).collect()
 }
 
-/// Adds `by` to a parameter in the unit of the tables; whether there is one.
+/// Adds `by` to a parameter in the unit of the tables. Returns false if there is none.
 fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     let mut content = blank(ephemeris.clone());
     let found = of_set().into_iter().any(|table| add_to(table, parameter, &mut content, by));

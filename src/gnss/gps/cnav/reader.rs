@@ -27,7 +27,7 @@ pub struct CnavReader {
 }
 
 impl CnavReader {
-    /// A reader of one of the two messages that has read nothing.
+    /// Creates a reader of one of the two messages that has received no symbols.
     pub fn of(message: &'static Message, sv: Sv) -> Self {
         Self { message, sv, code: Running::new(BITS, is_message), messages: BTreeMap::new(), complete: None }
     }

@@ -1,4 +1,4 @@
-//! Almanacs in pages 3 and 4 of subframe 3, and the turn in which pages are sent.
+//! Almanacs in pages 3 and 4 of subframe 3, and the order in which pages are sent.
 //!
 //! Source: IS-GPS-800J, 3.5.4.3; for QZSS IS-QZSS-PNT-005, 4.2.2.4. Page 3 has six reduced almanacs, page 4
 //! one almanac of medium length; both are those of CNAV ([`super::cnav`]) with eight bits of number. The
@@ -37,7 +37,7 @@ const INCLINED: f64 = 0.1;
 /// One satellite in both kinds of almanac; number 0 is a packet without satellite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Entry {
-    /// The elements: eccentricity and inclination count from those of the satellite's kind of orbit.
+    /// Elements whose eccentricity and inclination count from those of the satellite's kind of orbit.
     pub elements: Almanac,
     pub delta_a_m: f64,
     /// Node and argument of latitude of the reduced almanac, in radians.
@@ -46,7 +46,7 @@ pub(super) struct Entry {
 }
 
 impl Entry {
-    /// A packet without satellite, whose bits alternate after its number 0 as real ones do.
+    /// Creates a packet without a satellite, whose bits alternate after its number 0 as real ones do.
     pub fn empty() -> Self {
         Self {
             elements: Almanac { health: 5, ..Almanac::default() },
@@ -112,7 +112,8 @@ impl Almanacs {
         Self { toa, entries: entries.collect() }
     }
 
-    /// The page of a system's satellites in the frame that begins then, and the satellites in it.
+    /// Number of the page of a system's satellites in the frame that begins at `start`, and the satellites in
+    /// it.
     pub fn page_at(&self, system: System, start: Epoch) -> (f64, [Entry; PACKETS]) {
         let mut entries = [Entry::empty(); PACKETS];
         let own: Vec<Entry> = self.entries.iter().filter(|(other, _)| *other == system).map(|(_, own)| *own).collect();

@@ -39,7 +39,7 @@ pub use fields::tables;
 use fields::{DELAY, HEADER, OF_UTC, SET};
 pub use reader::Cnav2Reader;
 
-/// CNAV-2 as L1C names it.
+/// Definition of CNAV-2 for L1C.
 pub static CNAV2: Message = Message {
     name: "CNAV-2",
     symbol_s: 0.01,
@@ -131,10 +131,10 @@ struct Content {
     entries: [Entry; PACKETS],
 }
 
-/// A frame as decoded: its checks are right.
+/// Decoded frame with correct checks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
-    /// Count of eighteen seconds at which the next frame begins.
+    /// Time of the next frame's beginning, in units of eighteen seconds.
     pub time: u32,
     /// True if the symbols were inverted.
     pub inverted: bool,
@@ -174,12 +174,12 @@ fn page(bits: &[bool]) -> f64 {
     bits.get(8..14).map_or(0.0, |bits| number(bits) as f64)
 }
 
-/// The symbols of a frame before they are interleaved, of a time and of bits with their checks.
+/// Encodes a frame from a time and from bits with their checks, without interleaving.
 pub fn coded(time: u32, two: &[bool], three: &[bool]) -> Vec<bool> {
     FRAME.coded(time, two, three)
 }
 
-/// The order in which the symbols of a frame are sent.
+/// Interleaves the symbols of a frame for transmission.
 pub fn interleaved(coded: &[bool]) -> Vec<bool> {
     FRAME.interleaved(coded)
 }
@@ -359,7 +359,7 @@ fn klobuchar(page_1: &Vec<bool>) -> Klobuchar {
     content.klobuchar
 }
 
-/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
 ///
 /// # Errors
 /// A value that the message cannot carry.
@@ -394,7 +394,7 @@ fn adjustable() -> Vec<&'static str> {
     names.filter(|name| !FIXED_PARAMETERS.contains(name) && !name.starts_with("ura_ned")).collect()
 }
 
-/// Adds `by` to a parameter in the unit of the tables; whether there is one.
+/// Adds `by` to a parameter in the unit of the tables. Returns false if there is none.
 fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     let mut content = blank(ephemeris.clone());
     let found = of_set().into_iter().any(|table| add_to(table, parameter, &mut content, by));

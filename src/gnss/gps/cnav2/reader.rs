@@ -28,7 +28,7 @@ pub struct Cnav2Reader {
 }
 
 impl Cnav2Reader {
-    /// A reader that has read nothing.
+    /// Creates a reader that has received no symbols.
     pub fn new(sv: Sv) -> Self {
         Self { sv, frames: Frames::new(SYMBOLS), page_1: None, complete: None }
     }

@@ -31,7 +31,7 @@ const SUBFRAME_4_IDS: [u8; 25] =
 /// The SV ID of page 25 of subframe 5 (IS-GPS-200N, table 20-V).
 const HEALTH_ID: u8 = 51;
 
-/// One satellite's almanac; the week of `toa_s` is in page 25 of subframe 5.
+/// Almanac of one satellite. The week of `toa_s` is in page 25 of subframe 5.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Almanac {
     /// PRN.
@@ -42,11 +42,11 @@ pub struct Almanac {
     pub toa_s: f64,
     /// Inclination minus [`ALMANAC_INCLINATION_SEMICIRCLES`], in radians.
     pub delta_i_rad: f64,
-    /// Rate of right ascension of the node, rad/s.
+    /// Rate of right ascension of the node, in rad/s.
     pub omega_dot_radps: f64,
-    /// Eight bits: three of the message, five of the signals (IS-GPS-200N, 20.3.3.5.1.3).
+    /// Health in eight bits: three of the message, five of the signals (IS-GPS-200N, 20.3.3.5.1.3).
     pub health: u8,
-    /// Square root of the semi-major axis, √m.
+    /// Square root of the semi-major axis, in √m.
     pub sqrt_a_sqrtm: f64,
     /// Longitude of the ascending node at the beginning of the week, in radians.
     pub omega0_rad: f64,
@@ -54,14 +54,14 @@ pub struct Almanac {
     pub omega_rad: f64,
     /// Mean anomaly at the reference time, in radians.
     pub m0_rad: f64,
-    /// Clock's offset at the reference time.
+    /// Clock offset at the reference time, in seconds.
     pub af0_s: f64,
     /// Clock's drift, s/s.
     pub af1_sps: f64,
 }
 
 impl Almanac {
-    /// The almanac at `toa` that an ephemeris implies, not yet rounded.
+    /// Derives the almanac at `toa` from an ephemeris, not yet rounded.
     ///
     /// The mean-motion correction goes into the semi-major axis, for an almanac has no field for it.
     pub fn derive(ephemeris: &Ephemeris, toa: Epoch) -> Self {
@@ -86,10 +86,10 @@ impl Almanac {
     }
 }
 
-/// GPS time against UTC, as page 18 gives it; weeks modulo 256 (IS-GPS-200N, 20.3.3.5.2.4).
+/// UTC parameters of page 18; weeks are modulo 256 (IS-GPS-200N, 20.3.3.5.2.4).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Utc {
-    /// GPS time minus UTC beyond whole seconds at the reference time.
+    /// GPS time minus UTC beyond whole seconds at the reference time, in seconds.
     pub a0_s: f64,
     /// Rate of GPS time minus UTC, in s/s.
     pub a1_sps: f64,
@@ -99,11 +99,11 @@ pub struct Utc {
     pub week: u8,
     /// GPS time minus UTC in whole seconds.
     pub leap_s: i64,
-    /// Week and day (1..=7) at whose end `leap_after_s` takes effect.
+    /// Week, modulo 256, at the end of whose day `event_day` the value `leap_after_s` takes effect.
     pub event_week: u8,
-    /// Day of that week, 1 to 7.
+    /// Day of the week, 1 to 7.
     pub event_day: u8,
-    /// Whole seconds after the change.
+    /// GPS time minus UTC in whole seconds after the change.
     pub leap_after_s: i64,
 }
 
@@ -115,24 +115,23 @@ pub struct UtcData {
     /// Remainder of the offset beyond whole seconds. Its reference time is a multiple of 4096 s inside its
     /// week (IS-GPS-200N, 20.3.3.5.2.4). Absent means none, referred to the almanac's time.
     pub polynomial: Option<TimePolynomial>,
-    /// The last change of the whole seconds, or the next one: those after it, and the week and day at whose
-    /// end it comes.
+    /// Last or next change of the whole seconds.
     pub event: Option<LeapEvent>,
 }
 
-/// A change of the whole seconds at the end of a day.
+/// Change of the whole seconds at the end of a day.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LeapEvent {
-    /// Whole seconds after the change.
+    /// GPS time minus UTC in whole seconds after the change.
     pub after_s: i64,
-    /// Any count of weeks: 8 bits of it are sent.
+    /// Week of the change in any count; its lowest 8 bits are sent.
     pub week: i64,
-    /// 1 to 7, Sunday first.
+    /// Day of the week, 1 to 7, Sunday first.
     pub day: u8,
 }
 
 impl LeapEvent {
-    /// The first change after one time, up to another; those that are known are in this program's table.
+    /// First change after one time and up to another, from this program's table of known changes.
     pub fn first(after: Epoch, until: Epoch) -> Option<Self> {
         let leap_s = |seconds: i64| Epoch::new(seconds, 0.0).leap_seconds();
         let (mut before, mut behind) = (after.seconds(), until.seconds());

@@ -1,4 +1,4 @@
-//! The field table: where each parameter of the message is, and what its integer means.
+//! Field table of LNAV: the position of each parameter in the message, and the meaning of its integer.
 //!
 //! Source: IS-GPS-200N, figure 20-1 (positions) and tables 20-I, 20-III, 20-VI, 20-IX and 20-X (lengths and
 //! scales). A field is read and written through the same entry. Positions are the document's: bit 1 is
@@ -142,7 +142,7 @@ pub(super) static UTC_PAGE: [Element<Utc>; 8] = [
         |u| u.leap_after_s as f64, |u, v| u.leap_after_s = v as i64),
 ];
 
-/// Every field by the subframe or page that carries it.
+/// Lists every field by the subframe or page that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
     fn of<T>(table: &'static [Element<T>]) -> Vec<&'static Field> {
         table.iter().map(|element| &element.field).collect()

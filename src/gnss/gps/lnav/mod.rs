@@ -38,7 +38,7 @@ const WORD_BITS: usize = 30;
 /// The anti-spoof flag of the HOW, as every operational satellite sets it (IS-GPS-200N, 20.3.3.2).
 const ANTI_SPOOF: u32 = 1;
 
-/// LNAV as signals name it.
+/// Definition of LNAV.
 pub static LNAV: Message = Message {
     name: "LNAV",
     symbol_s: 0.02,
@@ -109,7 +109,7 @@ fn subframe_at(start: Epoch) -> u8 {
     (start.tow_whole_s() / SUBFRAME_S % 5 + 1) as u8
 }
 
-/// The ten 30-bit words of a subframe's symbols.
+/// Converts a subframe's symbols to ten 30-bit words.
 pub fn words(symbols: &[bool]) -> [u32; 10] {
     let mut words = [0; 10];
     for (word, bits) in words.iter_mut().zip(symbols.chunks(WORD_BITS)) {
@@ -148,7 +148,7 @@ impl Broadcast {
         Self::with_utc(klobuchar, &UtcData { leap_s: leap_seconds, ..UtcData::default() }, almanac, reference)
     }
 
-    /// [`Self::new`] with all that is known of UTC.
+    /// Builds all pages like [`Self::new`], with all known UTC parameters.
     ///
     /// # Errors
     /// A value outside its field, or a reference time off its step.
@@ -172,7 +172,8 @@ impl Broadcast {
         Self::with_utc(common.klobuchar, &common.utc, &own.cloned().collect::<Vec<_>>(), reference)
     }
 
-    /// The ten 30-bit words (D30 is bit 0) whose first bit leaves at GPS time `start`, a multiple of 6 s.
+    /// Encodes the ten 30-bit words (D30 is bit 0) whose first bit is sent at GPS time `start`, a multiple of
+    /// 6 s.
     ///
     /// Subframe 1 carries the week of `start`. A value outside its field is an error.
     pub fn subframe(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<[u32; 10], FieldError> {
@@ -231,7 +232,7 @@ fn check_issue(ephemeris: &Ephemeris) -> Result<(), FieldError> {
     }
 }
 
-/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
 pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     check_issue(ephemeris)?;
     let mut sent = ephemeris.clone();
@@ -318,18 +319,18 @@ impl SubframeError {
     }
 }
 
-/// A subframe whose parity held.
+/// Subframe with correct parity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Subframe {
     /// 1..=5.
     pub id: u8,
-    /// Time of week of the next subframe's start, in 6 s.
+    /// Time of week at the next subframe's start, in units of 6 s.
     pub tow_count: u32,
     /// The signal's accuracy may be worse than the URA states (IS-GPS-200N, 20.3.3.2).
     pub alert: bool,
     /// True if P is encrypted to Y (IS-GPS-200N, 20.3.3.2).
     pub antispoof: bool,
-    /// 24 bits a word, inversion removed.
+    /// Data bits, 24 in each word, with the inversion removed.
     pub data: [u32; 10],
 }
 
@@ -382,21 +383,21 @@ impl Subframe {
         }
     }
 
-    /// The ionosphere, if this is page 18 of subframe 4.
+    /// Ionosphere coefficients, if this is page 18 of subframe 4.
     pub fn klobuchar(&self) -> Option<Klobuchar> {
         let mut klobuchar = Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] };
         read_all(&IONOSPHERE_PAGE, &self.data, &mut klobuchar);
         self.is_page_18().then_some(klobuchar)
     }
 
-    /// GPS time against UTC, if this is page 18 of subframe 4.
+    /// UTC parameters, if this is page 18 of subframe 4.
     pub fn utc(&self) -> Option<Utc> {
         let mut utc = Utc::default();
         read_all(&UTC_PAGE, &self.data, &mut utc);
         self.is_page_18().then_some(utc)
     }
 
-    /// A satellite's almanac, if this is such a page.
+    /// Almanac of a satellite, if this is such a page.
     pub fn almanac(&self) -> Option<Almanac> {
         let mut almanac = Almanac::default();
         read_all(&ALMANAC_PAGE, &self.data, &mut almanac);
@@ -412,7 +413,7 @@ impl Subframe {
     }
 }
 
-/// The elements that subframes 1, 2 and 3 of one satellite hold together.
+/// Decodes the ephemeris from subframes 1, 2 and 3 of one satellite.
 ///
 /// The 10-bit week is the one nearest to `near`; `transmitted` is the start of subframe 1, and the
 /// reference times are within half a week of it. Errors: other subframes, or different issues of data.

@@ -1,5 +1,5 @@
-//! The (32, 26) Hamming code of a word: six parity bits that also depend on the two last bits of the word
-//! before.
+//! Parity of LNAV words: the (32, 26) Hamming code, whose six bits also depend on the two last bits of the
+//! word before.
 //!
 //! Source: IS-GPS-200N, 20.3.5.2 and table 20-XIV. Any one or two wrong bits of the 32 are detected.
 
@@ -37,7 +37,7 @@ pub(super) fn solve_tail(data: u32, previous: u32) -> u32 {
     blank | (d23 << 1) | d24
 }
 
-/// The 24 source bits of a received 30-bit word, or `None` when its parity is wrong.
+/// Returns the 24 source bits of a received 30-bit word, or `None` if its parity is wrong.
 ///
 /// `previous` is the word before, of which only the two low bits (D29*, D30*) count. The check holds
 /// for an inverted stream too, and the data come out upright.

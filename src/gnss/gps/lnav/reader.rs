@@ -46,7 +46,7 @@ pub struct LnavReader {
 }
 
 impl LnavReader {
-    /// A reader that has read nothing.
+    /// Creates a reader that has received no symbols.
     pub fn new(sv: Sv) -> Self {
         Self {
             sv,

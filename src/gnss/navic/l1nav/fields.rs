@@ -98,7 +98,7 @@ pub(super) static IONOSPHERE: [Of; 13] = [
     plain!("iodk", [(246, 2)], Whole, 0, ELECTRONS, iodk),
 ];
 
-/// Every field by the subframe that carries it.
+/// Lists every field by the subframe that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
     fn of(tables: &[&'static [Of]]) -> Vec<&'static Field> {
         tables.iter().flat_map(|table| table.iter()).map(|element| &element.field).collect()

@@ -40,7 +40,7 @@ pub use fields::tables;
 use fields::{HEADER, IONOSPHERE, SET, STEP_S};
 pub use reader::L1NavReader;
 
-/// The message as L1 names it.
+/// Definition of NavIC's message on L1.
 pub static L1_NAV: Message = Message {
     name: "L1 NAV",
     symbol_s: 0.01,
@@ -126,7 +126,7 @@ struct Content {
     iodk: f64,
 }
 
-/// A frame as decoded: its checks are right.
+/// Decoded frame with correct checks.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame(pub Blocks);
 
@@ -161,7 +161,7 @@ pub fn decode(soft: &[f32]) -> Option<Frame> {
     FRAME.decode(soft).map(Frame)
 }
 
-/// The symbols of a frame in the order in which they are sent, of its count and of bits with their checks.
+/// Encodes a frame to symbols as they are sent, from its count and from bits with their checks.
 pub fn sent(time: u32, two: &[bool], three: &[bool]) -> Vec<bool> {
     FRAME.interleaved(&FRAME.coded(time, two, three))
 }
@@ -310,7 +310,7 @@ fn coefficients_in(three: &Vec<bool>) -> Coefficients {
     Coefficients::KlobucharNavic(content.klobuchar)
 }
 
-/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
 ///
 /// # Errors
 /// A value that the message cannot carry.
@@ -328,7 +328,7 @@ fn adjustable() -> Vec<&'static str> {
     SET.iter().map(|element| element.field.name).filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
 }
 
-/// Adds `by` to a parameter in the unit of the tables; whether there is one.
+/// Adds `by` to a parameter in the unit of the tables. Returns false if there is none.
 fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     let mut content = blank(ephemeris.clone());
     let found = add_to(&SET, parameter, &mut content, by);

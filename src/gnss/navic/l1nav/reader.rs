@@ -25,7 +25,7 @@ pub struct L1NavReader {
 }
 
 impl L1NavReader {
-    /// A reader that has read nothing.
+    /// Creates a reader that has received no symbols.
     pub fn new(sv: Sv) -> Self {
         Self { sv, frames: Frames::new(SYMBOLS), complete: None }
     }

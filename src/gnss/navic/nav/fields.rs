@@ -9,10 +9,10 @@ use crate::klobuchar::Klobuchar;
 use crate::message::Common;
 use crate::time::Epoch;
 
-/// Bits of a subframe before its check.
+/// Number of bits of a subframe before its check.
 pub const DATA_BITS: usize = 262;
 
-/// The bits of a subframe that its check covers, the first sent first.
+/// Bits of a subframe that its check covers, in order of transmission.
 pub type Subframe = Bits<DATA_BITS>;
 
 const CLOCK: &str = "subframe 1, clock parameters";
@@ -185,7 +185,7 @@ pub(super) static MESSAGE_11: [Element<Klobuchar>; 8] = [
     plain!("beta_3", [(230, 8)], Signed, 16, ELECTRONS, beta[3]),
 ];
 
-/// Every field by what carries it.
+/// Lists every field by what carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
     fn of<T>(table: &'static [Element<T>]) -> Vec<&'static Field> {
         table.iter().map(|element| &element.field).collect()

@@ -29,7 +29,7 @@ use fields::{Almanac, MESSAGE_7, MESSAGE_11, MESSAGE_26, SUBFRAME_1, SUBFRAME_2,
 pub use fields::{DATA_BITS, Subframe, tables};
 pub use reader::NavReader;
 
-/// NavIC's message as signals name it.
+/// Definition of NavIC's message.
 pub static SPS_NAV: Message = Message {
     name: "SPS NAV",
     symbol_s: 0.02,
@@ -281,7 +281,7 @@ fn check(ephemeris: &Ephemeris) -> Result<(), FieldError> {
     }
 }
 
-/// The elements that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
+/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
 ///
 /// # Errors
 /// A value that the message cannot carry.
@@ -300,7 +300,7 @@ fn adjustable() -> Vec<&'static str> {
     names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
 }
 
-/// Adds `by` to a parameter of subframes 1 and 2 in the unit of the tables; whether there is one.
+/// Adds `by` to a parameter of subframes 1 and 2 in the unit of the tables. Returns false if there is none.
 pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     of_set().into_iter().any(|table| add_to(table, parameter, ephemeris, by))
 }

@@ -34,7 +34,7 @@ pub struct NavReader {
 }
 
 impl NavReader {
-    /// A reader that has read nothing.
+    /// Creates a reader that has received no symbols.
     pub fn new(sv: Sv) -> Self {
         Self {
             sv,

@@ -14,7 +14,7 @@ pub(in crate::rinex) struct Delays {
     pub sv: Sv,
     /// Reference time of the record's clock.
     pub toc: Epoch,
-    /// Code, delay, and whether the message is that of the signal itself.
+    /// RINEX code, delay in seconds, and true if the message is that of the signal itself.
     pub all: Vec<(&'static str, f64, bool)>,
 }
 

@@ -94,7 +94,7 @@ pub(in crate::rinex) struct Record {
 }
 
 impl Record {
-    /// A field by its name; `None` if it is blank.
+    /// Returns a field by its name; `None` if it is blank.
     pub fn get(&self, name: &str) -> Option<f64> {
         if self.sv.system == System::Glonass {
             let at = OF_GLONASS.iter().position(|field| *field == name)?;

@@ -103,7 +103,7 @@ impl Content {
         }
     }
 
-    /// Puts it into a block of that type.
+    /// Writes the content into a block of its type.
     ///
     /// # Errors
     /// A value that its field cannot carry.
@@ -152,7 +152,7 @@ impl Content {
         })
     }
 
-    /// The integers of the fields of a block of a type.
+    /// Reads the integers of the fields in a block of this type.
     pub fn raw(kind: u8, bits: &Vec<bool>) -> Parameters {
         match kind {
             TEST if bits.get(HEAD_BITS..DATA_BITS).is_some_and(|own| own.iter().any(|bit| *bit)) => raw(&FAST, bits),

@@ -85,7 +85,7 @@ pub(super) static TIME: [Element<NetworkTime>; 3] = [
     plain!("week", [(141, 10)], Whole, 0, TIME_CLAUSE, week),
 ];
 
-/// Every field by the message that carries it.
+/// Lists every field by the message that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
     let own = vec![
         ("type 9", GEO.iter().map(|element| &element.field).collect()),

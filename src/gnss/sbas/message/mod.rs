@@ -33,7 +33,7 @@ pub use fields::tables;
 use fields::{GEO, TIME};
 pub use reader::SbasReader;
 
-/// The message as the signal names it.
+/// Definition of the SBAS message.
 pub static SBAS: Message = Message {
     name: "SBAS",
     symbol_s: 0.002,
@@ -219,7 +219,7 @@ fn adjustable() -> Vec<&'static str> {
     names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
 }
 
-/// Adds `by` to a parameter of type 9 in the unit of the tables; whether there is one.
+/// Adds `by` to a parameter of type 9 in the unit of the tables. Returns false if there is none.
 fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
     add_to(&GEO, parameter, ephemeris, by)
 }

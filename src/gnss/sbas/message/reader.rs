@@ -24,7 +24,7 @@ pub struct SbasReader {
 }
 
 impl SbasReader {
-    /// A reader that has read nothing.
+    /// Creates a reader that has received no symbols.
     pub fn new(sv: Sv) -> Self {
         Self { sv, code: Running::new(BITS, is_block), time: None, place: None, complete: None }
     }
