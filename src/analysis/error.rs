@@ -79,7 +79,7 @@ pub enum JudgeError {
         /// Description of the fault, in words.
         what: String,
     },
-    /// A foreign receiver's file belongs to another time or place than the truth.
+    /// A foreign receiver's file belongs to another time or position than the truth.
     #[error("{}: {what}", path.display())]
     NotOfThisTruth {
         /// The file or directory.

@@ -23,8 +23,8 @@ pub fn path(text: &str) -> Result<PathBuf, String> {
 ///
 /// # Errors
 ///
-/// Expected form, for any other text. Host names are refused, because their meaning changes from place to
-/// place.
+/// Expected form, for any other text. Host names are refused, because their meaning changes from one
+/// network to another.
 pub fn listen_address(text: &str) -> Result<SocketAddr, String> {
     let port = text.strip_prefix("localhost:").or_else(|| text.strip_prefix(':')).unwrap_or(text);
     if let Ok(port) = port.parse() {

@@ -51,7 +51,7 @@ impl CliError {
         Self { code: if passing(error) { 75 } else { 73 }, message: format!("cannot create {what}: {error}") }
     }
 
-    /// An output exists and is not ours to replace, or has no place to be.
+    /// An output exists and is not ours to replace, or has no directory.
     pub fn refused_output(message: impl Display) -> Self {
         Self { code: 73, message: message.to_string() }
     }

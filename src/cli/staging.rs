@@ -1,6 +1,6 @@
 //! Outputs appear under their names only when they are whole.
 //!
-//! A directory is written as `.<name>.part` beside its final place and renamed at the end. What
+//! A directory is written as `.<name>.part` beside its final path and renamed at the end. What
 //! a killed run left behind is swept by the next one. What is to be read while it grows, of a live reception,
 //! is written as `<name>.unfinished` ([`InSight`]) and stays there if the program is stopped.
 
@@ -138,7 +138,7 @@ fn refuse_others(target: &Path) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Refuses a file that is none: what is renamed over a device or a pipe takes its place.
+/// Refuses a file that is none: a file that is renamed over a device or a pipe replaces it.
 fn refuse_special(target: &Path) -> Result<(), CliError> {
     let about = match fs::metadata(target) {
         Err(missing) if missing.kind() == io::ErrorKind::NotFound => return Ok(()),

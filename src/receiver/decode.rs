@@ -25,7 +25,7 @@ pub enum News {
         /// True if a logical 0 arrives as a logical 1.
         inverted: bool,
     },
-    /// The time that the latest unit says contradicts the frame: synchronisation starts anew.
+    /// The time that the latest unit says contradicts the frame: synchronisation starts again.
     Contradiction,
     /// Start of a unit, with the week that it says, resolved near the given epoch.
     Time(Epoch),

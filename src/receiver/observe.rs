@@ -28,7 +28,7 @@ const NEAR_SPREAD_S: f64 = 0.035;
 /// Largest deviation for a receiver anywhere. Two satellites differ by 53 200 km at most, the width of their
 /// orbits.
 const FAR_SPREAD_S: f64 = 0.178;
-/// A receiver is far away where this share of all satellites departs by more than from near the Earth: wrong
+/// A receiver is far away where this share of all satellites differs by more than from near the Earth: wrong
 /// times are single.
 const FAR_SHARE: f64 = 1.0 / 3.0;
 /// The recording's start time is believed when it is this near.

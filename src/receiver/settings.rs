@@ -87,7 +87,7 @@ pub enum SettingsError {
         origin: String,
         /// The key with its tables.
         key: String,
-        /// Keys that are expected in its place.
+        /// Keys that are expected instead.
         expected: String,
     },
     /// A value out of its range.
@@ -99,7 +99,7 @@ pub enum SettingsError {
         key: &'static str,
         /// The value.
         value: String,
-        /// Values that are expected in its place.
+        /// Values that are expected instead.
         expected: String,
     },
     /// A setting of the search.
@@ -266,7 +266,7 @@ impl SettingsError {
         }
     }
 
-    /// The error with the place of its key in place of the file's name alone; settings are below `above`.
+    /// The error with the position of its key instead of the file's name alone; settings are below `above`.
     fn at(mut self, keys: &Keys<'_>, above: &str) -> Self {
         let below = |key: String| if above.is_empty() { key } else { format!("{above}.{key}") };
         let (origin, key) = match &mut self {

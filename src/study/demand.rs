@@ -17,9 +17,9 @@ use receiver::track::loops::Gains;
 /// Motion along a line of sight that the loop has to follow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
-    /// Along the line of sight, m/s².
+    /// Acceleration along the line of sight, in m/s².
     pub acceleration_mps2: f64,
-    /// Along the line of sight, m/s³.
+    /// Jerk along the line of sight, in m/s³.
     pub jerk_mps3: f64,
     /// Difference from the least to the largest acceleration, m/s².
     pub swing_mps2: f64,

@@ -68,7 +68,7 @@ pub struct DetectionRow {
     pub measured: f64,
     /// Share that theory expects.
     pub expected: f64,
-    /// Between which 95 % of counts lie if the expectation holds, as shares.
+    /// Lower end of the interval with 95 % of the counts if the expectation holds, as a share.
     pub low: f64,
     /// Upper end of the interval.
     pub high: f64,

@@ -119,9 +119,14 @@ fn words(path: &str, text: &str) -> Vec<String> {
     WORDS.iter().filter(ours).filter(is).map(|(word, term)| format!("'{word}': {term}")).collect()
 }
 
-/// A text in one line, without code spans and fenced code.
+/// A text in one line, without code spans, fenced code and the targets of links.
 fn without_code(text: &str) -> String {
     let prose = text.split("```").step_by(2).collect::<Vec<_>>().join(" ");
     let spans = prose.split('`').step_by(2).collect::<Vec<_>>().join(" ");
+    let spans = spans.split("](").enumerate().map(|(at, part)| match part.split_once(')') {
+        Some((_, rest)) if at > 0 => rest,
+        _ => part,
+    });
+    let spans = spans.collect::<Vec<_>>().join(" ");
     spans.split_whitespace().collect::<Vec<_>>().join(" ")
 }

@@ -17,7 +17,7 @@ pub struct FrontEnd<'r> {
     pub samples: u64,
     /// Samples a second.
     pub rate_hz: f64,
-    /// Frequency on the air that lies at 0 in the samples, Hz.
+    /// Radio frequency that appears at 0 Hz in the samples, in Hz.
     pub center_hz: Option<f64>,
     /// True if the samples' spectrum is inverted.
     pub inverted: bool,
@@ -74,7 +74,7 @@ impl<'r> FrontEnd<'r> {
         self.format.is_some_and(|format| !format.is_complex())
     }
 
-    /// Frequency in the samples of a frequency on the air, Hz.
+    /// Frequency in the samples of a radio frequency, in Hz.
     pub fn place_hz(&self, on_air_hz: f64) -> f64 {
         let offset_hz = on_air_hz - self.center_hz.unwrap_or(on_air_hz);
         if self.inverted { -offset_hz } else { offset_hz }

@@ -1,7 +1,7 @@
 //! Hatch's filter on a satellite's code: bias by code-carrier divergence, and the remaining noise.
 //!
 //! Written from the settings, not from the receiver's code. The weight of a new code value falls from one to
-//! interval over window, and a break of lock or a gap begins anew. Noise of a first-order code loop is
+//! interval over window, and a break of lock or a gap begins again. Noise of a first-order code loop is
 //! correlated as exp(−4Bt). Its variance is propagated with its covariance (`smoothing_s` and
 //! `dll_bandwidth_hz`). Limits: loops of other orders have other correlations.
 

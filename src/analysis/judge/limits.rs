@@ -74,7 +74,7 @@ pub enum LimitsError {
 }
 
 impl LimitsError {
-    /// The error with the place of its key in place of the file's name alone.
+    /// The error with the position of its key instead of the file's name alone.
     fn at(mut self, keys: &Keys<'_>) -> Self {
         let (name, key) = match &mut self {
             Self::Toml { .. } | Self::Nothing { .. } => return self,

@@ -31,9 +31,9 @@ pub enum Calibration {
     /// The mean lies within the band.
     #[serde(rename = "consistent")]
     Consistent,
-    /// Above: errors are larger than the receiver says.
+    /// Mean above the band: errors are larger than the receiver reports.
     Optimistic,
-    /// Below: they are smaller.
+    /// Mean below the band: errors are smaller than the receiver reports.
     Pessimistic,
 }
 

@@ -2,8 +2,8 @@
 //!
 //! A slip is a change of the constant between measured and true carrier: declared by the receiver's events,
 //! or found against the truth and not declared. Its size is the difference of the medians around it, to the
-//! half cycle of a Costas loop; where the count began anew (another lock) it has none. The cause is the first
-//! of these that the half second before it shows: the signal is not there or fell by [`FADE_DB`];
+//! half cycle of a Costas loop; where the count began again (another lock) it has none. The cause is the
+//! first of these that the half second before it shows: the signal is not there or fell by [`FADE_DB`];
 //! interference takes [`JAMMED_DB`] and leaves less than the loop needs; the true motion leaves a phase error
 //! of which 3σ + θ > 45° (the loop of the receiver's settings, `expect::loops`); the oscillator's noise or
 //! all noise alone breaks that rule. What is left is unexplained. Limits: causes are those that the truth's

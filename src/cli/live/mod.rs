@@ -213,7 +213,7 @@ impl Live<'_> {
         json!({ "tick": tick_ms, "join": join_ms, "ring": arguments.latency, "sink": "its own" })
     }
 
-    /// Makes ticks to the scene's end, a signal, or the first sink's departure.
+    /// Makes ticks to the scene's end, a signal, or the first sink's end.
     fn ticks(&mut self) -> Result<End, CliError> {
         let (mut messages, mut arrivals) = (Vec::new(), VecDeque::new());
         let mut used: VecDeque<Arc<Block>> = VecDeque::new();

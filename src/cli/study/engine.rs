@@ -1,7 +1,7 @@
 //! `study export` and `study submit`: handing a plan to an engine, and seeing it through.
 //!
 //! What the engine loses is found by looking at the shards' files and handed out again. A submission leaves
-//! its script and its job's number in `submit/`: started anew, it waits for a job that is still there before
+//! its script and its job's number in `submit/`: started again, it waits for a job that is still there before
 //! it hands out another one.
 
 use std::env;

@@ -5,8 +5,8 @@
 //! because it needs the largest cells of all codes ([`super::multiple_access`]). The first threshold is seven
 //! tenths of the value expected from the codes' first dwells, and not below the value that nine codes in ten
 //! stay below. A satellite that passes it without being sure has its column filled. All choices are then made
-//! anew, until no such satellite is left. Columns whose first dwells show noise are excepted. So no satellite
-//! is found below the threshold of a search without leaving.
+//! again, until no such satellite is left. Columns whose first dwells show noise are excepted. So no
+//! satellite is found below the threshold of a search without leaving.
 
 use std::collections::BTreeSet;
 

@@ -367,7 +367,7 @@ impl Grid {
         (PEAK_CHIPS / (self.chips_per_sample * self.lag_samples)).ceil() as usize
     }
 
-    /// The place of a satellite that is known, at sample `first`.
+    /// Delay and Doppler of a known satellite at sample `first`.
     pub fn refined(&self, known: &Acquired, first: u64) -> Refined {
         let later = first as f64 - known.sample as f64;
         let code_phase_chips = known.code_phase_chips + later * self.received_chips_per_sample(known.doppler_hz);

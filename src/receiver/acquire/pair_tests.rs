@@ -108,7 +108,7 @@ fn leaving_dopplers_brings_no_more_false_alarms_than_designed() {
 
 /// Share of satellites that a search finds, by a model of one cell: signs that turn at random at a random
 /// position, a Doppler anywhere in its bin, a lag anywhere in its cell. `dwells` are `None` for as many as
-/// `asked` by the pilot alone that begin at one place of the code.
+/// `asked` by the pilot alone that begin at one position of the code.
 fn share_found(cn0_dbhz: f64, asked: u32, dwells: Option<&Dwells>, random: &mut Noise) -> f64 {
     const TRIALS: u32 = 4000;
     const CELLS: f64 = 29_600.0;

@@ -98,8 +98,8 @@ pub struct Corrections {
 pub struct Solution {
     /// ECEF position.
     pub position_m: Vector3<f64>,
-    /// The time scales of the ranges, GPS time first, with the reading of the receiver's clock minus each but
-    /// for whole seconds, in metres.
+    /// The time scales of the ranges, GPS time first, with the receiver's clock minus each, without the whole
+    /// seconds, in metres.
     pub clocks: Vec<(&'static TimeScale, f64)>,
     /// Index of each range's clock among the clocks.
     pub clock_of: Vec<usize>,
@@ -130,7 +130,7 @@ pub struct Solution {
 }
 
 impl Solution {
-    /// Reading of the receiver's clock minus the first time scale, but for whole seconds, in metres.
+    /// Offset of the receiver's clock from the first time scale without the whole seconds, in metres.
     pub fn clock_m(&self) -> f64 {
         self.clocks.first().map_or(0.0, |clock| clock.1)
     }

@@ -103,7 +103,7 @@ impl Smoother {
     }
 
     /// The carriers' counts of these signals go on although lock was broken: the next observation of each
-    /// satellite may have been locked anew.
+    /// satellite may have been locked again.
     pub fn bridge(&mut self, signals: &[&'static Signal]) {
         let own = self.states.iter_mut().filter(|(key, _)| is_of(key, signals));
         own.for_each(|(_, state)| state.locked_s = f64::NEG_INFINITY);

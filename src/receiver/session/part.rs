@@ -8,7 +8,7 @@ use crate::looks::Pattern;
 use crate::parting::{Change, Estimate, Parted, common};
 use gnss::record::AcquisitionRow;
 
-/// Lines begin anew so long after the code loops were moved: two time constants 1/(4B) of the narrow loop at
+/// Lines begin again so long after the code loops were moved: two time constants 1/(4B) of the narrow loop at
 /// least.
 const MOVING_S: f64 = 1.0;
 /// A rate beyond so many deviations is named beside an inverted spectrum.

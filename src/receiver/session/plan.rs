@@ -19,7 +19,7 @@ pub(super) const WIDTHS: [f64; 3] = [1.0, 2.0, 5.0];
 pub(super) const WIDEN_S: f64 = 1.0;
 /// Centres lie on this grid, so that a small drift changes nothing.
 const CENTRE_STEP_HZ: f64 = 500.0;
-/// A sky this far from zero stretches the range, and no further.
+/// A sky this far from zero extends the range, and no further.
 const STRETCH_HZ: f64 = 30_000.0;
 /// Dopplers of satellites about their middle, from near the Earth.
 pub(super) const SKY_HZ: f64 = 4000.0;

@@ -8,7 +8,7 @@ use num_complex::Complex64;
 
 /// Code periods before a decision is tried.
 const LEAST_PERIODS: u64 = 300;
-/// Bits after which a search begins anew.
+/// Bits after which a search begins again.
 const MOST_BITS: u64 = 300;
 /// Standard deviations by which the best position leads every other.
 const LEAD_SIGMAS: f64 = 5.0;

@@ -44,7 +44,7 @@ pub struct Cn0 {
     power: f64,
     /// Sum of their squares.
     square: Complex64,
-    /// Mean product of neighbours while symbols are unknown, then the signal's power in the first place.
+    /// Mean product of neighbours while symbols are unknown, then the signal's power itself.
     signal: Mean,
     /// Power of a prompt's noise, both components.
     noise: Mean,

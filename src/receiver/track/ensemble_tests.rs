@@ -156,7 +156,7 @@ fn needed_samples(signal: &'static Signal, stream: &Stream) -> usize {
 }
 
 /// Runs starts on the main peak and on both side peaks in turn, half of them with an echo. One that the
-/// search does not find is no start: another is drawn in its place.
+/// search does not find is no start: another is drawn instead.
 fn cold_starts(signal: &'static Signal, starts: u64, duration_s: f64) -> Vec<Start> {
     let one = |run: u64| cold_start(signal, 4000 + run, [0, 1, -1][run as usize % 3], run % 2 == 1, duration_s);
     let mut runs: Vec<Start> = (0..starts).into_par_iter().filter_map(one).collect();

@@ -1,4 +1,4 @@
-//! A pilot whose code is many periods of the followed one long: which of its segments is on the air.
+//! A pilot whose code is many periods of the followed one long: which of its segments is sent.
 //!
 //! Both codes begin together, so each period of the followed code has one segment of the long one. What a
 //! period correlates to with every segment is summed for every position that the first period may have in the

@@ -1,13 +1,13 @@
 //! Pull-in of weak signals: carrier frequency, carrier phase and symbol edges from one batch of prompts.
 //!
-//! While the carrier's oscillator runs free, prompts of one code period are collected. For every place of the
-//! symbols' edges and every frequency on a grid the energies of whole symbols are added (maximum likelihood
-//! where symbols are random and phases unknown); the largest sum gives both. Then the phases of the squared
-//! symbols, which know no data, give frequency and phase exactly enough for a phase loop to begin in lock.
-//! Noise alone is recognised by its chi-square distribution. Limits: the frequency is within 400 Hz for a
-//! period of 1 ms (of symbols of one period within a quarter of a cycle a period) and changes by less than
-//! some hertz in the batch (1 m/s² is 5 Hz/s); edges are found to a few periods, which [`super::sync`] has to
-//! confirm.
+//! While the carrier's oscillator runs free, prompts of one code period are collected. For every position of
+//! the symbols' edges and every frequency on a grid the energies of whole symbols are added (maximum
+//! likelihood where symbols are random and phases unknown); the largest sum gives both. Then the phases of
+//! the squared symbols, which know no data, give frequency and phase exactly enough for a phase loop to begin
+//! in lock. Noise alone is recognised by its chi-square distribution. Limits: the frequency is within 400 Hz
+//! for a period of 1 ms (of symbols of one period within a quarter of a cycle a period) and changes by less
+//! than some hertz in the batch (1 m/s² is 5 Hz/s); edges are found to a few periods, which [`super::sync`]
+//! has to confirm.
 
 use std::f64::consts::TAU;
 
@@ -125,7 +125,7 @@ impl Batch {
         Some(Found { changes, ..self.refine(offset, (f64::from(number) + vertex) * step) })
     }
 
-    /// Energy of the symbols for every place of the first edge, with the oscillator faster by `cycles` a
+    /// Energy of the symbols for every position of the first edge, with the oscillator faster by `cycles` a
     /// period.
     fn energies(&self, cycles: f64, symbols: usize, energies: &mut Vec<f64>) {
         let mut sums = Vec::with_capacity(self.prompts.len() + 1);

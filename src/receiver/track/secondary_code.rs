@@ -32,7 +32,7 @@ const LEAST_PROMPTS: u32 = 20;
 const LEAD_SIGMAS: f64 = 6.0;
 /// The next has less than this of the best: what differs in few of the prompts is not separated yet.
 const NEXT_SHARE: f64 = 0.8;
-/// Prompts after which a search begins anew, in secondary codes: longer searches do not become surer.
+/// Prompts after which a search begins again, in secondary codes: longer searches do not become surer.
 const MOST_CODES: u32 = 20;
 
 impl Shifts {

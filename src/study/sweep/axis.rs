@@ -250,7 +250,7 @@ impl Grid {
         product(&self.signal).unwrap_or(1) * self.sharing()
     }
 
-    /// The place of a case.
+    /// Position of a case on the axes.
     pub fn case(&self, number: u64) -> Case {
         let group = number / self.sharing();
         let (signal, repetition) = (group / self.repetitions, group % self.repetitions);

@@ -40,7 +40,7 @@ pub const FIGURES: &[&str] = &[
 const LOCK_S: f64 = 4.0;
 /// Nearest and farthest satellite in seconds of travel.
 const TRAVEL_S: [f64; 2] = [0.066, 0.092];
-/// Between measurements.
+/// Time between measurements, in seconds.
 const STEP_S: f64 = 0.1;
 const SUBFRAME_S: f64 = 6.0;
 const FRAME_S: f64 = 30.0;

@@ -76,7 +76,7 @@ pub struct Manifest {
 pub struct Input {
     /// Name in the study's text; empty for the study itself.
     pub written: String,
-    /// Below the study's directory.
+    /// Path relative to the study's directory.
     pub path: String,
     /// Hash of its contents, hexadecimal.
     pub sha256: String,

@@ -181,7 +181,7 @@ impl Results {
     }
 }
 
-/// Departure from theory that is allowed, where the measurement's own 95 % interval is not wider.
+/// Difference from theory that is allowed, where the measurement's own 95 % interval is not wider.
 pub const BAR: f64 = 0.05;
 
 /// A figure beside its theory.

@@ -131,7 +131,7 @@ struct Ear {
     directory: PathBuf,
     settings: Settings,
     output: Output,
-    /// Taken at the end.
+    /// Reception, which is moved out at the end.
     reception: Option<Reception>,
 }
 

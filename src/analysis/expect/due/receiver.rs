@@ -198,7 +198,7 @@ impl Search {
     /// Shares of the power that are left where signs turn within the sums, with their probabilities.
     ///
     /// A sum in which a sign turns after a share x of it keeps (1 − 2x)² of its power. Of one code every
-    /// sum begins at the same place of a code period, which is as likely as any other. Sums of data and
+    /// sum begins at the same position of a code period, which is as likely as any other. Sums of data and
     /// pilot begin at positions all over the period: mean and mean square of (1 − 2x)² are ⅓ and ⅕. What
     /// random signs add is binomial; three values with the weights ⅙, ⅔, ⅙ have its mean and variance, and
     /// five moments of the normal distribution near it.

@@ -3,7 +3,7 @@
 //! A satellite must be acquired once its searches have missed it with a probability below one in a million.
 //! The searches are counted at the worst phase of their interval. It must be observed after time for lock and
 //! two headers of the message. It must be used after time for its ephemeris. An excused end of a lock starts
-//! all of that anew: the satellite is not there, too weak, faded, or the scene expects it.
+//! all of that again: the satellite is not there, too weak, faded, or the scene expects it.
 
 use super::receiver::Receiver;
 use super::timetable::Timetable;
@@ -71,7 +71,7 @@ pub enum Excuse {
     Faded,
     /// The receiver's loop does not follow the scene's oscillator.
     Oscillator,
-    /// Below another's cross-correlation.
+    /// Signal below another's cross-correlation.
     Hidden,
     /// Something is wrong with the satellite or its message.
     Fault,

@@ -2,7 +2,7 @@
 //!
 //! Angles in radians, C/N0 in hertz, T the coherent integration, B the one-sided noise bandwidth of the
 //! discrete loop. Sources: Kaplan and Hegarty, Understanding GPS 2nd ed., 5.6.1; Viterbi, Principles of
-//! Coherent Communication 1966. Limits: small errors; the arctangent departs upward by 4 % where T·C/N0 is 3
+//! Coherent Communication 1966. Limits: small errors; the arctangent is 4 % larger where T·C/N0 is 3
 //! and by 10 to 20 % where it is 1.
 
 use std::f64::consts::PI;

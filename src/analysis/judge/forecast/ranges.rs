@@ -342,7 +342,7 @@ pub struct Ranges<'s, 'r> {
 
 impl Ranges<'_, '_> {
     /// Gives the ranges that a fix may use to `take`; fixes come in the order of their samples, with the true
-    /// place of each.
+    /// position of each.
     ///
     /// # Errors
     /// [`JudgeError::Read`] where spilled rows cannot be read.

@@ -48,8 +48,8 @@ pub struct ClockRow {
     pub label_s: f64,
     /// Number of satellites.
     pub satellites: usize,
-    /// Mean error of the pseudoranges over the speed of light: reading of the receiver's clock minus GPS
-    /// time.
+    /// Mean error of the pseudoranges over the speed of light, in seconds: time of the receiver's clock minus
+    /// GPS time.
     pub bias_s: f64,
     /// The sampler's clock there.
     pub sampler_bias_s: f64,

@@ -67,7 +67,7 @@ pub struct Places {
     /// Delay of the time labels in seconds, without the common part of all errors. It needs a motion that
     /// turns or changes its speed.
     pub changing_s: Option<Estimate>,
-    /// Fixes at the place of the one before, to the last digit.
+    /// Fixes with the position of the one before, to the last digit.
     pub repeated: usize,
     /// Fixes less than a row of the truth before its beginning or after its end.
     pub at_edge: usize,

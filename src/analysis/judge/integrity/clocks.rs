@@ -2,7 +2,7 @@
 //! its time.
 //!
 //! The offset of a receiver's clock from the truth's nominal time may be any constant. That constant is the
-//! same for every row of every table. Limits: a receiver that sets its clock anew within a run has several.
+//! same for every row of every table. Limits: a receiver that sets its clock again within a run has several.
 
 use super::{Finding, Found};
 use crate::error::JudgeError;
@@ -49,7 +49,7 @@ pub(super) fn findings(run: &Run) -> Result<Vec<Finding>, JudgeError> {
     Ok(all)
 }
 
-/// Largest difference of lock time and samples passed; a lock that begins anew needs an event.
+/// Largest difference of lock time and samples passed; a lock that begins again needs an event.
 fn locks(run: &Run, link: Link, breaks: &mut Found, impossible: &mut Found) -> Result<f64, JudgeError> {
     let events: Vec<u64> = run
         .events
@@ -83,7 +83,7 @@ fn locks(run: &Run, link: Link, breaks: &mut Found, impossible: &mut Found) -> R
     Ok(most_s)
 }
 
-/// A fix's bias and time make the reading of the clock that pseudoranges have; its dilutions add up.
+/// A fix's bias and time make the clock offset that pseudoranges have; its dilutions add up.
 fn fixes(run: &Run, reading_m: Option<f64>) -> Result<Vec<Finding>, JudgeError> {
     let mut truth = run.trajectory.finder()?;
     let (mut any, mut most_m, mut most): (_, f64, Option<f64>) = (false, 0.0, None);

@@ -138,7 +138,7 @@ pub struct Point {
     pub alpha: Option<i32>,
     /// Equivalent degrees of freedom in that noise.
     pub freedom: Option<f64>,
-    /// Between these the true deviation lies.
+    /// Lower and upper bound of the true deviation.
     pub interval: Option<(f64, f64)>,
 }
 

@@ -444,7 +444,7 @@ fn level_carrier(rows: &mut [SignalError], declared: &[u64]) -> usize {
 }
 
 /// The first row of an arc whose carrier jumped by [`SLIP_CYCLES`] or more against the rows before, and
-/// stayed. A slip may take place during a measurement and show as two half steps.
+/// stayed. A slip may occur during a measurement and show as two half steps.
 fn first_jump(arc: &[SignalError]) -> Option<usize> {
     first_jump_of(&arc.iter().map(|row| row.carrier_cycles).collect::<Vec<_>>())
 }

@@ -3,7 +3,7 @@
 //! Source: Hatanaka 2008, "A compression format and tools for GNSS observation data", Bulletin of the GSI
 //! 55. An epoch line and a satellite's indicators are written as what differs from the line before, in which
 //! `&` is a blank; a value is written as a difference of up to the fifth order of thousandths, `m&value`
-//! beginning anew. Differences are undone by the kernels of the `rinex` crate.
+//! beginning again. Differences are undone by the kernels of the `rinex` crate.
 
 use std::collections::BTreeMap;
 
@@ -18,7 +18,7 @@ const DIGITS: usize = 14;
 
 /// State from which later lines are differences.
 pub(super) struct Restorer {
-    /// The first character of an epoch line: as it is plain, and where it begins anew.
+    /// The first character of an epoch line: as it is plain, and where it begins again.
     first: [char; 2],
     epoch: Option<TextDiff>,
     indicators: BTreeMap<Sv, TextDiff>,
@@ -46,7 +46,7 @@ impl Restorer {
         Ok(format!("{plain}{}", before.decompress(rest)))
     }
 
-    /// Forgets the satellites that an epoch does not have: they begin anew when they come back.
+    /// Forgets the satellites that an epoch does not have: they begin again when they come back.
     pub fn keep(&mut self, satellites: &[Sv]) {
         self.indicators.retain(|sv, _| satellites.contains(sv));
         self.values.retain(|(sv, _), _| satellites.contains(sv));

@@ -44,7 +44,7 @@ pub enum Tone {
     Plain,
     /// Less weight than the surrounding text.
     Faint,
-    /// In bold.
+    /// Bold text.
     Strong,
     /// Green: passed.
     Good,
@@ -139,7 +139,7 @@ pub enum Item {
 pub struct Report {
     /// Title on the first page and at the head of the others.
     pub title: String,
-    /// Below the title.
+    /// Text below the title.
     pub subtitle: String,
     /// Text at the right of every page's head; the title is at its left.
     pub head: String,

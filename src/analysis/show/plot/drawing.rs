@@ -1,6 +1,6 @@
 //! A finished picture as SVG, and as PNG through resvg with the bundled font.
 //!
-//! plotters places everything on whole pixels, so a picture is drawn at [`FINE`] times its size and scaled
+//! plotters rounds everything to whole pixels, so a picture is drawn at [`FINE`] times its size and scaled
 //! down. It writes one element a dot; dots of a kind that follow each other become one path here, which is an
 //! order of magnitude smaller and what keeps reports with tens of thousands of points printable.
 

@@ -5,10 +5,10 @@
 //! codes, [`settle`] counts the samples. Codes of all signals take part: their steps are compared in chips of
 //! the front end's first signal, the scan takes the signal whose code is longest, and whole code periods are
 //! counted by the signal whose symbols or secondary code are longest. Limits: a channel whose code period
-//! does not divide what the scan leaves open is searched for anew. Whole periods of all codes that are no
+//! does not divide what the scan leaves open is searched for again. Whole periods of all codes that are no
 //! whole symbol show in no code but in the signs of symbols within 0.4 s and of secondary codes within 0.15
 //! s, in which a phase loop loses its lock: where that takes longer than the lock's patience (code periods of
-//! 10 ms and more), or the signs stay in doubt for two seconds, channels are lost and found anew.
+//! 10 ms and more), or the signs stay in doubt for two seconds, channels are lost and found again.
 
 use std::collections::VecDeque;
 
@@ -70,7 +70,7 @@ pub(super) struct Watched {
 }
 
 impl Watched {
-    /// The trend begins anew: the code's aid has changed.
+    /// The trend begins again: the code's aid has changed.
     pub fn forget(&mut self) {
         self.trend.clear();
         self.settled = suspect::Settled::default();

@@ -22,8 +22,8 @@ const EDGES_S: f64 = 0.4;
 /// chip sequence of 25 show every displacement; a phase loop in a wrong secondary code loses its lock after
 /// 0.2 s.
 const SECONDARY_CODE_PERIODS: u64 = 10;
-/// A secondary code out of place shakes the phase loop until no power is left: for so long after a scan has
-/// found the codes in place, that is no reason for another.
+/// A misaligned secondary code shakes the phase loop until no power is left: for so long after a scan has
+/// found the codes aligned, that is no reason for another.
 const SHAKEN_S: f64 = 0.3;
 /// Looks that are averaged before they enter a trend: whole symbols that are missing move codes by their
 /// Dopplers alone, 0.02 chip in 20 ms, twice the noise of one look at 45 dB-Hz.

@@ -97,7 +97,7 @@ impl Channel {
         &self.glances.edges
     }
 
-    /// Begins anew to look where signs turn.
+    /// Restarts the search for the positions at which signs change.
     pub fn forget_edges(&mut self) {
         self.take_edges();
     }

@@ -154,7 +154,7 @@ impl Channel {
         batch(&self.settings, self.group, self.period_s)
     }
 
-    /// Confirms the edges of symbols, moves them, or begins anew where they contradict what was beyond doubt.
+    /// Confirms the edges of symbols, moves them, or restarts where they contradict what was beyond doubt.
     fn verify_symbols(&mut self, begin: u64, number: u64, prompt: Complex64, report: &mut Report) {
         if !self.has_symbols {
             return;

@@ -29,7 +29,7 @@ const AGE_S: f64 = 0.03;
 const VELOCITY_AGE_S: f64 = 0.5;
 /// Speed from which on a course means something.
 const SLOWEST_MPS: f64 = 1.0;
-/// Departures of course and speed that nobody notices: 5 degrees, and as much of the speed.
+/// Differences of course and speed that are not reported: 5 degrees, and as much of the speed.
 const COURSE_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
 /// Fixes that must be equal to the ones before, of hundred, before they are called frozen.
 const REPEATED_PERCENT: f64 = 50.0;

@@ -265,5 +265,5 @@ impl Verdict {
     }
 }
 
-/// Departure of a Doppler's scale that nobody notices: 1 Hz in 1000.
+/// Difference of a Doppler's scale that is not reported: 1 Hz in 1000.
 const SCALE: f64 = 1e-3;
