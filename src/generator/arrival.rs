@@ -121,7 +121,7 @@ pub fn seen_on(
     Ok(found.map(|emission| arriving(scene, signal, Arriving { emission, bias_s, gain })))
 }
 
-/// The rays of a signal of what arrives.
+/// Computes the rays of a signal from the arrival of its satellite.
 fn arriving(scene: &Scene, signal: &Signal, Arriving { emission, bias_s, gain }: Arriving) -> Seen {
     let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
     for effect in &scene.effects {

@@ -61,7 +61,7 @@ pub struct Silence {
     pub until: Option<Epoch>,
 }
 
-/// The broadcast ephemerides of every satellite, arranged by when they are sent, and what is true besides.
+/// Broadcast ephemerides of every satellite, ordered by transmission time, and the true orbits and clocks.
 #[derive(Clone, Debug)]
 pub struct Catalogue {
     satellites: BTreeMap<Sv, Timeline>,

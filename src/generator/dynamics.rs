@@ -43,7 +43,8 @@ pub struct LineOfSight {
     pub cn0_dbhz: Option<f64>,
 }
 
-/// A satellite in view at an instant: towards it, and what it alone makes of the range's second derivative.
+/// View of a satellite at an instant: unit vector towards it, and its contribution to the range's second
+/// derivative.
 #[derive(Clone, Copy)]
 struct Look {
     towards: Vector3<f64>,

@@ -24,7 +24,7 @@ pub enum Grade {
     Fast,
     /// The cheapest value of each knob whose error is below the noise of an ordinary scene.
     Balanced,
-    /// `f64` for every sample: what the others are measured against.
+    /// Reference level with `f64` for every sample, to which the other levels are compared.
     Reference,
 }
 

@@ -13,7 +13,7 @@
 use crate::fast_phase::FastPhase;
 use gnss::time::Rate;
 
-/// Parts of the grid are not halved below this; what error remains is reported.
+/// Shortest part of the grid in samples. An error that remains there is reported.
 const SHORTEST_SAMPLES: u64 = 1024;
 /// Largest error of a ray's amplitude between knots, relative to its largest in the part: 0.0087 dB.
 pub const AMPLITUDE_ERROR: f64 = 1e-3;

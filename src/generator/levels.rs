@@ -189,7 +189,7 @@ pub fn strongest(scene: &Scene) -> Result<Option<(Sv, f64)>, OrbitError> {
     Ok(found)
 }
 
-/// Full scale and what it is, where components of a deviation reach the converter.
+/// Full scale in LSB and its description, for components of a given standard deviation at the converter.
 fn full_scale(scene: &Scene, deviation_lsb: f64) -> (f64, String) {
     let mut found = None;
     scene.stages(|stage| {

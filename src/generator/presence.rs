@@ -146,7 +146,7 @@ pub fn warning(missing: &[Missing], start: Epoch) -> Option<String> {
 /// Intervals in which one satellite was in view, collected second by second.
 #[derive(Clone, Debug, Default)]
 pub struct Passes {
-    /// First sample in view and what came before, of the pass that lasts; the others are whole.
+    /// First sample of the pass that continues, and the state before it. The other passes are complete.
     open: Option<(u64, PassEnd)>,
     /// Reason for the absence of the satellite at the last check; `None` before the first check.
     absent: Option<PassEnd>,

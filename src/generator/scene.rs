@@ -110,7 +110,7 @@ impl Scene {
         self.front_end.iter().for_each(|stage| visit(stage.as_ref()));
     }
 
-    /// Seed of what is random in one front end alone: a function of the front end's name, and not of its
+    /// Seed of the random numbers of one front end. It is a function of the front end's name, and not of its
     /// position in a list.
     pub fn noise_seed(&self) -> u64 {
         let own = |name: &String| Stream::new(self.seed, "front end").named(name).word(0);

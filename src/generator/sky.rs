@@ -175,13 +175,13 @@ pub struct Arc {
     nodes_s: [f64; ARC_NODES],
     /// Newton's divided differences.
     differences: [Row; ARC_NODES],
-    /// Light time at the middle, and what it gains a second.
+    /// Light time at the middle in seconds, and its rate in s/s.
     guess: (f64, f64),
 }
 
 impl Arc {
-    /// The arc for what is received from `from` to `to`; `None` where the catalogue has no ephemeris for some
-    /// of it.
+    /// Computes the arc for signals that are received from `from` to `to`. `None` where the catalogue lacks
+    /// an ephemeris.
     ///
     /// # Errors
     /// [`OrbitError`] from the elements.

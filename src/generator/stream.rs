@@ -214,7 +214,7 @@ impl<'a> Stream<'a> {
     }
 }
 
-/// Gives `truth` what is known at the end alone.
+/// Passes the records to `truth` that are known only at the end.
 fn end(
     truth: &mut dyn Sink,
     navigation: BTreeSet<NavigationRow>,

@@ -258,7 +258,7 @@ impl Field {
         if angle { scaled * GPS_PI } else { scaled }
     }
 
-    /// The integer whose meaning is nearest to `value`.
+    /// Integer that encodes `value` with the smallest error.
     pub fn raw(&self, value: f64) -> Result<i64, FieldError> {
         let angle = matches!(self.kind, Kind::Semicircles | Kind::Turn);
         let scaled = libm::ldexp(if angle { value / GPS_PI } else { value }, -self.exponent());

@@ -201,7 +201,7 @@ const B1I_HZ: f64 = 1_561.098e6;
 const B2I_HZ: f64 = 1_207.14e6;
 const B3I_HZ: f64 = 1_268.52e6;
 
-/// Motion in the orbital plane: what orbit and clock have in common.
+/// Motion in the orbital plane, from which orbit and clock are both computed.
 struct Anomaly {
     /// Time from the reference time of the orbit, in seconds.
     since_toe_s: f64,

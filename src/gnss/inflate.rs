@@ -5,7 +5,7 @@ use std::io::Read;
 use thiserror::Error;
 
 const MAGIC: [u8; 2] = [0x1f, 0x8b];
-/// First bytes of what other programs pack.
+/// First bytes of files that other programs pack.
 const OTHERS: [(&[u8], &str); 7] = [
     (b"\x1f\x9d", "compress (.Z)"),
     (b"PK\x03\x04", "zip"),
@@ -25,7 +25,7 @@ pub enum InflateError {
     /// Packed in another way, which is this one.
     #[error("packed by {0}, which is not read: expected the plain file, or one packed by gzip")]
     Packed(&'static str),
-    /// Data that are no gzip, with what was wrong.
+    /// Data that are not gzip, with a description of the error.
     #[error("damaged gzip data ({0})")]
     Damaged(String),
 }

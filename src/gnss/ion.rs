@@ -107,7 +107,7 @@ struct Framing {
     blocks: Option<Blocks>,
 }
 
-/// A document, and what its elements are called by.
+/// Document, with the names of its elements.
 struct Of<'a, 'i> {
     name: &'a str,
     ids: BTreeMap<(&'a str, &'a str), Node<'a, 'i>>,
@@ -127,7 +127,7 @@ impl<'a, 'i> Of<'a, 'i> {
         }
     }
 
-    /// Children of that name, each replaced by what it refers to.
+    /// Children with this name. Each reference is replaced by its target.
     fn children(&self, within: Node<'a, 'i>, name: &'static str) -> impl Iterator<Item = Node<'a, 'i>> + '_ {
         let own = within.children().filter(move |child| child.tag_name().name() == name);
         own.map(move |child| {

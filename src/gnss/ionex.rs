@@ -185,7 +185,7 @@ struct Header {
     exponent: Option<i32>,
 }
 
-/// Lines with their numbers, and what has been read of them.
+/// Lines with their numbers, and the data that were read from them.
 struct Reader<'t> {
     lines: std::iter::Enumerate<std::str::Lines<'t>>,
     /// Number (from 1) and text of the last line.

@@ -61,7 +61,7 @@ pub struct Message {
     /// Function that reads a unit's parameters from its symbols, with true if they belong to an ephemeris.
     /// `None` if the unit fails its checks or has no parameters.
     pub parameters: fn(&[bool]) -> Option<(bool, Parameters)>,
-    /// A reader of what a satellite sends.
+    /// Function that creates a decoder for a satellite.
     pub reader: fn(Sv) -> Box<dyn Reader>,
     /// Function that converts an ephemeris of another message of the same satellite to this form. The orbit
     /// is the same, clocks differ by group delays.
@@ -259,7 +259,7 @@ pub enum Read {
         /// True if symbols are received inverted.
         inverted: bool,
     },
-    /// The start of a unit with its week, resolved near what the reader was given.
+    /// Start of a unit with its week, which is resolved near the time that the reader was given.
     Time(Epoch),
     /// A whole ephemeris.
     Ephemeris(Box<Ephemeris>),
@@ -303,8 +303,7 @@ pub trait Reader: fmt::Debug + Send + Sync {
     /// Takes the next symbol: positive for a logical 0 if it is not inverted, and as large as it is sure.
     /// `near` resolves weeks.
     fn take(&mut self, soft: f32, near: Epoch) -> Vec<Read>;
-    /// Takes a time that is known to within a year. A message whose own date leaves something out is dated
-    /// by it.
+    /// Takes a time that is known to within a year. Messages whose own date is incomplete are dated by it.
     fn know(&mut self, _near: Epoch) {}
     /// Symbols are missing before the next one.
     fn skip(&mut self);

@@ -349,8 +349,8 @@ pub struct ClockRow {
 pub enum IonosphereModel {
     /// No correction, because the settings state that there is no ionosphere.
     None,
-    /// A typical ionosphere, whose error is in the covariance: no satellite's parameters have been decoded
-    /// yet.
+    /// Nominal ionosphere, whose error is in the covariance, because no satellite's parameters have been
+    /// decoded yet.
     Nominal,
     /// Klobuchar's model with the parameters that the satellites send.
     Broadcast,
@@ -360,7 +360,7 @@ pub enum IonosphereModel {
     Bdgim,
     /// Two carriers of every satellite, in the combination that has no ionosphere.
     Combined,
-    /// The grid that an augmentation system sends; where it has no points what would correct without it.
+    /// Grid of an augmentation system. Where it has no points, the correction is that without a grid.
     Grid,
 }
 
@@ -524,8 +524,8 @@ pub enum Event {
     PhaseLocked,
     /// The edges of symbols are known.
     BitSynchronised,
-    /// The message states which satellite it is: what was recorded of the channel before, under the name of
-    /// another on the same carrier with the same code, is of this one.
+    /// The message identifies the satellite. Earlier records of the channel, under another satellite with the
+    /// same carrier and code, belong to this one.
     Identified,
     /// The message's frame is known, and with it the time.
     FrameSynchronised,

@@ -447,7 +447,7 @@ impl File<'_> {
         found.map(|(_, meaning)| *meaning).ok_or_else(|| self.bad(key, &value(), expected))
     }
 
-    /// The recording with what its captures state of it; numbers of samples count from `offset`.
+    /// Adds the data of the captures to the recording. Numbers of samples count from `offset`.
     fn captures(&self, captures: Vec<Capture>, offset: u64, of: Description) -> Result<Description, SigmfError> {
         let mut captures = captures.into_iter();
         let Some(first) = captures.next() else { return Ok(of) };

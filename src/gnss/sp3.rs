@@ -130,7 +130,8 @@ fn quoted(line: &str) -> String {
     line.chars().take(40).flat_map(char::escape_default).collect()
 }
 
-/// Columns `first` to `last` of a line, counted from 1 as the standard does; what the line lacks is missing.
+/// Columns `first` to `last` of a line, counted from 1 as in the standard. Columns beyond the line's end are
+/// missing.
 fn columns(line: &str, first: usize, last: usize) -> &str {
     line.get(first - 1..last.min(line.len())).unwrap_or_default()
 }

@@ -123,7 +123,7 @@ struct Place {
     sine: bool,
 }
 
-/// One row of the table, or what was expected of it.
+/// Parses one row of the table. The error states the expected form.
 fn row(line: &str) -> Result<(Place, Season), &'static str> {
     let fields: Vec<&str> = line.split(',').collect();
     let [quantity, factor, n, m, rest @ ..] = fields.as_slice() else { return Err("nine fields") };

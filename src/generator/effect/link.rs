@@ -100,7 +100,8 @@ impl LinkBudget {
         received_dbw - (REFERENCE_NOISE_DBWHZ + self.noise_figure_db) - self.implementation_loss_db - self.extra_loss_db
     }
 
-    /// Gain towards a user, and what a system sends more than GPS for its longer way.
+    /// Transmit gain towards a user in dB, with the additional power by which a system compensates for its
+    /// longer path.
     fn transmitted_db(&self, sight: &Sight) -> f64 {
         let Sight { sv, off_nadir_rad, .. } = *sight;
         let all = if sv.system == System::Gps { self.block } else { Block::Typical };

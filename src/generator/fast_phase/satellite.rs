@@ -30,7 +30,7 @@ pub enum ChangeKind {
         /// Clock offset in seconds, positive ahead.
         step_s: f64,
     },
-    /// Gains so much a second between the nodes and keeps what it gained.
+    /// Constant drift between the nodes, whose accumulated offset remains.
     Ramp {
         /// Drift in s/s.
         drift: f64,

@@ -63,7 +63,8 @@ const REFERENCE: usize = 8;
 pub struct Strength {
     /// Standard deviation of the intensity over its mean.
     pub s4: f64,
-    /// Standard deviation of the phase, in radians; absent means what comes with `s4` of a carrier.
+    /// Standard deviation of the phase, in radians; absent means the value that accompanies `s4` on a
+    /// carrier.
     pub sigma_phi_rad: Option<f64>,
     /// Time in seconds after which the autocorrelation of ξ is 1/e.
     pub decorrelation_s: f64,
@@ -87,7 +88,7 @@ impl Strength {
         }
     }
 
-    /// Phase noise that is added to what comes with `s4`.
+    /// Phase noise in radians that is added to the part that accompanies `s4`.
     fn added_rad(&self) -> f64 {
         let intrinsic = self.intrinsic_phase_rad();
         self.sigma_phi_rad.map_or(0.0, |sigma| (sigma * sigma - intrinsic * intrinsic).max(0.0).sqrt())

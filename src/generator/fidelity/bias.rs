@@ -11,7 +11,7 @@ use gnss::signal::{Component, Signal};
 use super::CodeEdge;
 use folds::Folds;
 
-/// Largest error of a code at rest that `balanced` leaves, whatever the noise.
+/// Largest code error in metres at rest that `balanced` permits at any noise.
 pub(super) const LARGEST_BIAS_M: f64 = 0.2;
 /// Noise bandwidth of the code loop behind which the plan states a moving code's error, in Hz.
 pub const LOOP_HZ: f64 = 0.5;

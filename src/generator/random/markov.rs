@@ -40,7 +40,7 @@ pub enum Process {
     },
 }
 
-/// Covariance of what a process gains over an interval.
+/// Covariance of the increment of a process over an interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Covariance {
     xx: f64,
@@ -152,7 +152,7 @@ pub fn apply(matrix: &Matrix, [x, y]: State) -> State {
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
     transition: Matrix,
-    /// Standard deviations: of the frequency gained, of the phase besides what follows it by `slope`.
+    /// Standard deviation of the frequency increment.
     frequency: f64,
     slope: f64,
     own: f64,

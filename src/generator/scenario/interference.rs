@@ -207,7 +207,7 @@ fn center_hz(table: &Table<'_>) -> Result<f64, ScenarioError> {
     }
 }
 
-/// The one of three keys that states how strong the source is.
+/// Reads the one of three keys that states the strength of the source.
 fn strength(table: &Table<'_>, placed: bool) -> Result<Strength, ScenarioError> {
     const ONE: &str = "exactly one of js_db, power_dbw and eirp_dbw";
     let distance_m = table.number("distance_m")?;

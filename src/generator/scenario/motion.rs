@@ -51,7 +51,7 @@ pub enum MotionSpec {
         place: Geodetic,
         /// Length of a tick, in seconds.
         tick_s: f64,
-        /// Time in which what is sent joins what was pushed.
+        /// Time in seconds in which the transmitted motion joins the pushed one.
         join_s: f64,
         /// Age of a push up to which its acceleration is kept.
         hold_s: f64,
@@ -62,7 +62,7 @@ pub enum MotionSpec {
     Ticks {
         /// Path of the log of ticks.
         path: PathBuf,
-        /// Table of what was switched meanwhile.
+        /// Path of the table of events during the run.
         events: Option<PathBuf>,
         /// Length of a tick, in seconds.
         tick_s: f64,

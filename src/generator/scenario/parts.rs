@@ -108,7 +108,7 @@ fn far_s(file: &Navigation, at: Epoch) -> f64 {
     middle(file).map_or(f64::INFINITY, |middle| at.since(middle).abs())
 }
 
-/// Moves a file by whole days; what it states of leap seconds belongs to its own.
+/// Moves a file by whole days. Its leap seconds stay those of its own date.
 fn move_days(file: &mut Navigation, days: i64) {
     for set in &mut file.ephemerides {
         *set = set.moved(days);
@@ -339,7 +339,7 @@ fn outside(catalogue: &Catalogue, system: System, scenario: &Scenario, end: Epoc
     )
 }
 
-/// Passes a list on: the first few, and how many more.
+/// Adds a list to the warnings: the first few entries, and the number of the others.
 fn summarise(warnings: &mut Vec<String>, list: &[String], what: &str) {
     if list.len() <= LISTED {
         warnings.extend_from_slice(list);

@@ -54,7 +54,7 @@ pub enum SatelliteFault {
         /// scene.
         off_s: Option<f64>,
     },
-    /// A clock that gains until the end and keeps what it gained.
+    /// Clock drift until the end of the fault; the accumulated offset remains.
     Ramp {
         /// The satellites concerned.
         satellites: Vec<Sv>,
@@ -342,7 +342,7 @@ pub(super) fn clocks(
     clocks
 }
 
-/// Faults of messages, each tried on what is sent when it begins; those of no size are left out.
+/// Faults of messages, each tested on the message at its start. Faults of zero size are left out.
 pub(super) fn message_faults(
     scenario: &Scenario,
     catalogue: &Catalogue,

@@ -48,15 +48,15 @@ pub enum Value {
     },
     /// True or false.
     Flag,
-    /// A text; how to describe it.
+    /// Text, with a description of its permitted values.
     Text(&'static str),
     /// A time: TOML's own, or a text.
     Time,
     /// One word of a list.
     Word(fn() -> Vec<&'static str>),
-    /// An array of texts; how to describe it.
+    /// Array of texts, with a description of their permitted values.
     Words(&'static str),
-    /// A text or an array of texts; how to describe it.
+    /// Text or array of texts, with a description of the permitted values.
     Texts(&'static str),
     /// An array of plain values.
     Values,
@@ -135,7 +135,7 @@ pub const fn flag(name: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Flag, meaning)
 }
 
-/// A text; `expected` states what it must be.
+/// Declares a text; `expected` describes its permitted values.
 pub const fn text(name: &'static str, expected: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Text(expected), meaning)
 }
@@ -150,12 +150,12 @@ pub const fn word(name: &'static str, words: fn() -> Vec<&'static str>, meaning:
     key(name, Value::Word(words), meaning)
 }
 
-/// An array of words; `expected` states of which.
+/// Declares an array of words; `expected` describes the permitted ones.
 pub const fn words(name: &'static str, expected: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Words(expected), meaning)
 }
 
-/// A text or an array of texts; `expected` states what they are.
+/// Declares a text or an array of texts; `expected` describes the permitted values.
 pub const fn texts(name: &'static str, expected: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Texts(expected), meaning)
 }
@@ -185,7 +185,7 @@ pub const fn one_or_more(name: &'static str, keys: &'static [Key], meaning: &'st
     key(name, Value::OneOrMore(keys), meaning)
 }
 
-/// A table whose keys another reference has; `found` states which.
+/// Declares a table whose keys another reference describes; `found` names that reference.
 pub const fn foreign(name: &'static str, found: &'static str, meaning: &'static str) -> Key {
     key(name, Value::Foreign(found), meaning)
 }

@@ -25,7 +25,8 @@ const NOISE_RATE: f64 = 1.5;
 /// A part of the sampled band from which on noise is white in all of it.
 const WHOLE: f64 = 0.98;
 
-/// The interference of a scene. What lies wholly outside the samples' band is left out: [`unheard`].
+/// Creates the sources of interference of a scene. Sources wholly outside the samples' band are left out:
+/// [`unheard`].
 pub(super) fn interferers(
     scenario: &Scenario,
     scene: &Scene,
@@ -60,7 +61,7 @@ struct Source<'a> {
     tuning: Tuning,
 }
 
-/// A waveform with the share of its power and the middle of what is in the samples' band.
+/// Waveform within the samples' band, with the share of its power there and the middle of this part.
 struct Fitted {
     waveform: Waveform,
     share: f64,
@@ -216,7 +217,7 @@ impl Source<'_> {
         Ok(Some(Fitted { waveform, share: 1.0, carrier_hz, text }))
     }
 
-    /// Refuses what happens within less than two samples.
+    /// Refuses a duration shorter than two samples.
     fn lasts(&self, what: &str, time_s: f64) -> Result<(), ScenarioError> {
         let least_s = 2.0 / self.scene.clock.rate.hz();
         if time_s >= least_s {
@@ -233,7 +234,7 @@ impl Source<'_> {
         }
     }
 
-    /// Noise in what its band shares with the samples'.
+    /// Noise in the common part of its band and the samples' band.
     fn noise(&self, bandwidth_hz: f64) -> Option<Fitted> {
         let (low_hz, high_hz) = self.overlap_hz(bandwidth_hz)?;
         let rate_hz = self.scene.clock.rate.hz();

@@ -71,7 +71,8 @@ pub(super) fn render(
     clipped
 }
 
-/// The satellites in `samples` samples from `first` on, with what stages look back at before them.
+/// Renders the satellites in `samples` samples from `first` on, with the samples before them that stages
+/// need.
 pub(super) fn satellites<'w>(
     scene: &Scene,
     transmitters: &[Transmitter],

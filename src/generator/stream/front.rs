@@ -18,7 +18,7 @@ use crate::transmit::Transmitter;
 use gnss::record::{NavigationRow, PassRow};
 use gnss::satellite::Sv;
 
-/// Length of a block at least, in units of what its stages look back at.
+/// Smallest length of a block, in units of the samples that its stages look back at.
 const LEADS_PER_BLOCK: u64 = 8;
 
 /// A front end on its way to samples. A batch is prepared, then rendered; truth may be written in between.
@@ -188,8 +188,7 @@ impl<'a> Front<'a> {
     }
 }
 
-/// Lets all signals that front ends receive from one satellite of one constellation share what is known of
-/// it.
+/// Shares the geometry among all signals that front ends receive from one satellite of one constellation.
 pub(super) fn share_geometry(fronts: &mut [Front<'_>]) {
     let mut count: BTreeMap<(usize, Sv), u32> = BTreeMap::new();
     let transmitters = |front: &Front<'_>| front.transmitters.iter().map(|t| (t.from.number, t.sv)).collect::<Vec<_>>();

@@ -269,7 +269,7 @@ impl Layer {
     }
 }
 
-/// Adds what a sequence is at every lane's position.
+/// Adds the values of a sequence at every lane's position.
 #[inline(always)]
 fn each(fraction: u32, places: &Side<u32>, wave: &mut Side, value: impl Fn(u32) -> f32) {
     for k in 0..HALF {

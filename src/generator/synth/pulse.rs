@@ -105,7 +105,7 @@ impl Pulse {
         })
     }
 
-    /// The sum over the edges of a chip of what each does by its position from the middle, in chips, and its
+    /// Sum over the edges of a chip of a function of each edge's position from the middle, in chips, and its
     /// height.
     fn edges(&self, of: impl Fn(f64, f64) -> f64) -> f64 {
         let steps = self.levels.len() as f64;

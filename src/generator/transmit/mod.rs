@@ -267,7 +267,7 @@ impl Transmitter {
         self.grid.root_samples()
     }
 
-    /// Gathers what samples `from..to` need, and forgets what lies before.
+    /// Prepares the data for samples `from..to`, and drops earlier data.
     ///
     /// # Errors
     /// Those of orbits and messages.

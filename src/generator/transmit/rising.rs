@@ -13,7 +13,7 @@ use gnss::satellite::Sv;
 
 /// Satellites in the Earth's axes are slower: 3.9 km/s the fastest, and a quarter more for a fault's own.
 const SATELLITE_MPS: f64 = 5000.0;
-/// No leap is longer, so that ranges stay about what they are.
+/// Longest leap in seconds, over which ranges change little.
 const LEAP_S: f64 = 600.0;
 /// Largest change of an elevation by lever arms and orbit errors of a satellite, in radians: 200 m at 20 000
 /// km.

@@ -20,7 +20,7 @@ pub struct Symbols {
     pub navigation: BTreeSet<NavigationRow>,
 }
 
-/// The symbols of a component's message: which of a satellite's, and how many code periods one takes.
+/// Message symbols of a component: index of the form among the satellite's, and code periods per symbol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Data {
     form: usize,
@@ -51,8 +51,8 @@ impl Symbols {
         Some(Data { form, periods_per_symbol: i64::from(component.periods_per_symbol()?) })
     }
 
-    /// Gathers what `sv` sends from `first` to `last`, and forgets what lies before. A unit for which no
-    /// ephemeris was uploaded carries the one of `received`.
+    /// Prepares the symbols that `sv` sends from `first` to `last`, and drops earlier ones. A unit for which
+    /// no ephemeris was uploaded carries the one of `received`.
     ///
     /// # Errors
     /// Those of messages.

@@ -108,7 +108,7 @@ pub fn observe(
     observe_by(scene, from, (sv, signal), (sample, locked_s), None)
 }
 
-/// [`observe`] where what all signals of the satellite have in common may be known.
+/// Like [`observe`], with the geometry that all signals of the satellite share, if it is stored.
 ///
 /// # Errors
 /// Those of the orbit.

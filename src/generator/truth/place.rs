@@ -42,7 +42,7 @@ impl Nmea {
         Ok(Self { path, writer, place: None, observed: None, seen: BTreeMap::new() })
     }
 
-    /// Writes what came since the tick began.
+    /// Writes the records since the tick began.
     fn end_tick(&mut self) -> Result<(), TruthError> {
         let (Some(row), seen) = (self.place.take(), std::mem::take(&mut self.seen)) else { return Ok(()) };
         let seen: Vec<Seen> = seen.into_values().collect();

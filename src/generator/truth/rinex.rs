@@ -11,8 +11,8 @@ use gnss::exchange::{NavigationSets, ObservationFile, Version};
 use gnss::signal::Signal;
 use gnss::time::Epoch;
 
-/// Writes `observations.rnx` as the truth comes, and `navigation.rnx` at the end: what an ideal receiver
-/// would have, its clock that of the scene's.
+/// Writer of `observations.rnx` while the truth arrives, and of `navigation.rnx` at the end. They contain the
+/// data of an ideal receiver with the scene's clock.
 pub struct Rinex {
     directory: PathBuf,
     version: Version,

@@ -144,7 +144,7 @@ fn edge_cutoff_cps(scene: &Scene) -> Option<f64> {
     (scene.fidelity.code_edge == CodeEdge::BandLimited).then(|| scene.cutoff_cps())
 }
 
-/// The number that has the same shortest decimal text: what a reader of that text takes it for.
+/// Number in `f64` with the same shortest decimal text, as a reader of this text gets it.
 fn decimal(value: f32) -> f64 {
     value.to_string().parse().unwrap_or(f64::from(value))
 }

@@ -171,7 +171,7 @@ pub enum Fault {
         /// The acceleration, in m/s².
         acceleration_mps2: f64,
     },
-    /// A tolerance for rows whose velocities state how the motion goes.
+    /// Tolerance for rows whose velocities already determine the motion.
     #[error("velocities beside tolerance_m: expected positions alone, or no tolerance_m")]
     Velocities,
     /// Fewer rows than a motion needs.
@@ -437,7 +437,7 @@ pub fn read_csv(input: impl Read, file: &str, options: &Options) -> Result<CsvTr
     Ok(CsvTrajectory { trajectory: rows.finish(file)?, ignored: columns.ignored, digits })
 }
 
-/// A trajectory of NMEA sentences, and what was passed over or assumed.
+/// Trajectory of NMEA sentences, with the sentences that were skipped and the values that were assumed.
 #[derive(Clone, Debug)]
 pub struct NmeaTrajectory {
     /// The motion.

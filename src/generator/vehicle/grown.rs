@@ -17,11 +17,11 @@ use super::{Knot, Motion, between};
 pub struct Joining {
     /// Samples of a tick.
     pub tick_samples: u64,
-    /// Time in which what is sent joins what was pushed.
+    /// Time in seconds in which the transmitted motion joins the pushed one.
     pub join_s: f64,
     /// Age of the newest push up to which its acceleration is kept.
     pub hold_s: f64,
-    /// Largest jerk of a join; what would need more is a snap.
+    /// Largest jerk of a join in m/s³; a join that needs more becomes a snap.
     pub max_jerk_mps3: f64,
 }
 

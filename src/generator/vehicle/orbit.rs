@@ -19,7 +19,7 @@ use gnss::earth::{EARTH_ROTATION_RADPS, SEMI_MAJOR_AXIS_M, rotate_earth};
 const STEP_RAD: f64 = 0.01;
 /// Knots at most, 80 bytes each: 46 days of a low orbit.
 const MOST_KNOTS: f64 = 5e5;
-/// Lowest perigee, in metres: what flies below does not stay in orbit.
+/// Lowest perigee in metres, below which atmospheric drag ends an orbit.
 const LOWEST_M: f64 = 80e3;
 
 /// Elements at the scene's start.

@@ -60,7 +60,7 @@ impl Ramp {
         }
     }
 
-    /// Integral over time of what has changed, from the beginning to `t_s` within the change.
+    /// Integral of the change over time, from its beginning to `t_s` within the change.
     pub fn integral(&self, t_s: f64) -> f64 {
         let third = |t: f64| self.rate * t * t * t / (6.0 * self.ramp_s);
         let held = |t: f64| {

@@ -13,7 +13,7 @@ use super::ramp::Ramp;
 use super::{Knot, Motion, Trajectory};
 use gnss::earth::Geodetic;
 
-/// A position on the route and how it is passed.
+/// Waypoint of a route: a position, the speed there and a stop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Waypoint {
     /// Position of the waypoint.

@@ -226,6 +226,6 @@ pub trait Network: fmt::Debug + Send + Sync {
     fn satellite(&self, number: u8, at: Epoch) -> Known;
     /// Bands of the grid with the numbers of the points that it has delays of, in ascending order.
     fn bands(&self) -> &[(u8, Vec<u8>)];
-    /// Vertical delay on L1 at a point of a band and what bounds its error, in metres.
+    /// Vertical delay on L1 at a point of a band and the bound of its error, both in metres.
     fn vertical_m(&self, band: u8, point: u8, at: Epoch) -> Option<(f64, f64)>;
 }

@@ -13,7 +13,7 @@ use crate::satellite::{Sv, System};
 use crate::signal::Signal;
 use crate::time::{BDT, BDT_WEEK, Epoch, TimeScale, UTC};
 
-/// The parameters of an ephemeris, or of what is common to all, by name.
+/// Parameters of an ephemeris, or parameters that are common to all satellites, by name.
 type Raws = BTreeMap<String, i64>;
 
 /// Collects parameters as they come; an ephemeris is some kilobytes, however often it is read again.
@@ -227,7 +227,7 @@ fn vector_record(set: &Ephemeris, vector: &StateVector, channel: Option<i8>) -> 
     text
 }
 
-/// Position, velocity and acceleration along an axis in kilometres, and what ends their line.
+/// Position, velocity and acceleration along an axis in kilometres, followed by the last value of their line.
 fn axis_km(vector: &StateVector, of: usize, last: f64) -> [f64; 4] {
     let axes = [vector.position_m, vector.velocity_mps, vector.acceleration_mps2];
     let [place, speed, pull] = axes.map(|axis| axis.get(of).map_or(0.0, |metres| 1e-3 * metres));

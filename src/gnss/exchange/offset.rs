@@ -21,7 +21,7 @@ pub(super) struct Offset {
     reference: Epoch,
 }
 
-/// Parameters of an offset, by what their names begin with, and the pair and UTC that they are of.
+/// Prefix of an offset's parameters, RINEX name of the pair, and name of the UTC realisation.
 type Named = (&'static str, &'static str, &'static str);
 
 /// Time offsets that messages of a system contain.

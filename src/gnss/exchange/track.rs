@@ -90,7 +90,7 @@ impl<W: Write> Track<W> {
     }
 }
 
-/// A text without what XML gives a meaning, and without control characters.
+/// Replaces the characters that have a meaning in XML, and drops control characters.
 fn escaped(text: &str) -> String {
     let mut out = String::new();
     for c in text.chars().filter(|c| !c.is_control()) {

@@ -10,7 +10,7 @@
 
 /// Rounds over all checks before a word is given up.
 const ROUNDS: u32 = 50;
-/// Part of the least reliability that a check passes on: what min-sum overstates, taken off.
+/// Factor on the smallest reliability that a check passes on; it corrects the overestimate of min-sum.
 const NORMALISATION: f32 = 0.78;
 
 /// A code.
@@ -84,7 +84,7 @@ impl Ldpc {
     }
 }
 
-/// One check: what it said before is taken off its bits, and what it states now added instead.
+/// Updates one check: its previous message is subtracted from its bits, and its new message added.
 fn update(row: &[usize], said: &mut [f32], sure: &mut [f32]) {
     let (mut least, mut next, mut at, mut odd) = (f32::INFINITY, f32::INFINITY, 0, false);
     for (edge, (&place, said)) in row.iter().zip(said.iter()).enumerate() {

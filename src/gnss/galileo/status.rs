@@ -62,7 +62,7 @@ const ABOVE_E6_HZ: f64 = 1_400e6;
 /// Part of the spectrum to which a signal belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Band {
-    /// E1, and what is beside it.
+    /// E1, and all higher frequencies.
     E1,
     /// The lower side of E5.
     E5a,

@@ -24,7 +24,8 @@ use Sends::{L1CToo, L2, L2AndL5};
 
 const CNAV_BEGAN: &str = "2014-04-28T00:00:00";
 
-/// Number, since when, and what; the newer of a number first.
+/// Satellite number, date of the first transmission, and set of signals. For a number with several entries,
+/// the newest comes first.
 #[rustfmt::skip]
 const SINCE: [(u8, &str, Sends); 28] = [
     (1, "2026-03-09T00:00:00", L1CToo),

@@ -77,7 +77,7 @@ pub static CNAV2_SETS: SetForm = SetForm {
     ..cnav2::CNAV2_SETS
 };
 
-/// An ephemeris as one of these messages has it, of what GPS makes of one of LNAV.
+/// Converts an ephemeris of LNAV to the form of one of these messages, by way of the GPS message.
 fn form(set: &Ephemeris, gps: &Message, message: &Message) -> Ephemeris {
     if set.form == message.sets {
         return set.clone();

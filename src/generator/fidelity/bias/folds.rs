@@ -32,7 +32,7 @@ const LINES: f64 = 1280.0;
 /// Classes of lines, at least and at most.
 const CLASSES: [usize; 2] = [16, 320];
 
-/// The band of a component at a rate and what folds back into it.
+/// Band of a component at a sample rate, and the parts of the spectrum that fold into it.
 pub(super) struct Folds {
     edge: CodeEdge,
     response: Option<Response>,

@@ -105,7 +105,7 @@ impl Rows {
         Trajectory::through(knots, breaks_s).ok_or_else(too_few)
     }
 
-    /// The row that makes the spline bend too hard from knot `bent` on, and how hard.
+    /// Row that bends the spline too much from knot `bent` on, with the acceleration.
     ///
     /// One wrong row bends the spline at its neighbours too, each a quarter as hard as the one before: it is
     /// the row without which the rows about it are smooth. Where the motion jumps for good, leaving out a row

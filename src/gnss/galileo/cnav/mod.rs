@@ -205,7 +205,7 @@ pub fn is_dummy(page: &Vec<bool>) -> bool {
     page.piece(HEADER_PLACE) == DUMMY_HEADER
 }
 
-/// The raw integers of what a page carries; of dummies nothing but the header's.
+/// Raw integers of a page's content; only those of the header for dummy pages.
 pub fn parameters(page: &Vec<bool>) -> Parameters {
     let body = BODY.iter().filter(|_| !is_dummy(page));
     HEAD.iter().chain(body).map(|field| (field.name, field.read(page))).collect()

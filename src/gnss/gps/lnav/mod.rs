@@ -161,7 +161,7 @@ impl Broadcast {
         Ok(Self { pages: almanac::pages(klobuchar.as_ref(), utc, almanac, reference)? })
     }
 
-    /// The pages of what a scene states of its satellites.
+    /// Builds the pages from the parameters of a scene.
     ///
     /// # Errors
     /// As [`Self::with_utc`].

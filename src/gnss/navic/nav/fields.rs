@@ -185,7 +185,7 @@ pub(super) static MESSAGE_11: [Element<Klobuchar>; 8] = [
     plain!("beta_3", [(230, 8)], Signed, 16, ELECTRONS, beta[3]),
 ];
 
-/// Lists every field by what carries it.
+/// Lists every field by the subframe or message that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
     fn of<T>(table: &'static [Element<T>]) -> Vec<&'static Field> {
         table.iter().map(|element| &element.field).collect()

@@ -94,7 +94,7 @@ const ALMANAC: u32 = 7;
 const ELECTRONS: u32 = 11;
 const UTC: u32 = 26;
 
-/// Positions of what all subframes, and all messages, have.
+/// Positions of the fields that all subframes and all messages have.
 const COUNT: (u16, u8) = (8, 17);
 const ID: (u16, u8) = (27, 2);
 const MESSAGE: (u16, u8) = (30, 6);
