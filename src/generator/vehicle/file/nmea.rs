@@ -84,7 +84,7 @@ fn elapsed_s(time: &str, start: Epoch, before_s: Option<f64>) -> f64 {
     t_s + DAY_S * ((before_s.unwrap_or(0.0) - t_s) / DAY_S).round()
 }
 
-/// Velocity in ECEF from a velocity over ground and a rate of the height.
+/// Position in metres and velocity in m/s in ECEF, from a velocity over ground and a rate of the height.
 pub fn rising(rmc: &Rmc, height_m: f64, up_mps: f64) -> (Vector3<f64>, Vector3<f64>) {
     let place = Geodetic::from_degrees(rmc.latitude_deg, rmc.longitude_deg, height_m);
     let [east, north] = rmc.velocity_mps;
