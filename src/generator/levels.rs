@@ -101,7 +101,7 @@ pub struct Levels {
     /// Largest share of a segment's components that is clipped, and the start of that segment in seconds.
     pub worst: (f64, f64),
     stretches: u64,
-    /// What chip edges keep of signals.
+    /// Shares of the signals' powers that chip edges keep.
     #[serde(skip)]
     pub(crate) kept: Kept,
     /// Time of this machine for a sample of all that the scene sends, on one core: the median of the
@@ -151,8 +151,8 @@ impl Levels {
         over_noise_dbhz + self.unit_dbfs
     }
 
-    /// Level in dBFS of a satellite's or spoofer's signal in the samples, behind the playback that a scene may
-    /// have.
+    /// Level in dBFS of a satellite's or spoofer's signal in the samples, behind the playback that a scene
+    /// may have.
     pub fn satellite_dbfs(&self, sampled_dbhz: f64) -> f64 {
         self.dbfs(sampled_dbhz) - self.attenuation_db
     }

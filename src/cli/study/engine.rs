@@ -11,9 +11,9 @@ use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use super::args;
 use super::queue::{self, Queued};
 use super::{load, study_error};
-use crate::cli::args;
 use crate::cli::error::CliError;
 use crate::cli::progress::Progress;
 use crate::cli::scenario;

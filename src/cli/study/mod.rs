@@ -1,5 +1,6 @@
 //! `study`: plan, run, look at, merge and hand out studies; with a study alone, all of it on this machine.
 
+pub mod args;
 mod engine;
 mod queue;
 
@@ -8,7 +9,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::cli::args;
 use crate::cli::error::CliError;
 use crate::cli::progress::Progress;
 use crate::cli::run::{generator_error, judge_error, output_error, receiver_error};

@@ -75,7 +75,8 @@ const ECHOES: &str = "[[multipath]]\nkind = \"given\"\namplitude = 0.5\nphase_de
 /// Every key of the tables that may occur several times.
 const HOSTILE: &str = "[[interference]]\nkind = \"chirp\"\noffset_hz = 1e5\njs_db = 30\non_s = 1\noff_s = 2\n\
                        sweep_hz = -2e6\n\
-    sweep_s = 1e-5\n[[interference]]\nkind = \"sine_fm\"\ncenter_hz = 1.5759e9\npower_dbw = -130\ndeviation_hz = 5e4\nrate_hz = 1e4\n\
+    sweep_s = 1e-5\n[[interference]]\nkind = \"sine_fm\"\ncenter_hz = 1.5759e9\n\
+    power_dbw = -130\ndeviation_hz = 5e4\nrate_hz = 1e4\n\
     [[interference]]\nkind = \"pulse\"\neirp_dbw = -20\nwidth_s = 1e-5\nrate_hz = 1e4\njitter = 0.5\n\
     latitude_deg = 26.6\nlongitude_deg = 80.2\nheight_m = 100\n[[interference]]\nkind = \"noise\"\njs_db = 1\n\
     bandwidth_hz = 1e6\n\

@@ -34,7 +34,7 @@ pub(crate) struct Stretch {
 pub(crate) struct Kept(Vec<(&'static Signal, f64)>);
 
 impl Kept {
-    /// Of the first satellite that sends each signal: others differ by what their codes do, 0.05 dB of C/A.
+    /// Shares of a scene's signals, each by its first satellite; the codes of C/A differ by 0.05 dB.
     pub fn of(scene: &Scene) -> Self {
         let filter = limiting(scene);
         let (edge, rate_hz) = (edge(scene, filter.as_ref()), scene.clock.rate.hz());
@@ -42,7 +42,7 @@ impl Kept {
         Self(all.collect())
     }
 
-    /// That share of a signal.
+    /// Share that is kept of a signal, 0 to 1.
     pub fn share(&self, signal: &Signal) -> f64 {
         self.0.iter().find(|(own, _)| own.name == signal.name).map_or(1.0, |(_, share)| *share)
     }

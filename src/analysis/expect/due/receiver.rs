@@ -241,8 +241,8 @@ fn turns(signal: &'static Signal, component: &Component, coherent_s: f64) -> (f6
     }
 }
 
-/// What filter, converter and edges between samples take from each signal, in dB; of a truth that does not
-/// state its noise, the loss of a converter of few bits (Van Vleck; optimal steps, white noise).
+/// Losses of each signal in filter, converter and edges between samples, in dB. A truth that does not state
+/// its noise has the loss of a converter of few bits (Van Vleck; optimal steps, white noise).
 fn front_end_costs_db(run: &Run) -> BTreeMap<&'static Signal, f64> {
     let mut costs_db = spectrum::costs_db(run);
     for (signal, cost_db) in &mut costs_db {
