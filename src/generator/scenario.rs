@@ -471,7 +471,7 @@ fn satellites(table: Option<&Table<'_>>) -> Result<Choice, ScenarioError> {
         let mask_rad = MASK_DEG.to_radians();
         return Ok(Choice { mask_rad, only: None, excluded: Vec::new(), include_unhealthy: false });
     };
-    let mask_rad = table.need::<f64>("mask_deg")?.to_radians();
+    let mask_rad = table.need("mask_deg")?.to_radians();
     let only = satellite_list(table, "only")?;
     let excluded = satellite_list(table, "exclude")?.unwrap_or_default();
     match &only {

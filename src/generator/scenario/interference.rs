@@ -203,7 +203,7 @@ fn center_hz(table: &Table<'_>) -> Result<f64, ScenarioError> {
             Err(table.bad("offset_hz", "nothing beside center_hz, which is the radio frequency of the centre"))
         }
         Some(center_hz) => Ok(center_hz),
-        None => Ok(L1_CA.centre_hz() + table.need::<f64>("offset_hz")?),
+        None => Ok(L1_CA.centre_hz() + table.need("offset_hz")?),
     }
 }
 
