@@ -36,6 +36,7 @@ SCENES = {
     "dual_band": "Galileo E1 and E5a",
     "gps_bands": "GPS L1, L2C and L5",
     "beidou_bands": "BeiDou B1C and B2a",
+    "galileo_e6": "Galileo E1 and E6",
 }
 BANDS = [
     ("ionosphere_p95_m", "ionospheric delay by two carriers, error, 95 %", "m", "ionosphere.error_p95_m"),
@@ -46,7 +47,7 @@ BANDS = [
 def accuracy():
     for scene, words in SCENES.items():
         file = f"scenarios/{scene}.toml"
-        rows = OF_A_SCENE + (BANDS if scene in ("dual_band", "gps_bands", "beidou_bands") else [])
+        rows = OF_A_SCENE + (BANDS if scene in ("dual_band", "gps_bands", "beidou_bands", "galileo_e6") else [])
         for name, what, unit, path in rows:
             counted = unit == ""
             yield Figure(
@@ -54,6 +55,19 @@ def accuracy():
                 (*ALL_SAMPLES, "src/analysis/measure", file), "= 0" if name == "losses" else "",
                 None if counted else 3 if name == "first_fix_s" else 2,
             )
+    for name, what, unit in [
+        ("dll_sigma_chips", "code loop's error, standard deviation", "chip"),
+        ("pll_sigma_deg", "phase loop's error, standard deviation", "°"),
+        ("fll_sigma_hz", "frequency error, standard deviation", "Hz"),
+    ]:
+        file = "scenarios/high_dynamics.toml"
+        yield Figure(f"accuracy.high_dynamics.{name}", f"{what}: {SCENES['high_dynamics']}", unit, make.Run(file, f"tracking.{name}"),
+                     (*ALL_SAMPLES, "src/analysis/measure", file), "", 2)
+    test = "tests/loops/bdgim.rs"
+    yield Figure("accuracy.bdgim.without_m", "position from one carrier of BeiDou without BDGIM, off by more than", "m",
+                 make.Asserted(test, r"without_m\.norm\(\) > ([\d.]+)"))
+    yield Figure("accuracy.bdgim.with_m", "the same with BDGIM, off by less than", "m",
+                 make.Asserted(test, r"with_m\.norm\(\) < ([\d.]+)"))
 
 
 BENCH = "reports/performance.md"
@@ -206,6 +220,19 @@ def studies():
             yield Figure(f"studies.starts.{name}.{short}", f"{what}, {words} of 200 starts", unit,
                          make.Page(page, command, row=row, column=column, runs="200"),
                          (*ALL_SAMPLES, "studies/starts.toml"), "", 3 if unit == "s" else 2)
+    yield Figure("studies.starts.velocity_all_mps.largest", "velocity 95 % of a run, also before the ionosphere's page, largest of 200 starts",
+                 "m/s", make.Page(page, command, row="position.velocity_p95_mps", column="largest", runs="200"),
+                 (*ALL_SAMPLES, "studies/starts.toml"), "", 2)
+    for scene in ("static", "moderate", "high_dynamics"):
+        for name, what, unit, column in [
+            ("horizontal_p95_m", "horizontal error, 95 %", "m", "position.horizontal_p95_m"),
+            ("vertical_p95_m", "vertical error, 95 %", "m", "position.vertical_p95_m"),
+            ("velocity_p95_mps", "velocity error, 95 %", "m/s", "position.velocity_p95_mps"),
+            ("pseudorange_rms_m", "pseudorange error, rms", "m", "observables.pseudorange_rms_m"),
+        ]:
+            yield Figure(f"studies.motions.{scene}.{name}", f"{what}, mean of five noises: {SCENES[scene]}", unit,
+                         make.Page("reports/studies/motions/report.md", "\"$GNSS_TWIN\" study studies/motions.toml", row=scene,
+                                   column=column, runs="5"), (*ALL_SAMPLES, "studies/motions.toml", f"scenarios/{scene}.toml"), "", 2)
     yield Figure("studies.starts.slips_per_hour.mean", "cycle slips an hour, mean of 200 starts", "",
                  make.Page(page, command, row="tracking.slips_per_hour", column="mean", runs="200"), (*ALL_SAMPLES, "studies/starts.toml"), "", 2)
     for column in ("mean", "low", "high"):
