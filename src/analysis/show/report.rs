@@ -123,7 +123,7 @@ impl Summary {
             let (sigma, theory) = (pooled.sigma, pooled.theory_sigma);
             writeln!(
                 f,
-                "{name} against theory    closed loop {:.3} of it, {} rules broken",
+                "{name} jitter    measured/theory {:.3}, {} thresholds exceeded",
                 sigma / theory,
                 pooled.rules_broken
             )?;
@@ -133,8 +133,8 @@ impl Summary {
             let verdict = self.position.nees_verdict.map_or("unjudged", Calibration::name);
             writeln!(
                 f,
-                "covariance    {verdict}: normalised error squared {mean:.2}, of consistent ones {low:.2} to {high:.2} \
-                 ({fixes} independent fixes)"
+                "covariance    {verdict}: NEES {mean:.2}, expected 95 % band {low:.2} to {high:.2} ({fixes} independent \
+                 fixes)"
             )?;
         }
         Ok(())
