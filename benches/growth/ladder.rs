@@ -89,11 +89,11 @@ impl Ladder {
         });
         let top = points.iter().chain(&along).map(|point| point.1).fold(0.0, f64::max);
         let x = Axis::new(self.x, (place(from), place(last) + 0.02 * (place(last) - place(from))));
-        let x_ticks = self.is_log.then(|| x.log_ticks(&[1.0, 3.0], |value| format!("{value}")));
+        let x = if self.is_log { x.logarithmic() } else { x };
         let y = Axis::new(self.unit, (0.0, 1.08 * top));
         let series =
             vec![Series::new("line", GREY, Mark::Line, along), Series::new("measured", BLUE, Mark::Balls, points)];
-        Chart { x_ticks, ..Chart::new(self.title.clone(), x, y, series) }
+        Chart::new(self.title.clone(), x, y, series)
     }
 }
 

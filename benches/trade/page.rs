@@ -261,14 +261,11 @@ const EDGES: [(&str, usize); 3] = [("nearest", 1), ("area", 0), ("band_limited",
 
 const FAMILIES: [&str; 6] = ["GPS L1 C/A", "Galileo E1", "GPS L5", "GPS L1C", "Galileo E5", "GLONASS G1"];
 
-fn log_chart(title: &str, x: (&str, &[f64]), y: (&str, &[f64]), series: Vec<Series>, multiples: &[f64]) -> Chart {
+fn log_chart(title: &str, x: (&str, &[f64]), y: (&str, &[f64]), series: Vec<Series>) -> Chart {
     let logs = |values: &[f64]| values.iter().map(|value| libm::log10(*value)).collect::<Vec<_>>();
-    let x = Axis::around(x.0, logs(x.1).into_iter(), 0.6);
-    let y = Axis::around(y.0, logs(y.1).into_iter(), 0.6);
-    let name = |value: f64| if (0.001..1e4).contains(&value) { format!("{value}") } else { format!("{value:e}") };
-    let x_ticks = Some(x.log_ticks(multiples, name));
-    let y_ticks = Some(y.log_ticks(if y.to - y.from > 3.0 { &[1.0] } else { &[1.0, 2.0, 5.0] }, name));
-    Chart { x_ticks, y_ticks, ..Chart::new(title, x, y, series) }
+    let x = Axis::around(x.0, logs(x.1).into_iter(), 0.6).logarithmic();
+    let y = Axis::around(y.0, logs(y.1).into_iter(), 0.6).logarithmic();
+    Chart::new(title, x, y, series)
 }
 
 fn draw_signals(directory: &Path, rows: &[SignalRow]) {
@@ -290,7 +287,7 @@ fn draw_signals(directory: &Path, rows: &[SignalRow]) {
         series.push(Series::new("band_limited, f64", GREY, Mark::Cross, of("band_limited", &|r| r.f64_ns)));
         let costs: Vec<f64> = own.iter().flat_map(|row| [row.f32_ns, row.f64_ns]).collect();
         let y = ("code error (m, rms)", errors.as_slice());
-        work.push(log_chart(family, ("ns for a sample of a satellite", &costs), y, series, &[1.0, 2.0, 5.0]));
+        work.push(log_chart(family, ("time for a sample of a satellite (ns)", &costs), y, series));
         let series = EDGES.iter().flat_map(|(edge, colour)| {
             let points = of(edge, &|row| row.sample_rate_msps);
             [
@@ -299,7 +296,7 @@ fn draw_signals(directory: &Path, rows: &[SignalRow]) {
             ]
         });
         let at: Vec<f64> = own.iter().map(|row| row.sample_rate_msps).collect();
-        rates.push(log_chart(family, ("sample rate (Msps)", &at), y, series.collect(), &[1.0, 2.0, 3.0, 5.0]));
+        rates.push(log_chart(family, ("sample rate (Msps)", &at), y, series.collect()));
     }
     let mut legend: Vec<Series> =
         EDGES.iter().map(|(edge, colour)| Series::new(*edge, COLOURS[*colour], Mark::Balls, Vec::new())).collect();
@@ -329,8 +326,7 @@ fn draw_scenes(directory: &Path, rows: &[SceneRow]) {
         let costs: Vec<f64> = own.iter().map(|row| row.total_s()).collect();
         let errors: Vec<f64> = own.iter().filter_map(|row| error(row)).collect();
         let y = if positions { "position error (m, rms)" } else { "pseudorange error (m, rms)" };
-        let mut chart =
-            log_chart(name, ("processor s for a simulated s", &costs), (y, &errors), series, &[1.0, 2.0, 5.0]);
+        let mut chart = log_chart(name, ("processor time for a simulated second (s)", &costs), (y, &errors), series);
         let labelled = own.iter().copied().filter(is_level);
         chart.labels = labelled.filter_map(|row| Some((place(&row)?, row.setting.clone(), 12))).collect();
         charts.push(chart);

@@ -154,13 +154,14 @@ pub const ORDER: Order<'static> = &[
     ),
     (
         "analysis/show",
-        &[&["report", "staged"], &["write"], &["plot"], &["foreign", "pdf", "tables", "trade"], &["run_report"]],
+        &[&["report", "staged"], &["write"], &["plot"], &["pdf", "tables", "trade"], &["run_report"], &["foreign"]],
     ),
     (
         "analysis/show/plot",
         &[
-            &["chart", "drawing"],
-            &["judged"],
+            &["clip", "drawing", "marks", "ticks"],
+            &["chart"],
+            &["judged", "series"],
             &["canvas"],
             &["sketch"],
             &["clock", "consistency", "delays", "foreign", "jitter", "position", "signals", "sky", "spectrum"],

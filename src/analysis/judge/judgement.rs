@@ -50,6 +50,50 @@ impl Status {
     }
 }
 
+/// What a figure is about: a report has a line for each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Group {
+    /// Limits of a user's file.
+    #[default]
+    Limits,
+    /// Satellites found and observed, fixes that are due.
+    Availability,
+    /// Loops, observables and cycle slips.
+    Tracking,
+    /// Navigation messages and false acquisitions.
+    Messages,
+    /// Position and velocity.
+    Position,
+    /// The receiver's clock.
+    Clock,
+    /// What the receiver states of its own errors.
+    Sigmas,
+    /// Level and spectrum of the samples.
+    Samples,
+    /// Interference and spoofing.
+    Interference,
+    /// Whether the tables are whole and agree.
+    Tables,
+}
+
+impl Group {
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Limits => "limits of the file",
+            Self::Availability => "satellites and availability",
+            Self::Tracking => "tracking and observables",
+            Self::Messages => "acquisition and messages",
+            Self::Position => "position and velocity",
+            Self::Clock => "clock",
+            Self::Sigmas => "stated sigmas",
+            Self::Samples => "samples",
+            Self::Interference => "interference and spoofing",
+            Self::Tables => "consistency of the tables",
+        }
+    }
+}
+
 /// One figure judged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Judgement {
@@ -67,6 +111,8 @@ pub struct Judgement {
     pub margin: Option<f64>,
     /// Status of the figure.
     pub status: Status,
+    /// Group of figures that it belongs to.
+    pub group: Group,
     /// Origin of the limit.
     pub source: String,
     /// Evidence behind the figure: satellites and times, hints.
@@ -94,7 +140,8 @@ impl Judgement {
             (true, false) => Status::Pass,
         };
         let (figure, unit, source) = (figure.to_owned(), unit.to_owned(), source.to_owned());
-        Self { figure, path: None, value, unit, bound, margin, status, source, why: Vec::new() }
+        let group = Group::default();
+        Self { figure, path: None, value, unit, bound, margin, status, group, source, why: Vec::new() }
     }
 
     pub(super) fn at(mut self, path: &str) -> Self {

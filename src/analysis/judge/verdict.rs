@@ -5,7 +5,7 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::judge::judgement::{Bound, Judgement, MARGINAL_SHARE, Status};
+use crate::judge::judgement::{Bound, Group, Judgement, MARGINAL_SHARE, Status};
 
 /// Every figure of a run that is judged.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -16,12 +16,32 @@ pub struct Verdict {
     pub of_user: usize,
     /// Figures that are not judged, each with the reason.
     pub not_judged: Vec<String>,
+    /// What the next rows are about.
+    group: Group,
 }
 
 impl Verdict {
     /// Number of judgements with a status.
     pub fn count(&self, status: Status) -> usize {
         self.rows.iter().filter(|row| row.status == status).count()
+    }
+
+    /// Groups in their order, each with how many of its figures passed, are marginal and failed.
+    pub fn groups(&self) -> Vec<(Group, [usize; 3])> {
+        let mut groups: Vec<Group> = self.rows.iter().map(|row| row.group).collect();
+        groups.sort_unstable();
+        groups.dedup();
+        let of = |group: Group, status: Status| {
+            self.rows.iter().filter(|row| row.group == group && row.status == status).count()
+        };
+        let counts = |group| [Status::Pass, Status::Marginal, Status::Fail].map(|status| of(group, status));
+        groups.into_iter().map(|group| (group, counts(group))).collect()
+    }
+
+    /// What the rows that follow are about.
+    pub(super) fn about(&mut self, group: Group) -> &mut Self {
+        self.group = group;
+        self
     }
 
     /// The worst status.
@@ -58,7 +78,18 @@ impl Verdict {
         source: &str,
     ) {
         let row = Judgement::new(figure, value.into(), unit, bound, MARGINAL_SHARE, source);
+        let row = Judgement { group: self.group_of(figure), ..row };
         self.rows.push(if path.is_empty() { row } else { row.at(path) });
+    }
+
+    /// Among errors of positions are those of clocks, and figures of what the receiver states of its errors.
+    fn group_of(&self, figure: &str) -> Group {
+        const STATED: [&str; 4] = ["sigma", "normalised", "formal", "dilutions and condition"];
+        match self.group {
+            Group::Position if STATED.iter().any(|word| figure.contains(word)) => Group::Sigmas,
+            Group::Position if figure.starts_with("clock") => Group::Clock,
+            group => group,
+        }
     }
 
     /// Says what is behind the row that was judged last.

@@ -1,4 +1,4 @@
-//! Files of a foreign receiver's judgement: tables, pictures and `foreign.json`.
+//! Files of a foreign receiver's judgement: tables, pictures, report and `foreign.json`.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use crate::judge::verdict::Verdict;
 use crate::show::plot;
 use crate::show::write::{write_rows, write_whole};
 
-/// Writes tables, verdict, pictures and `foreign.json` into an existing directory.
+/// Writes tables, verdict, pictures, `foreign_report.pdf` and `foreign.json` into an existing directory.
 ///
 /// # Errors
 /// The file that cannot be written or drawn.
@@ -24,7 +24,11 @@ pub fn write(judgement: &Judgement, verdict: &Verdict, out: &Path) -> Result<(),
         write_rows(&out.join("foreign_fixes.csv"), places.rows.iter())?;
     }
     write_rows(&out.join("foreign_verdict.csv"), verdict.csv_rows())?;
-    plot::foreign::all(out, judged)?;
+    let pictures = plot::foreign::all(out, judged)?;
+    #[cfg(feature = "pdf")]
+    crate::show::run_report::foreign::write(out, judgement, verdict, pictures)?;
+    #[cfg(not(feature = "pdf"))]
+    drop(pictures);
     let path = out.join("foreign.json");
     let mut json = serde_json::to_vec_pretty(&judgement.summary)
         .map_err(|source| JudgeError::Json { path: path.clone(), source })?;

@@ -235,19 +235,17 @@ fn chart(rows: &[TradeRow], group: &[usize]) -> Chart {
     let all = || front.iter().chain(&beaten);
     let (low, high) = all().fold((0.0_f64, 0.0_f64), |(low, high), (x, _)| (low.min(*x), high.max(*x)));
     let top = all().fold(0.0_f64, |top, (_, y)| top.max(*y));
-    let x = Axis::new("ns for a sample of a satellite, one core", (low - 0.12, high + 0.45));
-    let y = Axis::new("pseudorange error (m, rms)", (libm::log10(FLOOR_M) - 0.3, top + 0.4));
+    let x = Axis::new("time for a sample of a satellite, one core (ns)", (low - 0.12, high + 0.45)).logarithmic();
+    let words = format!("pseudorange error (m, rms); {FLOOR_M} stands for less");
+    let y = Axis::new(&words, (libm::log10(FLOOR_M) - 0.3, top + 0.4)).logarithmic();
     let limit = vec![(x.from, -1.0), (x.to, -1.0)];
-    let name = |value: f64| if value <= 1.5 * FLOOR_M { format!("≤ {FLOOR_M}") } else { format!("{value}") };
-    let ticks = |axis: &Axis| Some(axis.log_ticks(&[1.0, 2.0, 5.0], name));
-    let (x_ticks, y_ticks) = (ticks(&x), ticks(&y));
     let series = vec![
         Series::new("0.1 m", ORANGE, Mark::Dash, limit),
         Series::new("front", BLUE, Mark::Line, front.clone()),
         Series::new("on the Pareto front", BLUE, Mark::Balls, front),
         Series::new("dominated", GREY, Mark::Balls, beaten),
     ];
-    Chart { x_ticks, y_ticks, labels, ..Chart::new(title, x, y, series) }
+    Chart { labels, ..Chart::new(title, x, y, series) }
 }
 
 #[cfg(test)]

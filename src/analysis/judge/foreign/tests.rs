@@ -291,6 +291,9 @@ fn every_planted_bias_is_named_with_its_size() {
     ] {
         assert!(fs::metadata(place.path().join(name)).unwrap().len() > 50, "{name}");
     }
+    if cfg!(feature = "pdf") {
+        assert!(fs::read(place.path().join("foreign_report.pdf")).unwrap().starts_with(b"%PDF-"));
+    }
 }
 
 #[test]

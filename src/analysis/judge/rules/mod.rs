@@ -31,6 +31,7 @@ mod within;
 use crate::error::JudgeError;
 use crate::expect::due::Expectations;
 use crate::expect::due::receiver::Receiver;
+use crate::judge::judgement::Group;
 use crate::judge::summary::Summary;
 use crate::judge::verdict::Verdict;
 use crate::measure::errors::Errors;
@@ -46,25 +47,25 @@ impl Verdict {
     pub fn of(run: &Run, errors: &Errors, slips: &Slips, summary: &Summary) -> Result<Self, JudgeError> {
         let mut verdict = Self::default();
         let expected = Expectations::of(run, Receiver::of(run), run)?;
-        verdict.satellites(run, &expected)?;
+        verdict.about(Group::Availability).satellites(run, &expected)?;
         verdict.availability(run.scene.duration_s, &run.scene.expect, &expected, &Came::of(run)?);
         let receiver = expected.receiver.clone();
         // They have a row an epoch.
         drop(expected);
         verdict.own_fixes(run, &receiver)?;
-        verdict.values(run, errors, summary)?;
+        verdict.about(Group::Position).values(run, errors, summary)?;
         let places = errors.positions.map(|error| (error.time_s, error.enu_m.norm()))?;
         verdict.within(&run.scene.expect, places.into_iter());
-        verdict.tracking(run, summary);
+        verdict.about(Group::Tracking).tracking(run, summary);
         verdict.links(run, errors, summary)?;
         verdict.excused(run, errors)?;
         verdict.losses(run, &receiver, slips)?;
-        verdict.reception(summary);
-        verdict.cn0(run, summary);
-        verdict.spectrum(run)?;
-        verdict.interference(summary);
+        verdict.about(Group::Messages).reception(summary);
+        verdict.about(Group::Tracking).cn0(run, summary);
+        verdict.about(Group::Samples).spectrum(run)?;
+        verdict.about(Group::Interference).interference(summary);
         verdict.spoofing(run, summary)?;
-        verdict.tables(run, errors)?;
+        verdict.about(Group::Tables).tables(run, errors)?;
         verdict.hint(run);
         Ok(verdict)
     }

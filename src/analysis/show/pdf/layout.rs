@@ -195,6 +195,9 @@ pub(super) fn lay_out<'a>(report: &'a Report, fonts: &'a Fonts) -> Pages<'a> {
                 figures += 1;
                 figure(&mut sheet, drawing, figures, caption);
             }
+            Item::Pair(left, right) => {
+                pair(&mut sheet, [left, right], figures + 1);
+            }
             Item::Listing(text) => listing(&mut sheet, text),
         }
     }
@@ -301,6 +304,23 @@ fn figure<'a>(sheet: &mut Sheet<'a>, drawing: &'a Drawing, number: usize, captio
     sheet.skip(height + 2.0);
     sheet.labelled(&format!("Figure {number}."), caption);
     sheet.skip(14.0);
+}
+
+/// Two pictures of one height that fill the width together.
+fn pair<'a>(sheet: &mut Sheet<'a>, drawings: [&'a Drawing; 2], first: usize) {
+    const BETWEEN: f32 = 10.0;
+    let shapes = drawings.map(|drawing| drawing.width_px as f32 / drawing.height_px.max(1) as f32);
+    let height = (WIDTH - BETWEEN) / (shapes[0] + shapes[1]);
+    if sheet.room() < height && !sheet.is_fresh() {
+        sheet.new_page();
+    }
+    let (mut x, y) = (LEFT, sheet.y);
+    for (place, (drawing, shape)) in drawings.into_iter().zip(shapes).enumerate() {
+        let width = shape * height;
+        sheet.mark(Mark::Picture { x, y, width, height, number: first + place, drawing });
+        x += width + BETWEEN;
+    }
+    sheet.skip(height + 12.0);
 }
 
 fn listing(sheet: &mut Sheet<'_>, text: &str) {

@@ -128,6 +128,8 @@ pub enum Item {
     Table(Table),
     /// A picture as wide as the text, and its caption below.
     Figure(Drawing, String),
+    /// Two pictures side by side, without captions.
+    Pair(Drawing, Drawing),
     /// Lines as they are, in a font of equal widths.
     Listing(String),
     /// Page break.

@@ -11,9 +11,14 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use crate::error::JudgeError;
-pub use crate::show::plot::chart::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
-use crate::show::plot::chart::{LIGHT, drawn};
+use crate::show::plot::chart::LIGHT;
+pub use crate::show::plot::chart::{
+    Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Scale, Series, Shape, WIDTH_PX,
+};
+use crate::show::plot::clip::Frame;
 pub use crate::show::plot::drawing::{Area, Drawing, FINE, Failure};
+use crate::show::plot::series;
+use crate::show::plot::ticks::{Tick, Ticks};
 
 /// Draws charts, `columns` a row, with one legend below all of them, into a picture of that size: a PNG, or
 /// an SVG where the file is named so.
@@ -70,141 +75,230 @@ pub fn anchored(pixels: i32, horizontal: HPos, vertical: VPos) -> TextStyle<'sta
 /// Free space around a chart: plotters hangs an axis label on the very edge of its area.
 const EDGE_PX: i32 = 6;
 const LEFT_PX: i32 = 74;
-const RIGHT_PX: i32 = 16;
+const RIGHT_PX: i32 = 24;
 const TOP_PX: i32 = 26;
 const BOTTOM_PX: i32 = 38;
+/// From a name beside an axis to the outer edge, where the axis' words are.
+const WORDS_PX: i32 = 30;
+/// Size of a tick's label, and the smallest of a name.
+const LABEL_PX: i32 = 12;
+const LEAST_LABEL_PX: i32 = 6;
+/// From one label to the next at least.
+const APART_PX: i32 = 8;
+const TICK_PX: i32 = 5;
 
 /// Draws one chart into an area.
 pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
     let (width, height) = area.dim_in_pixel();
-    let title = anchored(14, HPos::Center, VPos::Center);
-    area.draw(&Text::new(chart.title.clone(), (width as i32 / 2, TOP_PX * FINE / 2), title))?;
+    let (width_px, height_px) = (width as i32 / FINE, height as i32 / FINE);
+    title(area, &chart.title, width)?;
     let (mut x, mut y) = (chart.x.clone(), chart.y.clone());
+    let left_px = left_of(area, &y)?.min(width_px / 2);
+    let across_px = (width_px - left_px - RIGHT_PX - EDGE_PX).max(1);
+    let up_px = (height_px - TOP_PX - BOTTOM_PX - EDGE_PX).max(1);
     if chart.equal {
-        let across = f64::from(width as i32 - (LEFT_PX + RIGHT_PX + EDGE_PX) * FINE).max(1.0);
-        let up = f64::from(height as i32 - (TOP_PX + BOTTOM_PX + EDGE_PX) * FINE).max(1.0);
-        let per_pixel = (x.span() / across).max(y.span() / up);
-        widen(&mut x, per_pixel * across);
-        widen(&mut y, per_pixel * up);
+        let per_pixel = (x.span() / f64::from(across_px)).max(y.span() / f64::from(up_px));
+        widen(&mut x, per_pixel * f64::from(across_px));
+        widen(&mut y, per_pixel * f64::from(up_px));
     }
+    let (across, across_label_px) = ticks_across(area, &x, (left_px + EDGE_PX, across_px, width_px))?;
+    let (up, up_label_px) = ticks_up(&y, up_px);
     let mut context = ChartBuilder::on(area)
         .margin_top(TOP_PX * FINE)
         .margin_right(RIGHT_PX * FINE)
         .margin_left(EDGE_PX * FINE)
         .margin_bottom(EDGE_PX * FINE)
-        .set_label_area_size(LabelAreaPosition::Left, LEFT_PX * FINE)
+        .set_label_area_size(LabelAreaPosition::Left, left_px * FINE)
         .set_label_area_size(LabelAreaPosition::Bottom, BOTTOM_PX * FINE)
         .build_cartesian_2d(x.from..x.to, y.from..y.to)?;
-    // As many as fit side by side, a digit being 7 pixels wide at most.
-    let finest = decimals(x.span(), 10);
-    let digits = [x.from, x.to].map(|end| tick(end, finest).len()).into_iter().max().unwrap_or(1);
-    let across_px = width as i32 / FINE - LEFT_PX - RIGHT_PX - EDGE_PX;
-    let x_labels = (across_px / (7 * digits as i32 + 12)).clamp(3, 10) as usize;
-    let y_labels = ((height as i32 / FINE - TOP_PX - BOTTOM_PX - EDGE_PX) / 18).clamp(4, 12) as usize;
-    let (x_decimals, y_decimals) = (decimals(x.span(), x_labels), decimals(y.span(), y_labels));
-    let (ticked, y_ticked) = (chart.x_ticks.is_some(), chart.y_ticks.is_some());
-    let mut mesh = context.configure_mesh();
-    if y_ticked {
-        mesh.disable_mesh();
-    }
-    mesh.light_line_style(TRANSPARENT)
-        .bold_line_style(LIGHT.stroke_width(FINE as u32))
+    context
+        .configure_mesh()
+        .disable_mesh()
         .axis_style(GREY.stroke_width(FINE as u32))
-        .set_all_tick_mark_size(if y_ticked { 0 } else { 5 * FINE })
-        .x_desc(x.label.clone())
-        .y_desc(y.label.clone())
+        .x_labels(0)
+        .y_labels(0)
+        .set_all_tick_mark_size(0)
+        .x_desc(words(&x, &across))
+        .y_desc(words(&y, &up))
         .axis_desc_style(font(13))
-        .label_style(font(12))
-        .x_labels(x_labels)
-        .y_labels(y_labels)
-        .x_label_formatter(&|value| if ticked { String::new() } else { tick(*value, x_decimals) })
-        .y_label_formatter(&|value| if y_ticked { String::new() } else { tick(*value, y_decimals) })
         .draw()?;
-    if let (Some(columns), Some(rows)) = (&chart.x_ticks, &chart.y_ticks) {
-        let across = rows.iter().map(|(at, _)| vec![(x.from, *at), (x.to, *at)]);
-        let up = columns.iter().map(|(at, _)| vec![(*at, y.from), (*at, y.to)]);
-        for line in across.chain(up) {
-            context.draw_series(LineSeries::new(line, LIGHT.stroke_width(FINE as u32)))?;
-        }
+    let (from_left, from_top) = area.get_base_pixel();
+    let at = |point: (f64, f64)| {
+        let (pixel_x, pixel_y) = context.plotting_area().map_coordinate(&point);
+        (pixel_x - from_left, pixel_y - from_top)
+    };
+    for Tick { at: place, label } in &across.ticks {
+        let (foot, head) = (at((*place, y.from)), at((*place, y.to)));
+        tick(area, [foot, head], (0, tick_px(&x)))?;
+        let style = anchored(across_label_px, HPos::Center, VPos::Top);
+        area.draw(&Text::new(label.clone(), (foot.0, foot.1 + 8 * FINE), style))?;
     }
+    for Tick { at: place, label } in &up.ticks {
+        let (foot, head) = (at((x.from, *place)), at((x.to, *place)));
+        tick(area, [foot, head], (-tick_px(&y), 0))?;
+        let style = anchored(up_label_px, HPos::Right, VPos::Center);
+        area.draw(&Text::new(label.clone(), (foot.0 - 8 * FINE, foot.1), style))?;
+    }
+    let corners = [(x.from, y.to), (x.from, y.from), (x.to, y.from)].map(at);
+    area.draw(&PathElement::new(corners, GREY.stroke_width(FINE as u32)))?;
+    let labels: Vec<((i32, i32), &str)> = chart
+        .labels
+        .iter()
+        .map(|(point, label, above_px)| {
+            let (x, y) = at(*point);
+            ((x - 2 * FINE, y - above_px * FINE), label.as_str())
+        })
+        .collect();
+    let middle = at((0.5 * (x.from + x.to), 0.5 * (y.from + y.to)));
+    let frame = Frame::new(x.ends(), y.ends());
     for series in &chart.series {
-        draw_series(&mut context, series)?;
+        series::draw(&mut context, &frame, series)?;
     }
-    let bottom = height as i32 - (BOTTOM_PX + EDGE_PX - 7) * FINE;
-    let (left, top) = area.get_base_pixel();
-    // As large as fits side by side: a digit is about 0.56 of its size wide, a gap half of that.
-    let longest = chart.x_ticks.iter().flatten().map(|(_, label)| label.len()).max().unwrap_or(1);
-    let each_px = f64::from(across_px) / chart.x_ticks.as_ref().map_or(1, Vec::len).max(1) as f64;
-    let tick_px = (each_px / (0.56 * (longest as f64 + 0.5))).clamp(6.0, 11.0) as i32;
-    for (at, label) in chart.x_ticks.iter().flatten() {
-        let (pixel, _) = context.plotting_area().map_coordinate(&(*at, y.from));
-        let style = anchored(tick_px, HPos::Center, VPos::Top);
-        area.draw(&Text::new(label.clone(), (pixel - left, bottom), style))?;
+    for (place, label) in labels {
+        area.draw(&Text::new(label.to_owned(), place, anchored(11, HPos::Left, VPos::Center)))?;
     }
-    for (at, label) in chart.y_ticks.iter().flatten() {
-        let (pixel_x, pixel_y) = context.plotting_area().map_coordinate(&(x.from, *at));
-        let style = anchored(11, HPos::Right, VPos::Center);
-        area.draw(&Text::new(label.clone(), (pixel_x - left - 8 * FINE, pixel_y - top), style))?;
-    }
-    for (at, label, above_px) in &chart.labels {
-        let (pixel_x, pixel_y) = context.plotting_area().map_coordinate(at);
-        let style = anchored(11, HPos::Left, VPos::Center);
-        area.draw(&Text::new(label.clone(), (pixel_x - left - 2 * FINE, pixel_y - top - above_px * FINE), style))?;
+    if chart.series.iter().all(|series| series.points.is_empty()) {
+        let style = anchored(13, HPos::Center, VPos::Center).color(&GREY);
+        area.draw(&Text::new("no data", middle, style))?;
     }
     Ok(())
 }
 
-type Context<'a, 'b> = ChartContext<
-    'a,
-    SVGBackend<'b>,
-    Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>,
->;
+/// Words beside an axis, with what its labels count from.
+fn words(axis: &Axis, ticks: &Ticks) -> String {
+    match &ticks.offset {
+        Some(offset) => format!("{}, counted from {offset}", axis.label),
+        None => axis.label.clone(),
+    }
+}
 
-fn draw_series(context: &mut Context<'_, '_>, series: &Series) -> Result<(), Failure> {
-    let points = drawn(series);
-    let line = series.colour.stroke_width(3 * FINE as u32 / 2);
-    match series.mark {
-        Mark::Line => {
-            context.draw_series(LineSeries::new(points, line))?;
+/// Length of an axis' ticks; names have none.
+fn tick_px(axis: &Axis) -> i32 {
+    if matches!(axis.scale, Scale::Named(_)) { 0 } else { TICK_PX }
+}
+
+/// A line of the grid from its foot on, and a tick outward from there, in pixels.
+fn tick(area: &Area<'_>, [foot, head]: [(i32, i32); 2], (x_px, y_px): (i32, i32)) -> Result<(), Failure> {
+    area.draw(&PathElement::new([foot, head], LIGHT.stroke_width(FINE as u32)))?;
+    let end = (foot.0 + x_px * FINE, foot.1 + y_px * FINE);
+    area.draw(&PathElement::new([foot, end], GREY.stroke_width(FINE as u32)))?;
+    Ok(())
+}
+
+/// Words above a chart, as large as fits.
+fn title(area: &Area<'_>, words: &str, width: u32) -> Result<(), Failure> {
+    let room = width.saturating_sub(2 * (EDGE_PX * FINE) as u32);
+    let (wide, _) = area.estimate_text_size(words, &font(14))?;
+    let pixels = if wide > room { (14 * room / wide.max(1)).max(LEAST_LABEL_PX as u32 + 2) as i32 } else { 14 };
+    let style = anchored(pixels, HPos::Center, VPos::Center);
+    area.draw(&Text::new(words.to_owned(), (width as i32 / 2, TOP_PX * FINE / 2), style))?;
+    Ok(())
+}
+
+fn width_px(area: &Area<'_>, text: &str, size_px: i32) -> Result<f64, Failure> {
+    let (fine_px, _) = area.estimate_text_size(text, &font(size_px))?;
+    Ok(f64::from(fine_px) / f64::from(FINE))
+}
+
+/// Width of the labels beside an axis with the axis' words; names have what they need.
+fn left_of(area: &Area<'_>, y: &Axis) -> Result<i32, Failure> {
+    let Scale::Named(names) = &y.scale else { return Ok(LEFT_PX) };
+    let mut widest = 0.0_f64;
+    for (_, name) in names {
+        widest = widest.max(width_px(area, name, 11)?);
+    }
+    Ok((libm::ceil(widest) as i32 + WORDS_PX).max(LEFT_PX))
+}
+
+/// Ticks along an axis of that left end and length, as many as fit beside each other, and the size of their
+/// labels; names become smaller where they would overlap.
+fn ticks_across(
+    area: &Area<'_>,
+    x: &Axis,
+    (left_px, across_px, width_px): (i32, i32, i32),
+) -> Result<(Ticks, i32), Failure> {
+    let per_unit = f64::from(across_px) / x.span();
+    let place = |tick: &Tick| f64::from(left_px) + (tick.at - x.from) * per_unit;
+    // Whether no label touches the next one or the edge.
+    let fits = |ticks: &[Tick], size_px: i32, apart_px: f64| {
+        let mut free_from = 0.0;
+        for tick in ticks {
+            let half = 0.5 * self::width_px(area, &tick.label, size_px)?;
+            if place(tick) - half < free_from || place(tick) + half > f64::from(width_px) {
+                return Ok(false);
+            }
+            free_from = place(tick) + half + apart_px;
         }
-        Mark::Dash => {
-            context.draw_series(DashedLineSeries::new(points, 7 * FINE, 5 * FINE, line))?;
+        Ok::<_, Failure>(true)
+    };
+    if matches!(x.scale, Scale::Named(_)) {
+        let names = x.ticks(0);
+        for size_px in (LEAST_LABEL_PX..=LABEL_PX - 1).rev() {
+            if fits(&names.ticks, size_px, 0.3 * f64::from(size_px))? {
+                return Ok((names, size_px));
+            }
         }
-        Mark::Dots => {
-            let dot = |point| Circle::new(point, 3 * FINE / 2, series.colour.mix(0.75).filled());
-            context.draw_series(points.into_iter().map(dot))?;
+        return Ok((names, LEAST_LABEL_PX));
+    }
+    for most in (2..=10).rev() {
+        let mut ticks = x.ticks(most);
+        for outside in [ticks.ticks.len().wrapping_sub(1), 0] {
+            // A label at an end gives way where others stay.
+            if ticks.ticks.len() > 2
+                && let Some(end) = ticks.ticks.get(outside)
+                && !fits(std::slice::from_ref(end), LABEL_PX, 0.0)?
+            {
+                ticks.ticks.remove(outside);
+            }
         }
-        Mark::Balls => {
-            let ball = |point| Circle::new(point, 4 * FINE, series.colour.filled());
-            context.draw_series(points.into_iter().map(ball))?;
-        }
-        Mark::Rings => {
-            let ring = |point| Circle::new(point, 3 * FINE / 2, series.colour.stroke_width(FINE as u32 * 3 / 4));
-            context.draw_series(points.into_iter().map(ring))?;
-        }
-        Mark::Cross => {
-            let cross =
-                |point| plotters::element::Cross::new(point, 7 * FINE, series.colour.stroke_width(2 * FINE as u32));
-            context.draw_series(points.into_iter().map(cross))?;
-        }
-        Mark::Bars(width) => {
-            let bar = |&(x, y): &(f64, f64)| {
-                Rectangle::new([(x - width / 2.0, 0.0), (x + width / 2.0, y)], series.colour.filled())
-            };
-            context.draw_series(series.points.iter().map(bar))?;
-        }
-        Mark::Band if points.len() < 3 => {}
-        Mark::Band => {
-            let inside = Polygon::new(points, series.colour.mix(0.2).filled());
-            context.draw_series(std::iter::once(inside))?;
-        }
-        Mark::Tile(width, height) => {
-            let (w, h) = (width / 2.0, height / 2.0);
-            let tile = |&(x, y): &(f64, f64)| Rectangle::new([(x - w, y - h), (x + w, y + h)], series.colour.filled());
-            context.draw_series(series.points.iter().map(tile))?;
+        if ticks.ticks.len() >= 2 && fits(&ticks.ticks, LABEL_PX, f64::from(APART_PX))? {
+            return Ok((ticks, LABEL_PX));
         }
     }
-    Ok(())
+    // Of a few ticks that are too near each other the two that are furthest apart.
+    let few = x.ticks(2);
+    let count = few.ticks.len();
+    let mut pairs: Vec<(usize, usize)> = (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b))).collect();
+    pairs.sort_by_key(|(a, b)| count + a - b);
+    let pair =
+        |(a, b): (usize, usize)| -> Vec<Tick> { [a, b].iter().filter_map(|n| few.ticks.get(*n).cloned()).collect() };
+    for size_px in [LABEL_PX, LEAST_LABEL_PX + 2] {
+        for places in &pairs {
+            let ticks = pair(*places);
+            if fits(&ticks, size_px, 0.3 * f64::from(size_px))? {
+                return Ok((Ticks { ticks, offset: few.offset.clone() }, size_px));
+            }
+        }
+    }
+    Ok((few, LEAST_LABEL_PX))
+}
+
+/// Ticks up an axis of that length, as many as fit above each other, and the size of their labels.
+fn ticks_up(y: &Axis, up_px: i32) -> (Ticks, i32) {
+    let per_unit = f64::from(up_px) / y.span();
+    let apart_px = |ticks: &[Tick]| {
+        let steps = ticks.windows(2).map(|pair| match pair {
+            [low, high] => (high.at - low.at).abs() * per_unit,
+            _ => f64::INFINITY,
+        });
+        steps.fold(f64::INFINITY, f64::min)
+    };
+    if matches!(y.scale, Scale::Named(_)) {
+        let names = y.ticks(0);
+        let size_px = (apart_px(&names.ticks) / 1.2).clamp(f64::from(LEAST_LABEL_PX), 11.0) as i32;
+        return (names, size_px);
+    }
+    let mut all = (2..=(up_px / 18).clamp(2, 12) as usize).rev().map(|most| y.ticks(most));
+    let fitting = all.find(|ticks| apart_px(&ticks.ticks) >= f64::from(LABEL_PX));
+    let ends = || {
+        let mut few = y.ticks(2);
+        let last = few.ticks.len().saturating_sub(1);
+        if last > 1 {
+            few.ticks.drain(1..last);
+        }
+        few
+    };
+    (fitting.unwrap_or_else(ends), LABEL_PX)
 }
 
 const LEGEND_ROW_PX: i32 = 20;
@@ -242,6 +336,13 @@ fn draw_entry(area: &Area<'_>, x_px: i32, y_px: i32, series: &Series) -> Result<
             area.draw(&PathElement::new([(x, y), (x + 7 * FINE, y)], thick))?;
             area.draw(&PathElement::new([(end - 7 * FINE, y), (end, y)], thick))?;
         }
+        Mark::Dashes(on_px, off_px) => {
+            let starts = (x..end).step_by(((on_px + off_px) * FINE).max(1) as usize);
+            for start in starts {
+                area.draw(&PathElement::new([(start, y), ((start + on_px * FINE).min(end), y)], thick))?;
+            }
+        }
+        Mark::Small(shape) | Mark::Large(shape) => series::outline(area, middle, (shape, 9 * FINE / 2), series.colour)?,
         Mark::Dots | Mark::Balls => area.draw(&Circle::new(middle, 4 * FINE, series.colour.filled()))?,
         Mark::Rings => area.draw(&Circle::new(middle, 4 * FINE, thick))?,
         Mark::Cross => area.draw(&plotters::element::Cross::new(middle, 5 * FINE, thick))?,
@@ -263,30 +364,5 @@ fn widen(axis: &mut Axis, span: f64) {
     (axis.from, axis.to) = (middle - span / 2.0, middle + span / 2.0);
 }
 
-/// Decimals that distinguish neighbouring ticks of an axis.
-fn decimals(span: f64, labels: usize) -> usize {
-    // Labels are 1, 2 or 5 times a power of ten apart, so that there are no more than wanted.
-    let least = span / labels as f64;
-    let power = libm::pow(10.0, libm::floor(libm::log10(least)));
-    let apart = [1.0, 2.0, 5.0, 10.0].map(|times| times * power).into_iter().find(|apart| *apart > 0.999 * least);
-    libm::ceil(-libm::log10(apart.unwrap_or(power)) - 1e-6).clamp(0.0, 12.0) as usize
-}
-
-fn tick(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    // A zero that rounding left negative.
-    if text.trim_start_matches('-').bytes().all(|b| matches!(b, b'0' | b'.')) { text.replace('-', "") } else { text }
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ticks_have_as_many_decimals_as_tell_them_apart() {
-        assert_eq!((decimals(60.0, 10), decimals(4.0, 10), decimals(0.03, 5)), (0, 1, 2));
-        // Four and a half units in twelve labels are half a unit apart, in five a whole one.
-        assert_eq!((decimals(4.5, 12), decimals(4.5, 5)), (1, 0));
-        assert_eq!((tick(-0.0, 1), tick(-0.04, 1), tick(-1.0, 0)), ("0.0".into(), "0.0".into(), "-1".into()));
-    }
-}
+mod tests;

@@ -2,51 +2,17 @@
 
 use plotters::style::RGBColor;
 
+use super::clip::Frame;
+use super::marks;
+pub(super) use super::marks::LIGHT;
+pub use super::marks::{BLUE, COLOURS, GREEN, GREY, Mark, ORANGE, Shape};
+use super::ticks::{self, LEAST_SHARE, Tick, Ticks};
+
+/// Part of a receiver's bounds that an axis has room for: those of the first fixes would hide the errors.
+pub(super) const SHOWN_BOUNDS: f64 = 0.98;
+
 /// Width of a picture that fills a page's text width.
 pub const WIDTH_PX: u32 = 680;
-
-/// Colours that colour-blind people distinguish (Okabe and Ito 2008), without its yellow, too pale on white.
-pub const COLOURS: [RGBColor; 7] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(230, 159, 0),
-    RGBColor(86, 180, 233),
-    RGBColor(0, 0, 0),
-];
-/// The first colour, of estimates.
-pub const BLUE: RGBColor = COLOURS[0];
-/// The second colour, of limits and of what is to be noticed.
-pub const ORANGE: RGBColor = COLOURS[1];
-/// The third colour, of the truth and of theory.
-pub const GREEN: RGBColor = COLOURS[2];
-/// Colour of the background's elements.
-pub const GREY: RGBColor = RGBColor(120, 120, 120);
-pub(super) const LIGHT: RGBColor = RGBColor(225, 225, 225);
-
-/// Form of a series' points.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Mark {
-    /// A solid line through the points.
-    Line,
-    /// A thin dashed line.
-    Dash,
-    /// Small filled dots.
-    Dots,
-    /// Hollow dots.
-    Rings,
-    /// A larger cross.
-    Cross,
-    /// Larger dots.
-    Balls,
-    /// Bars from zero, of that width in data units.
-    Bars(f64),
-    /// The area inside the points, pale.
-    Band,
-    /// Filled rectangles about the points, of that width and height in data units.
-    Tile(f64, f64),
-}
 
 /// Points in data units and how they look.
 #[derive(Clone, Debug)]
@@ -67,12 +33,35 @@ impl Series {
         Self { name: name.into(), colour, mark, points }
     }
 
-    /// A series of a satellite: colours first, then the same colours hollow.
+    /// Small marks of one of many series, which differ from those of every other number.
     pub fn numbered(name: String, index: usize, points: Vec<(f64, f64)>) -> Self {
-        let colour = COLOURS[index % COLOURS.len()];
-        let mark = if (index / COLOURS.len()).is_multiple_of(2) { Mark::Dots } else { Mark::Rings };
+        let (colour, mark) = marks::numbered(index);
         Self { name, colour, mark, points }
     }
+
+    /// Large marks of one of many series, which differ from those of every other number.
+    pub fn large(name: String, index: usize, points: Vec<(f64, f64)>) -> Self {
+        let (colour, mark) = marks::large(index);
+        Self { name, colour, mark, points }
+    }
+
+    /// A line that is one of many, in a colour and a pattern of its own.
+    pub fn lined(name: String, index: usize, points: Vec<(f64, f64)>) -> Self {
+        let (colour, mark) = marks::lined(index);
+        Self { name, colour, mark, points }
+    }
+}
+
+/// How the numbers of an axis are meant.
+#[derive(Clone, Debug, Default)]
+pub enum Scale {
+    /// As they are.
+    #[default]
+    Linear,
+    /// As common logarithms of what is written at the ticks.
+    Logarithmic,
+    /// As places of names.
+    Named(Vec<(f64, String)>),
 }
 
 /// An axis in data units.
@@ -84,14 +73,22 @@ pub struct Axis {
     pub from: f64,
     /// Upper end.
     pub to: f64,
+    /// What its numbers are.
+    pub scale: Scale,
 }
 
 impl Axis {
-    /// An axis from one value to another. If they are equal, it extends half a unit about the first.
+    /// An axis from one value to another. If they are equal, it extends to either side of them.
     pub fn new(label: &str, (from, to): (f64, f64)) -> Self {
-        // plotters needs a range with a length.
-        let (from, to) = if from < to { (from, to) } else { (from - 0.5, from + 0.5) };
-        Self { label: label.to_owned(), from, to }
+        // Ticks need a range with a length.
+        let (from, to) = if from.is_finite() && to.is_finite() { (from, to) } else { (0.0, 1.0) };
+        let least = (LEAST_SHARE * from.abs().max(to.abs())).max(f64::MIN_POSITIVE * 1e12);
+        let (from, to) = match to - from > least {
+            true => (from, to),
+            false if from < to => (from - least, from + least),
+            false => (from - least.max(0.5), from + least.max(0.5)),
+        };
+        Self { label: label.to_owned(), from, to, scale: Scale::Linear }
     }
 
     /// An axis around every finite value, with a margin, not shorter than `least`.
@@ -105,17 +102,39 @@ impl Axis {
         Self::new(label, (middle - half, middle + half))
     }
 
-    /// Marks of an axis of common logarithms: these multiples of every power of ten, as `name` writes them.
-    pub fn log_ticks(&self, multiples: &[f64], name: impl Fn(f64) -> String) -> Vec<(f64, String)> {
-        let decades = self.from.floor() as i32..=self.to.ceil() as i32;
-        let value = |decade: i32, multiple: f64| {
-            // Powers of ten from 1 up are exact, their inverses are not.
-            if decade < 0 { multiple / 10_f64.powi(-decade) } else { multiple * 10_f64.powi(decade) }
-        };
-        let values = decades.flat_map(|decade| multiples.iter().map(move |multiple| value(decade, *multiple)));
-        let placed = values.map(|value| (libm::log10(value), value));
-        let shown = placed.filter(|(place, _)| (self.from..=self.to).contains(place));
-        shown.map(|(place, value)| (place, name(value))).collect()
+    /// The same, its numbers being common logarithms; it is a thousandth of a decade long at least.
+    #[must_use]
+    pub fn logarithmic(self) -> Self {
+        let (from, to) = (self.from.clamp(-300.0, 300.0), self.to.clamp(-300.0, 300.0));
+        let short = (0.5e-3 - 0.5 * (to - from)).max(0.0);
+        Self { scale: Scale::Logarithmic, from: from - short, to: to + short, ..self }
+    }
+
+    /// The same with names in place of numbers.
+    #[must_use]
+    pub fn named(self, names: Vec<(f64, String)>) -> Self {
+        Self { scale: Scale::Named(names), ..self }
+    }
+
+    /// Its ticks, `most` of them at most where that leaves two; names are all ticks.
+    pub fn ticks(&self, most: usize) -> Ticks {
+        match &self.scale {
+            Scale::Linear => ticks::linear(self.from, self.to, most),
+            Scale::Logarithmic => ticks::logarithmic(self.from, self.to, most),
+            Scale::Named(names) => {
+                let tick = |(at, label): &(f64, String)| Tick { at: *at, label: label.clone() };
+                Ticks { ticks: names.iter().map(tick).collect(), offset: None }
+            }
+        }
+    }
+
+    pub(super) fn ends(&self) -> (f64, f64) {
+        (self.from, self.to)
+    }
+
+    /// Whether a value lies between its ends.
+    pub fn holds(&self, value: f64) -> bool {
+        (self.from..=self.to).contains(&value)
     }
 
     pub(super) fn span(&self) -> f64 {
@@ -136,18 +155,25 @@ pub struct Chart {
     pub series: Vec<Series>,
     /// One metre is as long up as across.
     pub equal: bool,
-    /// Labels under the x axis in place of numbers.
-    pub x_ticks: Option<Vec<(f64, String)>>,
-    /// Labels beside the y axis in place of numbers; the grid then follows both lists.
-    pub y_ticks: Option<Vec<(f64, String)>>,
     /// Words at points, so many pixels above them.
     pub labels: Vec<((f64, f64), String, i32)>,
 }
 
 impl Chart {
+    /// Whether something with the look of this entry of a legend is drawn in it.
+    pub fn shows(&self, entry: &Series) -> bool {
+        let frame = Frame::new(self.x.ends(), self.y.ends());
+        let alike = |series: &&Series| series.colour == entry.colour && series.mark.is_like(entry.mark);
+        self.series.iter().filter(alike).any(|series| match series.mark {
+            mark if mark.is_line() => !frame.pieces(&series.points).is_empty(),
+            Mark::Bars(_) | Mark::Band | Mark::Tile(..) => !series.points.is_empty(),
+            _ => series.points.iter().any(|point| frame.holds(*point)),
+        })
+    }
+
     /// Axes with series, without labels of its own.
     pub fn new(title: impl Into<String>, x: Axis, y: Axis, series: Vec<Series>) -> Self {
-        Self { title: title.into(), x, y, series, equal: false, x_ticks: None, y_ticks: None, labels: Vec::new() }
+        Self { title: title.into(), x, y, series, equal: false, labels: Vec::new() }
     }
 }
 
@@ -167,8 +193,21 @@ impl Series {
 }
 
 impl Mark {
+    /// Whether a legend shows both alike.
+    fn is_like(self, other: Self) -> bool {
+        match (self, other) {
+            (Self::Bars(_), Self::Bars(_)) | (Self::Tile(..), Self::Tile(..)) => true,
+            _ => self == other,
+        }
+    }
+
+    /// Whether it joins its points.
+    pub(super) fn is_line(self) -> bool {
+        matches!(self, Self::Line | Self::Dash | Self::Dashes(..))
+    }
+
     fn is_cloud(self) -> bool {
-        matches!(self, Self::Dots | Self::Rings)
+        matches!(self, Self::Dots | Self::Rings | Self::Small(_))
     }
 
     /// Points with which a series of it is drawn where so many series of marks share a chart.
@@ -278,7 +317,7 @@ struct Thinner {
 impl Thinner {
     /// A thinner for `count` finite points.
     fn new(mark: Mark, most: usize, count: usize) -> Self {
-        let is_line = matches!(mark, Mark::Line | Mark::Dash) && count > most;
+        let is_line = mark.is_line() && count > most;
         let run = match count <= most {
             true => 1,
             false if is_line => count.div_ceil(most / 2),

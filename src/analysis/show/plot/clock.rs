@@ -95,10 +95,7 @@ impl Curves<'_> {
         let all = || series.iter().flat_map(|series| series.points.iter());
         let x = log_axis("averaging time (s)", all().map(|point| point.0));
         let y = log_axis(label, all().map(|point| point.1));
-        let few = if y.to - y.from > 3.0 { &[1.0][..] } else { &[1.0, 2.0, 5.0] };
-        let x_ticks = Some(x.log_ticks(&[1.0, 2.0, 5.0], |value| value.to_string()));
-        let y_ticks = Some(y.log_ticks(few, |value| format!("{value:e}")));
-        Chart { x_ticks, y_ticks, ..Chart::new(title, x, y, series) }
+        Chart::new(title, x, y, series)
     }
 
     fn points(&self, of: Of) -> &[Point] {
@@ -152,5 +149,5 @@ fn log((x, y): (f64, f64)) -> (f64, f64) {
 
 /// An axis around common logarithms, at least half a decade long.
 fn log_axis(label: &str, values: impl Iterator<Item = f64>) -> Axis {
-    Axis::around(label, values, 0.5)
+    Axis::around(label, values, 0.5).logarithmic()
 }

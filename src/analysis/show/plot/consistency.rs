@@ -3,9 +3,10 @@
 use crate::error::JudgeError;
 use crate::measure::consistency::{FREEDOM, NormalisedError};
 use crate::show::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
-use crate::show::plot::chart::{Ends, Shown};
+use crate::show::plot::chart::{Ends, SHOWN_BOUNDS, Shown};
 use crate::show::plot::judged::Judged;
 use crate::show::plot::sketch::Sketch;
+use crate::statistics::percentile;
 
 /// Draws them.
 pub fn consistency(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
@@ -27,7 +28,10 @@ pub fn consistency(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         let error = over(Mark::Dots, &error)?;
         let above = over(Mark::Line, &|row| 2.0 * sigma(row))?;
         let below = over(Mark::Line, &|row| -2.0 * sigma(row))?;
-        let y = Axis::around("error (m)", error.y.with(above.y).with(below.y).values(), 0.2);
+        let mut all = Vec::new();
+        found.rows.each(|row| all.push(2.0 * sigma(&row)))?;
+        let most = percentile(&all, SHOWN_BOUNDS).unwrap_or(0.0);
+        let y = Axis::around("error (m)", error.y.values().chain([-most, most]), 0.2);
         let series = vec![
             Series::new("error", BLUE, Mark::Dots, error.points),
             Series::new("formal ±2σ", ORANGE, Mark::Line, above.points),

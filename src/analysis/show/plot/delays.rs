@@ -2,12 +2,11 @@
 
 use crate::error::JudgeError;
 use crate::read::Emission;
-use crate::show::plot::canvas::{Axis, COLOURS, Chart, Mark, Series, WIDTH_PX};
+use crate::show::plot::canvas::{Axis, Chart, Series, WIDTH_PX};
 use crate::show::plot::chart::{Ends, Shown};
 use crate::show::plot::judged::Judged;
 use crate::show::plot::sketch::Sketch;
 use gnss::record::SkyRow;
-use gnss::satellite::Sv;
 
 /// Slant delays over time, satellite by satellite: ionosphere above, troposphere below.
 pub fn delays(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
@@ -16,7 +15,7 @@ pub fn delays(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         let (mut series, mut ends, mut times) = (Vec::new(), Ends::none(), Ends::none());
         ends.add(0.0);
         for (index, sv) in run.in_the_sky().into_iter().enumerate() {
-            let mut one = line(sv, index, Vec::new());
+            let mut one = Series::lined(sv.to_string(), index, Vec::new());
             let shown = Shown::of(one.mark, |see| {
                 run.seen(sv, |row| see(run.time_s(row.sample), of(&row))).map(|_: Vec<()>| ())
             })?;
@@ -34,14 +33,11 @@ pub fn delays(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         chart(&format!("Ionosphere{on}, as it is"), |row| row.ionosphere_m)?,
         chart("Troposphere, as it is", |row| row.troposphere_m)?,
     ];
-    let names: Vec<Series> =
-        run.in_the_sky().into_iter().enumerate().map(|(index, sv)| line(sv, index, Vec::new())).collect();
+    let names: Vec<Series> = run
+        .in_the_sky()
+        .into_iter()
+        .enumerate()
+        .map(|(index, sv)| Series::lined(sv.to_string(), index, Vec::new()))
+        .collect();
     Ok(Some(Sketch::charts((WIDTH_PX, 340), 2, charts, names)))
-}
-
-/// A satellite's line, dashed once the colours begin again.
-fn line(sv: Sv, index: usize, points: Vec<(f64, f64)>) -> Series {
-    let mut series = Series::numbered(sv.to_string(), index, points);
-    series.mark = if (index / COLOURS.len()).is_multiple_of(2) { Mark::Line } else { Mark::Dash };
-    series
 }

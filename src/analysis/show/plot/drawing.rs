@@ -20,6 +20,8 @@ use crate::error::JudgeError;
 
 /// Virtual pixels in one pixel of the picture.
 pub const FINE: i32 = 4;
+/// Pixels of a run's PNG in one pixel of the picture.
+pub(crate) const PNG_SCALE: f32 = 2.0;
 /// A picture is rasterised so many rows at a time: one of many signals is 8000 high, which would take more
 /// memory than all that it was drawn from.
 const BAND_ROWS: u32 = 2048;
@@ -64,7 +66,7 @@ impl Drawing {
             draw(&area)?;
             area.present()?;
         }
-        Ok(Self { svg: with_dots_joined(&svg), width_px, height_px })
+        Ok(Self { svg: with_shapes_joined(&with_dots_joined(&svg)), width_px, height_px })
     }
 
     /// The picture as usvg reads it, its text in the bundled font.
@@ -148,6 +150,46 @@ fn with_dots_joined(svg: &str) -> String {
     }
     join(&run, &mut joined);
     joined
+}
+
+/// Joins opaque polygons, and lines, of the same look that follow each other into one path.
+fn with_shapes_joined(svg: &str) -> String {
+    let mut joined = String::with_capacity(svg.len());
+    let mut run: Vec<(&str, &str, &str)> = Vec::new();
+    let flush = |run: &mut Vec<(&str, &str, &str)>, joined: &mut String| {
+        match run.as_slice() {
+            [] => {}
+            [(_, _, line)] => joined.extend([line, "\n"]),
+            [(look, ..), ..] => {
+                let (tag, attributes) = look.split_once(' ').unwrap_or((look, ""));
+                let close = if tag == "<polygon" { "Z" } else { "" };
+                joined.extend(["<path ", attributes, " d=\""]);
+                run.iter().for_each(|(_, points, _)| joined.extend(["M", points, close]));
+                joined.push_str("\"/>\n");
+            }
+        }
+        run.clear();
+    };
+    for line in svg.lines() {
+        let shape = shape(line);
+        if shape.map(|(look, _)| look) != run.first().map(|(look, ..)| *look) {
+            flush(&mut run, &mut joined);
+        }
+        match shape {
+            Some((look, points)) => run.push((look, points, line)),
+            None => joined.extend([line, "\n"]),
+        }
+    }
+    flush(&mut run, &mut joined);
+    joined
+}
+
+/// Look and points of an opaque polygon or line as plotters writes it.
+fn shape(line: &str) -> Option<(&str, &str)> {
+    let (look, rest) = line.split_once(" points=\"")?;
+    let is_shape = look.starts_with("<polygon ") || look.starts_with("<polyline ");
+    let points = rest.split_once("\"/>")?.0.trim_end();
+    (is_shape && look.contains("opacity=\"1\"")).then_some((look, points))
 }
 
 /// Writes circles of one look as one path, or as they are.
@@ -263,6 +305,31 @@ mod tests {
         let differing = one.data().iter().zip(other.data()).filter(|pair| differ(*pair)).count();
         // Two ways of flattening the same circle differ on edges, by less than a quarter of a shade.
         assert_eq!(differing, 0);
+        assert!(one.data().iter().filter(|value| **value < 128).count() > 1000, "nothing was drawn");
+    }
+
+    #[test]
+    fn joined_shapes_are_one_path_and_look_the_same() {
+        let mut apart = String::new();
+        let area = SVGBackend::with_string(&mut apart, (400, 400)).into_drawing_area();
+        area.fill(&WHITE).unwrap();
+        for n in 0..9 {
+            let (x, y) = (20 + 40 * n, 60);
+            area.draw(&Polygon::new(vec![(x, y - 9), (x + 8, y + 6), (x - 8, y + 6)], BLUE.filled())).unwrap();
+        }
+        for n in 0..9 {
+            let (x, y) = (20 + 40 * n, 200);
+            area.draw(&PathElement::new([(x - 8, y - 8), (x + 8, y + 8)], RED.stroke_width(3))).unwrap();
+        }
+        area.present().unwrap();
+        drop(area);
+        let joined = with_shapes_joined(&apart);
+        assert_eq!((apart.matches("points=").count(), joined.matches("<path").count()), (18, 2));
+        assert!(!joined.contains("points="));
+        let render = |svg: &str| Drawing { svg: svg.to_owned(), width_px: 100, height_px: 100 }.png(4.0).unwrap();
+        let pixels = |svg: &str| tiny_skia::Pixmap::decode_png(&render(svg)).unwrap();
+        let (one, other) = (pixels(&apart), pixels(&joined));
+        assert_eq!(one.data(), other.data());
         assert!(one.data().iter().filter(|value| **value < 128).count() > 1000, "nothing was drawn");
     }
 

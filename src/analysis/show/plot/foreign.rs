@@ -1,4 +1,4 @@
-//! A foreign receiver's errors: observables and clock, and positions.
+//! A foreign receiver's errors: observables and clock, and positions, in the style of a run's pictures.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,21 +6,41 @@ use std::path::Path;
 use crate::error::JudgeError;
 use crate::judge::foreign::Judged;
 use crate::judge::foreign::measured::ObservationError;
-use crate::show::plot::canvas::{Axis, BLUE, Chart, GREEN, GREY, Mark, ORANGE, Series, figure};
+use crate::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::show::plot::drawing::{Drawing, Failure, PNG_SCALE};
+use crate::show::plot::sketch::Sketch;
 use crate::statistics::{mean, percentile};
 
 type Points = Vec<(f64, f64)>;
 
-/// Draws what there is to draw into a directory.
-pub(crate) fn all(directory: &Path, judged: &Judged) -> Result<(), JudgeError> {
-    if judged.observables.is_some() {
-        observables(&directory.join("foreign_observables.png"), judged)?;
-    }
-    if judged.places.is_some() {
-        position(&directory.join("foreign_position.png"), judged)?;
-    }
-    Ok(())
+/// A picture with the words below it.
+#[cfg_attr(not(feature = "pdf"), allow(dead_code, reason = "they are for paper"))]
+pub(crate) struct Picture {
+    pub caption: &'static str,
+    pub drawing: Drawing,
 }
+
+/// Draws what there is to draw into a directory.
+pub(crate) fn all(directory: &Path, judged: &Judged) -> Result<Vec<Picture>, JudgeError> {
+    let sketches = [
+        ("foreign_observables", OBSERVABLES, judged.observables.as_ref().map(|_| observables(judged))),
+        ("foreign_position", POSITION, judged.places.as_ref().map(|_| position(judged))),
+    ];
+    let mut pictures = Vec::new();
+    for (name, caption, sketch) in sketches {
+        let Some(sketch) = sketch.flatten() else { continue };
+        let path = directory.join(name).with_extension("png");
+        let failed = |error: Failure| JudgeError::Plot { path: path.clone(), reason: error.to_string() };
+        let drawing = sketch.draw().map_err(failed)?;
+        drawing.write_png(&path, PNG_SCALE)?;
+        pictures.push(Picture { caption, drawing });
+    }
+    Ok(pictures)
+}
+
+const OBSERVABLES: &str = "Errors of the receiver's observables against the truth over its own time. What all \
+                           satellites share at an epoch is the clock's and removed; the clock stands below.";
+const POSITION: &str = "Errors of the receiver's positions over its own time, and in plan.";
 
 /// A chart over the times of its points.
 fn over_time(title: &str, label: &str, least: f64, series: Vec<Series>) -> Chart {
@@ -30,6 +50,9 @@ fn over_time(title: &str, label: &str, least: f64, series: Vec<Series>) -> Chart
     let y = Axis::around(label, [low, high].into_iter(), least.max(1.3 * (high - low)));
     let (from, to) = points().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| (a.min(p.0), b.max(p.0)));
     let x = Axis::new("receiver's time since the truth began (s)", if from <= to { (from, to) } else { (0.0, 1.0) });
+    let outside = values.iter().filter(|value| value.is_finite() && !y.holds(**value)).count();
+    let total = values.len();
+    let title = if outside > 0 { format!("{title} ({outside} of {total} points outside)") } else { title.to_owned() };
     Chart::new(title, x, y, series)
 }
 
@@ -42,8 +65,8 @@ fn per_satellite(rows: &[ObservationError], of: fn(&ObservationError) -> Option<
     found.into_iter().enumerate().map(|(index, (sv, points))| Series::numbered(sv.to_owned(), index, points)).collect()
 }
 
-fn observables(path: &Path, judged: &Judged) -> Result<(), JudgeError> {
-    let Some(measured) = &judged.observables else { return Ok(()) };
+fn observables(judged: &Judged) -> Option<Sketch> {
+    let measured = judged.observables.as_ref()?;
     let rows = &measured.rows;
     let clock: Points = measured.clock.iter().map(|row| (row.label_s, row.bias_s)).collect();
     let middle_s = mean(&clock.iter().map(|point| point.1).collect::<Vec<_>>()).unwrap_or(0.0);
@@ -71,30 +94,29 @@ fn observables(path: &Path, judged: &Judged) -> Result<(), JudgeError> {
         ),
     ];
     let legend: Vec<Series> = per_satellite(rows, |_| None);
-    figure(path, (1100, 1350), 1, &charts, &legend)
+    Some(Sketch::charts((WIDTH_PX, 900), 1, charts, legend))
 }
 
-fn position(path: &Path, judged: &Judged) -> Result<(), JudgeError> {
-    let Some(places) = &judged.places else { return Ok(()) };
+fn position(judged: &Judged) -> Option<Sketch> {
+    let places = judged.places.as_ref()?;
     let over = |of: fn(&crate::judge::foreign::place::FixError) -> f64| -> Points {
         places.rows.iter().map(|row| (row.label_s, of(row))).collect()
     };
-    let legend = vec![
+    let errors = vec![
         Series::new("east", BLUE, Mark::Dots, over(|row| row.east_m)),
         Series::new("north", ORANGE, Mark::Dots, over(|row| row.north_m)),
         Series::new("up", GREEN, Mark::Dots, over(|row| row.up_m)),
     ];
-    let time = over_time("Position error", "error (m)", 0.5, legend.clone());
     let points: Points = places.rows.iter().map(|row| (row.east_m, row.north_m)).collect();
     let bias = places.bias_enu_m.map(|[east, north, _]| (east.value, north.value));
-    let axis = |label, of: fn(&(f64, f64)) -> f64| Axis::around(label, points.iter().map(of).chain([0.0]), 0.5);
+    let axis = |label, of: fn(&(f64, f64)) -> f64| Axis::around(label, points.iter().map(of).chain([0.0]), 0.01);
     let (x, y) = (axis("east (m)", |p| p.0), axis("north (m)", |p| p.1));
-    let series = vec![
+    let plan = vec![
         Series::new("fixes", GREY, Mark::Dots, points),
-        Series::new("mean", ORANGE, Mark::Cross, bias.into_iter().collect()),
-        Series::new("truth", GREEN, Mark::Cross, vec![(0.0, 0.0)]),
+        Series::new("mean", COLOURS[3], Mark::Cross, bias.into_iter().collect()),
+        Series::new("truth", COLOURS[6], Mark::Cross, vec![(0.0, 0.0)]),
     ];
-    let mut scatter = Chart::new("Horizontal error: mean (orange), truth (green)", x, y, series);
-    scatter.equal = true;
-    figure(path, (1300, 520), 2, &[time, scatter], &legend)
+    let legend = [errors.clone(), plan.clone()].concat();
+    let scatter = Chart { equal: true, ..Chart::new("Horizontal error", x, y, plan) };
+    Some(Sketch::charts((WIDTH_PX, 340), 2, [over_time("Position error", "error (m)", 0.5, errors), scatter], legend))
 }

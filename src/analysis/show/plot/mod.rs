@@ -8,6 +8,7 @@
 
 pub mod canvas;
 pub mod chart;
+mod clip;
 mod clock;
 mod consistency;
 mod delays;
@@ -16,12 +17,15 @@ mod elevation;
 pub(crate) mod foreign;
 pub(crate) mod jitter;
 mod judged;
+mod marks;
 mod multipath;
 mod position;
+mod series;
 mod signals;
 mod sketch;
 mod sky;
 mod spectrum;
+pub mod ticks;
 
 use std::path::Path;
 
@@ -29,7 +33,7 @@ use rayon::prelude::*;
 
 use crate::error::JudgeError;
 use canvas::Failure;
-use drawing::Drawing;
+use drawing::{Drawing, PNG_SCALE};
 pub(crate) use judged::Judged;
 pub(crate) use sketch::Sketch;
 
@@ -173,8 +177,11 @@ pub(crate) const PICTURES: [Picture; 17] = [
     },
 ];
 
-/// Pixels of a PNG in one pixel of a picture.
-const PNG_SCALE: f32 = 2.0;
+/// Sky and horizontal errors half as wide as a page's text, for its first page.
+#[cfg_attr(not(feature = "pdf"), allow(dead_code, reason = "they are for paper alone"))]
+pub(crate) fn front(judged: &Judged<'_>) -> Result<[Sketch; 2], JudgeError> {
+    Ok([sky::narrow(judged)?, position::narrow(judged)?])
+}
 
 /// Content of each picture that a run has.
 pub(crate) fn sketches(judged: &Judged<'_>) -> Result<Vec<(&'static Picture, Sketch)>, JudgeError> {

@@ -3,10 +3,11 @@
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use crate::error::JudgeError;
+use crate::judge::judgement::digits;
 use crate::measure::errors::PositionError;
 use crate::measure::spoofing;
 use crate::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
-use crate::show::plot::chart::{Ends, Shown};
+use crate::show::plot::chart::{Ends, SHOWN_BOUNDS, Shown};
 use crate::show::plot::judged::Judged;
 use crate::show::plot::sketch::Sketch;
 use crate::statistics::percentile;
@@ -15,11 +16,16 @@ use gnss::record::Fix;
 
 type Points = Vec<(f64, f64)>;
 
-/// East and north errors with the ellipses of 50 % and 95 %, and the distribution of horizontal and vertical
-/// errors.
-pub fn scatter(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
-    let errors = &judged.errors.positions;
-    let flat: Vec<Vector2<f64>> = errors.map(|error| error.enu_m.xy())?;
+/// East and north errors with the ellipses of 50 % and 95 %.
+struct Plan {
+    chart: Chart,
+    legend: Vec<Series>,
+    /// The errors themselves.
+    flat: Vec<Vector2<f64>>,
+}
+
+fn plan(judged: &Judged<'_>) -> Result<Plan, JudgeError> {
+    let flat: Vec<Vector2<f64>> = judged.errors.positions.map(|error| error.enu_m.xy())?;
     let fixes = Shown::of(Mark::Dots, |see| {
         flat.iter().for_each(|at| see(at.x, at.y));
         Ok::<_, JudgeError>(())
@@ -34,20 +40,37 @@ pub fn scatter(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     series.push(Series::new("truth", COLOURS[6], Mark::Cross, vec![(0.0, 0.0)]));
     let ends = || series.iter().flat_map(|one| one.points.iter()).flat_map(|&(x, y)| [x.abs(), y.abs()]);
     let far = fixes.x.values().chain(fixes.y.values()).map(f64::abs);
-    let reach = 1.1 * ends().chain(far).fold(0.05, f64::max);
+    // Without fixes there is no size.
+    let least = if flat.is_empty() { 1.0 } else { 0.0 };
+    let reach = 1.1 * ends().chain(far).fold(least, f64::max);
     let axis = |label| Axis::new(label, (-reach, reach));
-    let mut legend = series.clone();
-    let mut cloud = Chart::new("Horizontal error", axis("east (m)"), axis("north (m)"), series);
-    cloud.equal = true;
+    let legend = series.clone();
+    let chart = Chart { equal: true, ..Chart::new("Horizontal error", axis("east (m)"), axis("north (m)"), series) };
+    Ok(Plan { chart, legend, flat })
+}
+
+/// The horizontal errors alone, half as wide as a page's text.
+pub fn narrow(judged: &Judged<'_>) -> Result<Sketch, JudgeError> {
+    let Plan { chart, legend, .. } = plan(judged)?;
+    Ok(Sketch::charts((WIDTH_PX / 2, WIDTH_PX / 2), 1, [chart], legend))
+}
+
+/// Horizontal errors about the truth, and the distribution of horizontal and vertical errors.
+pub fn scatter(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
+    let errors = &judged.errors.positions;
+    let Plan { chart: cloud, mut legend, flat } = plan(judged)?;
+    let least = if flat.is_empty() { 1.0 } else { 0.0 };
 
     let mut horizontal: Vec<f64> = flat.iter().map(|at| at.norm()).collect();
     drop(flat);
     let title = match [0.5, 0.95].map(|p| percentile(&horizontal, p)) {
-        [Some(half), Some(most)] => format!("Horizontal: 50 % {half:.2} m, 95 % {most:.2} m"),
+        [Some(half), Some(most)] => {
+            format!("Horizontal: 50 % {} m, 95 % {} m", digits(half, 3), digits(most, 3))
+        }
         _ => "No fixes".to_owned(),
     };
     let across = distribution(&mut horizontal, Mark::Line);
-    let mut longest = horizontal.into_iter().fold(0.05, f64::max);
+    let mut longest = horizontal.into_iter().fold(least, f64::max);
     let mut vertical = errors.map(|error| error.enu_m.z.abs())?;
     let up = distribution(&mut vertical, Mark::Dash);
     longest = vertical.into_iter().fold(longest, f64::max);
@@ -124,26 +147,19 @@ pub fn time(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
                 }
             })
         };
-        // A bound far outside the errors would hide them.
-        let own = points.y.values().map(f64::abs).fold(0.05, f64::max);
+        // Bounds of a few fixes far outside, as of the first ones, would hide the errors.
+        let mut all = Vec::new();
+        bounds(&mut |_, bound| all.push(bound))?;
+        let most = percentile(&all, SHOWN_BOUNDS).unwrap_or(0.0);
+        drop(all);
         let mut ends = points.y;
-        ends.add(0.0);
-        bounds(&mut |_, bound| {
-            let near = [-bound, bound].into_iter().filter(|value| value.abs() < 12.0 * own);
-            near.for_each(|value| ends.add(value));
-        })?;
+        [0.0, -most, most].into_iter().for_each(|value| ends.add(value));
         let y = Axis::around("error (m)", ends.values(), 0.1);
         let x = judged.time_axis(points.x.values());
         let mut series = vec![Series::new("", GREY, Mark::Line, vec![(x.from, 0.0), (x.to, 0.0)])];
         series.push(Series::new("", BLUE, Mark::Dots, points.points));
         for sign in [-1.0, 1.0] {
-            let bound = Shown::of(Mark::Line, |see| {
-                bounds(&mut |time_s, bound| {
-                    if (y.from..=y.to).contains(&(sign * bound)) {
-                        see(time_s, sign * bound);
-                    }
-                })
-            })?;
+            let bound = Shown::of(Mark::Line, |see| bounds(&mut |time_s, bound| see(time_s, sign * bound)))?;
             series.push(Series::new("", ORANGE, Mark::Line, bound.points));
         }
         Ok::<_, JudgeError>(Chart::new(title, x, y, series))

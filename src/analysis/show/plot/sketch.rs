@@ -30,6 +30,8 @@ impl Sketch {
             chart.series.iter_mut().for_each(|series| series.thin(clouds));
         }
         legend.iter_mut().for_each(|series| series.points = Vec::new());
+        // What no chart shows is not named.
+        legend.retain(|entry| charts.iter().any(|chart| chart.shows(entry)));
         Self::Charts { size, columns, charts, legend }
     }
 
@@ -47,7 +49,7 @@ impl Sketch {
 
 #[cfg(test)]
 mod tests {
-    use super::super::chart::{Axis, BLUE, Mark};
+    use super::super::chart::{Axis, BLUE, Mark, ORANGE};
     use super::*;
 
     #[test]
@@ -67,5 +69,21 @@ mod tests {
         assert!(counts[..10].iter().all(|count| (300..=400).contains(count)), "{counts:?}");
         assert!((900..=1002).contains(&counts[10]), "{counts:?}");
         assert!(legend.len() == 11 && legend.iter().all(|one| one.points.is_empty()));
+    }
+
+    #[test]
+    fn a_legend_names_what_is_in_view() {
+        let axis = || Axis::new("", (0.0, 1.0));
+        let line = |colour, y| Series::new("line", colour, Mark::Line, vec![(0.0, y), (1.0, y)]);
+        let series =
+            vec![line(BLUE, 0.5), line(ORANGE, 7.0), Series::new("dots", ORANGE, Mark::Dots, vec![(0.5, 0.5)])];
+        let Sketch::Charts { legend, .. } =
+            Sketch::charts((100, 100), 1, [Chart::new("", axis(), axis(), series.clone())], series)
+        else {
+            panic!("charts were asked for")
+        };
+        let names: Vec<(&str, Mark)> = legend.iter().map(|entry| (entry.name.as_str(), entry.mark)).collect();
+        assert_eq!(names, [("line", Mark::Line), ("dots", Mark::Dots)]);
+        assert_eq!(legend[0].colour, BLUE);
     }
 }

@@ -10,9 +10,21 @@ use crate::show::plot::sketch::Sketch;
 use crate::statistics::mean;
 use gnss::satellite::{Sv, System};
 
-const HEIGHT_PX: i32 = 490;
-const CENTRE: (i32, i32) = (290 * FINE, 255 * FINE);
-const RADIUS: f64 = (195 * FINE) as f64;
+/// Where on its picture the sky lies.
+#[derive(Clone, Copy)]
+struct Dome {
+    size_px: (i32, i32),
+    centre_px: (i32, i32),
+    radius_px: i32,
+    /// Left end and upper end of the colours' scale.
+    scale_px: Option<(i32, i32)>,
+}
+
+/// As wide as a page's text.
+const WIDE: Dome =
+    Dome { size_px: (WIDTH_PX as i32, 490), centre_px: (290, 255), radius_px: 195, scale_px: Some((580, 80)) };
+/// Half as wide, beside another picture.
+const NARROW: Dome = Dome { size_px: (340, 340), centre_px: (170, 168), radius_px: 120, scale_px: None };
 
 /// A satellite's way over the sky.
 struct Track {
@@ -26,21 +38,30 @@ struct Track {
 /// Polar plot: north up, zenith in the middle, tracks ending in a labelled dot whose colour is the mean C/N0
 /// as set; a satellite that the receiver did not observe is hollow.
 pub fn sky(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
+    sketch(judged, WIDE).map(Some)
+}
+
+/// The same half as wide.
+pub fn narrow(judged: &Judged<'_>) -> Result<Sketch, JudgeError> {
+    sketch(judged, NARROW)
+}
+
+fn sketch(judged: &Judged<'_>, dome: Dome) -> Result<Sketch, JudgeError> {
     let run = judged.run;
     let mut tracks = Vec::new();
     for sv in run.in_the_sky() {
-        let mut places: Vec<(i32, i32)> = run.seen(sv, |row| place(row.azimuth_deg, row.elevation_deg))?;
+        let mut places: Vec<(i32, i32)> = run.seen(sv, |row| dome.place(row.azimuth_deg, row.elevation_deg))?;
         places.dedup();
         let cn0: Vec<f64> = run.expected.iter().filter(|one| one.sv == sv).map(|one| one.cn0_mean_dbhz).collect();
         let observed = judged.errors.signals.keys().any(|link| link.sv == sv);
         tracks.push(Track { sv, places, cn0_dbhz: mean(&cn0), observed });
     }
     let skyline_deg = run.scene.skyline_deg.clone();
-    let draw = Box::new(move |area: &Area<'_>| tracked(area, &tracks, &skyline_deg));
-    Ok(Some(Sketch::Free { size: (WIDTH_PX, HEIGHT_PX as u32), draw }))
+    let draw = Box::new(move |area: &Area<'_>| tracked(area, dome, &tracks, &skyline_deg));
+    Ok(Sketch::Free { size: (dome.size_px.0 as u32, dome.size_px.1 as u32), draw })
 }
 
-fn tracked(area: &Area<'_>, tracks: &[Track], skyline_deg: &[[f64; 2]]) -> Result<(), Failure> {
+fn tracked(area: &Area<'_>, dome: Dome, tracks: &[Track], skyline_deg: &[[f64; 2]]) -> Result<(), Failure> {
     let strengths = || tracks.iter().filter_map(|track| track.cn0_dbhz);
     let low = strengths().fold(f64::INFINITY, f64::min).floor();
     let high = strengths().fold(f64::NEG_INFINITY, f64::max).ceil();
@@ -48,9 +69,11 @@ fn tracked(area: &Area<'_>, tracks: &[Track], skyline_deg: &[[f64; 2]]) -> Resul
     let mut systems: Vec<System> = tracks.iter().map(|track| track.sv.system).collect();
     systems.sort_unstable();
     systems.dedup();
-    obstructed(area, skyline_deg)?;
-    frame(area)?;
-    scale(area, low, high)?;
+    obstructed(area, dome, skyline_deg)?;
+    frame(area, dome)?;
+    if let Some(corner_px) = dome.scale_px {
+        scale(area, corner_px, low, high)?;
+    }
     // Names keep clear of the dots, the tracks and each other.
     let mut taken: Vec<(i32, i32)> = tracks.iter().flat_map(|track| track.places.iter().copied()).collect();
     let mut ends = Vec::new();
@@ -72,8 +95,11 @@ fn tracked(area: &Area<'_>, tracks: &[Track], skyline_deg: &[[f64; 2]]) -> Resul
         let shapes = systems.iter().zip(SHAPES).map(|(system, (shape, _))| format!("{shape}: {system}"));
         lines.push(shapes.collect::<Vec<_>>().join("; "));
     }
-    for (line, above) in lines.into_iter().rev().zip([16, 34]) {
-        area.draw(&Text::new(line, (14 * FINE, (HEIGHT_PX - above) * FINE), note.clone()))?;
+    if dome.scale_px.is_none() && strengths().next().is_some() {
+        lines.insert(0, format!("C/N0 {low:.0} (dark) to {high:.0} dB-Hz (light)"));
+    }
+    for (line, above) in lines.into_iter().rev().zip([12, 28, 44]) {
+        area.draw(&Text::new(line, (14 * FINE, (dome.size_px.1 - above) * FINE), note.clone()))?;
     }
     Ok(())
 }
@@ -106,9 +132,9 @@ fn dot(area: &Area<'_>, (x, y): (i32, i32), system: usize, (inside, rim): (RGBCo
 }
 
 /// Shades what lies between the horizon and the skyline.
-fn obstructed(area: &Area<'_>, skyline_deg: &[[f64; 2]]) -> Result<(), Failure> {
-    let skyline = skyline_deg.iter().map(|[azimuth_deg, elevation_deg]| place(*azimuth_deg, *elevation_deg));
-    let rim = skyline_deg.iter().rev().map(|[azimuth_deg, _]| place(*azimuth_deg, 0.0));
+fn obstructed(area: &Area<'_>, dome: Dome, skyline_deg: &[[f64; 2]]) -> Result<(), Failure> {
+    let skyline = skyline_deg.iter().map(|[azimuth_deg, elevation_deg]| dome.place(*azimuth_deg, *elevation_deg));
+    let rim = skyline_deg.iter().rev().map(|[azimuth_deg, _]| dome.place(*azimuth_deg, 0.0));
     area.draw(&Polygon::new(skyline.chain(rim).collect::<Vec<_>>(), RGBColor(226, 222, 214).filled()))?;
     Ok(())
 }
@@ -127,10 +153,18 @@ fn label(area: &Area<'_>, sv: Sv, (x, y): (i32, i32), taken: &mut Vec<(i32, i32)
     Ok(())
 }
 
-fn place(azimuth_deg: f64, elevation_deg: f64) -> (i32, i32) {
-    let (sin, cos) = libm::sincos(azimuth_deg.to_radians());
-    let distance = RADIUS * (90.0 - elevation_deg) / 90.0;
-    (CENTRE.0 + (distance * sin) as i32, CENTRE.1 - (distance * cos) as i32)
+impl Dome {
+    /// Its zenith, in virtual pixels.
+    fn centre(self) -> (i32, i32) {
+        (self.centre_px.0 * FINE, self.centre_px.1 * FINE)
+    }
+
+    fn place(self, azimuth_deg: f64, elevation_deg: f64) -> (i32, i32) {
+        let (sin, cos) = libm::sincos(azimuth_deg.to_radians());
+        let distance = f64::from(self.radius_px * FINE) * (90.0 - elevation_deg) / 90.0;
+        let (x, y) = self.centre();
+        (x + (distance * sin) as i32, y - (distance * cos) as i32)
+    }
 }
 
 fn shade(cn0_dbhz: f64, low: f64, high: f64) -> RGBColor {
@@ -138,22 +172,25 @@ fn shade(cn0_dbhz: f64, low: f64, high: f64) -> RGBColor {
     ViridisRGB.get_color_normalized((cn0_dbhz - low) / (high - low) * 0.92, 0.0, 1.0)
 }
 
-fn frame(area: &Area<'_>) -> Result<(), Failure> {
+fn frame(area: &Area<'_>, dome: Dome) -> Result<(), Failure> {
     let title = anchored(15, HPos::Center, VPos::Center);
-    area.draw(&Text::new("Satellites above the horizon", (CENTRE.0, 20 * FINE), title))?;
+    let centre = dome.centre();
+    area.draw(&Text::new("Satellites above the horizon", (centre.0, 16 * FINE), title))?;
     let line = RGBColor(205, 205, 205).stroke_width(FINE as u32);
     for elevation_deg in [0.0, 30.0, 60.0_f64] {
-        let (x, y) = place(0.0, elevation_deg);
-        area.draw(&Circle::new(CENTRE, CENTRE.1 - y, line))?;
+        let (x, y) = dome.place(0.0, elevation_deg);
+        area.draw(&Circle::new(centre, centre.1 - y, line))?;
         if elevation_deg == 0.0 {
             continue;
         }
         let style = anchored(12, HPos::Left, VPos::Bottom).color(&GREY);
         area.draw(&Text::new(format!("{elevation_deg:.0}°"), (x + 4 * FINE, y - 2 * FINE), style))?;
     }
+    // Names stand so many pixels beyond the horizon.
+    let outside_deg = -90.0 * 17.0 / f64::from(dome.radius_px);
     for azimuth_deg in (0..360).step_by(30) {
         let azimuth_deg = f64::from(azimuth_deg);
-        area.draw(&PathElement::new([CENTRE, place(azimuth_deg, 0.0)], line))?;
+        area.draw(&PathElement::new([centre, dome.place(azimuth_deg, 0.0)], line))?;
         let name = match azimuth_deg as i32 {
             0 => "N".to_owned(),
             90 => "E".to_owned(),
@@ -161,14 +198,14 @@ fn frame(area: &Area<'_>) -> Result<(), Failure> {
             270 => "W".to_owned(),
             other => format!("{other}°"),
         };
-        area.draw(&Text::new(name, place(azimuth_deg, -8.0), anchored(13, HPos::Center, VPos::Center)))?;
+        area.draw(&Text::new(name, dome.place(azimuth_deg, outside_deg), anchored(13, HPos::Center, VPos::Center)))?;
     }
     Ok(())
 }
 
 /// The colours of C/N0 with their ends.
-fn scale(area: &Area<'_>, low: f64, high: f64) -> Result<(), Failure> {
-    let (left, top, width, height) = (580 * FINE, 80 * FINE, 18 * FINE, 2 * FINE);
+fn scale(area: &Area<'_>, (left_px, top_px): (i32, i32), low: f64, high: f64) -> Result<(), Failure> {
+    let (left, top, width, height) = (left_px * FINE, top_px * FINE, 18 * FINE, 2 * FINE);
     let steps = 150;
     for step in 0..steps {
         let cn0 = high - (high - low) * f64::from(step) / f64::from(steps);

@@ -88,9 +88,7 @@ fn statistics(run: &Run, best: &[&AcquisitionRow], title: String, legend: &mut V
     legend.clone_from(&series);
     let x = Axis::new("satellite", (-0.8, best.len().max(1) as f64 - 0.2));
     let y = Axis::new("largest statistic of the search", (0.0, 1.08 * top));
-    let mut chart = Chart::new(title, x, y, series);
     // By number alone, to fit side by side.
-    let tick = |(place, row): (u32, &&AcquisitionRow)| (f64::from(place), row.sv.number.to_string());
-    chart.x_ticks = Some((0..).zip(best).map(tick).collect());
-    chart
+    let name = |(place, row): (u32, &&AcquisitionRow)| (f64::from(place), row.sv.number.to_string());
+    Chart::new(title, x.named((0..).zip(best).map(name).collect()), y, series)
 }

@@ -1,6 +1,8 @@
-//! `report.pdf` of a run: the verdict on one page, then tables, pictures, settings, and how the figures were
-//! made.
+//! `report.pdf` of a run: what was run and what came of it on one page, then the whole verdict, tables,
+//! pictures, settings, and how the figures were made.
 
+pub(crate) mod foreign;
+mod front;
 mod method;
 mod tables;
 
@@ -13,7 +15,7 @@ use crate::judge::judgement::{Status, number};
 use crate::judge::verdict::Verdict;
 use crate::show::pdf::{Cell, Item, Report, Side, Table, Tone};
 use crate::show::plot::drawing::Drawing;
-use crate::show::plot::{Judged, Picture};
+use crate::show::plot::{self, Judged, Picture, Sketch};
 use crate::show::write::write_whole;
 
 /// A run's report, complete but for its pictures.
@@ -21,6 +23,8 @@ pub(crate) struct RunReport {
     report: Report,
     /// Index among the items at which the pictures are inserted.
     figures: usize,
+    /// Those of the first page, and where they come.
+    front: ([Sketch; 2], usize),
 }
 
 impl RunReport {
@@ -28,10 +32,15 @@ impl RunReport {
     pub fn new(judged: &Judged<'_>) -> Result<Self, JudgeError> {
         let summary = judged.summary;
         let head = format!("receiver against truth · seed {}", summary.seed);
-        let subtitle = "Receiver against truth: what a run of this scene came to.";
-        let mut report = Report::new(summary.scene.clone(), subtitle, head);
+        let mut report = Report::new(summary.scene.clone(), front::place_and_time(judged.run), head);
+        front::banner(&mut report, &summary.details.verdict);
+        report.add(Item::Facts(facts(judged)));
+        let front = (plot::front(judged)?, report.items.len());
+        front::figures(&mut report, &summary.details.verdict);
+        front::groups(&mut report, &summary.details.verdict);
+        front::failures(&mut report, &summary.details.verdict);
+        report.add(Item::NewPage).heading("Verdict");
         verdict(&mut report, &summary.details.verdict);
-        report.subheading("The run").add(Item::Facts(facts(judged)));
         report.add(Item::NewPage);
         tables::add(&mut report, judged)?;
         report.add(Item::NewPage).heading("Figures");
@@ -39,18 +48,22 @@ impl RunReport {
         report.add(Item::NewPage);
         settings(&mut report, judged);
         method::add(&mut report, judged);
-        Ok(Self { report, figures })
+        Ok(Self { report, figures, front })
     }
 
     /// Writes `report.pdf` with its pictures into a run's directory.
     pub fn write(mut self, directory: &Path, pictures: Vec<(&'static Picture, Drawing)>) -> Result<(), JudgeError> {
         let path = directory.join("report.pdf");
+        let failed = |reason: String| JudgeError::Plot { path: path.clone(), reason };
+        let ([left, right], front) = &self.front;
+        let [left, right] = [left, right].map(|sketch| sketch.draw().map_err(|error| failed(error.to_string())));
+        let pair = Item::Pair(left?, right?);
         let item = |(picture, drawing): (&Picture, Drawing)| {
             Item::Figure(drawing, format!("{} Numbers: {}.", picture.caption, picture.numbers.join(", ")))
         };
         self.report.items.splice(self.figures..self.figures, pictures.into_iter().map(item));
-        let pdf = self.report.pdf();
-        let pdf = pdf.map_err(|error| JudgeError::Plot { path: path.clone(), reason: error.to_string() })?;
+        self.report.items.insert(*front, pair);
+        let pdf = self.report.pdf().map_err(|error| failed(error.to_string()))?;
         write_whole(&path, &pdf)
     }
 }
