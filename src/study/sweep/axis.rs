@@ -9,6 +9,7 @@ use std::path::Path;
 use toml::Value;
 
 use super::spec::SCENARIO_KEY;
+use super::words;
 use generator::scenario::read::Table;
 use generator::scenario::{Place, ScenarioError};
 
@@ -66,6 +67,11 @@ impl Axis {
     /// Label in plots and tables.
     pub fn label(&self) -> &str {
         self.label.as_deref().unwrap_or(&self.key)
+    }
+
+    /// Text beside the axis of a plot: the words of the study, or the key in words with its unit.
+    pub fn words(&self) -> String {
+        self.label.clone().unwrap_or_else(|| words::of_key(&self.key))
     }
 
     /// True if every value is a number.

@@ -15,10 +15,8 @@ use super::estimate::Estimate;
 use super::publish::short;
 use super::result::{Cell, Results, THEORY};
 use super::spec::{Plot, PlotKind};
-use super::unit_of;
-use analysis::show::plot::canvas::{
-    Axis, COLOURS, Chart, Drawing, Failure, GREY, Mark, Series, WIDTH_PX, compose, figure,
-};
+use super::words;
+use analysis::show::plot::canvas::{Axis, Chart, Drawing, Failure, GREY, Mark, Series, WIDTH_PX, compose, figure};
 
 /// A picture of a study.
 #[derive(Clone, Debug)]
@@ -83,8 +81,13 @@ pub fn pictures(results: &Results) -> Vec<Picture> {
         .collect()
 }
 
-/// Values of an axis that are written under it at most.
-const MOST_TICKS: usize = 10;
+/// Name of bands in the legend.
+const BAND: &str = "95 % of the mean";
+/// Columns of a heat map up to which its values have three digits.
+const MOST_COLUMNS: usize = 10;
+/// Bands reach beyond the curves by this part of their span at most: the interval of a few runs that survive
+/// would hide all else.
+const MOST_BAND: f64 = 0.5;
 /// Distance from one series to the next where names are on the axis, in steps of the names.
 const NAMED_STEP: f64 = 0.12;
 
@@ -155,7 +158,17 @@ impl View<'_> {
 
     fn words(&self, axis: usize, value: usize) -> String {
         let Some(axis) = self.axis(axis) else { return String::new() };
-        format!("{} = {}", axis.label(), axis.words_of(value))
+        let words = axis.words();
+        // The unit goes to the value.
+        match words.strip_suffix(')').and_then(|words| words.rsplit_once(" (")) {
+            Some((name, unit)) => format!("{name} = {} {unit}", axis.words_of(value)),
+            None => format!("{words} = {}", axis.words_of(value)),
+        }
+    }
+
+    /// The figure in words, with its unit.
+    fn figure_words(&self) -> String {
+        self.plot.label.clone().unwrap_or_else(|| words::of_figure(&self.plot.figure))
     }
 
     fn estimate(&self, cell: &Cell) -> Option<Estimate> {
@@ -175,7 +188,7 @@ impl View<'_> {
     }
 
     /// The axis across, with words under it where values are no numbers.
-    fn across(&self, cells: &[&Cell]) -> (Axis, Option<Vec<(f64, String)>>) {
+    fn across(&self, cells: &[&Cell]) -> Axis {
         let key = &self.plot.x;
         let places = cells.iter().filter_map(|cell| self.place(cell, key, self.plot.log_x));
         let number = self.results.axis(key);
@@ -184,29 +197,24 @@ impl View<'_> {
         // Names have half a step on either side of them.
         let named = study_axis.filter(|_| !numbers).map_or(0.0, |axis| axis.values.len() as f64);
         let room = [-0.5, named - 0.5].into_iter().filter(|_| !numbers);
-        let label = study_axis.map_or(key.clone(), |axis| axis.label().to_owned());
-        let across = Axis::around(&label, places.chain(room), 1e-9);
-        let ticks = if !numbers {
-            study_axis.map(|axis| (0..axis.values.len()).map(|rank| (rank as f64, axis.words_of(rank))).collect())
-        } else if self.plot.log_y && !self.plot.log_x {
-            // A grid needs the positions of both axes.
-            study_axis.map(|axis| {
-                let every = axis.values.len().div_ceil(MOST_TICKS).max(1);
-                let tick = |value| Some((axis::number_of(value)?, axis::text_of(value)));
-                axis.values.iter().step_by(every).filter_map(tick).collect()
-            })
-        } else {
-            self.plot.log_x.then(|| across.log_ticks(&[1.0, 2.0, 5.0], |value| value.to_string()))
-        };
-        (across, ticks)
+        let label = study_axis.map_or(key.clone(), StudyAxis::words);
+        let least = if self.plot.log_x { 0.3 } else { 1e-9 };
+        let across = Axis::around(&label, places.chain(room), least);
+        match study_axis.filter(|_| !numbers) {
+            Some(axis) => across.named((0..axis.values.len()).map(|rank| (rank as f64, axis.words_of(rank))).collect()),
+            None if self.plot.log_x => across.logarithmic(),
+            None => across,
+        }
     }
 
-    fn up(&self, values: impl Iterator<Item = f64>) -> (Axis, Option<Vec<(f64, String)>>) {
-        let unit = unit_of(&self.plot.figure);
-        let label = if unit == "1" { self.plot.figure.clone() } else { format!("{} ({unit})", self.plot.figure) };
-        let up = Axis::around(&label, values, 1e-9);
-        let ticks = self.plot.log_y.then(|| up.log_ticks(&[1.0, 2.0, 5.0], |value| value.to_string()));
-        (up, ticks)
+    /// The axis upward around curves and, as far as these stay readable, the bands about them.
+    fn up(&self, series: &[Series]) -> Axis {
+        let ends = |is_band: bool| {
+            let own = series.iter().filter(move |series| (series.mark == Mark::Band) == is_band);
+            let values = own.flat_map(|series| series.points.iter().map(|point| point.1)).filter(|y| y.is_finite());
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(y), high.max(y)))
+        };
+        upward(&self.figure_words(), ends(false), ends(true), self.plot.log_y)
     }
 
     fn height(&self, value: f64) -> Option<f64> {
@@ -222,7 +230,6 @@ impl View<'_> {
         let middle = 0.5 * every.len().saturating_sub(1) as f64;
         for (rank, chosen) in every.into_iter().enumerate() {
             let aside = if named { NAMED_STEP * (rank as f64 - middle) } else { 0.0 };
-            let colour = COLOURS.get(rank % COLOURS.len()).copied().unwrap_or(GREY);
             let own = |cell: &&&Cell| chosen.is_none_or(|(axis, value)| cell.at.get(axis) == Some(&value));
             let mut points: Vec<(f64, &Cell)> = cells
                 .iter()
@@ -236,11 +243,14 @@ impl View<'_> {
             let low = line(&|cell| self.estimate(cell)?.interval.map(|(low, _)| low));
             let high = line(&|cell| self.estimate(cell)?.interval.map(|(_, high)| high));
             let means = line(&|cell| Some(self.estimate(cell)?.mean));
-            let name = chosen.map_or_else(|| self.plot.figure.clone(), |(axis, value)| self.words(axis, value));
+            let name = chosen.map_or_else(|| self.figure_words(), |(axis, value)| self.words(axis, value));
             // Nothing lies between names: each has its own interval, and no line leads to the next.
-            let mark = if self.theory.is_some() || named { Mark::Balls } else { Mark::Line };
+            // A line needs two points.
+            let apart = self.theory.is_some() || named || means.len() < 2;
+            let means = if apart { Series::large(name, rank, means) } else { Series::lined(name, rank, means) };
+            let colour = means.colour;
             if first {
-                picture.legend.push(Series::new(name.clone(), colour, mark, Vec::new()));
+                picture.legend.push(Series { points: Vec::new(), ..means.clone() });
             }
             if named {
                 let box_of = |((x, low), (_, high)): (&(f64, f64), &(f64, f64))| {
@@ -255,27 +265,30 @@ impl View<'_> {
             }
             if let Some(theory) = self.theory {
                 let expected = line(&|cell| cell.estimates.get(theory).copied().flatten().map(|e| e.mean));
-                series.push(Series::new("theory", colour, theory_mark, expected));
+                let mark = if named { Mark::Rings } else { Series::lined(String::new(), rank, Vec::new()).mark };
+                series.push(Series::new("theory", colour, mark, expected));
             }
-            series.push(Series::new(name, colour, mark, means));
+            series.push(means);
         }
         if std::mem::take(&mut first) {
             if self.theory.is_some() {
                 picture.legend.push(Series::new("theory", GREY, theory_mark, Vec::new()));
             }
             if self.results.study.grid.repetitions > 1 {
-                picture.legend.push(Series::new("95 % of the mean", GREY, Mark::Band, Vec::new()));
+                picture.legend.push(Series::new(BAND, GREY, Mark::Band, Vec::new()));
             }
         }
         self.chart(picture, title, cells, series);
     }
 
     fn chart(&self, picture: &mut Picture, title: String, cells: &[&Cell], series: Vec<Series>) {
-        let (x, x_ticks) = self.across(cells);
-        let (y, y_ticks) = self.up(series.iter().flat_map(|series| series.points.iter().map(|point| point.1)));
-        let mut chart = Chart::new(title, x, y, series);
-        (chart.x_ticks, chart.y_ticks) = (x_ticks, y_ticks);
-        picture.charts.push(chart);
+        let y = self.up(&series);
+        let is_cut = |band: &Series| band.mark == Mark::Band && band.points.iter().any(|point| !y.holds(point.1));
+        if series.iter().any(is_cut) {
+            let bands = picture.legend.iter_mut().filter(|entry| entry.name == BAND);
+            bands.for_each(|entry| entry.name += ", cut at the axis");
+        }
+        picture.charts.push(Chart::new(title, self.across(cells), y, series));
     }
 
     /// Colours by value, the same for all panels, and the value in each tile.
@@ -286,7 +299,7 @@ impl View<'_> {
         let share = |value: f64| if high > low { (value - low) / (high - low) } else { 0.5 };
         // A value has to fit into its tile.
         let columns = self.axis(x_axis).map_or(0, |axis| axis.values.len());
-        let words = |mean: f64| if columns > MOST_TICKS { shorter(mean) } else { short(mean) };
+        let words = |mean: f64| if columns > MOST_COLUMNS { shorter(mean) } else { short(mean) };
         let (mut tiles, mut labels) = (Vec::new(), Vec::new());
         for cell in cells {
             let (Some(x), Some(y)) = (cell.at.get(x_axis), cell.at.get(y_axis)) else { continue };
@@ -314,12 +327,10 @@ impl View<'_> {
             self.axis(axis).map_or_else(Vec::new, of)
         };
         let side = |axis: usize| {
-            let (label, count) = self.axis(axis).map_or(("", 0), |axis| (axis.label(), axis.values.len()));
-            Axis::new(label, (-0.5, count as f64 - 0.5))
+            let (label, count) = self.axis(axis).map_or((String::new(), 0), |axis| (axis.words(), axis.values.len()));
+            Axis::new(&label, (-0.5, count as f64 - 0.5)).named(ticks(axis))
         };
-        let mut chart = Chart::new(title, side(x_axis), side(y_axis), tiles);
-        (chart.x_ticks, chart.y_ticks, chart.labels) = (Some(ticks(x_axis)), Some(ticks(y_axis)), labels);
-        picture.charts.push(chart);
+        picture.charts.push(Chart { labels, ..Chart::new(title, side(x_axis), side(y_axis), tiles) });
     }
 
     /// Draws the crossing of a level along an axis by the mean and by the ends of its interval, over x.
@@ -327,7 +338,6 @@ impl View<'_> {
         let first = picture.legend.is_empty();
         let (mut series, mut rows) = (Vec::new(), Vec::new());
         for (rank, chosen) in self.values_of(self.plot.series.as_deref()).into_iter().enumerate() {
-            let colour = COLOURS.get(rank % COLOURS.len()).copied().unwrap_or(GREY);
             let (mut means, mut lows, mut highs) = (Vec::new(), Vec::new(), Vec::new());
             for x in self.values_of(Some(&self.plot.x)) {
                 let own = |cell: &&&Cell| {
@@ -366,9 +376,12 @@ impl View<'_> {
                 row.extend([number(mean), number(least(ends).filter(|_| both)), number(most(ends).filter(|_| both))]);
                 rows.push(row);
             }
-            let name = chosen.map_or_else(|| self.plot.figure.clone(), |(axis, value)| self.words(axis, value));
+            let name = chosen.map_or_else(|| self.figure_words(), |(axis, value)| self.words(axis, value));
+            let balls = Series::large(name.clone(), rank, means.clone());
+            let line = Series::lined(name, rank, means);
+            let colour = balls.colour;
             if first {
-                picture.legend.push(Series::new(name.clone(), colour, Mark::Line, Vec::new()));
+                picture.legend.push(Series { points: Vec::new(), ..balls.clone() });
             }
             series.push(Series::new(
                 "band",
@@ -376,26 +389,40 @@ impl View<'_> {
                 Mark::Band,
                 lows.into_iter().chain(highs.into_iter().rev()).collect(),
             ));
-            series.push(Series::new("line", colour, Mark::Line, means.clone()));
-            series.push(Series::new(name, colour, Mark::Balls, means));
+            series.push(Series { colour, ..line });
+            series.push(balls);
         }
-        let label = |key: &str| {
-            self.results.axis(key).and_then(|n| self.axis(n)).map_or(key.to_owned(), |a| a.label().to_owned())
-        };
-        let (x, x_ticks) = self.across(cells);
+        let label =
+            |key: &str| self.results.axis(key).and_then(|n| self.axis(n)).map_or(key.to_owned(), StudyAxis::words);
         let y_values = series.iter().flat_map(|series| series.points.iter().map(|point| point.1));
-        let y = Axis::around(&label(along), y_values, 1e-9);
-        let y_ticks = self.plot.log_y.then(|| y.log_ticks(&[1.0, 2.0, 5.0], |value| value.to_string()));
-        let mut chart = Chart::new(title, x, y, series);
-        (chart.x_ticks, chart.y_ticks) = (x_ticks, y_ticks);
-        picture.charts.push(chart);
+        let (least, is_log) = if self.plot.log_y { (0.3, true) } else { (1e-9, false) };
+        let y = Axis::around(&label(along), y_values, least);
+        let y = if is_log { y.logarithmic() } else { y };
+        picture.charts.push(Chart::new(title, self.across(cells), y, series));
         let mut heads: Vec<String> = self.plot.panel.iter().chain(&self.plot.series).map(|key| label(key)).collect();
         heads.push(label(&self.plot.x));
-        heads.push(format!("{} where {} = {level}", label(along), self.plot.figure));
+        heads.push(format!("{} where {} = {level}", label(along), self.figure_words()));
         heads.extend(["from".to_owned(), "to".to_owned()]);
         let (_, all) = picture.crossings.get_or_insert_with(|| (heads, Vec::new()));
         all.extend(rows);
     }
+}
+
+/// An axis around the ends of curves and, as far as these stay readable, those of bands; numbers of a
+/// logarithmic one are logarithms.
+fn upward(label: &str, (low, high): (f64, f64), (band_low, band_high): (f64, f64), is_log: bool) -> Axis {
+    let (span, most) = (high - low, low.abs().max(high.abs()));
+    // Curves of one height show their bands whole.
+    let room = if span > 1e-9 * most { MOST_BAND * span } else { f64::INFINITY };
+    let values = [low, high, band_low.max(low - room), band_high.min(high + room)];
+    // Half a decade at least, or a part of values that are all alike.
+    let least = match is_log {
+        true => 0.5,
+        false if most > 0.0 && most.is_finite() => 0.02 * most,
+        false => 1.0,
+    };
+    let axis = Axis::around(label, values.into_iter(), least);
+    if is_log { axis.logarithmic() } else { axis }
 }
 
 fn least(ends: [Option<f64>; 2]) -> Option<f64> {
@@ -426,4 +453,26 @@ fn warmth(share: f64) -> RGBColor {
     let (a, b, u) = (STOPS[index], STOPS[index + 1], at - index as f64);
     let mix = |a: f64, b: f64| (a + (b - a) * u).round() as u8;
     RGBColor(mix(a.0, b.0), mix(a.1, b.1), mix(a.2, b.2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_interval_of_two_survivors_does_not_hide_the_curves() {
+        // Once drawn from -1000° to 1500°: the mean of two runs that held lock, beside curves of 10° to 25°.
+        let axis = upward("largest phase error (degrees)", (10.0, 25.0), (-1000.0, 1500.0), false);
+        assert!((25.0 - 10.0) / (axis.to - axis.from) > 0.4, "{axis:?}");
+        assert!(axis.holds(10.0) && axis.holds(25.0));
+        // What fits is shown whole.
+        let axis = upward("share", (0.2, 0.9), (0.1, 1.0), false);
+        assert!(axis.holds(0.1) && axis.holds(1.0));
+        // So is the band about one point.
+        let axis = upward("share", (0.5, 0.5), (0.1, 0.9), false);
+        assert!(axis.holds(0.1) && axis.holds(0.9));
+        // No curve at all still makes an axis.
+        let none = (f64::INFINITY, f64::NEG_INFINITY);
+        assert!(upward("share", none, none, false).ticks(5).ticks.len() >= 2);
+    }
 }

@@ -96,12 +96,13 @@ const AXIS: &[Key] = &[
     integer("count", 0, i64::MAX as u64, "number of values"),
     word("spacing", || vec!["linear", "log"], "spacing of count values").or_else("linear"),
     text("zip", "a word that other axes share", "axes with the same word step together"),
-    text("label", "words for the plots", "name of the axis in plots").or_else("the key"),
+    text("label", "words for the plots", "name of the axis in plots").or_else("the key in words"),
 ];
 
 const PLOT: &[Key] = &[
     word("kind", || vec!["curve", "heat", "crossing"], "kind of picture").or_else("curve"),
-    text("title", "a title", "title above the picture").or_else("the figure"),
+    text("title", "a title", "title above the picture").or_else("the figure in words"),
+    text("label", "words with the unit", "name of the figure in the picture").or_else("the figure in words"),
     text("x", "one of the axes", "horizontal axis").required(),
     text(
         "y",

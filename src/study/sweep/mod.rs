@@ -30,6 +30,7 @@ pub mod sampled;
 pub mod shard;
 pub mod spec;
 mod temporary;
+mod words;
 
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};

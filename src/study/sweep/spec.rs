@@ -10,7 +10,7 @@ use toml::Value;
 use toml::de::DeTable;
 
 use super::axis::{self, Axis, Grid};
-use super::{fixes, keys, model, sampled};
+use super::{fixes, keys, model, sampled, words};
 use generator::scenario::ScenarioError;
 use generator::scenario::read::{Source, Table, nearest};
 use receiver::settings::Settings;
@@ -76,6 +76,8 @@ pub struct Plot {
     pub x: String,
     /// Figure that is drawn.
     pub figure: String,
+    /// What the picture calls it in place of its name in words.
+    pub label: Option<String>,
     /// Axis that distinguishes curves.
     pub series: Option<String>,
     /// Axis that distinguishes pictures.
@@ -362,8 +364,12 @@ fn plot(table: &Table<'_>, axes: &[Axis], grid: &Grid, keep: &[String]) -> Resul
             fixed.push((key.to_owned(), value.ok_or_else(|| named.bad(key, "one of the axis's values"))?));
         }
     }
+    let label = table.text("label")?;
     let plot = Plot {
-        title: table.text("title")?.map_or_else(|| figure.clone(), str::to_owned),
+        title: table
+            .text("title")?
+            .map_or_else(|| label.unwrap_or(&words::of_figure(&figure)).to_owned(), str::to_owned),
+        label: label.map(str::to_owned),
         kind,
         x,
         figure,
