@@ -27,8 +27,8 @@ const RINEX: &str =
 const LATE_S: f64 = 3e-3;
 /// Part of a chip by which signals of one front end may be late against each other: replicas and filters.
 const SIGNALS_CHIPS: f64 = 0.1;
-/// Rate by which Doppler and carrier may differ: a Doppler is one of a moment, a carrier's rate one of an
-/// interval.
+/// Difference between a Doppler and its carrier's rate, Hz: a Doppler that is cut to whole hertz, in place of
+/// rounded, is half a hertz off on average.
 const RATE_HZ: f64 = 0.5;
 /// Longest interval over which a mean of two Dopplers is the carrier's rate.
 const INTERVAL_S: f64 = 2.0;

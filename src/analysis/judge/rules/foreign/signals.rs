@@ -23,7 +23,8 @@ use gnss::signal::{Link, Signal};
 const ENOUGH: usize = 20;
 /// Length of the segments whose means are judged beside the whole.
 const STRETCH_S: f64 = 5.0;
-/// Allowed difference between estimates of C/N0 of two satellites in decibels: a factor of two in power.
+/// Largest difference between the C/N0 errors of two satellites, dB. A replica that is half a sample off, at
+/// two samples a chip, costs one of them 20 lg(4/3) = 2.5 dB; a C/N0 in whole decibels adds half a decibel.
 const CN0_DB: f64 = 3.0;
 /// Least time over which a carrier's drift says something.
 const DRIFT_S: f64 = 5.0;
@@ -221,7 +222,8 @@ impl Verdict {
         let source =
             "loss of a one-bit quantiser, 10 lg(π/2), one component's part, filter, edges, fades: more is unexplained";
         self.nearest("C/N0 bias, magnitude", "", "dB", biases, source);
-        let source = "the scene's C/N0 and the other satellites of the signal: a factor of two in power, and fades";
+        let source =
+            "the scene's C/N0 and the other satellites of the signal: half a sample at two samples a chip, and fades";
         self.nearest("C/N0 error of a satellite against the others", "", "dB", satellites, source);
     }
 
