@@ -114,7 +114,10 @@ impl Scenario {
                 continue;
             }
             if from < low || to > high {
-                warnings.push(format!("{of_it}{what}: it will fold over"));
+                warnings.push(format!(
+                    "{of_it}{what}: the rest will fold over with code_edge = \"nearest\", and other edges take it \
+                     from C/N0 (`gnss-twin plan` states how much)"
+                ));
             }
             let outside = |sv: &Sv| is_link_outside(metadata, signal.link(*sv));
             if matches!(signal.carrier, Carrier::Channels { .. }) {

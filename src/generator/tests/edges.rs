@@ -19,7 +19,7 @@ use gnss::galileo::e1::E1;
 use gnss::gps::l1c::L1C;
 use gnss::gps::l5::L5;
 use gnss::satellite::Sv;
-use gnss::signal::Signal;
+use gnss::signal::{Signal, always};
 
 const RATE_HZ: f64 = 4.1e6;
 const CN0_DBHZ: f64 = 45.0;
@@ -39,6 +39,10 @@ struct Printed {
 const STRONG: f64 = 0.953_462_589_245_592_3;
 const WEAK: f64 = 0.301_511_344_577_763_6;
 
+/// As if every satellite of the scene sent them.
+static SENT_L1C: Signal = Signal { sent: always, ..L1C };
+static SENT_L5: Signal = Signal { sent: always, ..L5 };
+
 const PRINTED: [Printed; 3] = [
     Printed {
         signal: &E1,
@@ -47,14 +51,14 @@ const PRINTED: [Printed; 3] = [
         components: [(0.5, &[(1.0, &[(2, STRONG), (12, WEAK)])]), (0.5, &[(1.0, &[(2, STRONG), (12, -WEAK)])])],
     },
     Printed {
-        signal: &L1C,
+        signal: &SENT_L1C,
         chip_rate_hz: 1.023e6,
         // IS-GPS-800J, 3.2.1.6 and 3.3: three quarters on the pilot, TMBOC with four chips of 33
         // BOC(6,1); the data are BOC(1,1).
         components: [(0.75, &[(29.0 / 33.0, &[(2, 1.0)]), (4.0 / 33.0, &[(12, 1.0)])]), (0.25, &[(1.0, &[(2, 1.0)])])],
     },
     Printed {
-        signal: &L5,
+        signal: &SENT_L5,
         chip_rate_hz: 10.23e6,
         components: [(0.5, &[(1.0, &[(1, 1.0)])]), (0.5, &[(1.0, &[(1, 1.0)])])],
     },
