@@ -50,7 +50,7 @@ impl Status {
     }
 }
 
-/// What a figure is about: a report has a line for each.
+/// Group of figures, which has one line in a report.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Group {
     /// Limits of a user's file.
@@ -66,18 +66,18 @@ pub enum Group {
     Position,
     /// The receiver's clock.
     Clock,
-    /// What the receiver states of its own errors.
+    /// Sigmas that the receiver states.
     Sigmas,
     /// Level and spectrum of the samples.
     Samples,
     /// Interference and spoofing.
     Interference,
-    /// Whether the tables are whole and agree.
+    /// Completeness and agreement of the tables.
     Tables,
 }
 
 impl Group {
-    /// In words.
+    /// Name of the group in words.
     pub fn words(self) -> &'static str {
         match self {
             Self::Limits => "limits of the file",

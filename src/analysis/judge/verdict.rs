@@ -16,7 +16,7 @@ pub struct Verdict {
     pub of_user: usize,
     /// Figures that are not judged, each with the reason.
     pub not_judged: Vec<String>,
-    /// What the next rows are about.
+    /// Group of the next rows.
     group: Group,
 }
 
@@ -38,7 +38,7 @@ impl Verdict {
         groups.into_iter().map(|group| (group, counts(group))).collect()
     }
 
-    /// What the rows that follow are about.
+    /// Sets the group of the rows that follow.
     pub(super) fn about(&mut self, group: Group) -> &mut Self {
         self.group = group;
         self

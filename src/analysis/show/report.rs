@@ -133,8 +133,8 @@ impl Summary {
             let verdict = self.position.nees_verdict.map_or("unjudged", Calibration::name);
             writeln!(
                 f,
-                "covariance    {verdict}: NEES {mean:.2}, expected 95 % band {low:.2} to {high:.2} ({fixes} independent \
-                 fixes)"
+                "covariance    {verdict}: NEES {mean:.2}, expected 95 % band {low:.2} to {high:.2} ({fixes} \
+                 independent fixes)"
             )?;
         }
         Ok(())

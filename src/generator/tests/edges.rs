@@ -39,8 +39,9 @@ struct Printed {
 const STRONG: f64 = 0.953_462_589_245_592_3;
 const WEAK: f64 = 0.301_511_344_577_763_6;
 
-/// As if every satellite of the scene sent them.
+/// L1C as if every satellite of the scene sent it.
 static SENT_L1C: Signal = Signal { sent: always, ..L1C };
+/// L5 as if every satellite of the scene sent it.
 static SENT_L5: Signal = Signal { sent: always, ..L5 };
 
 const PRINTED: [Printed; 3] = [

@@ -76,7 +76,7 @@ pub struct Plot {
     pub x: String,
     /// Figure that is drawn.
     pub figure: String,
-    /// What the picture calls it in place of its name in words.
+    /// Name of the figure in the picture, in place of its name in words.
     pub label: Option<String>,
     /// Axis that distinguishes curves.
     pub series: Option<String>,

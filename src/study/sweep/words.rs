@@ -1,4 +1,5 @@
-//! What plots call figures and keys that a study gives no words of its own: names in words, with their units.
+//! Names in words, with units, of figures and keys in plots, for those that a study gives no words of its
+//! own.
 //!
 //! Limits: words of keys follow from their names; a study with a better word gives it as `label`.
 

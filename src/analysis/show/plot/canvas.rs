@@ -78,12 +78,12 @@ const LEFT_PX: i32 = 74;
 const RIGHT_PX: i32 = 24;
 const TOP_PX: i32 = 26;
 const BOTTOM_PX: i32 = 38;
-/// From a name beside an axis to the outer edge, where the axis' words are.
+/// Distance in pixels from a name beside an axis to the outer edge, which holds the axis' words.
 const WORDS_PX: i32 = 30;
 /// Size of a tick's label, and the smallest of a name.
 const LABEL_PX: i32 = 12;
 const LEAST_LABEL_PX: i32 = 6;
-/// From one label to the next at least.
+/// Least distance in pixels from one label to the next.
 const APART_PX: i32 = 8;
 const TICK_PX: i32 = 5;
 

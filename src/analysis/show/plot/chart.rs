@@ -52,15 +52,15 @@ impl Series {
     }
 }
 
-/// How the numbers of an axis are meant.
+/// Meaning of the numbers of an axis.
 #[derive(Clone, Debug, Default)]
 pub enum Scale {
-    /// As they are.
+    /// The values themselves.
     #[default]
     Linear,
-    /// As common logarithms of what is written at the ticks.
+    /// Common logarithms of the values at the ticks.
     Logarithmic,
-    /// As places of names.
+    /// Positions of names along the axis.
     Named(Vec<(f64, String)>),
 }
 
@@ -73,7 +73,7 @@ pub struct Axis {
     pub from: f64,
     /// Upper end.
     pub to: f64,
-    /// What its numbers are.
+    /// Meaning of the axis' numbers.
     pub scale: Scale,
 }
 
@@ -102,7 +102,7 @@ impl Axis {
         Self::new(label, (middle - half, middle + half))
     }
 
-    /// The same, its numbers being common logarithms; it is a thousandth of a decade long at least.
+    /// Makes the axis logarithmic: its numbers are common logarithms, over at least a thousandth of a decade.
     #[must_use]
     pub fn logarithmic(self) -> Self {
         let (from, to) = (self.from.clamp(-300.0, 300.0), self.to.clamp(-300.0, 300.0));
@@ -110,13 +110,13 @@ impl Axis {
         Self { scale: Scale::Logarithmic, from: from - short, to: to + short, ..self }
     }
 
-    /// The same with names in place of numbers.
+    /// Gives the axis names in place of numbers.
     #[must_use]
     pub fn named(self, names: Vec<(f64, String)>) -> Self {
         Self { scale: Scale::Named(names), ..self }
     }
 
-    /// Its ticks, `most` of them at most where that leaves two; names are all ticks.
+    /// Ticks of the axis, at most `most` of them if that leaves two; each name is a tick.
     pub fn ticks(&self, most: usize) -> Ticks {
         match &self.scale {
             Scale::Linear => ticks::linear(self.from, self.to, most),
@@ -132,7 +132,7 @@ impl Axis {
         (self.from, self.to)
     }
 
-    /// Whether a value lies between its ends.
+    /// True if a value lies between the ends of the axis.
     pub fn holds(&self, value: f64) -> bool {
         (self.from..=self.to).contains(&value)
     }
@@ -160,7 +160,7 @@ pub struct Chart {
 }
 
 impl Chart {
-    /// Whether something with the look of this entry of a legend is drawn in it.
+    /// True if the chart draws a series that looks like this entry of a legend.
     pub fn shows(&self, entry: &Series) -> bool {
         let frame = Frame::new(self.x.ends(), self.y.ends());
         let alike = |series: &&Series| series.colour == entry.colour && series.mark.is_like(entry.mark);
@@ -193,7 +193,7 @@ impl Series {
 }
 
 impl Mark {
-    /// Whether a legend shows both alike.
+    /// True if a legend shows both marks alike.
     fn is_like(self, other: Self) -> bool {
         match (self, other) {
             (Self::Bars(_), Self::Bars(_)) | (Self::Tile(..), Self::Tile(..)) => true,
@@ -201,7 +201,7 @@ impl Mark {
         }
     }
 
-    /// Whether it joins its points.
+    /// True if the mark joins its points.
     pub(super) fn is_line(self) -> bool {
         matches!(self, Self::Line | Self::Dash | Self::Dashes(..))
     }

@@ -1,4 +1,4 @@
-//! What of a series lies inside its axes: nothing is drawn over titles, labels and other charts.
+//! Clipping of series to their axes: nothing is drawn over titles, labels and other charts.
 
 /// A rectangle in data units.
 #[derive(Clone, Copy, Debug)]
@@ -8,12 +8,12 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// Between the ends of both axes.
+    /// A frame between the ends of both axes.
     pub fn new(x: (f64, f64), y: (f64, f64)) -> Self {
         Self { x, y }
     }
 
-    /// Whether a point lies inside or on its edge.
+    /// True if a point lies inside the frame or on its edge.
     pub fn holds(&self, (x, y): (f64, f64)) -> bool {
         (self.x.0..=self.x.1).contains(&x) && (self.y.0..=self.y.1).contains(&y)
     }

@@ -18,11 +18,11 @@ pub const BLUE: RGBColor = COLOURS[0];
 pub const ORANGE: RGBColor = COLOURS[1];
 /// The third colour, of the truth and of theory.
 pub const GREEN: RGBColor = COLOURS[2];
-/// Of what is in the background.
+/// Colour of the background's elements.
 pub const GREY: RGBColor = RGBColor(120, 120, 120);
 pub(super) const LIGHT: RGBColor = RGBColor(225, 225, 225);
 
-/// How a series is drawn.
+/// Form in which a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mark {
     /// A solid line through the points.
@@ -56,7 +56,7 @@ pub enum Mark {
 pub enum Shape {
     /// A filled polygon with these corners, in eighths of its radius.
     Filled(&'static [(i32, i32)]),
-    /// Its outline alone.
+    /// Outline of a polygon.
     Hollow(&'static [(i32, i32)]),
     /// Strokes from each pair of these points to the other.
     Strokes(&'static [[(i32, i32); 2]]),

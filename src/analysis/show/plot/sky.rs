@@ -10,7 +10,7 @@ use crate::show::plot::sketch::Sketch;
 use crate::statistics::mean;
 use gnss::satellite::{Sv, System};
 
-/// Where on its picture the sky lies.
+/// Position and size of the sky on its picture.
 #[derive(Clone, Copy)]
 struct Dome {
     size_px: (i32, i32),
@@ -20,10 +20,10 @@ struct Dome {
     scale_px: Option<(i32, i32)>,
 }
 
-/// As wide as a page's text.
+/// Sky as wide as a page's text.
 const WIDE: Dome =
     Dome { size_px: (WIDTH_PX as i32, 490), centre_px: (290, 255), radius_px: 195, scale_px: Some((580, 80)) };
-/// Half as wide, beside another picture.
+/// Sky half as wide, beside another picture.
 const NARROW: Dome = Dome { size_px: (340, 340), centre_px: (170, 168), radius_px: 120, scale_px: None };
 
 /// A satellite's way over the sky.
@@ -41,7 +41,7 @@ pub fn sky(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     sketch(judged, WIDE).map(Some)
 }
 
-/// The same half as wide.
+/// Sketch of the sky, half as wide as a page's text.
 pub fn narrow(judged: &Judged<'_>) -> Result<Sketch, JudgeError> {
     sketch(judged, NARROW)
 }
@@ -154,7 +154,7 @@ fn label(area: &Area<'_>, sv: Sv, (x, y): (i32, i32), taken: &mut Vec<(i32, i32)
 }
 
 impl Dome {
-    /// Its zenith, in virtual pixels.
+    /// Zenith, in virtual pixels.
     fn centre(self) -> (i32, i32) {
         (self.centre_px.0 * FINE, self.centre_px.1 * FINE)
     }

@@ -16,18 +16,18 @@ pub const LEAST_SHARE: f64 = 1e-12;
 /// One tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tick {
-    /// On the axis: a common logarithm where the axis is logarithmic.
+    /// Position on the axis: a common logarithm where the axis is logarithmic.
     pub at: f64,
-    /// Its words.
+    /// Label of the tick.
     pub label: String,
 }
 
 /// All ticks of an axis.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ticks {
-    /// From left to right.
+    /// Ticks from left to right.
     pub ticks: Vec<Tick>,
-    /// What is added to each label.
+    /// Offset that a reader adds to each label.
     pub offset: Option<String>,
 }
 
@@ -44,7 +44,7 @@ impl Decimal {
         format!("{}e{}", self.units, self.exponent).parse().unwrap_or(f64::NAN)
     }
 
-    /// Without an exponent.
+    /// Text of the number without an exponent.
     fn plain(self) -> String {
         let sign = if self.units < 0 { "-" } else { "" };
         let digits = self.units.unsigned_abs().to_string();
@@ -69,7 +69,7 @@ impl Decimal {
         if self.exponent >= 0 { digits + places } else { digits.max(places + 1) + 1 }
     }
 
-    /// With an exponent, without zeros at the end of its digits.
+    /// Text of the number with an exponent, without zeros at the end of its digits.
     fn scientific(self) -> String {
         let sign = if self.units < 0 { "-" } else { "" };
         let digits = self.units.unsigned_abs().to_string();
@@ -139,7 +139,7 @@ fn labelled(decimals: &[Decimal]) -> Ticks {
     with(words(&rest), Some(offset))
 }
 
-/// Without zeros behind the point.
+/// Text of a number without zeros behind the decimals.
 fn shortened(decimal: Decimal) -> String {
     let text = decimal.plain();
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }

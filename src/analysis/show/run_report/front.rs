@@ -20,7 +20,7 @@ const FIGURES: [(&str, &str); 6] = [
     ("unexpected cycle slips", "unexpected cycle slips"),
 ];
 
-/// Place and time in one line.
+/// Position and time in one line.
 pub(super) fn place_and_time(run: &Run) -> String {
     let start = run.scene_json.get("start").and_then(|start| start.as_str()).unwrap_or("");
     let start = start.trim_end_matches(".000000").replace('T', " ");
@@ -77,7 +77,7 @@ fn with_unit(row: &Judgement) -> String {
     if row.unit.is_empty() { row.value_text() } else { format!("{} {}", row.value_text(), row.unit) }
 }
 
-/// How many figures of each group passed.
+/// Writes how many figures of each group passed.
 pub(super) fn groups(report: &mut Report, verdict: &Verdict) {
     let columns =
         [("what was judged", Side::Left), ("passed", Side::Right), ("marginal", Side::Right), ("verdict", Side::Left)];

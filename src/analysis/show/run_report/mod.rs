@@ -23,7 +23,7 @@ pub(crate) struct RunReport {
     report: Report,
     /// Index among the items at which the pictures are inserted.
     figures: usize,
-    /// Those of the first page, and where they come.
+    /// Sketches of the first page, and the number of the page's item before which they come.
     front: ([Sketch; 2], usize),
 }
 

@@ -109,7 +109,7 @@ struct Read {
     words: String,
 }
 
-/// What is wrong with an axis as it was read; nothing if a reader finds the right values on it.
+/// Fault of an axis as it was read; `None` if a reader finds the right values on it.
 fn fault(axis: &Axis, read: &Read) -> Option<String> {
     if read.labels.len() < 2 {
         return Some(format!("{} ticks", read.labels.len()));
