@@ -469,8 +469,9 @@ fn judge(run: &Path) -> Result<u64, String> {
     let clock = Clock::measure(&read, &errors).map_err(refused)?;
     let consistency = Consistency::measure(&read, &errors);
     let slips = Slips::find(&read, &errors).map_err(refused)?;
-    let jitter = Jitter::measure(&read, &errors, &Stated::of(&read)).map_err(refused)?;
-    let _ = (clock, consistency, jitter, Elevations::measure(&read, &errors).map_err(refused)?);
+    let stated = Stated::of(&read);
+    let jitter = Jitter::measure(&read, &errors, &stated).map_err(refused)?;
+    let _ = (clock, consistency, jitter, Elevations::measure(&read, &errors, &stated).map_err(refused)?);
     Ok(hashed(slips.causes()))
 }
 
