@@ -140,13 +140,13 @@ impl Waveform {
         }
         if secondary_code_chips != periods || periods == 0 {
             return refuse(
-                "secondary_code",
+                "secondary code",
                 format!("{secondary_code_chips} chips"),
                 &format!("{periods}, at least one"),
             );
         }
         if let Some(chip) = secondary_code.iter().find(|chip| chip.abs() != 1) {
-            return refuse("secondary_code", format!("a chip of {chip}"), "-1 or 1");
+            return refuse("secondary code", format!("a chip of {chip}"), "-1 or 1");
         }
         let pulses = || component.layers.iter().map(|layer| layer.pulse);
         let is_none = |pulse: &[i8]| pulse.iter().all(|&step| step == 0);
