@@ -306,15 +306,17 @@ fn figure<'a>(sheet: &mut Sheet<'a>, drawing: &'a Drawing, number: usize, captio
     sheet.skip(14.0);
 }
 
-/// Two pictures of one height that fill the width together.
+/// Two pictures of one height that fill the width together, or as much of it as their height allows.
 fn pair<'a>(sheet: &mut Sheet<'a>, drawings: [&'a Drawing; 2], first: usize) {
     const BETWEEN: f32 = 10.0;
+    const TALLEST: f32 = 195.0;
     let shapes = drawings.map(|drawing| drawing.width_px as f32 / drawing.height_px.max(1) as f32);
-    let height = (WIDTH - BETWEEN) / (shapes[0] + shapes[1]);
+    let height = TALLEST.min((WIDTH - BETWEEN) / (shapes[0] + shapes[1]));
     if sheet.room() < height && !sheet.is_fresh() {
         sheet.new_page();
     }
-    let (mut x, y) = (LEFT, sheet.y);
+    let spare = WIDTH - BETWEEN - height * (shapes[0] + shapes[1]);
+    let (mut x, y) = (LEFT + 0.5 * spare, sheet.y);
     for (place, (drawing, shape)) in drawings.into_iter().zip(shapes).enumerate() {
         let width = shape * height;
         sheet.mark(Mark::Picture { x, y, width, height, number: first + place, drawing });

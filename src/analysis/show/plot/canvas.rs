@@ -83,6 +83,8 @@ const WORDS_PX: i32 = 30;
 /// Size of a tick's label, and the smallest of a name.
 const LABEL_PX: i32 = 12;
 const LEAST_LABEL_PX: i32 = 6;
+/// Number of names up to which all are written, however small; of more, every second or third has a label.
+const MANY_NAMES: usize = 24;
 /// Least distance in pixels from one label to the next.
 const APART_PX: i32 = 8;
 const TICK_PX: i32 = 5;
@@ -149,7 +151,7 @@ pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
             ((x - 2 * FINE, y - above_px * FINE), label.as_str())
         })
         .collect();
-    let middle = at((0.5 * (x.from + x.to), 0.5 * (y.from + y.to)));
+    let middle = at((0.5 * (x.from + x.to), y.from + 0.62 * y.span()));
     let frame = Frame::new(x.ends(), y.ends());
     for series in &chart.series {
         series::draw(&mut context, &frame, series)?;
@@ -233,9 +235,18 @@ fn ticks_across(
     };
     if matches!(x.scale, Scale::Named(_)) {
         let names = x.ticks(0);
-        for size_px in (LEAST_LABEL_PX..=LABEL_PX - 1).rev() {
+        let least_px = if names.ticks.len() > MANY_NAMES { LEAST_LABEL_PX + 3 } else { LEAST_LABEL_PX };
+        for size_px in (least_px..=LABEL_PX - 1).rev() {
             if fits(&names.ticks, size_px, 0.3 * f64::from(size_px))? {
                 return Ok((names, size_px));
+            }
+        }
+        // Many names, as numbers of satellites, are fewer sooner than unreadable.
+        let fewer = if names.ticks.len() > MANY_NAMES { 2..names.ticks.len() } else { 0..0 };
+        for every in fewer {
+            let ticks: Vec<Tick> = names.ticks.iter().step_by(every).cloned().collect();
+            if fits(&ticks, LEAST_LABEL_PX + 3, 0.3 * f64::from(LEAST_LABEL_PX))? {
+                return Ok((Ticks { ticks, offset: None }, LEAST_LABEL_PX + 3));
             }
         }
         return Ok((names, LEAST_LABEL_PX));
@@ -255,17 +266,13 @@ fn ticks_across(
             return Ok((ticks, LABEL_PX));
         }
     }
-    // Of a few ticks that are too near each other the two that are furthest apart.
+    // Of a few ticks that are too near each other every second one, or every third, and so on.
     let few = x.ticks(2);
     let count = few.ticks.len();
-    let mut pairs: Vec<(usize, usize)> = (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b))).collect();
-    pairs.sort_by_key(|(a, b)| count + a - b);
-    let pair =
-        |(a, b): (usize, usize)| -> Vec<Tick> { [a, b].iter().filter_map(|n| few.ticks.get(*n).cloned()).collect() };
     for size_px in [LABEL_PX, LEAST_LABEL_PX + 2] {
-        for places in &pairs {
-            let ticks = pair(*places);
-            if fits(&ticks, size_px, 0.3 * f64::from(size_px))? {
+        for (stride, start) in (1..count.max(2)).flat_map(|stride| (0..stride).map(move |start| (stride, start))) {
+            let ticks: Vec<Tick> = few.ticks.iter().skip(start).step_by(stride).cloned().collect();
+            if ticks.len() >= 2 && fits(&ticks, size_px, 0.3 * f64::from(size_px))? {
                 return Ok((Ticks { ticks, offset: few.offset.clone() }, size_px));
             }
         }

@@ -31,7 +31,8 @@ pub fn consistency(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         let mut all = Vec::new();
         found.rows.each(|row| all.push(2.0 * sigma(&row)))?;
         let most = percentile(&all, SHOWN_BOUNDS).unwrap_or(0.0);
-        let y = Axis::around("error (m)", error.y.values().chain([-most, most]), 0.2);
+        let y =
+            Axis::around("error (m)", error.y.values().chain([-most, most]), if error.count > 0 { 0.2 } else { 2.0 });
         let series = vec![
             Series::new("error", BLUE, Mark::Dots, error.points),
             Series::new("formal ±2σ", ORANGE, Mark::Line, above.points),

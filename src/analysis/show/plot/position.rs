@@ -45,7 +45,8 @@ fn plan(judged: &Judged<'_>) -> Result<Plan, JudgeError> {
     let reach = 1.1 * ends().chain(far).fold(least, f64::max);
     let axis = |label| Axis::new(label, (-reach, reach));
     let legend = series.clone();
-    let chart = Chart { equal: true, ..Chart::new("Horizontal error", axis("east (m)"), axis("north (m)"), series) };
+    let title = if flat.is_empty() { "Horizontal error: no fixes" } else { "Horizontal error" };
+    let chart = Chart { equal: true, ..Chart::new(title, axis("east (m)"), axis("north (m)"), series) };
     Ok(Plan { chart, legend, flat })
 }
 
@@ -154,7 +155,8 @@ pub fn time(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         drop(all);
         let mut ends = points.y;
         [0.0, -most, most].into_iter().for_each(|value| ends.add(value));
-        let y = Axis::around("error (m)", ends.values(), 0.1);
+        // Without fixes there is no size.
+        let y = Axis::around("error (m)", ends.values(), if points.count > 0 { 0.1 } else { 2.0 });
         let x = judged.time_axis(points.x.values());
         let mut series = vec![Series::new("", GREY, Mark::Line, vec![(x.from, 0.0), (x.to, 0.0)])];
         series.push(Series::new("", BLUE, Mark::Dots, points.points));
@@ -220,8 +222,8 @@ pub fn spoofing(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         Ok::<_, JudgeError>(Series::new(name, colour, mark, shown.points))
     };
     let distances = vec![
-        distance("fix from truth", ORANGE, Mark::Dots, |fix| fix.from_truth_m)?,
-        distance("claim from truth", GREEN, Mark::Dash, |fix| fix.claim_from_truth_m)?,
+        distance("fix from truth", COLOURS[4], Mark::Dots, |fix| fix.from_truth_m)?,
+        distance("claim from truth", COLOURS[6], Mark::Dash, |fix| fix.claim_from_truth_m)?,
         distance("fix from claim", COLOURS[3], Mark::Line, |fix| fix.from_claim_m)?,
     ];
     let y = Axis::around("distance (m)", all.values(), 1.0);

@@ -7,6 +7,7 @@ use crate::error::JudgeError;
 use crate::show::plot::canvas::{Area, FINE, Failure, GREY, WIDTH_PX, anchored};
 use crate::show::plot::judged::Judged;
 use crate::show::plot::sketch::Sketch;
+use crate::show::plot::ticks::{self, Tick};
 use crate::statistics::mean;
 use gnss::satellite::{Sv, System};
 
@@ -24,7 +25,7 @@ struct Dome {
 const WIDE: Dome =
     Dome { size_px: (WIDTH_PX as i32, 490), centre_px: (290, 255), radius_px: 195, scale_px: Some((580, 80)) };
 /// Sky half as wide, beside another picture.
-const NARROW: Dome = Dome { size_px: (340, 340), centre_px: (170, 168), radius_px: 120, scale_px: None };
+const NARROW: Dome = Dome { size_px: (340, 340), centre_px: (170, 158), radius_px: 108, scale_px: None };
 
 /// A satellite's way over the sky.
 struct Track {
@@ -213,10 +214,10 @@ fn scale(area: &Area<'_>, (left_px, top_px): (i32, i32), low: f64, high: f64) ->
         let opposite = (left + width, top + (step + 1) * height + 1);
         area.draw(&Rectangle::new([corner, opposite], shade(cn0, low, high).filled()))?;
     }
-    for tick in 0..=4 {
-        let cn0 = high - (high - low) * f64::from(tick) / 4.0;
-        let at = (left + width + 6 * FINE, top + steps * height * tick / 4);
-        area.draw(&Text::new(format!("{cn0:.1}"), at, anchored(12, HPos::Left, VPos::Center)))?;
+    for Tick { at, label } in ticks::linear(low, high, 6).ticks {
+        let down = f64::from(steps * height) * (high - at) / (high - low);
+        let at = (left + width + 6 * FINE, top + down.round() as i32);
+        area.draw(&Text::new(label, at, anchored(12, HPos::Left, VPos::Center)))?;
     }
     let style = anchored(12, HPos::Center, VPos::Bottom);
     area.draw(&Text::new("C/N0 (dB-Hz)", (left + 14 * FINE, top - 10 * FINE), style))?;

@@ -38,9 +38,16 @@ pub(crate) fn write(
     let facts = facts.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?)));
     report.add(Item::Facts(facts.collect()));
     front::failures(&mut report, found);
+    // Positions come last, and are what the first page shows.
+    let mut pictures = pictures;
+    if let Some(last) = pictures.pop() {
+        report.figure(last.drawing, last.caption);
+    }
     report.add(Item::NewPage).heading("Verdict");
     verdict(&mut report, found);
-    report.add(Item::NewPage).heading("Figures");
+    if !pictures.is_empty() {
+        report.add(Item::NewPage).heading("Figures");
+    }
     for picture in pictures {
         report.figure(picture.drawing, picture.caption);
     }

@@ -2,13 +2,14 @@
 
 use super::tone;
 use crate::judge::judgement::{Judgement, Status, number};
+use crate::judge::summary::Summary;
 use crate::judge::verdict::Verdict;
 use crate::read::Run;
 use crate::show::pdf::{Cell, Item, Report, Side, Table, Tone};
 use gnss::earth::Geodetic;
 
 /// Failures whose reasons the first page has room for.
-const MOST_FAILURES: usize = 8;
+const MOST_FAILURES: usize = 5;
 
 /// The figures of the first page: their words, and the verdict's rows that they are.
 const FIGURES: [(&str, &str); 6] = [
@@ -55,26 +56,38 @@ pub(super) fn banner(report: &mut Report, verdict: &Verdict) {
 }
 
 /// Six figures with their limits.
-pub(super) fn figures(report: &mut Report, verdict: &Verdict) {
+pub(super) fn figures(report: &mut Report, summary: &Summary) {
     let columns = [("figure", Side::Left), ("value", Side::Right), ("limit", Side::Right), ("verdict", Side::Left)];
     let mut table = Table::new("", columns);
     for (words, figure) in FIGURES {
-        let row = verdict.rows.iter().find(|row| row.figure.starts_with(figure));
+        let row = summary.details.verdict.rows.iter().find(|row| row.figure.starts_with(figure));
         match row {
             Some(row) => table.row([
                 Cell::from(words),
                 Cell::from(with_unit(row)),
-                Cell::from(row.bound.to_string()),
+                Cell::from(if row.unit.is_empty() {
+                    row.bound.to_string()
+                } else {
+                    format!("{} {}", row.bound, row.unit)
+                }),
                 Cell::toned(row.status.word(), tone(row.status)),
             ]),
-            None => table.row([Cell::from(words), Cell::from("–"), Cell::from("–"), Cell::from("not judged")]),
+            None => {
+                let first_s = summary.position.first_fix_s.filter(|_| figure == "time to first fix");
+                let value = first_s.map_or_else(|| "–".to_owned(), |first_s| format!("{} s", number(first_s)));
+                table.row([words, &value, "–", "not judged"]);
+            }
         }
     }
     report.table(table);
 }
 
 fn with_unit(row: &Judgement) -> String {
-    if row.unit.is_empty() { row.value_text() } else { format!("{} {}", row.value_text(), row.unit) }
+    if row.unit.is_empty() || row.value.is_null() {
+        row.value_text()
+    } else {
+        format!("{} {}", row.value_text(), row.unit)
+    }
 }
 
 /// Writes how many figures of each group passed.

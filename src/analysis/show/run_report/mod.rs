@@ -34,11 +34,11 @@ impl RunReport {
         let head = format!("receiver against truth · seed {}", summary.seed);
         let mut report = Report::new(summary.scene.clone(), front::place_and_time(judged.run), head);
         front::banner(&mut report, &summary.details.verdict);
+        front::failures(&mut report, &summary.details.verdict);
         report.add(Item::Facts(facts(judged)));
         let front = (plot::front(judged)?, report.items.len());
-        front::figures(&mut report, &summary.details.verdict);
+        front::figures(&mut report, summary);
         front::groups(&mut report, &summary.details.verdict);
-        front::failures(&mut report, &summary.details.verdict);
         report.add(Item::NewPage).heading("Verdict");
         verdict(&mut report, &summary.details.verdict);
         report.add(Item::NewPage);
@@ -152,11 +152,7 @@ fn facts(judged: &Judged<'_>) -> Vec<(String, String)> {
         .collect();
     let satellites = &summary.satellites;
     let mut facts = vec![
-        ("scene", Some(scene.name.clone())),
-        ("seed", Some(scene.seed.to_string())),
         ("program", Some(concat!("gnss-twin ", env!("CARGO_PKG_VERSION")).to_owned())),
-        ("start (GPS time)", text("start").map(|start| start.trim_end_matches(".000000").to_owned())),
-        ("duration", Some(format!("{} s", scene.duration_s))),
         ("samples", Some(format!("{} Msps, {}", number(scene.sample_rate_hz / 1e6), scene.format))),
         ("centre", scene.center_hz.map(|hz| format!("{} MHz", hz / 1e6))),
         ("signals", text("signals")),
