@@ -85,8 +85,8 @@ pub fn pictures(results: &Results) -> Vec<Picture> {
 const BAND: &str = "95 % of the mean";
 /// Columns of a heat map up to which its values have three digits.
 const MOST_COLUMNS: usize = 10;
-/// Bands reach beyond the curves by this part of their span at most: the interval of a few runs that survive
-/// would hide all else.
+/// Bands reach beyond the curves by this part of their span at most, unless most bands do: the interval of a few
+/// runs that survive would hide all else.
 const MOST_BAND: f64 = 0.5;
 /// Distance from one series to the next where names are on the axis, in steps of the names.
 const NAMED_STEP: f64 = 0.12;
@@ -209,12 +209,11 @@ impl View<'_> {
 
     /// The axis upward around curves and, as far as these stay readable, the bands about them.
     fn up(&self, series: &[Series]) -> Axis {
-        let ends = |is_band: bool| {
-            let own = series.iter().filter(move |series| (series.mark == Mark::Band) == is_band);
-            let values = own.flat_map(|series| series.points.iter().map(|point| point.1)).filter(|y| y.is_finite());
-            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(y), high.max(y)))
+        let values = |is_band: bool| -> Vec<f64> {
+            let own = series.iter().filter(|series| (series.mark == Mark::Band) == is_band);
+            own.flat_map(|series| series.points.iter().map(|point| point.1)).filter(|y| y.is_finite()).collect()
         };
-        upward(&self.figure_words(), ends(false), ends(true), self.plot.log_y)
+        upward(&self.figure_words(), &values(false), &values(true), self.plot.log_y)
     }
 
     fn height(&self, value: f64) -> Option<f64> {
@@ -408,20 +407,25 @@ impl View<'_> {
     }
 }
 
-/// An axis around the ends of curves and, as far as these stay readable, those of bands; numbers of a
-/// logarithmic one are logarithms.
-fn upward(label: &str, (low, high): (f64, f64), (band_low, band_high): (f64, f64), is_log: bool) -> Axis {
-    let (span, most) = (high - low, low.abs().max(high.abs()));
+/// An axis around curves and, as far as these stay readable, bands; values of a logarithmic one are logarithms.
+/// Bands that most others are like are shown whole.
+fn upward(label: &str, curves: &[f64], bands: &[f64], is_log: bool) -> Axis {
+    let (low, high) =
+        curves.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(*y), high.max(*y)));
+    let (span, most) = ((high - low).max(0.0), low.abs().max(high.abs()));
+    let mut beyond: Vec<f64> = bands.iter().map(|y| (low - y).max(y - high).max(0.0)).collect();
+    beyond.sort_by(f64::total_cmp);
+    let usual = beyond.get(beyond.len() * 3 / 4).copied().unwrap_or(0.0);
     // Curves of one height show their bands whole.
-    let room = if span > 1e-9 * most { MOST_BAND * span } else { f64::INFINITY };
-    let values = [low, high, band_low.max(low - room), band_high.min(high + room)];
+    let room = if span > 1e-9 * most { (MOST_BAND * span).max(1.5 * usual) } else { f64::INFINITY };
+    let shown = bands.iter().map(|y| y.clamp(low.min(high) - room, high.max(low) + room));
     // Half a decade at least, or a part of values that are all alike.
     let least = match is_log {
         true => 0.5,
         false if most > 0.0 && most.is_finite() => 0.02 * most,
         false => 1.0,
     };
-    let axis = Axis::around(label, values.into_iter(), least);
+    let axis = Axis::around(label, curves.iter().copied().chain(shown), least);
     if is_log { axis.logarithmic() } else { axis }
 }
 
@@ -462,17 +466,17 @@ mod tests {
     #[test]
     fn the_interval_of_two_survivors_does_not_hide_the_curves() {
         // Once drawn from -1000° to 1500°: the mean of two runs that held lock, beside curves of 10° to 25°.
-        let axis = upward("largest phase error (degrees)", (10.0, 25.0), (-1000.0, 1500.0), false);
+        let curves = [10.0, 12.0, 14.0, 16.0, 18.0, 25.0];
+        let bands = [9.0, 11.0, 11.0, 13.0, 13.0, 15.0, 15.0, 17.0, 17.0, 19.0, -1000.0, 1500.0];
+        let axis = upward("largest phase error (degrees)", &curves, &bands, false);
         assert!((25.0 - 10.0) / (axis.to - axis.from) > 0.4, "{axis:?}");
         assert!(axis.holds(10.0) && axis.holds(25.0));
-        // What fits is shown whole.
-        let axis = upward("share", (0.2, 0.9), (0.1, 1.0), false);
-        assert!(axis.holds(0.1) && axis.holds(1.0));
-        // So is the band about one point.
-        let axis = upward("share", (0.5, 0.5), (0.1, 0.9), false);
+        // Bands that are all wide are shown whole, as is the band about one point.
+        let axis = upward("error (m)", &[0.155, 0.16, 0.14], &[0.05, 0.25, 0.06, 0.26, 0.04, 0.24], false);
+        assert!(axis.holds(0.04) && axis.holds(0.26), "{axis:?}");
+        let axis = upward("share", &[0.5], &[0.1, 0.9], false);
         assert!(axis.holds(0.1) && axis.holds(0.9));
         // No curve at all still makes an axis.
-        let none = (f64::INFINITY, f64::NEG_INFINITY);
-        assert!(upward("share", none, none, false).ticks(5).ticks.len() >= 2);
+        assert!(upward("share", &[], &[], false).ticks(5).ticks.len() >= 2);
     }
 }
