@@ -85,8 +85,8 @@ pub fn pictures(results: &Results) -> Vec<Picture> {
 const BAND: &str = "95 % of the mean";
 /// Columns of a heat map up to which its values have three digits.
 const MOST_COLUMNS: usize = 10;
-/// Bands reach beyond the curves by this part of their span at most, unless most bands do: the interval of a few
-/// runs that survive would hide all else.
+/// Bands reach beyond the curves by this part of their span at most, unless most bands do: the interval of a
+/// few runs that survive would hide all else.
 const MOST_BAND: f64 = 0.5;
 /// Distance from one series to the next where names are on the axis, in steps of the names.
 const NAMED_STEP: f64 = 0.12;
@@ -407,8 +407,8 @@ impl View<'_> {
     }
 }
 
-/// An axis around curves and, as far as these stay readable, bands; values of a logarithmic one are logarithms.
-/// Bands that most others are like are shown whole.
+/// An axis around curves and, as far as these stay readable, bands; values of a logarithmic one are
+/// logarithms. Bands that most others are like are shown whole.
 fn upward(label: &str, curves: &[f64], bands: &[f64], is_log: bool) -> Axis {
     let (low, high) =
         curves.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(*y), high.max(*y)));
