@@ -34,6 +34,11 @@ def save(root, table):
         writer.writerows(table[name] for name in sorted(table))
 
 
+def some(names):
+    """The first names, and how many there are."""
+    return ", ".join(names) if len(names) < 4 else f"{', '.join(names[:2])} and {len(names) - 2} more"
+
+
 def line_of_row(root, name):
     lines = (root / LEDGER).read_text(encoding="utf8").splitlines()
     return next((number for number, line in enumerate(lines, 1) if line.startswith(f"{name},")), 1)
@@ -62,7 +67,8 @@ def met(value, bar):
 
 def shown(row, kind):
     number = re.sub(r"^-", "−", row["value"])
-    return f"{number} {row['unit']}" if kind == "=" and row["unit"] else number
+    space = "" if row["unit"] == "°" else " "
+    return f"{number}{space}{row['unit']}" if kind == "=" and row["unit"] else number
 
 
 def pages(root, patterns):
@@ -102,9 +108,12 @@ def said(text):
 def check(root, figures):
     """Findings and warnings, each with place and cure."""
     table = read(root)
-    found, stale = [], defaultdict(list)
+    found, stale, old_runs = [], defaultdict(list), defaultdict(list)
+    missing = defaultdict(list)
     for name in sorted(figures.keys() - table.keys()):
-        found.append(f"{LEDGER}:1: {name} is declared and has no row; make it by: --make {name}")
+        missing[name.rpartition(".")[0]].append(name)
+    for family, names in missing.items():
+        found.append(f"{LEDGER}:1: {some(names)}: declared without a row; make by: --make {family}.")
     for name, row in table.items():
         place = f"{LEDGER}:{line_of_row(root, name)}"
         if name not in figures:
@@ -116,15 +125,17 @@ def check(root, figures):
             if isinstance(source, make.Page):
                 stale[source.page, row["commit"], source.command].append(name)
             else:
-                text = f"{place}: stale: {name} speaks of {row['rooms']}, made at {row['commit']}"
-                found.append(f"{text}; make it anew by: --make {name}")
+                old_runs[name.rpartition(".")[0], row["rooms"], row["commit"]].append(name)
+    for (family, rooms, commit), names in old_runs.items():
+        place = f"{LEDGER}:{line_of_row(root, names[0])}"
+        found.append(f"{place}: stale: {some(names)}: of {rooms}, made at {commit}; make anew by: --make {family}.")
     expected = notices(root, table, figures)
     for page in measured_pages(figures):
         path = root / page
         if path.is_file() and said(path.read_text(encoding="utf8")) != expected.get(page, ""):
             found.append(f"{page}:3: the page does not say which of its figures are older than the code; fill it by: --write")
     warnings = [
-        f"{page}: {len(names)} figures are older than the code, made at {commit} ({', '.join(names[:3])}{' …' * (len(names) > 3)}); "
+        f"{page}: {len(names)} figures are older than the code, made at {commit} ({some(names)}); "
         f"make them anew by: {command}, then --make"
         for (page, commit, command), names in stale.items()
     ]

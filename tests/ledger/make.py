@@ -14,8 +14,11 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+import digest
+
 ROOT = Path(__file__).resolve().parent.parent.parent
 TIMED_RUNS = 5
+NUMBER = r"-?\d+(?:\.\d+)?(?:e-?\d+)?"
 
 
 class NotMade(Exception):
@@ -92,19 +95,22 @@ class Run:
 
 @dataclass(frozen=True)
 class Timing:
-    """A speed of a scene's run on this machine: median of several runs."""
+    """A cost of a scene's run on this machine: median of several runs. What the clock on the wall measures wants an idle machine."""
 
     scene: str
     path: str
+    by_clock: bool = False
 
     @property
     def command(self):
         return f"gnss-twin run {self.scene} ({TIMED_RUNS} times)"
 
     def make(self):
+        load = os.getloadavg()[0]
+        if self.by_clock and load > 0.5 * len(os.sched_getaffinity(0)):
+            raise NotMade(f"the machine has other work (load {load:.1f}): wait until it is idle")
         values = [at(summary, self.path) for summary in timed(twin(), self.scene)]
-        load = f", load {os.getloadavg()[0]:.1f} at the end" if hasattr(os, "getloadavg") else ""
-        return Made(statistics.median(values), processor() + load, str(len(values)))
+        return Made(statistics.median(values), processor(), str(len(values)))
 
 
 @functools.cache
@@ -189,9 +195,11 @@ class Page:
     text: str = r"\1"
     row: str = ""
     less: str = ""
-    per: int = 1
+    per: float = 1
     column: str = "value"
+    which: int = 0
     mark: str = ""
+    after: str = ""
     counted: str = ""
     summed: int = 0
     runs: str = "1"
@@ -207,13 +215,14 @@ class Page:
             if not found:
                 raise NotMade(f"{self.page} has nothing like {self.pattern}")
             return found.expand(self.text)
+        text = text[text.index(self.after) :]
         return (self.cell(text, self.row) - (self.cell(text, self.less) if self.less else 0.0)) / self.per
 
     def cell(self, text, name):
         head = []
         for row in rows(text):
             if row[0].strip("`") == name and self.column in head:
-                return float(row[head.index(self.column)].split(" ")[0])
+                return float(re.findall(NUMBER, row[head.index(self.column)])[self.which])
             head = row if self.column in row else head
         raise NotMade(f"{self.page} has no row {name!r} with a column {self.column!r}")
 
@@ -253,9 +262,11 @@ def tree_of(commit, place):
         archive.extractall(place, filter="data")
 
 
-def warn_of_old_program(paths):
+@functools.cache
+def warn_of_old_program(rooms):
     """Says where the program is older than code that a figure speaks of: it may have been built of other code."""
     program = Path(twin())
+    paths = [path for room in rooms for path in digest.files(ROOT, room)]
     newer = [path for path in paths if path.stat().st_mtime > program.stat().st_mtime]
     if newer:
         print(f"warning: {program} is older than {newer[0].relative_to(ROOT)}: build it anew", file=sys.stderr)

@@ -12,10 +12,12 @@ import make
 
 
 def chosen(figures, prefixes):
+    """Figures whose ids begin so, and all others of the pages that they are read from."""
     some = [figure for name, figure in figures.items() if not prefixes or name.startswith(tuple(prefixes))]
     if not some:
         sys.exit(f"no figure begins with {' or '.join(prefixes)}")
-    return some
+    read = {figure.source.page for figure in some if isinstance(figure.source, make.Page)}
+    return [figure for figure in figures.values() if figure in some or getattr(figure.source, "page", None) in read]
 
 
 def stamp(path):
@@ -46,7 +48,7 @@ def row_of(figure, old):
     if isinstance(source, make.Page) and not source.mark and (make.ROOT / source.page).is_file():
         stamp(make.ROOT / source.page)
     if isinstance(source, (make.Run, make.Timing)):
-        make.warn_of_old_program([path for room in figure.rooms for path in digest.files(make.ROOT, room)])
+        make.warn_of_old_program(figure.rooms)
     made = source.make()
     value, bar = check.rounded(made.value, figure.digits), made.bar if made.bar is not None else figure.bar
     rooms = " ".join(figure.rooms)
@@ -83,11 +85,17 @@ def make_all(figures, prefixes):
 
 
 def compare(figures, prefixes):
+    """Makes what is the same on every machine, and says where the ledger has another value."""
     table, failed = check.read(make.ROOT), 0
     for figure in chosen(figures, prefixes):
-        if isinstance(figure.source, (make.Run, make.Count, make.Asserted)):
+        if not isinstance(figure.source, (make.Run, make.Count, make.Asserted)):
+            continue
+        try:
             value = check.rounded(figure.source.make().value, figure.digits)
-            if value != table[figure.id]["value"]:
-                failed += 1
-                print(f"{figure.id} is {value}, {check.LEDGER} has {table[figure.id]['value']}; make it anew by: --make {figure.id}")
+        except (make.NotMade, OSError) as error:
+            value = f"not made ({error})"
+        recorded = table.get(figure.id, {}).get("value", "nothing")
+        if value != recorded:
+            failed += 1
+            print(f"{figure.id} is {value}, {check.LEDGER} has {recorded}; make it anew by: --make {figure.id}")
     return failed > 0

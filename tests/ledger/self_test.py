@@ -103,8 +103,8 @@ FAULTS = [
     ("a figure in a table of results", [("README.md", "| key |", "| error |")], "README.md:14: '90 °' has no source"),
     ("a marker without an end", [("README.md", "0.31 m<!--/-->", "0.31 m")], "README.md:3: "),
     ("a marker that begins a line", [("README.md", "The error is <", "<")], "README.md:3: a marker begins the line; put a word before it"),
-    ("code", [("src/room/lib.rs", "458.0", "459.0")], "stale: a.error_m speaks of src/room, made at 1234567; make it anew by: --make a.error_m"),
-    ("text in code", [("src/room/lib.rs", "// no comment", "// a comment")], "stale: a.bias_m speaks of src/room"),
+    ("code", [("src/room/lib.rs", "458.0", "459.0")], "reports/evidence.csv:2: stale: a.bias_m, a.error_m: of src/room, made at 1234567; make anew by: --make a."),
+    ("text in code", [("src/room/lib.rs", "// no comment", "// a comment")], "stale: a.bias_m, a.error_m: of src/room"),
     ("a comment", [("src/room/lib.rs", "// a comment", "// another comment")], None),
     ("a comment of the library", [("src/room/lib.rs", "/// Speed of light in m/s.", "/// Speed of light.\n\n")], None),
     ("layout", [("src/room/lib.rs", "() -> &'static str {", "() ->\n    &'static str\n{")], None),
@@ -115,7 +115,7 @@ FAULTS = [
     ("a missed bar that is called met", [("reports/evidence.csv", "≤ 0.5", "≤ 0.2")], "reports/evidence.csv:4: a.error_m: met says yes of 0.31 against ≤ 0.2"),
     ("words of a row", [("reports/evidence.csv", "an error", "a tiny error")], "a.error_m: what is 'a tiny error', declared 'an error'"),
     ("a row that nobody declared", [("reports/evidence.csv", "a.bias_m", "a.bios_m")], "a.bios_m is not declared in tests/ledger/figures.py"),
-    ("a row too few", [("reports/evidence.csv", "a.bias_m", "a.bios_m")], "a.bias_m is declared and has no row; make it by: --make a.bias_m"),
+    ("a row too few", [("reports/evidence.csv", "a.bias_m", "a.bios_m")], "reports/evidence.csv:1: a.bias_m: declared without a row; make by: --make a."),
 ]
 
 
