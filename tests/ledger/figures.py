@@ -58,14 +58,6 @@ def accuracy():
                 (*ALL_SAMPLES, "src/analysis/measure", file), "= 0" if name == "losses" else "",
                 None if counted else 3 if name == "first_fix_s" else 2,
             )
-    for name, what, unit in [
-        ("dll_sigma_chips", "code loop's error, standard deviation", "chip"),
-        ("pll_sigma_deg", "phase loop's error, standard deviation", "°"),
-        ("fll_sigma_hz", "frequency error, standard deviation", "Hz"),
-    ]:
-        file = "scenarios/high_dynamics.toml"
-        yield Figure(f"accuracy.high_dynamics.{name}", f"{what}: {SCENES['high_dynamics']}", unit, make.Run(file, f"tracking.{name}"),
-                     (*ALL_SAMPLES, "src/analysis/measure", file), "", 2)
     test = "tests/loops/bdgim.rs"
     yield Figure("accuracy.bdgim.without_m", "position from one carrier of BeiDou without BDGIM, off by more than", "m",
                  make.Asserted(test, r"without_m\.norm\(\) > ([\d.]+)"))
@@ -259,15 +251,6 @@ def studies():
         yield Figure(f"studies.starts_thermal.nees.{column}", f"normalised error squared of a run's last fix, {words}", "",
                      make.Page("reports/studies/starts_thermal/report.md", "\"$GNSS_TWIN\" study studies/starts_thermal.toml",
                                row="broadcast.last_nees", column=column, runs="40"), (*ALL_SAMPLES, "studies/starts_thermal.toml"), "", 3)
-    for scene in ("static", "moderate", "high_dynamics"):
-        for name, path, unit in [("horizontal_p95_m", "position.horizontal_p95_m", "m"), ("vertical_p95_m", "position.vertical_p95_m", "m"),
-                                 ("velocity_p95_mps", "position.velocity_p95_mps", "m/s"), ("pseudorange_rms_m", "observables.pseudorange_rms_m", "m")]:
-            for which, part in enumerate(("mean", "low", "high")):
-                words = ("mean", "lower end of the mean's 95 % interval", "upper end of the mean's 95 % interval")[which]
-                source = make.Page("reports/studies/motions/report.md", "\"$GNSS_TWIN\" study studies/motions.toml", row=scene,
-                                   column=path, which=which, runs="5")
-                yield Figure(f"studies.motions.{scene}.{name}.{part}", f"study motions, {scene}, {path}: {words}", unit, source,
-                             (*ALL_SAMPLES, "studies/motions.toml", f"scenarios/{scene}.toml"), "", 2)
     for study, figure, name in [
         ("pll_jitter", "phase_sigma_deg", ""), ("dll_jitter", "code_sigma_m", ""), ("pll_jitter_e1", "phase_sigma_deg", ""),
         ("dll_jitter_e1", "code_sigma_m", ""), ("jitter_maps", "phase_sigma_deg", "phase_"), ("jitter_maps", "code_sigma_m", "code_"),
