@@ -256,15 +256,14 @@ impl Expectations {
         let signals: BTreeSet<&'static Signal> = self.satellites.keys().map(|link| link.signal).collect();
         let table = |signal: &&'static Signal| Timetable::beside(signal, &signals, start);
         let page_s = |signal: &&'static Signal| table(signal).ionosphere_by_s(acquired_s + satellite::LOCK_S);
+        let model = receiver.ionosphere_model(&signals);
         // Nine zeros are no coefficients of BDGIM.
-        let has_coefficients = |signal: &&&'static Signal| {
+        let model = model.filter(|model| *model != Model::Bdgim || self.message.ionosphere(*model).is_some());
+        let brings = |signal: &&&'static Signal| {
             let mut messages = signal.components.iter().filter_map(|component| component.message);
-            messages.all(|message| {
-                let model = message.ionosphere.model;
-                model != Model::Bdgim || self.message.ionosphere(model).is_some()
-            })
+            messages.any(|message| Some(message.ionosphere.model) == model)
         };
-        let page_s = signals.iter().filter(has_coefficients).map(page_s).fold(f64::INFINITY, f64::min);
+        let page_s = signals.iter().filter(brings).map(page_s).fold(f64::INFINITY, f64::min);
         let waited_s = four_s + receiver.ionosphere_wait_s;
         let due_s = if receiver.requires_ionosphere { four_s.max(page_s) } else { waited_s } + SOLVE_S;
         // Where the scene excuses a time, the clock begins anew after it.

@@ -5,7 +5,7 @@
 //! states none is taken to have the defaults of a common one. Losses of the search are its worst: half a cell
 //! of code, half a step of Doppler, and signs that turn within its sums.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use serde_json::Value;
@@ -17,6 +17,7 @@ use crate::expect::theory::clock::PowerLaw;
 use crate::expect::theory::detection;
 use crate::read::Run;
 use crate::waveform::leading;
+use gnss::ionosphere::Model;
 use gnss::signal::{Component, SIGNALS, Signal};
 
 /// Jitter up to which a phase loop is expected to hold for good: 3σ leaves a third of the discriminator's 45°
@@ -59,6 +60,8 @@ pub struct Receiver {
     pub requires_ionosphere: bool,
     /// Time that the first fix waits for the ionosphere's parameters, seconds.
     pub ionosphere_wait_s: f64,
+    /// Correction of the ionosphere, in the word of its setting.
+    ionosphere: String,
     /// True if the receiver uses satellites by their reduced elements.
     pub reduced_elements: bool,
     /// Loss of the signal in the front end by filter, converter and edges between samples, dB.
@@ -108,7 +111,8 @@ impl Receiver {
             detection::threshold(cell, pairs)
         };
         let carrier = Carrier::of(signal, entry.as_ref(), oscillator, |key, default| number("tracking", key, default));
-        let broadcast = value("position", "ionosphere").and_then(Value::as_str).unwrap_or("none") != "none";
+        let ionosphere = value("position", "ionosphere").and_then(Value::as_str).unwrap_or("none");
+        let broadcast = ionosphere != "none";
         let required = value("position", "require_ionosphere").and_then(Value::as_bool).unwrap_or(false);
         Self {
             stated: stated.clone(),
@@ -130,6 +134,24 @@ impl Receiver {
             cost_db: 0.0,
             costs_db: Arc::default(),
             ionosphere_wait_s: if broadcast { number("position", "ionosphere_wait_s", 0.0) } else { 0.0 },
+            ionosphere: ionosphere.to_owned(),
+        }
+    }
+
+    /// The model of the ionosphere whose coefficients it waits for, of those that `signals` bring: the one of
+    /// its setting, or the first in the order in which a receiver that takes any prefers them.
+    pub fn ionosphere_model(&self, signals: &BTreeSet<&'static Signal>) -> Option<Model> {
+        let is_brought = |model: &Model| {
+            let mut messages = signals.iter().flat_map(|signal| signal.components.iter().filter_map(|c| c.message));
+            messages.any(|message| message.ionosphere.model == *model)
+        };
+        let mut klobuchar = Model::KLOBUCHAR.into_iter();
+        match self.ionosphere.as_str() {
+            "none" => None,
+            "klobuchar" => klobuchar.find(is_brought),
+            "nequick_g" => Some(Model::NequickG),
+            "bdgim" => Some(Model::Bdgim),
+            _ => klobuchar.chain([Model::NequickG, Model::Bdgim]).find(is_brought),
         }
     }
 
@@ -328,5 +350,24 @@ mod tests {
         assert_eq!(waits(serde_json::json!({ "ionosphere": "broadcast", "require_ionosphere": true })), (true, 0.0));
         assert_eq!(waits(serde_json::json!({ "ionosphere": "broadcast", "ionosphere_wait_s": 8.0 })), (false, 8.0));
         assert_eq!(waits(serde_json::json!({ "ionosphere": "none", "require_ionosphere": true })), (false, 0.0));
+    }
+
+    #[test]
+    fn it_waits_for_the_one_model_that_it_prefers_of_those_that_signals_bring() {
+        let of = |word: &str, names: &[&str]| {
+            let settings = serde_json::json!({ "position": { "ionosphere": word } });
+            let signals = names.iter().map(|name| Signal::find(name).unwrap()).collect();
+            Receiver::new(&settings, None, Some(&L1_CA)).ionosphere_model(&signals)
+        };
+        // BeiDou's coefficients come every 30 s and those of GPS every 12.5 min: with GPS received none of
+        // BeiDou serve.
+        let both = ["GPS L1 C/A", "BeiDou B1I"];
+        assert_eq!(of("klobuchar", &both), Some(Model::Klobuchar));
+        assert_eq!(of("combined", &both), Some(Model::Klobuchar));
+        assert_eq!(of("broadcast", &["Galileo E1", "BeiDou B1I"]), Some(Model::KlobucharBeidou));
+        assert_eq!(of("broadcast", &["Galileo E1", "BeiDou B1C"]), Some(Model::NequickG));
+        assert_eq!(of("nequick_g", &["GPS L1 C/A", "Galileo E1"]), Some(Model::NequickG));
+        assert_eq!(of("bdgim", &both), Some(Model::Bdgim));
+        assert_eq!(of("none", &both), None);
     }
 }
