@@ -3,9 +3,8 @@
 //! Three figures describe the ratio of measured to expected density: its mean over all bins (the level), the
 //! mean over each thirty-second of the band over the level (broad shape), and each bin over the level (narrow
 //! shape). Each is a mean of squares with a relative variance v, the sum of three:
-//! - the variance of Welch's estimate of Gaussian samples ([`welch::variance`]), times a factor for an
-//! unsteady
-//!   density;
+//! - the variance of Welch's estimate of Gaussian samples ([`welch::variance`]), times a factor for
+//!   an unsteady density;
 //! - the variance of lines of codes, which are taken as random. A band B of a component of period T has B·T
 //!   lines, each with a standard deviation of its mean. It has half as many where B spans the carrier, about
 //!   which a real code's lines are alike;

@@ -268,7 +268,7 @@ fn turns(signal: &'static Signal, component: &Component, coherent_s: f64) -> (f6
 fn front_end_costs_db(run: &Run) -> BTreeMap<&'static Signal, f64> {
     let mut costs_db = spectrum::costs_db(run);
     for (signal, cost_db) in &mut costs_db {
-        *cost_db += spectrum::edge_cost_db(run, *signal);
+        *cost_db += spectrum::edge_cost_db(run, signal);
         if run.scene.noise_lsb.is_none() {
             *cost_db += match run.scene.converter().map(|converter| converter.bits) {
                 Some(1) => 1.96,

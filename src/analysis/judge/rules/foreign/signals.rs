@@ -210,7 +210,7 @@ impl Verdict {
             let shares = signal.components.iter().map(|component| component.power_share);
             let part_db = -10.0 * libm::log10(shares.fold(1.0, f64::min));
             // C/N0 is at the antenna: filter and edges between samples take their part.
-            let band_db = front_ends_db.get(signal).copied().unwrap_or(0.0) + edge_cost_db(scene.run, *signal);
+            let band_db = front_ends_db.get(signal).copied().unwrap_or(0.0) + edge_cost_db(scene.run, signal);
             let below_db = part_db + band_db.max(0.0);
             let limit = ONE_BIT_LOSS_DB + scatter_db + if middle_db < 0.0 { below_db } else { 0.0 };
             biases.push(Found { name: signal.name.to_owned(), value: middle_db.abs(), limit });
