@@ -2,7 +2,7 @@
 //!
 //! A tick is a whole number of `units` of a power of ten, and its label consists of the digits of that
 //! number. No label is rounded, so position and label cannot differ. A step is 1, 2 or 5 times a power of
-//! ten; a logarithmic axis has multiples of powers of ten. Labels longer than [`MOST_CHARACTERS`] are written
+//! ten; a logarithmic axis has multiples of powers of ten. Labels longer than `MOST_CHARACTERS` are written
 //! with an exponent or, where many digits are common to all, count from an offset that stands in the axis'
 //! words.
 
