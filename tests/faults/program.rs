@@ -358,7 +358,8 @@ fn samples_that_look_like_another_format_are_named_and_those_that_cannot_be_told
         // A twentieth: 1.4 LSB of eight bits, 26 of sixteen.
         for gain in [0.05, 0.2, 1.0] {
             let bytes = noise(format, 40_000, gain);
-            for (declared, name) in Format::NAMES {
+            for (declared, _) in Format::NAMES {
+                let name = &declared.to_string();
                 tally.case(
                     || format!("{format} at {gain} declared as {name}"),
                     || {

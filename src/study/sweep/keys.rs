@@ -46,13 +46,8 @@ pub const STUDY: &[Key] = &[
 ];
 
 const SIGNAL: &[Key] = &[
-    word(
-        "name
-        ",
-        || signals().into_iter().map(|signal| signal.name).collect(),
-        "name of the signal",
-    )
-    .or_else("GPS L1 C/A"),
+    word("name", || signals().into_iter().map(|signal| signal.name).collect(), "name of the signal")
+        .or_else("GPS L1 C/A"),
     word("component", || vec!["leading", "data", "pilot"], "tracked component").or_else("leading"),
     number("cn0_dbhz", 0.0, 80.0, "dB-Hz", "C/N0").or_else("no noise"),
     number("bandwidth_hz", 1e3, 1e9, "Hz", "bandwidth of the front end").or_else("none"),
