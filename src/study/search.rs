@@ -92,7 +92,8 @@ impl Folded {
         let own = middles(half, NODES).map(|(turns, step)| (turns, 2.0 * step * density(turns) / within)).collect();
         let above = |turns: f64, step: f64| (turns + 1.0, 2.0 * step * density(turns + 1.0) / within);
         let image = middles(half, NODES).flat_map(|(turns, step)| [above(turns, step), above(-turns, step)]).collect();
-        Self { own, image, share: within }
+        // Densities are of turns a sample; a chip of power one has `sample` of them.
+        Self { own, image, share: within / sample }
     }
 
     /// Correlation of the signal at `offset` samples from a lag that is `place` samples past a whole one, in

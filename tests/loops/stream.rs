@@ -228,7 +228,8 @@ fn without_satellites_the_noise_has_its_set_power_and_without_noise_the_signal_h
         scene.excluded.retain(|sv| *sv != one);
         // C over N0 fs, where N0 fs is the complex noise power (twice the real one).
         // A real carrier of amplitude sqrt(2C) has power C as well.
-        let expected = libm::pow(10.0, 4.5) / 4e6 * 2e6;
+        // C/N0 is at the antenna: edges of area keep 1 − d/3 of it, d chips a sample.
+        let expected = libm::pow(10.0, 4.5) / 4e6 * 2e6 * (1.0 - 1.023e6 / 4e6 / 3.0);
         let measured = power(&scene);
         assert!((measured / expected - 1.0).abs() < 0.01, "{format} {measured} {expected}");
     }

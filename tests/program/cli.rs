@@ -102,7 +102,7 @@ fn real_samples_need_their_intermediate_frequency() {
     let usual = ["receive", "real.bin", "--format", "ri8", "--rate-hz", "12e6", "--out", "out"];
     let without = twin(&usual, here.path());
     assert_eq!(code(&without), 2, "{}", stderr(&without));
-    assert!(stderr(&without).contains("--if-hz is needed"), "{}", stderr(&without));
+    assert!(stderr(&without).contains("--if-hz or --center-hz is needed"), "{}", stderr(&without));
     let with = twin(&[&usual[..], &["--if-hz", "3e6"]].concat(), here.path());
     assert_eq!(code(&with), 3, "{}", stderr(&with));
     let help = String::from_utf8_lossy(&twin(&["receive", "--help"], here.path()).stdout).into_owned();

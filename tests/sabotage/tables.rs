@@ -81,7 +81,7 @@ fn searches() -> Vec<Kind> {
                 rx.table("acquisition").map_where("statistic", found, |_, value| value * factor);
             }
         ),
-        kind!("thresholds larger", "times", Some(1.5), 4.0, &CONTRADICTS, AtRest, |rx, factor| {
+        kind!("thresholds larger", "times", Some(1.3), 4.0, &CONTRADICTS, AtRest, |rx, factor| {
             rx.table("acquisition").map("threshold", |_, value| value * factor);
         }),
         kind!(

@@ -18,6 +18,10 @@ use gnss::time::Epoch;
 
 /// The lock detectors' memory: how long before a declared loss or slip the signal may have failed.
 pub(super) const LOOK_BACK_S: f64 = 2.0;
+/// Longest time from a step of a satellite's clock to the half cycle that the message shows, seconds: a unit
+/// of 12 s (CNAV, the subframes of NavIC) that has just begun, and the two words of LNAV, 1.2 s, that confirm
+/// the next.
+const HALF_CYCLE_S: f64 = 13.2;
 /// Losses that are named; the rest is in `slips.csv`.
 const NAMED: usize = 12;
 
@@ -138,6 +142,13 @@ impl Witness {
                 && fault.satellites.as_ref().is_none_or(|list| list.contains(&sv))
                 && slip.time_s >= fault.from_s
         });
-        (garbled && slip.kind == Kind::LossOfLock).then_some(Excuse::Fault)
+        // The half cycle on which the loop has settled after a step shows in the next unit of the message.
+        let stepped = run.scene.faults.iter().any(|fault| {
+            fault.kind == FaultKind::ClockStep
+                && fault.satellites.as_ref().is_none_or(|list| list.contains(&sv))
+                && (fault.from_s..fault.from_s + HALF_CYCLE_S).contains(&slip.time_s)
+        });
+        let is_half = slip.kind == Kind::CycleSlip && slip.size_cycles.is_some_and(|cycles| cycles.abs() == 0.5);
+        (garbled && slip.kind == Kind::LossOfLock || stepped && is_half).then_some(Excuse::Fault)
     }
 }

@@ -10,12 +10,14 @@ use std::collections::BTreeSet;
 use nalgebra::Vector3;
 
 use crate::error::JudgeError;
+use crate::expect::due::satellite::is_stepping;
 use crate::expect::multiple_access::MultipleAccess;
 use crate::read::numbers::Pooled;
 use crate::read::spill_store::{Finder, SpillRow, SpillStore, Words};
 use crate::read::{Numbers, Run, Table};
 use crate::statistics::median;
 use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::facts::Fault;
 use gnss::record::{Event, EventRow, Observation};
 
 use gnss::signal::Signal;
@@ -161,6 +163,8 @@ pub struct Errors {
     pub cycle_slips: usize,
     /// Observations of satellites or samples that the truth does not have.
     pub unmatched: usize,
+    /// Faults of the scene's satellites.
+    faults: Vec<Fault>,
 }
 
 /// Phase lock is a fading mean over six symbols of 20 ms. When a satellite has gone, what it held fades as
@@ -193,6 +197,7 @@ impl Errors {
             positions: Table::new(directory),
             cycle_slips: 0,
             unmatched: 0,
+            faults: run.scene.faults.clone(),
         };
         let access = MultipleAccess::new(run);
         for link in run.observations.keys() {
@@ -343,8 +348,8 @@ impl Errors {
         Ok(all)
     }
 
-    /// Shows `see` one number of every observation that is past its pull-in, a list a satellite; of one
-    /// signal, or of all.
+    /// Shows `see` one number of every observation that is past its pull-in and not within a step of the
+    /// satellite's clock, a list a satellite; of one signal, or of all.
     ///
     /// # Errors
     /// As [`Self::pooled`].
@@ -358,7 +363,7 @@ impl Errors {
             let mut found = Numbers::new(self.signals.directory());
             for row in self.signals.cursor(link) {
                 let row = row?;
-                if row.locked_s >= PULL_IN_S {
+                if row.locked_s >= PULL_IN_S && !is_stepping(&self.faults, link.sv, row.time_s) {
                     found.push(of(&link, &row))?;
                 }
             }
