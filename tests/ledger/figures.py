@@ -72,13 +72,6 @@ RATE = "G satellite·samples/s/core"
 
 
 def speed():
-    timed = ("src/fft", "src/generator", "src/receiver")
-    yield Figure("speed.run.static_realtime", "run of the static scene, generator and receiver with truth, pictures apart",
-                 "× real time", make.Timing("scenarios/static.toml", "speed.run_x_real_time", by_clock=True), timed, "≥ 40", 2)
-    yield Figure("speed.run.static_cpu_s", "processor time of that run, 60 s of signal, before pictures", "s",
-                 make.Timing("scenarios/static.toml", "speed.cpu_s"), timed, "", 2)
-    yield Figure("speed.run.static_memory_mib", "largest memory of that run before the judge", "MiB",
-                 make.Timing("scenarios/static.toml", "speed.peak_memory_mib"), timed, "≤ 200", 2)
     for name, row, bar in [
         ("fast", "fast, noise-free, 2.6 Msps, ci8", "≥ 3"),
         ("balanced", "balanced, noise-free, 2.6 Msps, ci8", "≥ 2"),

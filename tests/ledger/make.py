@@ -7,7 +7,6 @@ import json
 import math
 import os
 import re
-import statistics
 import subprocess
 import sys
 import tarfile
@@ -18,7 +17,6 @@ from pathlib import Path
 import digest
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-TIMED_RUNS = 5
 NUMBER = r"-?\d+(?:\.\d+)?(?:e-?\d+)?"
 
 
@@ -95,31 +93,6 @@ class Run:
         rows = [row for row in verdict if row["path"] == self.path and row["limit"]]
         limits = [row["limit"] for row in rows if math.isclose(float(row["value"]), value, rel_tol=1e-3)]
         return Made(value, bar=limits[0] if limits else None)
-
-
-@dataclass(frozen=True)
-class Timing:
-    """A cost of a scene's run on this machine: median of several runs. What the clock on the wall measures wants an idle machine."""
-
-    scene: str
-    path: str
-    by_clock: bool = False
-
-    @property
-    def command(self):
-        return f"gnss-twin run {self.scene} ({TIMED_RUNS} times)"
-
-    def make(self):
-        load = os.getloadavg()[0]
-        if self.by_clock and load > 0.5 * len(os.sched_getaffinity(0)):
-            raise NotMade(f"the machine has other work (load {load:.1f}): wait until it is idle")
-        values = [at(summary, self.path) for summary in timed(twin(), self.scene)]
-        return Made(statistics.median(values), processor(), str(len(values)))
-
-
-@functools.cache
-def timed(program, scene):
-    return [run.__wrapped__(program, scene)[0] for _ in range(TIMED_RUNS)]
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ def row_of(figure, old):
     source = figure.source
     if isinstance(source, make.Page) and not source.mark and (make.ROOT / source.page).is_file():
         stamp(make.ROOT / source.page)
-    if isinstance(source, (make.Run, make.Timing)):
+    if isinstance(source, make.Run):
         make.warn_of_old_program(figure.rooms)
     made = source.make()
     value, bar = check.rounded(made.value, figure.digits), made.bar if made.bar is not None else figure.bar
