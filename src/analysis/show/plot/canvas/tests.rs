@@ -127,7 +127,7 @@ fn fault(axis: &Axis, read: &Read) -> Option<String> {
             _ => offset + number,
         };
         let place = axis.from + (at_px - read.ends_px.0) * per_pixel;
-        if !((value - place).abs() <= allowed) {
+        if (value - place).abs().partial_cmp(&allowed).is_none_or(|order| order.is_gt()) {
             return Some(format!("{label} (from {offset}) stands at {place}"));
         }
     }
@@ -154,7 +154,7 @@ fn read_back(x: &Axis, y: &Axis, size: (u32, u32)) -> [Read; 2] {
     let across: Vec<&Written> = all.iter().filter(under).collect();
     // Widths of DejaVu Sans in parts of its size.
     let advance = |c: char| match c {
-        '.' => 0.318,
+        '.' => 0.3178,
         '-' => 0.361,
         'e' => 0.615,
         _ => 0.636,
