@@ -106,7 +106,7 @@ fn real_samples_need_their_intermediate_frequency() {
     let with = twin(&[&usual[..], &["--if-hz", "3e6"]].concat(), here.path());
     assert_eq!(code(&with), 3, "{}", stderr(&with));
     let help = String::from_utf8_lossy(&twin(&["receive", "--help"], here.path()).stdout).into_owned();
-    for part in ["2 for a command line", "1575.42 MHz, lies in", "above zero"] {
+    for part in ["2 for a refused command line", "GPS L1 (1575.42 MHz) within", "positive if"] {
         assert!(help.split_whitespace().collect::<Vec<_>>().join(" ").contains(part), "{part}: {help}");
     }
 }
