@@ -72,7 +72,7 @@ pub fn judge_against(run: &Path, limits: Option<&Limits>) -> Result<Summary, Jud
 /// drawn.
 ///
 /// # Errors
-/// As [`judge()`], but for files that cannot be written.
+/// Errors of [`judge()`], but for files that cannot be written.
 pub fn assess(run: &Path, limits: Option<&Limits>) -> Result<Summary, JudgeError> {
     Ok(measure(Run::read(run)?, run, limits)?.summary)
 }

@@ -13,7 +13,7 @@ const LOOPBACK: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
 /// A path that is not empty.
 ///
 /// # Errors
-/// What was expected.
+/// A message that states what was expected.
 pub fn path(text: &str) -> Result<PathBuf, String> {
     if text.is_empty() { Err("expected a path".to_owned()) } else { Ok(text.into()) }
 }
@@ -63,7 +63,7 @@ pub fn listen(address: SocketAddr, what: &str) -> Result<(TcpListener, SocketAdd
 /// Text of a peer's address: `PORT` on this machine, or `HOST:PORT`.
 ///
 /// # Errors
-/// What was expected, of any other text.
+/// A message that states what was expected, for any other text.
 pub fn peer_address(text: &str) -> Result<String, String> {
     let expected = || format!("'{text}': expected HOST:PORT, or PORT on this machine");
     let bare = text.strip_prefix(':').unwrap_or(text);

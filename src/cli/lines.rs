@@ -86,7 +86,7 @@ impl Spec {
     /// Opens it; a file of a live reception can be read while it grows.
     ///
     /// # Errors
-    /// What cannot be made or listened on.
+    /// A file that cannot be made, or an address that cannot be listened on.
     pub fn open(&self, what: &str, live: bool) -> Result<Lines, CliError> {
         let nothing = |writer: Box<dyn Write>| Lines { writer, made: Made::Nothing };
         Ok(match self {

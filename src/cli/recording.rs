@@ -291,7 +291,7 @@ fn metadata(arguments: &args::Receive, of: Description) -> Result<(IfMetadata, O
         Some(text) => Some(Epoch::parse(text).map_err(|error| CliError::usage(format!("--start: {error}")))?),
     };
     let missing = |flag: &str| {
-        CliError::usage(format!("{}: no metadata beside it say it, so {flag} is needed", arguments.file.display()))
+        CliError::usage(format!("{}: there are no metadata beside it, so {flag} is needed", arguments.file.display()))
     };
     let described = arguments.format.map(Samples::Whole).or(of.samples);
     // A stream of ION's metadata is chosen already.

@@ -42,7 +42,7 @@ pub(super) fn received(scene: &Scene, from: &Constellation, local: Epoch) -> (Ep
 /// without an ephemeris.
 ///
 /// # Errors
-/// Those of the orbit.
+/// Errors of the orbit.
 pub fn seen(scene: &Scene, sv: Sv, signal: &Signal, local: Epoch) -> Result<Option<Seen>, OrbitError> {
     seen_from(scene, &Constellation::authentic(), sv, signal, local)
 }
@@ -51,7 +51,7 @@ pub fn seen(scene: &Scene, sv: Sv, signal: &Signal, local: Epoch) -> Result<Opti
 /// receiver's clock.
 ///
 /// # Errors
-/// Those of the orbit.
+/// Errors of the orbit.
 pub fn seen_from(
     scene: &Scene,
     from: &Constellation,
@@ -65,7 +65,7 @@ pub fn seen_from(
 /// Like [`seen_from`], with the geometry that all signals of the satellite share, if it is stored.
 ///
 /// # Errors
-/// Those of the orbit.
+/// Errors of the orbit.
 pub fn seen_by(
     scene: &Scene,
     from: &Constellation,
@@ -151,7 +151,7 @@ fn arriving(scene: &Scene, signal: &Signal, Arriving { emission, bias_s, gain }:
 /// applies it through its exclusions.
 ///
 /// # Errors
-/// Those of the orbit.
+/// Errors of the orbit.
 pub fn in_view(scene: &Scene, sv: Sv, local: Epoch) -> Result<bool, OrbitError> {
     in_view_from(scene, &Constellation::authentic(), sv, local)
 }
@@ -159,7 +159,7 @@ pub fn in_view(scene: &Scene, sv: Sv, local: Epoch) -> Result<bool, OrbitError> 
 /// True if `sv` is in the sky of the position for which a constellation's signals are made.
 ///
 /// # Errors
-/// Those of the orbit.
+/// Errors of the orbit.
 pub fn in_view_from(scene: &Scene, from: &Constellation, sv: Sv, local: Epoch) -> Result<bool, OrbitError> {
     Ok(presence_from(scene, from, sv, local)?.end().is_none())
 }
@@ -167,7 +167,7 @@ pub fn in_view_from(scene: &Scene, from: &Constellation, sv: Sv, local: Epoch) -
 /// Presence of `sv` in the sky of the position for which a constellation's signals are made.
 ///
 /// # Errors
-/// Those of the orbit.
+/// Errors of the orbit.
 pub fn presence_from(scene: &Scene, from: &Constellation, sv: Sv, local: Epoch) -> Result<Presence, OrbitError> {
     let (time, _, motion) = received(scene, from, local);
     presence(scene, sv, time, &motion)

@@ -63,7 +63,7 @@ struct Pull {
 /// Computes the lines of sight of the satellites that are in view for some of the scene, in their order.
 ///
 /// # Errors
-/// Those of the orbit.
+/// Errors of the orbit.
 pub fn lines_of_sight(scene: &Scene) -> Result<Vec<LineOfSight>, OrbitError> {
     let duration_s = scene.clock.rate.elapsed_s(scene.samples);
     let pulls = pulls(scene, duration_s);

@@ -44,7 +44,7 @@ impl Geometry {
     /// it.
     ///
     /// # Errors
-    /// Those of `find`.
+    /// Errors of `find`.
     pub fn at(
         &self,
         local: Epoch,

@@ -114,7 +114,7 @@ impl Levels {
     /// Measures the levels of `scene`.
     ///
     /// # Errors
-    /// Those of the stream.
+    /// Errors of the stream.
     pub fn new(scene: &Scene) -> Result<Self, GenerateError> {
         let (tuning, kept) = (scene.tuning(), Kept::of(scene));
         let (even, own) = stretches(scene);
@@ -170,7 +170,7 @@ fn middle(values: impl Iterator<Item = f64>) -> f64 {
 /// it is.
 ///
 /// # Errors
-/// Those of the orbit.
+/// Errors of the orbit.
 pub fn strongest(scene: &Scene) -> Result<Option<(Sv, f64)>, OrbitError> {
     let motion = scene.trajectory.at(0.0);
     let mut found: Option<(Sv, f64)> = None;

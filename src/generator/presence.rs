@@ -53,7 +53,7 @@ impl Presence {
 /// excludes counts as present.
 ///
 /// # Errors
-/// Those of the orbit.
+/// Errors of the orbit.
 pub fn presence(scene: &Scene, sv: Sv, time: Epoch, motion: &Motion) -> Result<Presence, OrbitError> {
     if scene.catalogue.sent_at(sv, time).is_none() {
         return Ok(Presence::NoEphemeris);
@@ -78,7 +78,7 @@ pub struct Missing {
 /// Finds the satellites that the scene, of length `end_s`, lacks because there is no ephemeris.
 ///
 /// # Errors
-/// Those of the orbit.
+/// Errors of the orbit.
 pub fn missing(scene: &Scene, end_s: f64) -> Result<Vec<Missing>, OrbitError> {
     let (start, end) = (scene.clock.start, scene.clock.start.plus_s(end_s));
     let mut found = Vec::new();

@@ -270,7 +270,7 @@ impl Scenario {
     /// Reads a scenario from a text; files that it names are relative to the working directory.
     ///
     /// # Errors
-    /// As [`Scenario::parse`].
+    /// Errors of [`Scenario::parse`].
     pub fn from_toml(text: &str) -> Result<Self, ScenarioError> {
         Self::parse(text, "scenario")
     }

@@ -82,7 +82,7 @@ pub fn emission(
 /// Like [`emission`], with a guess of the light time, on which the result depends only by rounding.
 ///
 /// # Errors
-/// As [`emission`].
+/// Errors of [`emission`].
 pub fn emission_near(
     catalogue: &Catalogue,
     sv: Sv,
@@ -96,7 +96,7 @@ pub fn emission_near(
 /// [`emission`] by one ephemeris, whether it is sent then or not.
 ///
 /// # Errors
-/// As [`emission`].
+/// Errors of [`emission`].
 pub fn emission_of_set(set: &Ephemeris, received: Epoch, motion: &Motion) -> Result<Option<Emission>, OrbitError> {
     let place = Place::new(received, 0.0, *motion);
     emission_of(|at| set.state_and_clock_l1(at).map(Some), set.sv, &place, LIGHT_TIME_S)

@@ -106,7 +106,7 @@ pub fn generate(
 /// [`generate`] with the work cut as `options` state.
 ///
 /// # Errors
-/// As [`generate`].
+/// Errors of [`generate`].
 pub fn generate_with(
     scene: &Scene,
     samples: &mut dyn Write,
@@ -121,7 +121,7 @@ pub fn generate_with(
 /// the part's first sample.
 ///
 /// # Errors
-/// As [`generate`], and [`GenerateError::Part`] for a part that the scene does not have.
+/// Errors of [`generate`], and [`GenerateError::Part`] for a part that the scene does not have.
 pub fn generate_part(
     scene: &Scene,
     part: Range<u64>,
@@ -157,7 +157,7 @@ impl<'a> Stream<'a> {
     /// Creates the stream of a part of `scene`.
     ///
     /// # Errors
-    /// As [`Stream::new`], and [`GenerateError::Part`].
+    /// Errors of [`Stream::new`], and [`GenerateError::Part`].
     pub fn of(
         scene: &'a Scene,
         part: Range<u64>,
@@ -190,7 +190,7 @@ impl<'a> Stream<'a> {
     /// Like `next`, but makes samples only up to `to`, counted in the scene.
     ///
     /// # Errors
-    /// As [`Stream::next`], and [`GenerateError::Unpushed`] where the motion is not known so far.
+    /// Errors of [`Stream::next`], and [`GenerateError::Unpushed`] where the motion is not known so far.
     pub fn advance(&mut self, to: u64, truth: &mut dyn Sink, packed: &mut Vec<u8>) -> Result<bool, GenerateError> {
         let to = to.min(self.front.part.end);
         if !self.front.is_before(to) {

@@ -280,7 +280,7 @@ impl Ephemeris {
     /// Computes [`Self::state`] and [`Self::clock_l1`] of one instant with one solution of Kepler's equation.
     ///
     /// # Errors
-    /// As [`Self::state`].
+    /// Errors of [`Self::state`].
     pub fn state_and_clock_l1(&self, at: Epoch) -> Result<(State, ClockState), OrbitError> {
         if self.vector.is_some() {
             return Ok((self.state(at)?, self.clock_l1(at)?));
@@ -393,7 +393,7 @@ impl Ephemeris {
     /// 20.3.3.3.3.2). For another system it is the clock on the carrier to which its group delay belongs.
     ///
     /// # Errors
-    /// As [`Self::clock`].
+    /// Errors of [`Self::clock`].
     pub fn clock_l1(&self, at: Epoch) -> Result<ClockState, OrbitError> {
         Ok(self.on_l1(self.clock(at)?))
     }
@@ -434,7 +434,7 @@ impl Ephemeris {
     /// Satellite clock for a user of `signal` alone.
     ///
     /// # Errors
-    /// As [`Self::clock`].
+    /// Errors of [`Self::clock`].
     pub fn clock_of_signal(&self, at: Epoch, signal: &Signal) -> Result<ClockState, OrbitError> {
         let clock = self.clock(at)?;
         Ok(ClockState { offset_s: clock.offset_s - self.group_delay_s(signal), ..clock })

@@ -223,7 +223,7 @@ pub trait Sender: Send + Sync {
     /// continues from unit to unit.
     ///
     /// # Errors
-    /// As [`Self::unit`].
+    /// Errors of [`Self::unit`].
     fn unit_after(&self, before: &Ephemeris, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
         let _ = before;
         self.unit(ephemeris, start)
@@ -233,7 +233,7 @@ pub trait Sender: Send + Sync {
     /// none of a unit without redundancy.
     ///
     /// # Errors
-    /// As [`Self::unit`].
+    /// Errors of [`Self::unit`].
     fn restored(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<Vec<bool>>, FieldError> {
         let _ = (ephemeris, start);
         Ok(Vec::new())

@@ -122,7 +122,7 @@ pub enum NavigationError {
 /// GPS broadcast of the whole day of 2010-07-01. It is the default of a scene that names no file.
 ///
 /// # Errors
-/// As [`read`]; a test makes sure that there are none.
+/// Errors of [`read`]; a test makes sure that there are none.
 pub fn embedded() -> Result<Navigation, NavigationError> {
     read(include_bytes!("data/brdc1820-2010.n.gz"), "embedded brdc1820-2010.n.gz")
 }
@@ -130,7 +130,7 @@ pub fn embedded() -> Result<Navigation, NavigationError> {
 /// GPS and Galileo broadcast of the hours around 2020-11-29T12:40. It is the default of scenes of that day.
 ///
 /// # Errors
-/// As [`read`]; a test makes sure that there are none.
+/// Errors of [`read`]; a test makes sure that there are none.
 pub fn embedded_two_systems() -> Result<Navigation, NavigationError> {
     let name = "embedded CARD00ESP_R_20203340900_15H_MN.rnx.gz";
     read(include_bytes!("data/CARD00ESP_R_20203340900_15H_MN.rnx.gz"), name)

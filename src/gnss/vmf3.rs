@@ -43,7 +43,7 @@ impl Vmf3 {
     /// The published expansion, which comes with the program.
     ///
     /// # Errors
-    /// As [`Self::read`]; a test sees to it that there are none.
+    /// Errors of [`Self::read`]; a test sees to it that there are none.
     pub fn embedded() -> Result<Self, ViennaError> {
         Self::read(include_str!("data/vmf3.csv"), "embedded vmf3.csv")
     }

@@ -42,7 +42,7 @@ impl<'a> Driver<'a> {
     /// The scene from its first sample on.
     ///
     /// # Errors
-    /// Those of [`Stream::new`].
+    /// Errors of [`Stream::new`].
     pub fn new(scene: &'a Scene, truth: &mut dyn truth::Sink) -> Result<Self, GenerateError> {
         // Ticks that are there already are those of a record.
         let grown = scene.trajectory.grown().filter(|grown| grown.ticks() == 0);
@@ -87,7 +87,7 @@ impl<'a> Driver<'a> {
     /// Takes a state, and returns its number.
     ///
     /// # Errors
-    /// Why it is not taken.
+    /// Reason for which it is not taken.
     pub fn offer(&mut self, push: &Push) -> Result<u64, Refusal> {
         self.joiner.as_mut().map_or(Err(Refusal::Known), |joiner| joiner.offer(push))
     }
@@ -95,7 +95,7 @@ impl<'a> Driver<'a> {
     /// Applies an event from the next tick on; its first sample.
     ///
     /// # Errors
-    /// Why it is not applied.
+    /// Reason for which it is not applied.
     pub fn switch(&mut self, event: &Event) -> Result<u64, EventError> {
         if self.joiner.is_none() {
             return Err(EventError::Known);
@@ -107,7 +107,7 @@ impl<'a> Driver<'a> {
     /// them. `None` after the last one.
     ///
     /// # Errors
-    /// Those of the generator.
+    /// Errors of the generator.
     pub fn tick(&mut self, truth: &mut dyn truth::Sink, packed: &mut Vec<u8>) -> Result<Option<Made>, GenerateError> {
         if self.is_done() {
             packed.clear();

@@ -137,7 +137,7 @@ impl<'a> Lockstep<'a> {
     /// Applies an event from the next step on; its first sample.
     ///
     /// # Errors
-    /// Why it is not applied.
+    /// Reason for which it is not applied.
     pub fn switch(&mut self, event: &Event) -> Result<u64, StepError> {
         Ok(self.driver.switch(event)?)
     }
@@ -145,7 +145,7 @@ impl<'a> Lockstep<'a> {
     /// Makes the next step with what is pushed of the motion.
     ///
     /// # Errors
-    /// Why it is not made.
+    /// Reason for which it is not made.
     pub fn step(&mut self, push: Option<&Push>) -> Result<Step, StepError> {
         if let Some(push) = push {
             self.driver.offer(push)?;
@@ -167,7 +167,7 @@ impl<'a> Lockstep<'a> {
     /// Ends the run, and gives `truth` what is known at the end alone.
     ///
     /// # Errors
-    /// As [`Self::step`].
+    /// Errors of [`Self::step`].
     pub fn finish(self, truth: &mut dyn truth::Sink) -> Result<Finished, StepError> {
         let generated = self.driver.finish(truth)?;
         let Some(mut receiver) = self.receiver else {

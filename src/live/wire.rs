@@ -98,7 +98,7 @@ impl Reader {
     /// Reads a message of a datagram, one of its [`pieces`].
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// A description of the fault.
     pub fn datagram(&mut self, bytes: &[u8]) -> Result<Message, WireError> {
         if bytes.len() > MOST_BYTES {
             return Err(WireError::Long);
@@ -112,7 +112,7 @@ impl Reader {
     /// Reads a line of text.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// A description of the fault.
     pub fn line(&mut self, text: &str) -> Result<Message, WireError> {
         if text.len() > MOST_BYTES {
             return Err(WireError::Long);

@@ -81,7 +81,7 @@ impl Reception {
     /// else its carrier.
     ///
     /// # Errors
-    /// As [`Reception::new`], and [`ReceiveError::NoFrontEnd`].
+    /// Errors of [`Reception::new`], and [`ReceiveError::NoFrontEnd`].
     pub fn of_several(metadata: &[IfMetadata], settings: &Settings) -> Result<Self, ReceiveError> {
         settings.validate("settings")?;
         let settings = &searched(metadata, settings);
@@ -285,7 +285,7 @@ impl Receiver {
     /// A cold start on samples that are packed as `metadata` says.
     ///
     /// # Errors
-    /// As [`Reception::new`].
+    /// Errors of [`Reception::new`].
     pub fn new(metadata: &IfMetadata, settings: &Settings) -> Result<Self, ReceiveError> {
         Reception::new(metadata, settings).map(|reception| Self { reception })
     }
@@ -293,7 +293,7 @@ impl Receiver {
     /// A cold start on the samples of several front ends: see [`Reception::of_several`].
     ///
     /// # Errors
-    /// As [`Reception::of_several`].
+    /// Errors of [`Reception::of_several`].
     pub fn of_several(metadata: &[IfMetadata], settings: &Settings) -> Result<Self, ReceiveError> {
         Reception::of_several(metadata, settings).map(|reception| Self { reception })
     }
@@ -302,7 +302,7 @@ impl Receiver {
     /// have come as far.
     ///
     /// # Errors
-    /// As [`Reception::take_of`].
+    /// Errors of [`Reception::take_of`].
     pub fn push_of(&mut self, number: usize, bytes: &[u8]) -> Result<Vec<Record>, ReceiveError> {
         let mut records = Vec::new();
         self.reception.take_of(number, bytes, &mut records)?;
@@ -351,7 +351,7 @@ pub fn receive<R: Read>(
 /// flat. The reception ends where the first of them does.
 ///
 /// # Errors
-/// As [`receive`], and [`ReceiveError::NoFrontEnd`].
+/// Errors of [`receive`], and [`ReceiveError::NoFrontEnd`].
 pub fn receive_several<R: Read>(
     front_ends: &mut [(IfMetadata, R)],
     settings: &Settings,

@@ -141,7 +141,7 @@ impl Settings {
     /// Reads the table `[receiver]` of a scenario's text; defaults if it has none.
     ///
     /// # Errors
-    /// As [`Self::parse`].
+    /// Errors of [`Self::parse`].
     pub fn of_scenario(text: &str, origin: &str) -> Result<Self, SettingsError> {
         #[derive(Deserialize)]
         struct Scenario {
@@ -183,7 +183,7 @@ impl Settings {
     /// Reads a TOML table that is in no text.
     ///
     /// # Errors
-    /// As [`Self::parse`], without positions.
+    /// Errors of [`Self::parse`], without positions.
     pub fn from_table(table: Table, origin: &str) -> Result<Self, SettingsError> {
         check_keys(&table, &known(), "", origin)?;
         let settings: Self = table.try_into().map_err(|error: toml::de::Error| {

@@ -2,7 +2,8 @@
 //!
 //! A doc comment stands alone. It begins with its noun or, for a function, with a verb in the third person or
 //! the noun of the result. A word that points to another comment, a preposition and a question word are no
-//! noun. Limits: the first paragraph's first word is read, not its grammar; code spans are left out.
+//! noun. Limits: the first word of the comment and of each section is read, not its grammar; code spans are
+//! left out.
 
 /// A rule that doc comments keep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,13 +91,20 @@ pub fn docs(text: &str) -> Vec<Doc> {
 
 /// Faults of a doc comment in the file `path` against a rule, in words.
 pub fn faults(path: &str, doc: &Doc, rule: Rule) -> Vec<String> {
-    let opens =
-        |list: &[&str]| list.iter().filter(|word| begins(&doc.text, word)).map(|word| format!("'{word}'")).collect();
+    let opens = |text: &str, list: &[&str]| -> Vec<String> {
+        list.iter().filter(|word| begins(text, word)).map(|word| format!("'{word}'")).collect()
+    };
     match rule {
-        Rule::Noun => opens(OPENINGS),
-        Rule::Sentence => opens(FRAGMENTS),
+        Rule::Noun => beginnings(&doc.text).flat_map(|text| opens(text, OPENINGS)).collect(),
+        Rule::Sentence => opens(&doc.text, FRAGMENTS),
         Rule::Word => words(path, &doc.text),
     }
+}
+
+/// Beginnings of a doc comment and of its sections, whose headings are left out.
+fn beginnings(text: &str) -> impl Iterator<Item = &str> {
+    let sections = text.split("\n# ").skip(1).filter_map(|section| section.split_once('\n'));
+    std::iter::once(text).chain(sections.map(|(_, section)| section.trim_start()))
 }
 
 /// True if a text begins with a word and not with a longer one.

@@ -98,7 +98,7 @@ impl<'r> Rays<'r> {
     /// The largest sum of amplitudes at a sample.
     ///
     /// # Errors
-    /// As [`Self::of`].
+    /// Errors of [`Self::of`].
     pub fn strongest(run: &'r Run, link: Link) -> Result<f64, JudgeError> {
         let mut strongest = 0.0_f64;
         if !run.rays.is_ordered(&link) {

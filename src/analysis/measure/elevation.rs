@@ -138,7 +138,7 @@ impl Elevations {
     /// Measures them.
     ///
     /// # Errors
-    /// As [`points`].
+    /// Errors of [`points`].
     pub fn measure(run: &Run, errors: &Errors, stated: &Stated) -> Result<Self, JudgeError> {
         let directory = errors.signals.directory();
         let mut satellites = Vec::new();

@@ -61,7 +61,7 @@ impl Spoofing {
     /// `None` in a run without a spoofer.
     ///
     /// # Errors
-    /// As [`moved`].
+    /// Errors of [`moved`].
     pub fn of(run: &Run) -> Result<Option<Self>, JudgeError> {
         if run.claimed.is_empty() {
             return Ok(None);

@@ -227,7 +227,7 @@ impl Fixes {
     /// Fixes by their samples.
     ///
     /// # Errors
-    /// As [`Table::finder`].
+    /// Errors of [`Table::finder`].
     pub fn finder(&self) -> Result<FixFinder<'_>, JudgeError> {
         Ok(FixFinder { fixes: self, found: self.table.finder()? })
     }
@@ -235,7 +235,7 @@ impl Fixes {
     /// The fixes in the order of their samples, of several of a sample the last.
     ///
     /// # Errors
-    /// As [`Self::each`], of a table whose samples do not ascend: it is read here.
+    /// Errors of [`Self::each`], of a table whose samples do not ascend: it is read here.
     pub fn in_order(&self) -> Result<InOrder<'_>, JudgeError> {
         if self.table.ascends() {
             return Ok(InOrder { fixes: self, cursor: Some(self.table.cursor()), sorted: Vec::new().into_iter() });

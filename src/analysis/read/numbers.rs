@@ -96,7 +96,7 @@ impl Numbers {
     /// Arithmetic mean.
     ///
     /// # Errors
-    /// As [`Self::each`].
+    /// Errors of [`Self::each`].
     pub fn mean(&self) -> Result<Option<f64>, JudgeError> {
         Ok(self.sums(|value| value)?.mean())
     }
@@ -104,7 +104,7 @@ impl Numbers {
     /// Root of the mean square about zero.
     ///
     /// # Errors
-    /// As [`Self::each`].
+    /// Errors of [`Self::each`].
     pub fn rms(&self) -> Result<Option<f64>, JudgeError> {
         Ok(self.sums(|value| value)?.rms())
     }
@@ -112,7 +112,7 @@ impl Numbers {
     /// Standard deviation about the mean, n − 1 in the divisor, and how many numbers it is of; 0 for one.
     ///
     /// # Errors
-    /// As [`Self::each`].
+    /// Errors of [`Self::each`].
     pub fn std(&self) -> Result<Option<(f64, usize)>, JudgeError> {
         let Some(mean) = self.mean()? else { return Ok(None) };
         let about = self.sums(|value| value - mean)?;
@@ -122,7 +122,7 @@ impl Numbers {
     /// The value below which a share `p` (0 to 1) of the numbers' sizes lies.
     ///
     /// # Errors
-    /// As [`Self::each`].
+    /// Errors of [`Self::each`].
     pub fn size_percentile(&self, p: f64) -> Result<Option<f64>, JudgeError> {
         self.ranked(p, f64::abs)
     }
@@ -130,7 +130,7 @@ impl Numbers {
     /// The value below which a share `p` (0 to 1) of the numbers lies.
     ///
     /// # Errors
-    /// As [`Self::each`].
+    /// Errors of [`Self::each`].
     pub fn percentile(&self, p: f64) -> Result<Option<f64>, JudgeError> {
         self.ranked(p, |value| value)
     }
@@ -174,7 +174,7 @@ impl Numbers {
     /// Mean, σ and 95 % of the magnitude.
     ///
     /// # Errors
-    /// As [`Self::each`].
+    /// Errors of [`Self::each`].
     pub fn spread(&self) -> Result<Option<Spread>, JudgeError> {
         let (Some(mean), Some((sigma, count)), Some(p95)) = (self.mean()?, self.std()?, self.size_percentile(0.95)?)
         else {
@@ -201,7 +201,7 @@ impl Pooled {
     /// Counts a group in.
     ///
     /// # Errors
-    /// As [`Numbers::each`].
+    /// Errors of [`Numbers::each`].
     pub fn add(&mut self, group: &Numbers) -> Result<(), JudgeError> {
         if let Some((sigma, count)) = group.std()?.filter(|(_, count)| *count > 1) {
             self.squares += sigma * sigma * (count - 1) as f64;

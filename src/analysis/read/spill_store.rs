@@ -164,7 +164,7 @@ impl<K: Copy + Ord, T: SpillRow<K>> SpillStore<K, T> {
     /// Shows each row of a key to `see`.
     ///
     /// # Errors
-    /// As [`Self::rows`].
+    /// Errors of [`Self::rows`].
     pub fn each(&self, key: K, mut see: impl FnMut(T)) -> Result<(), JudgeError> {
         let Some(stack) = self.stacks.get(&key) else { return Ok(()) };
         let mut show = |words: &[u64]| words.chunks(T::WORDS).for_each(|row| see(T::take(key, &mut Words(row.iter()))));
@@ -185,7 +185,7 @@ impl<K: Copy + Ord, T: SpillRow<K>> SpillStore<K, T> {
     /// The rows of a key by their samples.
     ///
     /// # Errors
-    /// As [`Self::rows`], of rows whose samples do not ascend: those are read here.
+    /// Errors of [`Self::rows`], of rows whose samples do not ascend: those are read here.
     pub fn finder(&self, key: K) -> Result<Finder<'_, K, T>, JudgeError> {
         let stack = self.stacks.get(&key);
         let mut finder = Finder { store: self, stack, key, lot: None, words: Vec::new(), all: None };

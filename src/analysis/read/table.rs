@@ -82,7 +82,7 @@ impl<T: SpillRow<()> + Clone> Table<T> {
     /// The rows by their samples.
     ///
     /// # Errors
-    /// As [`SpillStore::finder`].
+    /// Errors of [`SpillStore::finder`].
     pub fn finder(&self) -> Result<Finder<'_, (), T>, JudgeError> {
         self.rows.finder(())
     }

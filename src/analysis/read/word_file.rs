@@ -56,7 +56,7 @@ impl WordFile {
     /// Reads so many words from one on, in place of those that are in `words`.
     ///
     /// # Errors
-    /// Those of the system, and of words that were never written.
+    /// Errors of the system, and of words that were never written.
     pub fn read(&self, start: u64, count: usize, words: &mut Vec<u64>) -> io::Result<()> {
         let Some(file) = &self.file else { return Ok(()) };
         let mut bytes = vec![0; 8 * count];

@@ -35,7 +35,7 @@ impl Staged {
     /// Begins a file, in place of what is there: links are removed and never followed.
     ///
     /// # Errors
-    /// What is there and cannot be removed; a file that cannot be created.
+    /// Files that cannot be removed or created.
     pub fn file(path: PathBuf) -> io::Result<(Self, File)> {
         let mut known = known();
         remove(&path)?;
@@ -47,7 +47,7 @@ impl Staged {
     /// Begins a directory, in place of what is there.
     ///
     /// # Errors
-    /// As [`Self::file`].
+    /// Errors of [`Self::file`].
     pub fn directory(path: PathBuf) -> io::Result<Self> {
         let mut known = known();
         remove(&path)?;
@@ -70,7 +70,7 @@ impl Staged {
     /// Gives it its name. What bears that name is replaced, or stays if this fails.
     ///
     /// # Errors
-    /// Those of renaming.
+    /// Errors of renaming.
     pub fn finish(self, target: &Path) -> io::Result<()> {
         let mut known = known();
         let old = aside(&self.path);
@@ -144,7 +144,7 @@ pub fn present(path: &Path) -> io::Result<bool> {
 /// Removes what is there, if anything is.
 ///
 /// # Errors
-/// What cannot be removed.
+/// A file that cannot be removed.
 pub fn remove(path: &Path) -> io::Result<()> {
     let removed = match fs::symlink_metadata(path) {
         Ok(about) if about.is_dir() => fs::remove_dir_all(path),

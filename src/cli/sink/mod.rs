@@ -101,7 +101,7 @@ pub trait Sink: Send {
     /// Ends the stream: what is buffered goes out, a reader sees the end, a file gets its name.
     ///
     /// # Errors
-    /// As [`Sink::write`].
+    /// Errors of [`Sink::write`].
     fn finish(self: Box<Self>) -> io::Result<()>;
 }
 

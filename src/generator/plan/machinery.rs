@@ -32,7 +32,7 @@ pub struct Machinery {
 /// Computes the synthesiser's figures: knots along the scene, memory of a batch, and the usual speed.
 ///
 /// # Errors
-/// Those of orbits.
+/// Errors of orbits.
 pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
     let transmitters = transmitters(scene, Edge::Nearest)?;
     let rate = scene.clock.rate;

@@ -77,7 +77,7 @@ impl Scenario {
     /// Composes the scene of a scenario with one front end. Warnings of [`Scenario::compose`] are dropped.
     ///
     /// # Errors
-    /// As [`Scenario::compose`].
+    /// Errors of [`Scenario::compose`].
     pub fn scene(&self) -> Result<Scene, ScenarioError> {
         self.compose(&self.directory, &Overrides::default()).map(|(scene, _)| scene)
     }
@@ -86,8 +86,8 @@ impl Scenario {
     /// returns warnings for the user.
     ///
     /// # Errors
-    /// What cannot be, or not together; several front ends, of which [`Scenario::with_front_end`] chooses
-    /// one.
+    /// Values that are impossible, alone or together; several front ends, of which
+    /// [`Scenario::with_front_end`] chooses one.
     pub fn compose(&self, directory: &Path, overrides: &Overrides) -> Result<(Scene, Vec<String>), ScenarioError> {
         if self.front_ends.len() > 1 {
             let names = self.front_end_names();
@@ -102,7 +102,7 @@ impl Scenario {
     /// Composes the scenes of all front ends. Each equals the scene that its front end has alone.
     ///
     /// # Errors
-    /// What cannot be, or not together.
+    /// Values that are impossible, alone or together.
     pub fn compose_all(
         &self,
         directory: &Path,

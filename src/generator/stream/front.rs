@@ -118,7 +118,7 @@ impl<'a> Front<'a> {
     /// Prepares the data for the samples up to `to`.
     ///
     /// # Errors
-    /// Those of orbits and messages.
+    /// Errors of orbits and messages.
     pub fn prepare(&mut self, to: u64) -> Result<(), GenerateError> {
         let scene = self.scene;
         // Runs are made from their beginning on.

@@ -66,7 +66,7 @@ impl<'a> Generator<'a> {
     /// [`Generator::new`] with the work cut as `options` state.
     ///
     /// # Errors
-    /// As [`Generator::new`].
+    /// Errors of [`Generator::new`].
     pub fn with(scene: &'a Scene, options: &Options) -> Result<Self, GenerateError> {
         Ok(Self { scene, stream: Some(Stream::new(scene, &mut (), options)?), next: 0, done: None })
     }

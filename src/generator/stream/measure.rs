@@ -71,7 +71,7 @@ fn limiting(scene: &Scene) -> Option<Filter> {
 /// Makes the samples of `stretches`, which ascend, as the stream does, and measures them.
 ///
 /// # Errors
-/// Those of [`super::Stream::next`].
+/// Errors of [`super::Stream::next`].
 pub(crate) fn measured(scene: &Scene, stretches: &[Range<u64>]) -> Result<Vec<Stretch>, GenerateError> {
     let filter = limiting(scene);
     let edge = edge(scene, filter.as_ref());

@@ -40,7 +40,7 @@ impl Ticks {
     /// prepared as much.
     ///
     /// # Errors
-    /// Those of orbits, and of a sink that does not take a record.
+    /// Errors of orbits, and of a sink that does not take a record.
     pub fn give(&mut self, fronts: &[Front<'_>], to: u64, truth: &mut dyn Sink) -> Result<(), GenerateError> {
         let Some(scene) = fronts.first().map(|front| front.scene) else { return Ok(()) };
         let origin = self.origin;

@@ -144,7 +144,7 @@ impl Transmitter {
     /// The signal that a constellation sends as `sv`.
     ///
     /// # Errors
-    /// Those of [`Transmitter::new`].
+    /// Errors of [`Transmitter::new`].
     pub fn of(
         scene: &Scene,
         from: Arc<Constellation>,
@@ -211,7 +211,7 @@ impl Transmitter {
     /// The polynomials of one root part of the grid.
     ///
     /// # Errors
-    /// Those of orbits.
+    /// Errors of orbits.
     pub fn root(&self, scene: &Scene, root: u64) -> Result<Vec<Part>, GenerateError> {
         let span = self.span(scene, root);
         let made = match &self.arc {
@@ -270,7 +270,7 @@ impl Transmitter {
     /// Prepares the data for samples `from..to`, and drops earlier data.
     ///
     /// # Errors
-    /// Those of orbits and messages.
+    /// Errors of orbits and messages.
     pub fn prepare(&mut self, scene: &Scene, from: u64, to: u64) -> Result<(), GenerateError> {
         let first = scene.clock.rate.elapsed(from).0 as u64;
         if self.view.is_empty() && first > 0 {
@@ -285,7 +285,7 @@ impl Transmitter {
     /// [`Transmitter::prepare`] for samples alone: how long the satellite has been in view is not sought.
     ///
     /// # Errors
-    /// Those of [`Transmitter::prepare`].
+    /// Errors of [`Transmitter::prepare`].
     pub fn prepare_alone(&mut self, scene: &Scene, from: u64, to: u64) -> Result<(), GenerateError> {
         let rate = scene.clock.rate;
         let (first, last) = (rate.elapsed(from).0 as u64, rate.elapsed(to.saturating_sub(1)).0 as u64);

@@ -52,7 +52,7 @@ impl Leap {
 /// not in view in the last of them.
 ///
 /// # Errors
-/// Those of `presence`, which states where the satellite is at a second.
+/// Errors of `presence`, which states where the satellite is at a second.
 pub(super) fn rising<E>(
     scene: &Scene,
     (from, sv): (&Constellation, Sv),

@@ -55,7 +55,7 @@ impl Symbols {
     /// no ephemeris was uploaded carries the one of `received`.
     ///
     /// # Errors
-    /// Those of messages.
+    /// Errors of messages.
     pub fn prepare(
         &mut self,
         scene: &Scene,

@@ -96,7 +96,7 @@ pub type Truth = (Observation, SkyRow, Vec<RayRow>);
 /// Computes the true values of `sv` at a sample.
 ///
 /// # Errors
-/// Those of the orbit.
+/// Errors of the orbit.
 pub fn observe(
     scene: &Scene,
     from: &Constellation,
@@ -111,7 +111,7 @@ pub fn observe(
 /// Like [`observe`], with the geometry that all signals of the satellite share, if it is stored.
 ///
 /// # Errors
-/// Those of the orbit.
+/// Errors of the orbit.
 pub fn observe_by(
     scene: &Scene,
     from: &Constellation,

@@ -76,7 +76,7 @@ pub trait Sink {
     /// facts that they share, and the numbers of samples, are those of the first.
     ///
     /// # Errors
-    /// What keeps the sink from it; generation ends with it.
+    /// A reason for which the sink cannot; generation ends with it.
     fn begin(&mut self, scenes: &[Scene], part: &Range<u64>) -> Result<(), TruthError> {
         let _ = (scenes, part);
         Ok(())
@@ -85,13 +85,13 @@ pub trait Sink {
     /// Takes a record.
     ///
     /// # Errors
-    /// As [`Sink::begin`].
+    /// Errors of [`Sink::begin`].
     fn take(&mut self, record: Record) -> Result<(), TruthError>;
 
     /// The last record was taken.
     ///
     /// # Errors
-    /// As [`Sink::begin`].
+    /// Errors of [`Sink::begin`].
     fn finish(&mut self) -> Result<(), TruthError> {
         Ok(())
     }

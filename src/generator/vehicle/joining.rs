@@ -192,7 +192,7 @@ impl Joiner {
     /// Takes a push, and returns its number.
     ///
     /// # Errors
-    /// Why it is not taken; nothing changes then.
+    /// Reason for which it is not taken; nothing changes then.
     pub fn offer(&mut self, push: &Push) -> Result<u64, Refusal> {
         self.check(push)?;
         let before = self.waiting.back().or(self.used.as_ref());

@@ -34,7 +34,7 @@ const INITIAL: &str = "initial";
 /// Writes the header and the state with which a motion begins.
 ///
 /// # Errors
-/// Those of the output.
+/// Errors of the output.
 pub fn begin(output: &mut dyn Write, (first, turn): (&Motion, Option<&Turn>)) -> io::Result<()> {
     writeln!(output, "{HEADER}{}", if turn.is_some() { TURNED } else { "" })?;
     row(output, 0, INITIAL, (first, turn))
@@ -43,7 +43,7 @@ pub fn begin(output: &mut dyn Write, (first, turn): (&Motion, Option<&Turn>)) ->
 /// Writes the tick that ends at `sample`.
 ///
 /// # Errors
-/// Those of the output.
+/// Errors of the output.
 pub fn write(output: &mut dyn Write, sample: u64, tick: &Tick) -> io::Result<()> {
     row(output, sample, tick.kind.name(), (&tick.end, tick.turn.as_ref()))
 }

@@ -43,7 +43,7 @@ impl NavigationSets {
     /// send alike, have in RINEX 4 the first of them that sent a message.
     ///
     /// # Errors
-    /// What the writer reports.
+    /// Errors of the writer.
     pub fn write(
         &self,
         mut writer: impl Write,

@@ -56,7 +56,7 @@ impl<W: Write> ObservationFile<W> {
     /// Takes an observation; those of a sample come one after the other.
     ///
     /// # Errors
-    /// What the writer reports.
+    /// Errors of the writer.
     pub fn take(&mut self, row: Observation) -> io::Result<()> {
         if self.rows.first().is_some_and(|first| first.sample != row.sample) {
             self.end_epoch()?;
@@ -73,7 +73,7 @@ impl<W: Write> ObservationFile<W> {
     /// Writes the last epoch, and the header of a file that has none.
     ///
     /// # Errors
-    /// What the writer reports.
+    /// Errors of the writer.
     pub fn finish(&mut self) -> io::Result<()> {
         self.end_epoch()?;
         if !self.begun {
@@ -85,7 +85,7 @@ impl<W: Write> ObservationFile<W> {
     /// Writes the epoch of the newest observations: no more of it come.
     ///
     /// # Errors
-    /// What the writer reports.
+    /// Errors of the writer.
     pub fn end_epoch(&mut self) -> io::Result<()> {
         let rows = std::mem::take(&mut self.rows);
         let bias_s = self.clock_bias_s.take();

@@ -31,7 +31,7 @@ impl<W: Write> Track<W> {
     /// Begins a track with this name.
     ///
     /// # Errors
-    /// What the writer reports.
+    /// Errors of the writer.
     pub fn new(mut writer: W, form: TrackForm, name: &str) -> io::Result<Self> {
         let name = escaped(name);
         let program = concat!("gnss-twin ", env!("CARGO_PKG_VERSION"));
@@ -55,7 +55,7 @@ impl<W: Write> Track<W> {
     /// Adds a point, unless its second has one.
     ///
     /// # Errors
-    /// What the writer reports.
+    /// Errors of the writer.
     pub fn add(&mut self, time: Epoch, position_m: &Vector3<f64>) -> io::Result<()> {
         if self.newest.is_some_and(|newest| newest >= time.seconds()) {
             return Ok(());
@@ -80,7 +80,7 @@ impl<W: Write> Track<W> {
     /// Ends the track.
     ///
     /// # Errors
-    /// What the writer reports.
+    /// Errors of the writer.
     pub fn finish(&mut self) -> io::Result<()> {
         let closing = match self.form {
             TrackForm::Kml => "</gx:Track>\n</Placemark>\n</Document>\n</kml>\n",

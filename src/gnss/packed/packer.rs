@@ -97,7 +97,7 @@ impl<W: Write> Packer<W> {
     /// Ends the samples.
     ///
     /// # Errors
-    /// What the writer reports, and samples that fill no group.
+    /// Errors of the writer, and samples that fill no group.
     pub fn finish(mut self) -> io::Result<()> {
         let left = self.samples.len() / self.layout.format().bytes();
         if left > 0 {

@@ -142,7 +142,7 @@ fn far_hz(metadata: &IfMetadata, signal: &Signal, carrier_hz: f64) -> f64 {
 /// Chips from one cell of a search for `signal` to the next; there is another between them.
 ///
 /// # Errors
-/// As [`Searcher::search`] for a signal that has no code.
+/// Errors of [`Searcher::search`] for a signal that has no code.
 pub fn cell_chips(
     metadata: &IfMetadata,
     signal: &'static Signal,
@@ -169,7 +169,7 @@ pub fn bars(
 /// Independent cells at a Doppler whose largest has the law of all of them in a search for `signal`.
 ///
 /// # Errors
-/// As [`cell_chips`].
+/// Errors of [`cell_chips`].
 pub fn independent_cells(
     metadata: &IfMetadata,
     signal: &'static Signal,
@@ -189,7 +189,7 @@ fn grid(metadata: &IfMetadata, signal: &'static Signal, settings: &AcquisitionSe
 /// Searches `block` once for every candidate; rows come in the order of the candidates.
 ///
 /// # Errors
-/// As [`Searcher::search`].
+/// Errors of [`Searcher::search`].
 pub fn search(
     metadata: &IfMetadata,
     block: &Block,
@@ -240,7 +240,7 @@ impl Searcher {
     /// A search of samples as `metadata` describes them.
     ///
     /// # Errors
-    /// As [`AcquisitionSettings::validate`].
+    /// Errors of [`AcquisitionSettings::validate`].
     pub fn new(metadata: &IfMetadata, settings: &AcquisitionSettings) -> Result<Self, AcquireError> {
         Self::around(metadata, settings, 0.0)
     }
@@ -267,7 +267,7 @@ impl Searcher {
     /// sums as these have room for ([`shortened`]). Long codes of one signal cost the others nothing.
     ///
     /// # Errors
-    /// As [`AcquisitionSettings::validate`].
+    /// Errors of [`AcquisitionSettings::validate`].
     pub(crate) fn fitted(
         metadata: &IfMetadata,
         settings: &AcquisitionSettings,

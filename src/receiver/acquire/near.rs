@@ -14,7 +14,7 @@ impl Searcher {
     /// too.
     ///
     /// # Errors
-    /// As [`Searcher::search`].
+    /// Errors of [`Searcher::search`].
     pub(crate) fn search_near(
         &mut self,
         stretch: &Stretch,

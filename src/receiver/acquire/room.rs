@@ -8,7 +8,7 @@ use gnss::signal::Signal;
 /// Samples that a search for the signals that are asked for looks at, from the first sample of its block.
 ///
 /// # Errors
-/// As [`AcquisitionSettings::validate`].
+/// Errors of [`AcquisitionSettings::validate`].
 pub fn samples_needed(metadata: &IfMetadata, settings: &AcquisitionSettings) -> Result<u64, AcquireError> {
     settings.validate()?;
     let one = |signal: &'static Signal| {
@@ -26,7 +26,7 @@ pub fn samples_needed(metadata: &IfMetadata, settings: &AcquisitionSettings) -> 
 /// where one is too long; `None` below two code periods.
 ///
 /// # Errors
-/// As [`AcquisitionSettings::validate`].
+/// Errors of [`AcquisitionSettings::validate`].
 pub fn shortened(
     metadata: &IfMetadata,
     settings: &AcquisitionSettings,
@@ -51,7 +51,7 @@ pub fn shortened(
 /// Samples below which nothing is searched for: two code periods of the signal with the shortest.
 ///
 /// # Errors
-/// As [`AcquisitionSettings::validate`].
+/// Errors of [`AcquisitionSettings::validate`].
 pub fn least_samples(metadata: &IfMetadata, settings: &AcquisitionSettings) -> Result<u64, AcquireError> {
     settings.validate()?;
     let inside = settings.signals().into_iter().filter(|signal| can_hold(metadata, signal));

@@ -87,13 +87,13 @@ pub trait Sink {
     /// Takes a record.
     ///
     /// # Errors
-    /// What keeps the sink from it; the reception ends with it.
+    /// A reason for which the sink cannot; the reception ends with it.
     fn take(&mut self, record: Record) -> Result<(), OutputError>;
 
     /// The reception is over; `summary` is what `receiver.json` says.
     ///
     /// # Errors
-    /// As [`Sink::take`].
+    /// Errors of [`Sink::take`].
     fn finish(&mut self, summary: &serde_json::Value) -> Result<(), OutputError> {
         let _ = summary;
         Ok(())

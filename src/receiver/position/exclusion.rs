@@ -40,7 +40,7 @@ pub type Consistent = (Vec<Range>, Solution, Vec<(Sv, f64)>);
 /// Solves, and leaves out the fewest satellites without which the residuals fit.
 ///
 /// # Errors
-/// As [`least_squares::position`]; [`NoFix::Inconsistent`] when a fault shows but no set explains it,
+/// Errors of [`least_squares::position`]; [`NoFix::Inconsistent`] when a fault shows but no set explains it,
 /// [`NoFix::Ambiguous`] when several do and lead to different positions.
 pub fn consistent(
     ranges: Vec<Range>,
@@ -55,7 +55,7 @@ pub fn consistent(
 /// Leaves out the fewest satellites without which the residuals of a solution of all ranges fit.
 ///
 /// # Errors
-/// As [`consistent`].
+/// Errors of [`consistent`].
 pub fn without_faults(
     ranges: Vec<Range>,
     all: Solution,

@@ -406,7 +406,7 @@ fn condition(plain: &DMatrix<f64>) -> Result<f64, NoFix> {
 /// (1 + drift) g = 1 + n·v_u/c exactly: linear in the unknowns. Rates of the atmosphere are left out (mm/s).
 ///
 /// # Errors
-/// As the position's geometry.
+/// Errors of the position's geometry.
 pub fn velocity(ranges: &[Range], solution: &Solution) -> Result<(Vector3<f64>, f64), NoFix> {
     let spin = Vector3::new(0.0, 0.0, EARTH_ROTATION_RADPS);
     let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());

@@ -401,7 +401,7 @@ impl Solver {
     /// Solves from the observations of one sample.
     ///
     /// # Errors
-    /// Why there is no position.
+    /// Reason for which there is no position.
     pub fn solve(
         &mut self,
         sample: u64,

@@ -28,7 +28,7 @@ const SAME_M: f64 = 1.0;
 /// two positions that the ranges agree on, the one where the receiver can be.
 ///
 /// # Errors
-/// As [`position`]; two positions where it can be, or, without a range to spare, none.
+/// Errors of [`position`]; two positions where it can be, or, without a range to spare, none.
 pub fn first(ranges: &[Range], start_m: Vector3<f64>, corrections: &Corrections) -> Result<Solution, NoFix> {
     let found = position(ranges, start_m, corrections)?;
     let Some(other) = other(ranges, &found, corrections) else {

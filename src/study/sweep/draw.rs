@@ -48,7 +48,7 @@ impl Picture {
     /// The picture as wide as a page's text.
     ///
     /// # Errors
-    /// Whatever the drawing library reports.
+    /// Errors of the drawing library.
     pub fn drawing(&self) -> Result<Drawing, Failure> {
         let columns = self.charts.len().clamp(1, 2);
         let rows = self.charts.len().div_ceil(columns).max(1);

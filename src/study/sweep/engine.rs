@@ -73,7 +73,7 @@ pub fn run(plan: &Plan, shards: &[u32], progress: &(dyn Fn(u64) + Sync)) -> Resu
 /// [`run`] as long as `goes_on` says so.
 ///
 /// # Errors
-/// As [`run`], and [`StudyError::Stopped`].
+/// Errors of [`run`], and [`StudyError::Stopped`].
 pub fn run_while(
     plan: &Plan,
     shards: &[u32],

@@ -182,7 +182,7 @@ pub fn sha512_hex(bytes: &[u8]) -> String {
 /// SHA-256 of a whole file, in hexadecimal digits.
 ///
 /// # Errors
-/// Those of reading.
+/// Errors of reading.
 pub fn sha256_of_file(path: &Path) -> io::Result<String> {
     let (mut file, mut hash, mut bytes) = (std::fs::File::open(path)?, Sha256::new(), vec![0; 1 << 20]);
     loop {
@@ -199,29 +199,35 @@ fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
+/// Ends of names that state a unit, with the unit. An end that another one contains comes after it.
+const UNITS: [(&str, &str); 21] = [
+    ("_dbhz", "dB-Hz"),
+    ("_db", "dB"),
+    ("_dbw", "dBW"),
+    ("_deg", "deg"),
+    ("_rad", "rad"),
+    ("_cycles", "cycle"),
+    ("_chips", "chip"),
+    ("_per_hour", "1/h"),
+    ("_g_per_s", "g/s"),
+    ("_mps3", "m/s^3"),
+    ("_mps2", "m/s^2"),
+    ("_mps", "m/s"),
+    ("_hz", "Hz"),
+    ("_msps", "Msps"),
+    ("_ms", "ms"),
+    ("_ns", "ns"),
+    ("_sps", "s/s"),
+    ("_lsb", "LSB"),
+    ("_g", "g"),
+    ("_m", "m"),
+    ("_s", "s"),
+];
+
 /// The unit that the end of a name states; "1" for a pure number.
 pub fn unit_of(name: &str) -> &'static str {
-    const UNITS: [(&str, &str); 18] = [
-        ("_dbhz", "dB-Hz"),
-        ("_db", "dB"),
-        ("_dbw", "dBW"),
-        ("_deg", "deg"),
-        ("_cycles", "cycle"),
-        ("_chips", "chip"),
-        ("_per_hour", "1/h"),
-        ("_g_per_s", "g/s"),
-        ("_mps2", "m/s^2"),
-        ("_mps", "m/s"),
-        ("_hz", "Hz"),
-        ("_msps", "Msps"),
-        ("_ms", "ms"),
-        ("_sps", "s/s"),
-        ("_lsb", "LSB"),
-        ("_g", "g"),
-        ("_m", "m"),
-        ("_s", "s"),
-    ];
     // "bias_enu_m.0" carries its unit before the index.
-    let stem = name.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.');
+    let is_index = |last: &str| last.bytes().all(|byte| byte.is_ascii_digit());
+    let stem = name.rsplit_once('.').filter(|(_, last)| is_index(last)).map_or(name, |(stem, _)| stem);
     UNITS.iter().find(|(end, _)| stem.ends_with(end)).map_or("1", |(_, unit)| unit)
 }

@@ -117,7 +117,7 @@ pub fn patched(base: &Base, values: &[(&Axis, &Value)]) -> Result<toml::Table, S
 /// Scene and receiver of a document, each as its own reader understands it.
 ///
 /// # Errors
-/// What the reader refuses.
+/// Refusals of the reader.
 pub fn read(base: &Base, document: &toml::Table) -> Result<(Scenario, Settings), String> {
     let text = toml::to_string(document).map_err(|e| e.to_string())?;
     let scenario = Scenario::parse(&text, "scene").map_err(|e| e.without_place())?;

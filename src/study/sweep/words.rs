@@ -3,7 +3,7 @@
 //!
 //! Limits: words of keys follow from their names; a study with a better word gives it as `label`.
 
-use super::unit_of;
+use super::{UNITS, unit_of};
 
 /// Figures whose names say too little, without units.
 const FIGURES: [(&str, &str); 29] = [
@@ -39,7 +39,7 @@ const FIGURES: [(&str, &str); 29] = [
 ];
 
 /// Parts of names that are written otherwise in words.
-const PARTS: [(&str, &str); 25] = [
+const PARTS: [(&str, &str); 24] = [
     ("p95", "error, 95 %"),
     ("sigma", "jitter, 1 σ"),
     ("rms", "error, rms"),
@@ -51,7 +51,6 @@ const PARTS: [(&str, &str); 25] = [
     ("oadev", "Allan deviation"),
     ("mdev", "modified Allan deviation"),
     ("1s", "at 1 s"),
-    ("pseudorange", "pseudorange"),
     ("doppler", "Doppler"),
     ("if", "IF"),
     ("adc", "ADC"),
@@ -67,39 +66,12 @@ const PARTS: [(&str, &str); 25] = [
     ("raim", "RAIM"),
 ];
 
-/// Ends of names that state a unit, the longest first.
-const ENDS: [&str; 21] = [
-    "_per_hour",
-    "_g_per_s",
-    "_cycles",
-    "_chips",
-    "_mps3",
-    "_mps2",
-    "_dbhz",
-    "_msps",
-    "_mps",
-    "_sps",
-    "_dbw",
-    "_deg",
-    "_lsb",
-    "_db",
-    "_hz",
-    "_ms",
-    "_rad",
-    "_g",
-    "_m",
-    "_s",
-    "_ns",
-];
-
 /// A unit as it is printed.
 fn printed(name: &str) -> Option<&'static str> {
     match unit_of(name) {
-        _ if name.ends_with("_mps3") => Some("m/s³"),
-        _ if name.ends_with("_ns") => Some("ns"),
-        _ if name.ends_with("_rad") => Some("rad"),
         "1" => None,
         "m/s^2" => Some("m/s²"),
+        "m/s^3" => Some("m/s³"),
         "cycle" => Some("cycles"),
         "chip" => Some("chips"),
         "deg" => Some("degrees"),
@@ -136,7 +108,7 @@ fn with_unit(words: String, name: &str) -> String {
 
 /// Words between the lines and points of a name, without its unit.
 fn in_words(name: &str) -> String {
-    let stem = ENDS.iter().find_map(|end| name.strip_suffix(end)).unwrap_or(name);
+    let stem = UNITS.iter().find_map(|(end, _)| name.strip_suffix(end)).unwrap_or(name);
     let part = |part: &str| {
         let known = PARTS.iter().find(|(short, _)| *short == part);
         known.map_or_else(|| part.to_owned(), |(_, words)| (*words).to_owned())
@@ -172,6 +144,8 @@ mod tests {
         assert_eq!(of_figure("position.horizontal_p95_m"), "position horizontal error, 95 % (m)");
         assert_eq!(of_key("receiver.tracking.pll_bandwidth_hz"), "PLL bandwidth (Hz)");
         assert_eq!(of_key("motion.jerk_mps3"), "jerk (m/s³)");
+        assert_eq!(of_key("motion.acceleration_mps2"), "acceleration (m/s²)");
+        assert_eq!(of_key("front_end.offset_ns"), "offset (ns)");
         assert_eq!(of_key("signal.name"), "signal");
         assert_eq!(of_key("scenario"), "scenario");
     }

@@ -43,6 +43,11 @@ pub fn is_stepping(faults: &[Fault], sv: Sv, time_s: f64) -> bool {
         .any(|at_s| (at_s - 0.5..at_s + STEP_S).contains(&time_s))
 }
 
+/// Longest time from a step of a satellite's clock to the half cycle that the message shows, seconds: a unit
+/// of 12 s (CNAV, the subframes of NavIC) that has just begun, and the two words of LNAV, 1.2 s, that confirm
+/// the next.
+const HALF_CYCLE_S: f64 = 13.2;
+
 /// One row of the truth as expectation needs it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SatelliteEpoch {
@@ -131,6 +136,20 @@ impl Scene<'_> {
     fn garbled(&self, sv: Sv, time_s: f64) -> bool {
         self.of(sv, &[FaultKind::BitErrors, FaultKind::Bit, FaultKind::Alert])
             .any(|fault| during(fault, time_s, HEALTH_S))
+    }
+
+    /// True if the message has been garbled by `time_s`, so that a channel may have given it up.
+    pub fn was_garbled(&self, sv: Sv, time_s: f64) -> bool {
+        self.of(sv, &[FaultKind::BitErrors, FaultKind::Bit, FaultKind::Alert]).any(|fault| time_s >= fault.from_s)
+    }
+
+    /// True if the message may show at `time_s` that a loop has settled on the other half cycle after a step
+    /// of the satellite's clock.
+    pub fn shows_half_cycle(&self, sv: Sv, time_s: f64) -> bool {
+        self.of(sv, &[FaultKind::ClockStep])
+            .flat_map(|fault| [Some(fault.from_s), fault.to_s])
+            .flatten()
+            .any(|at_s| (at_s..at_s + HALF_CYCLE_S).contains(&time_s))
     }
 
     /// True if the satellite must not, or need not, be used.
@@ -347,7 +366,13 @@ mod tests {
                 assert!(scene.required(Sv::gps(5), &all, 45.0, false).iter().all(|r| !r.used), "unhealthy all along");
             },
         );
+        with(Expect::default(), &[fault(FaultKind::ClockStep, 30.0, Some(60.0))], |scene| {
+            let shows = |time_s| scene.shows_half_cycle(Sv::gps(5), time_s);
+            assert_eq!([29.9, 30.0, 43.0, 43.3, 60.0, 73.3].map(shows), [false, true, true, false, true, false]);
+            assert!(!scene.shows_half_cycle(Sv::gps(6), 30.0) && !scene.was_garbled(Sv::gps(5), 30.0));
+        });
         with(Expect::default(), &[fault(FaultKind::BitErrors, 0.0, None)], |scene| {
+            assert!(scene.was_garbled(Sv::gps(5), 80.0) && !scene.shows_half_cycle(Sv::gps(5), 1.0));
             assert_eq!(first(scene, &rows(90, |_| Some(45.0)), 0.0), [Some(0.0), None, None]);
         });
     }

@@ -157,7 +157,7 @@ impl Settled {
     /// Whole and half cycles in a carrier whose level was found with rows that are left out.
     ///
     /// # Errors
-    /// As [`Numbers::each`].
+    /// Errors of [`Numbers::each`].
     pub fn level_cycles(&self) -> Result<f64, JudgeError> {
         if self.count == self.all {
             return Ok(0.0);

@@ -10,7 +10,7 @@ use crate::judge::verdict::Verdict;
 use crate::measure::slips::{Kind, Slip, Slips};
 use crate::read::Run;
 use crate::statistics::median;
-use gnss::facts::{FaultKind, Losses};
+use gnss::facts::Losses;
 use gnss::satellite::Sv;
 use gnss::signal::Link;
 use gnss::signal::Signal;
@@ -18,10 +18,6 @@ use gnss::time::Epoch;
 
 /// The lock detectors' memory: how long before a declared loss or slip the signal may have failed.
 pub(super) const LOOK_BACK_S: f64 = 2.0;
-/// Longest time from a step of a satellite's clock to the half cycle that the message shows, seconds: a unit
-/// of 12 s (CNAV, the subframes of NavIC) that has just begun, and the two words of LNAV, 1.2 s, that confirm
-/// the next.
-const HALF_CYCLE_S: f64 = 13.2;
 /// Losses that are named; the rest is in `slips.csv`.
 const NAMED: usize = 12;
 
@@ -137,17 +133,9 @@ impl Witness {
             return Some(Excuse::NotThere);
         }
         // Without a frame for so long, a channel gives up what it cannot read.
-        let garbled = run.scene.faults.iter().any(|fault| {
-            matches!(fault.kind, FaultKind::BitErrors | FaultKind::Bit | FaultKind::Alert)
-                && fault.satellites.as_ref().is_none_or(|list| list.contains(&sv))
-                && slip.time_s >= fault.from_s
-        });
+        let garbled = scene.was_garbled(sv, slip.time_s);
         // The half cycle on which the loop has settled after a step shows in the next unit of the message.
-        let stepped = run.scene.faults.iter().any(|fault| {
-            fault.kind == FaultKind::ClockStep
-                && fault.satellites.as_ref().is_none_or(|list| list.contains(&sv))
-                && (fault.from_s..fault.from_s + HALF_CYCLE_S).contains(&slip.time_s)
-        });
+        let stepped = scene.shows_half_cycle(sv, slip.time_s);
         let is_half = slip.kind == Kind::CycleSlip && slip.size_cycles.is_some_and(|cycles| cycles.abs() == 0.5);
         (garbled && slip.kind == Kind::LossOfLock || stepped && is_half).then_some(Excuse::Fault)
     }

@@ -352,7 +352,7 @@ impl Errors {
     /// satellite's clock, a list a satellite; of one signal, or of all.
     ///
     /// # Errors
-    /// As [`Self::pooled`].
+    /// Errors of [`Self::pooled`].
     pub fn settled(
         &self,
         signal: Option<&Signal>,
@@ -375,7 +375,7 @@ impl Errors {
     /// Standard deviation of those numbers, each satellite about its own mean.
     ///
     /// # Errors
-    /// As [`Self::pooled`].
+    /// Errors of [`Self::pooled`].
     pub fn settled_std(
         &self,
         signal: Option<&Signal>,
@@ -391,7 +391,7 @@ impl Errors {
     /// satellites the mean takes 1/n of the variance with it. Of one signal, or of all.
     ///
     /// # Errors
-    /// As [`Self::pooled`].
+    /// Errors of [`Self::pooled`].
     pub fn code_without_clock_m(&self, of: Option<&Signal>) -> Result<Numbers, JudgeError> {
         let mut all = Numbers::new(self.signals.directory());
         for link in self.of(of) {

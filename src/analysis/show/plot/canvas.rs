@@ -43,7 +43,7 @@ pub fn figure(
 /// Draws charts, `columns` a row, with one legend below all of them.
 ///
 /// # Errors
-/// Whatever the drawing library reports.
+/// Errors of the drawing library.
 pub fn compose(
     (width, height): (u32, u32),
     columns: usize,

@@ -49,7 +49,7 @@ impl Drawing {
     /// Draws a picture of that many pixels.
     ///
     /// # Errors
-    /// Whatever the drawing library or `draw` reports.
+    /// Errors of the drawing library or of `draw`.
     pub fn new(
         (width_px, height_px): (u32, u32),
         draw: impl FnOnce(&Area<'_>) -> Result<(), Failure>,
@@ -78,7 +78,7 @@ impl Drawing {
     /// A PNG, `scale` times as large.
     ///
     /// # Errors
-    /// Whatever the rasteriser reports.
+    /// Errors of the rasteriser.
     pub fn png(&self, scale: f32) -> Result<Vec<u8>, Failure> {
         let size = |pixels: u32| (pixels as f32 * scale).round() as u32;
         let (width, height) = (size(self.width_px), size(self.height_px));

@@ -38,7 +38,7 @@ impl Sketch {
     /// The picture.
     ///
     /// # Errors
-    /// Whatever the drawing library reports.
+    /// Errors of the drawing library.
     pub fn draw(&self) -> Result<Drawing, Failure> {
         match self {
             Self::Charts { size, columns, charts, legend } => compose(*size, *columns, charts, legend),

@@ -11,14 +11,14 @@ use gnss::earth::Geodetic;
 /// Failures whose reasons the first page has room for.
 const MOST_FAILURES: usize = 5;
 
-/// The figures of the first page: their words, and the verdict's rows that they are.
-const FIGURES: [(&str, &str); 6] = [
-    ("time to first fix", "time to first fix"),
-    ("horizontal error, 95 %", "horizontal error, 95 %"),
-    ("vertical error, 95 %", "vertical error, 95 %"),
-    ("velocity error, 95 %", "velocity error, 95 %"),
-    ("epochs without a fix", "epochs without a fix"),
-    ("unexpected cycle slips", "unexpected cycle slips"),
+/// The verdict's rows that the first page shows as figures.
+const FIGURES: [&str; 6] = [
+    "time to first fix",
+    "horizontal error, 95 %",
+    "vertical error, 95 %",
+    "velocity error, 95 %",
+    "epochs without a fix",
+    "unexpected cycle slips",
 ];
 
 /// Position and time in one line.
@@ -59,11 +59,11 @@ pub(super) fn banner(report: &mut Report, verdict: &Verdict) {
 pub(super) fn figures(report: &mut Report, summary: &Summary) {
     let columns = [("figure", Side::Left), ("value", Side::Right), ("limit", Side::Right), ("verdict", Side::Left)];
     let mut table = Table::new("", columns);
-    for (words, figure) in FIGURES {
+    for figure in FIGURES {
         let row = summary.details.verdict.rows.iter().find(|row| row.figure.starts_with(figure));
         match row {
             Some(row) => table.row([
-                Cell::from(words),
+                Cell::from(figure),
                 Cell::from(with_unit(row)),
                 Cell::from(if row.unit.is_empty() {
                     row.bound.to_string()
@@ -75,7 +75,7 @@ pub(super) fn figures(report: &mut Report, summary: &Summary) {
             None => {
                 let first_s = summary.position.first_fix_s.filter(|_| figure == "time to first fix");
                 let value = first_s.map_or_else(|| "–".to_owned(), |first_s| format!("{} s", number(first_s)));
-                table.row([words, &value, "–", "not judged"]);
+                table.row([figure, &value, "–", "not judged"]);
             }
         }
     }

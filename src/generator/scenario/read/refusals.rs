@@ -84,7 +84,7 @@ impl Refusals {
     }
 
     /// # Errors
-    /// What was refused, in the order of the text.
+    /// Refusals, in the order of the text.
     pub fn finish(mut self) -> Result<(), ScenarioError> {
         self.leave_out_misspelt();
         self.0.sort_by_key(|error| error.place().map_or((usize::MAX, 0), |place| (place.line, place.column)));

@@ -284,7 +284,7 @@ pub fn elements(sv: Sv, strings: [&GlonassString; 4], sent: Epoch) -> Ephemeris 
 /// that is known to within a year supplies it.
 ///
 /// # Errors
-/// What in them is no time or date.
+/// Values that are no time or date.
 pub fn frame_began(
     one: &GlonassString,
     four: &GlonassString,

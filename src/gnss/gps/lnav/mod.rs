@@ -164,7 +164,7 @@ impl Broadcast {
     /// Builds the pages from the parameters of a scene.
     ///
     /// # Errors
-    /// As [`Self::with_utc`].
+    /// Errors of [`Self::with_utc`].
     pub fn of(common: &Common) -> Result<Self, FieldError> {
         let reference = common.reference.unwrap_or(Epoch::new(0, 0.0));
         // An almanac is of GPS satellites.
