@@ -644,6 +644,20 @@ fn run_in(directory: &Path, arguments: &[&str]) {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
+/// The page that the receiver waits for comes 12 min after the scene: no epoch is due a fix.
+#[test]
+fn a_receiver_that_waits_for_a_page_beyond_the_scene_fails_no_row() {
+    let directory = tempfile::tempdir().unwrap();
+    let scene = include_str!("../../scenarios/static.toml")
+        .replace("start = 2010-07-01T08:05:58", "start = 2010-07-01T08:06:40")
+        .replace("duration_s = 60", "duration_s = 45");
+    std::fs::write(directory.path().join("late.toml"), scene).unwrap();
+    run_in(directory.path(), &["run", "late.toml", "--out", "late", "--check"]);
+    let summary = std::fs::read_to_string(directory.path().join("late/summary.json")).unwrap();
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    assert_eq!((number(&summary, "/satellites/used"), number(&summary, "/position/fixes")), (0.0, 0.0), "{summary}");
+}
+
 #[test]
 fn after_a_second_of_silence_every_satellite_is_lost_found_again_and_used_again() {
     let directory = tempfile::tempdir().unwrap();

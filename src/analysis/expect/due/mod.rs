@@ -142,6 +142,8 @@ pub struct Expectations {
     /// Time at which satellites and geometry would have allowed it, without regard to the ionosphere,
     /// seconds.
     pub four_by_s: Option<f64>,
+    /// Time since which nothing keeps the receiver from a fix, seconds; it may lie beyond the scene.
+    fixes_from_s: f64,
     /// Messages that the satellites sent.
     message: Message,
 }
@@ -159,6 +161,7 @@ impl Expectations {
             receiver,
             first_fix_s: None,
             four_by_s: None,
+            fixes_from_s: f64::NEG_INFINITY,
             message: Message::of(run),
         };
         let steps: Vec<f64> = found.epochs.windows(2).map(|two| two[1].time_s - two[0].time_s).collect();
@@ -265,10 +268,9 @@ impl Expectations {
         };
         let page_s = signals.iter().filter(brings).map(page_s).fold(f64::INFINITY, f64::min);
         let waited_s = four_s + receiver.ionosphere_wait_s;
-        let due_s = if receiver.requires_ionosphere { four_s.max(page_s) } else { waited_s } + SOLVE_S;
+        self.fixes_from_s = if receiver.requires_ionosphere { four_s.max(page_s) } else { waited_s } + SOLVE_S;
         // Where the scene excuses a time, the clock begins anew after it.
-        let excused = |due: &&Due| due.time_s >= due_s && self.fix_due(expect, due, None);
-        self.first_fix_s = self.epochs.iter().find(excused).map(|due| due.time_s);
+        self.first_fix_s = self.epochs.iter().find(|due| self.fix_due(expect, due, None)).map(|due| due.time_s);
     }
 
     /// True if there must be a fix at an epoch of a receiver whose first one came at `first_s`.
@@ -277,7 +279,7 @@ impl Expectations {
             Some(Fixes::None | Fixes::Any) => return false,
             Some(Fixes::Required) | None => {}
         }
-        let on_time = self.first_fix_s.is_none_or(|limit_s| due.time_s >= limit_s);
+        let on_time = due.time_s >= self.first_fix_s.unwrap_or(self.fixes_from_s);
         (on_time && due.pdop() <= LARGEST_PDOP)
             || (first_s.is_some_and(|first_s| due.time_s > first_s) && !on_time && due.held >= ENOUGH)
     }
