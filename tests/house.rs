@@ -107,16 +107,41 @@ fn doc_comments_use_the_words_of_the_field() {
     hold(Rule::Word);
 }
 
+#[test]
+fn the_program_speaks_in_the_words_of_the_field() {
+    let all = Source::all("src");
+    let is_test = |path: &str| !all.iter().any(|source| source.path == path);
+    let sources = source::files("src").into_iter().filter(|(path, _)| !is_test(path));
+    keep(Rule::Word, sources.map(|(path, text)| (path, prose::messages(&text))));
+}
+
+#[test]
+fn documents_use_the_words_of_the_field() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let pages = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "REFERENCE.md"]
+        .map(|page| (page.to_owned(), fs::read_to_string(root.join(page)).unwrap()));
+    let book = source::files_of("book/src", "md");
+    assert!(book.len() > 20, "{} pages of the book found", book.len());
+    let scenes = ["scenarios", "studies"].into_iter().flat_map(|folder| source::files_of(folder, "toml"));
+    let documents = pages.into_iter().chain(book).chain(scenes);
+    keep(Rule::Word, documents.map(|(path, text)| (path, prose::paragraphs(&text))));
+}
+
 /// Panics where a doc comment of `src` breaks a rule.
 fn hold(rule: Rule) {
+    keep(rule, source::files("src").into_iter().map(|(path, text)| (path, prose::docs(&text))));
+}
+
+/// Panics where a text of a file breaks a rule.
+fn keep(rule: Rule, files: impl Iterator<Item = (String, Vec<prose::Doc>)>) {
     let mut found = Vec::new();
-    for (path, text) in source::files("src") {
-        for doc in prose::docs(&text) {
+    for (path, docs) in files {
+        for doc in docs {
             let faults = prose::faults(&path, &doc, rule).into_iter();
             found.extend(faults.map(|fault| format!("{path}:{}: {fault}", doc.line)));
         }
     }
-    assert!(found.is_empty(), "{} doc comments against {rule:?} of prose.rs:\n{}", found.len(), found.join("\n"));
+    assert!(found.is_empty(), "{} texts against {rule:?} of prose.rs:\n{}", found.len(), found.join("\n"));
 }
 
 #[test]
@@ -230,6 +255,20 @@ mod planted {
     fn an_unwrap_is_found_where_it_is_code() {
         let text = "fn f() { x.unwrap(); }\n// .unwrap()\nfn g() { y\n  .unwrap (); \".unwrap()\"; z.unwrap_or(1) }\n";
         assert_eq!(unwraps(&Source::new("src/a.rs", text).code), [1, 4]);
+    }
+
+    #[test]
+    fn a_word_that_is_not_ours_is_found_in_strings_and_documents() {
+        let source = "fn f() { say(\"it goes \\\n    anew\", \"{place} {of_it}\", r#\"a place\"#, \"place\"); }\n// \"a place\"\n\
+                      #[cfg(test)]\nmod tests { const A: &str = \"a place\"; }\n";
+        let found = |docs: Vec<prose::Doc>| -> Vec<(usize, usize)> {
+            docs.iter().map(|doc| (doc.line, prose::faults("src/a.rs", doc, Rule::Word).len())).collect()
+        };
+        assert_eq!(found(prose::messages(source)), [(1, 1), (2, 0), (2, 1)]);
+        let page = "# Head\n\nIt goes\nanew.\n```console\n$ anew\n```\n\nThe key `place`.\n";
+        let faults: usize = found(prose::paragraphs(page)).iter().map(|(_, faults)| faults).sum();
+        assert_eq!(faults, 1);
+        assert_eq!(found(prose::paragraphs(page))[1], (3, 1));
     }
 
     fn faults_of(text: &str, rule: Rule) -> Vec<String> {

@@ -1,8 +1,9 @@
 //! Events that switch sources while a scene is sent, written as lines of text.
 //!
-//! `power G05 -10` · `spoofer 1 3` · `jammer 1 off` · `jammer 1 on` · `spoofer 1 off` · `astray G05 30 0.5`
-//! (metres, metres per second) · `astray G05 0`. A power is in decibels over that of the scene, `off` none at
-//! all. The record of a live run holds them in a table with the sample of each, which a replay reads.
+//! `power G05 -10` · `spoofer 1 3` · `jammer 1 off` · `jammer 1 on` · `spoofer 1 off` ·
+//! `range_error G05 30 0.5` (metres, metres per second) · `range_error G05 0`. A power is in decibels over
+//! that of the scene, `off` none at all. The record of a live run holds them in a table with the sample of
+//! each, which a replay reads.
 
 use std::fmt;
 use std::io::{BufRead, BufReader, Read};
@@ -18,7 +19,7 @@ use gnss::satellite::Sv;
 /// Decibels that a power may be changed by.
 const MOST_DB: f64 = 100.0;
 /// Largest range error of a satellite in metres, and its largest rate in m/s.
-const MOST_ASTRAY: f64 = 1e7;
+const MOST_RANGE_ERROR: f64 = 1e7;
 
 /// Event that changes a source.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,15 +27,18 @@ pub enum Event {
     /// Power over that of the scene in decibels; `None` is off.
     Power(Source, Option<f64>),
     /// A true satellite's ranges are too long by metres, and by as many more a second.
-    Astray(Sv, f64, f64),
+    RangeError(Sv, f64, f64),
 }
 
 /// Reason for which a line is not a valid event, or not one of the scene.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum EventError {
     /// Line that is not a known event.
-    #[error("'{0}': expected power SV DB|off, jammer N on|off|DB, spoofer N on|off|DB or astray SV M [M/S]")]
+    #[error("'{0}': expected power SV DB|off, jammer N on|off|DB, spoofer N on|off|DB or range_error SV M [M/S]")]
     Unknown(String),
+    /// Event under a name of an earlier version, and its name now.
+    #[error("'{0}' is called '{1}' now")]
+    Renamed(&'static str, &'static str),
     /// A number beyond its range.
     #[error("{0}: expected {1:e} at most")]
     Range(f64, f64),
@@ -64,7 +68,7 @@ impl fmt::Display for Event {
                     None => f.write_str("off"),
                 }
             }
-            Self::Astray(sv, m, mps) => write!(f, "astray {sv} {m:?} {mps:?}"),
+            Self::RangeError(sv, m, mps) => write!(f, "range_error {sv} {m:?} {mps:?}"),
         }
     }
 }
@@ -82,14 +86,15 @@ impl FromStr for Event {
             if value.abs() <= most { Ok(value) } else { Err(EventError::Range(value, most)) }
         };
         let satellite = || name.parse::<Sv>().map_err(|_| unknown());
-        let event = if verb == "astray" {
-            let m = number(words.next().ok_or_else(unknown)?, MOST_ASTRAY)?;
-            Self::Astray(satellite()?, m, words.next().map_or(Ok(0.0), |word| number(word, MOST_ASTRAY))?)
+        let event = if verb == "range_error" {
+            let m = number(words.next().ok_or_else(unknown)?, MOST_RANGE_ERROR)?;
+            Self::RangeError(satellite()?, m, words.next().map_or(Ok(0.0), |word| number(word, MOST_RANGE_ERROR))?)
         } else {
             let source = match verb {
                 "power" => Source::Satellite(satellite()?),
                 "jammer" => Source::Jammer(name.parse().map_err(|_| unknown())?),
                 "spoofer" => Source::Spoofer(name.parse().map_err(|_| unknown())?),
+                "astray" => return Err(EventError::Renamed("astray", "range_error")),
                 _ => return Err(unknown()),
             };
             Self::Power(
@@ -112,7 +117,7 @@ impl Event {
     /// [`EventError::NoSuch`].
     pub fn check(&self, scene: &Scene) -> Result<(), EventError> {
         let there = match self {
-            Self::Power(Source::Satellite(sv), _) | Self::Astray(sv, ..) => {
+            Self::Power(Source::Satellite(sv), _) | Self::RangeError(sv, ..) => {
                 scene.catalogue.satellites().any(|known| known == *sv) && !scene.excluded.contains(sv)
             }
             Self::Power(Source::Jammer(number), _) => scene.interference.iter().any(|one| one.source == *number),
@@ -133,8 +138,8 @@ impl Event {
                 let gain = db.map_or(0.0, |db| libm::pow(10.0, db / 10.0));
                 switches.set(source, tick, |row| row.gain = gain)
             }
-            Self::Astray(sv, m, mps) => switches.set(Source::Satellite(sv), tick, |row| {
-                (row.astray_m, row.astray_mps) = (m, mps);
+            Self::RangeError(sv, m, mps) => switches.set(Source::Satellite(sv), tick, |row| {
+                (row.range_error_m, row.range_error_mps) = (m, mps);
             }),
         };
         if done { Ok(()) } else { Err(EventError::TooMany) }
@@ -201,14 +206,17 @@ mod tests {
 
     #[test]
     fn an_event_reads_as_it_is_written_and_nonsense_is_refused() {
-        for line in ["power G05 -10.5", "power E11 off", "jammer 2 on", "spoofer 1 off", "astray G12 30.0 0.5"] {
+        for line in ["power G05 -10.5", "power E11 off", "jammer 2 on", "spoofer 1 off", "range_error G12 30.0 0.5"] {
             assert_eq!(line.parse::<Event>().unwrap().to_string(), line);
         }
-        assert_eq!("astray G12 30".parse(), Ok(Event::Astray(Sv::gps(12), 30.0, 0.0)));
+        assert_eq!("range_error G12 30".parse(), Ok(Event::RangeError(Sv::gps(12), 30.0, 0.0)));
+        let renamed = "astray G12 30".parse::<Event>().unwrap_err().to_string();
+        assert_eq!(renamed, "'astray' is called 'range_error' now");
         for line in ["", "power", "power G05", "power five 3", "power G05 NaN", "power G05 1000", "jammer -1 on"] {
             assert!(line.parse::<Event>().is_err(), "{line}");
         }
-        for line in ["jammer 1 on now", "explode 1 on", "astray G05", "astray G05 1e9", "power G05 \u{1b}[2J"] {
+        for line in ["jammer 1 on now", "explode 1 on", "range_error G05", "range_error G05 1e9", "power G05 \u{1b}[2J"]
+        {
             let error = line.parse::<Event>().unwrap_err().to_string();
             assert!(!error.contains('\u{1b}') && error.contains("expected"), "{error}");
         }

@@ -172,7 +172,7 @@ impl Fidelity {
         let (signal, bias_m) = worst(signals, |signal| standing_bias_m(self.code_edge, signal, rate_hz))?;
         (bias_m > self.allowed_m).then(|| {
             format!(
-                "fidelity.code_edge = {} at {:.3} Msps: chips of {signal} meet the same places between samples, and \
+                "fidelity.code_edge = {} at {:.3} Msps: chips of {signal} meet the same phases between samples, and \
                  the code of a satellite without Doppler is {bias_m:.1} m off, rms; \"band_limited\" or another rate \
                  avoids it",
                 self.code_edge.name(),

@@ -302,6 +302,6 @@ impl fmt::Display for Levels {
         if share > 0.0 {
             write!(f, ", at most {share:.1e} (at {worst_s:.1} s)")?;
         }
-        writeln!(f, ", in {} stretches of samples", self.stretches)
+        writeln!(f, ", in {} segments of samples", self.stretches)
     }
 }

@@ -196,7 +196,7 @@ impl Constellation {
     /// Describes the spoofer for the plan.
     pub fn describe(&self) -> String {
         let place = match &self.place {
-            Place::Antenna => "the antenna's true place".to_owned(),
+            Place::Antenna => "the antenna's true position".to_owned(),
             Place::Claimed(trajectory) => {
                 let here = gnss::earth::Geodetic::from_ecef(&trajectory.at(self.on_s.start).position_m);
                 let (latitude, longitude) = (here.latitude_rad.to_degrees(), here.longitude_rad.to_degrees());

@@ -33,9 +33,9 @@ pub struct Switched {
     /// Factor on its power.
     pub gain: f64,
     /// Error of pseudorange and carrier in metres at sample `since`.
-    pub astray_m: f64,
+    pub range_error_m: f64,
     /// Growth of the range error, in m/s.
-    pub astray_mps: f64,
+    pub range_error_mps: f64,
     /// First sample of the tick from which the state applies.
     pub since: u64,
 }
@@ -43,15 +43,15 @@ pub struct Switched {
 impl Default for Switched {
     /// State of the scene without switches.
     fn default() -> Self {
-        Self { gain: 1.0, astray_m: 0.0, astray_mps: 0.0, since: 0 }
+        Self { gain: 1.0, range_error_m: 0.0, range_error_mps: 0.0, since: 0 }
     }
 }
 
 impl Switched {
     /// Range error in metres at a position between samples, as if the satellite's clock were behind by as
     /// much.
-    pub fn astray_m(&self, sample: f64, rate: Rate) -> f64 {
-        self.astray_m + self.astray_mps * (sample - self.since as f64) / rate.hz()
+    pub fn range_error_m(&self, sample: f64, rate: Rate) -> f64 {
+        self.range_error_m + self.range_error_mps * (sample - self.since as f64) / rate.hz()
     }
 
     /// Applies the switch state to an arrival at a position between samples.
@@ -59,10 +59,10 @@ impl Switched {
         if *self == Self::default() {
             return arrival;
         }
-        let astray_s = self.astray_m(sample, rate) / SPEED_OF_LIGHT_MPS;
+        let range_error_s = self.range_error_m(sample, rate) / SPEED_OF_LIGHT_MPS;
         Arrival {
-            delay_s: arrival.delay_s + astray_s,
-            carrier_cycles: arrival.carrier_cycles + carrier_hz * astray_s,
+            delay_s: arrival.delay_s + range_error_s,
+            carrier_cycles: arrival.carrier_cycles + carrier_hz * range_error_s,
             cn0_hz: arrival.cn0_hz * self.gain,
         }
     }
@@ -115,9 +115,9 @@ impl Switches {
         }
         let changes = rows.entry(source).or_default();
         let mut switched = changes.last().map_or_else(Switched::default, |(_, switched)| *switched);
-        let astray = (switched.astray_m, switched.astray_mps);
+        let error = (switched.range_error_m, switched.range_error_mps);
         change(&mut switched);
-        if (switched.astray_m, switched.astray_mps) != astray {
+        if (switched.range_error_m, switched.range_error_mps) != error {
             switched.since = tick * self.tick_samples;
         }
         match changes.last_mut().filter(|(last, _)| *last == tick) {
@@ -136,14 +136,17 @@ impl Switches {
             let mut before = Switched::default();
             for (tick, now) in changes {
                 let first = tick * self.tick_samples;
-                if now.since == first && (now.astray_m, now.astray_mps) != (before.astray_m, before.astray_mps) {
-                    let reached_m = before.astray_m + before.astray_mps * rate.elapsed_s(first - before.since);
+                if now.since == first
+                    && (now.range_error_m, now.range_error_mps) != (before.range_error_m, before.range_error_mps)
+                {
+                    let reached_m =
+                        before.range_error_m + before.range_error_mps * rate.elapsed_s(first - before.since);
                     found.push(Stray {
                         sv,
                         first,
-                        m: now.astray_m,
-                        mps: now.astray_mps,
-                        step_m: now.astray_m - reached_m,
+                        m: now.range_error_m,
+                        mps: now.range_error_mps,
+                        step_m: now.range_error_m - reached_m,
                     });
                 }
                 before = *now;
@@ -175,15 +178,15 @@ mod tests {
         let switches = Switches::new(1000);
         let source = Source::Satellite(Sv::gps(5));
         assert!(switches.set(source, 3, |row| row.gain = 0.1));
-        assert!(switches.set(source, 3, |row| row.astray_mps = 2.0));
+        assert!(switches.set(source, 3, |row| row.range_error_mps = 2.0));
         assert!(switches.set(source, 7, |row| row.gain = 0.0));
         assert_eq!(switches.at(source, 2), Switched::default());
-        let slipping = Switched { gain: 0.1, astray_m: 0.0, astray_mps: 2.0, since: 3000 };
+        let slipping = Switched { gain: 0.1, range_error_m: 0.0, range_error_mps: 2.0, since: 3000 };
         assert_eq!((switches.at(source, 3), switches.at(source, 6)), (slipping, slipping));
         assert_eq!(switches.at(source, 7), Switched { gain: 0.0, ..slipping });
         assert_eq!(switches.at(Source::Spoofer(1), 7), Switched::default());
         // Two metres a second from sample 3000 on, a megasample a second.
-        assert!(switches.set(source, 503, |row| (row.astray_m, row.astray_mps) = (1.0, 0.0)));
+        assert!(switches.set(source, 503, |row| (row.range_error_m, row.range_error_mps) = (1.0, 0.0)));
         let strays = switches.strays(Rate::from_hz(1e6).unwrap());
         let stray = |first, m, mps, step_m| Stray { sv: Sv::gps(5), first, m, mps, step_m };
         assert_eq!(strays, [stray(3000, 0.0, 2.0, 0.0), stray(503_000, 1.0, 0.0, 0.0)]);

@@ -340,7 +340,7 @@ pub fn write(directory: &Path, rows: &[DetectionRow], settings: &AcquisitionSett
     let joint = Joint::of(rows);
     let mut text = format!(
         "# Acquisition against theory\n\n\
-         One satellite in the noise of a scene at 2.6 Msps, 8 bit; each trial is the receiver's search of a stretch \
+         One satellite in the noise of a scene at 2.6 Msps, 8 bit; each trial is the receiver's search of a segment \
          of its own ({} sums of {} ms, Doppler steps of {} Hz, Doppler up to half a step off, code and symbol edges \
          anywhere). Detections are expected from the joint statistics of the cells about the peak (`study::search`), \
          false alarms at most as designed: Dopplers that are left before all sums are made take some \

@@ -100,13 +100,13 @@ fn outside(rows: &[ProofRow]) -> String {
     let rest = rows.iter().filter(|row| !row.in_region);
     let departing = rest.clone().filter(|row| !row.holds()).count();
     let mut text = format!(
-        "\n## Outside\n\n{departing} of {} cells depart from linear theory. Causes: the arctangent of a noisy prompt \
+        "\n## Outside\n\n{departing} of {} cells differ from linear theory. Causes: the arctangent of a noisy prompt \
          loses gain and spreads more than its squaring loss says; pairs of prompts wrap by half a cycle; the \
          quotient of noisy correlations has long tails (those of the dot product are unbounded); errors leave the \
          linear range ±d/2.\n",
         rest.clone().count()
     );
-    text += &listed("Cells that depart", rest.filter(|row| !row.holds()));
+    text += &listed("Cells that differ", rest.filter(|row| !row.holds()));
     text
 }
 

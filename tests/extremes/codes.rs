@@ -371,5 +371,5 @@ fn where_the_longest_codes_end_after_two_to_the_fortieth_samples_every_sample_is
     let ends: usize = of.iter().map(|(ends, _)| ends).sum();
     of.into_iter().for_each(|(_, of)| worst.merge(of));
     // Knots of 1e-6 cycle turn a sample by 6.3e-6 of itself; a wrong sign anywhere is 1 and more.
-    the.at_most(&format!("largest departure of a sample around {ends} ends, of the amplitude"), worst, 1e-5, "");
+    the.at_most(&format!("largest error of a sample around {ends} ends, of the amplitude"), worst, 1e-5, "");
 }

@@ -1,9 +1,12 @@
-//! Doc comments as a reader of docs.rs meets them: how each begins, and the words that it uses.
+//! Doc comments as a reader of docs.rs meets them: how each begins, and the words that it uses. Documents and
+//! the strings of the program use the same words.
 //!
 //! A doc comment stands alone. It begins with its noun or, for a function, with a verb in the third person or
 //! the noun of the result. A word that points to another comment, a preposition and a question word are no
 //! noun. Limits: the first word of the comment and of each section is read, not its grammar; code spans are
 //! left out.
+
+use crate::source::strings;
 
 /// A rule that doc comments keep.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +38,8 @@ const WORDS: &[(&str, &str)] = &[
     ("depart*", "differ, error"),
     ("honest*", "consistency, NEES"),
     ("in plan", "horizontal"),
+    ("meant to hurt", "degrades the receiver"),
+    ("nature took", "outages that the scene causes"),
     ("on the air", "sent, radio frequency"),
     ("overlay*", "secondary code"),
     ("parting", "code-carrier divergence"),
@@ -99,6 +104,41 @@ pub fn faults(path: &str, doc: &Doc, rule: Rule) -> Vec<String> {
         Rule::Sentence => opens(&doc.text, FRAGMENTS),
         Rule::Word => words(path, &doc.text),
     }
+}
+
+/// Paragraphs of a document.
+pub fn paragraphs(text: &str) -> Vec<Doc> {
+    let prose = unfenced(text);
+    let mut found = vec![Doc { line: 1, text: String::new() }];
+    for (number, line) in (1..).zip(prose.lines()) {
+        if line.trim().is_empty() {
+            found.push(Doc { line: number + 1, text: String::new() });
+        } else if let Some(doc) = found.last_mut() {
+            doc.text.extend([line, "\n"]);
+        }
+    }
+    found
+}
+
+/// A document whose fenced code is blank; lines stay where they are.
+fn unfenced(text: &str) -> String {
+    let mut inside = false;
+    let line = |line: &str| {
+        let is_fence = line.trim_start().starts_with("```");
+        inside ^= is_fence;
+        if inside || is_fence { String::new() } else { line.to_owned() }
+    };
+    text.lines().map(line).collect::<Vec<_>>().join("\n")
+}
+
+/// Strings of a source that are prose: those with a blank between words. What a format puts in is left out.
+pub fn messages(text: &str) -> Vec<Doc> {
+    let without_arguments = |text: &str| {
+        let parts = text.split('{').map(|part| part.split_once('}').map_or(part, |(_, rest)| rest));
+        parts.collect::<Vec<_>>().join("…")
+    };
+    let docs = strings(text).into_iter().map(|(line, text)| Doc { line, text: without_arguments(&text) });
+    docs.filter(|doc| doc.text.contains(' ')).map(|doc| Doc { text: doc.text.replace("\\\n", " "), ..doc }).collect()
 }
 
 /// Beginnings of a doc comment and of its sections, whose headings are left out.

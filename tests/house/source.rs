@@ -1,6 +1,7 @@
 //! Sources as text: which there are, and what is left of one without comments, strings and tests.
 
 use std::fs;
+use std::ops::Range;
 use std::path::Path;
 
 /// One file of the library.
@@ -67,15 +68,20 @@ pub fn rooms(sources: &[Source], folder: &str) -> Vec<String> {
 
 /// Rust files below a folder of the package, with their texts; none where there is no such folder.
 pub fn files(folder: &str) -> Vec<(String, String)> {
-    fn walk(root: &Path, path: &Path, found: &mut Vec<(String, String)>) {
+    files_of(folder, "rs")
+}
+
+/// Files of a kind, given by their extension, below a folder of the package, with their texts.
+pub fn files_of(folder: &str, kind: &str) -> Vec<(String, String)> {
+    fn walk(root: &Path, path: &Path, kind: &str, found: &mut Vec<(String, String)>) {
         let Ok(entries) = fs::read_dir(path) else { return };
         for entry in entries {
             let path = entry.unwrap().path();
             if path.is_dir() {
                 if !path.ends_with("target") {
-                    walk(root, &path, found);
+                    walk(root, &path, kind, found);
                 }
-            } else if path.extension().is_some_and(|extension| extension == "rs") {
+            } else if path.extension().is_some_and(|extension| extension == kind) {
                 let name = path.strip_prefix(root).unwrap().to_str().unwrap().replace('\\', "/");
                 found.push((name, fs::read_to_string(&path).unwrap()));
             }
@@ -83,27 +89,57 @@ pub fn files(folder: &str) -> Vec<(String, String)> {
     }
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut found = Vec::new();
-    walk(root, &root.join(folder), &mut found);
+    walk(root, &root.join(folder), kind, &mut found);
     found.sort();
     found
 }
 
 /// A text with the contents of comments, strings and characters turned into blanks.
 fn blanked(text: &str) -> String {
+    let mut chars: Vec<char> = text.chars().collect();
+    for range in spans(&chars) {
+        chars[range].iter_mut().for_each(|c| *c = blank(*c));
+    }
+    chars.into_iter().collect()
+}
+
+/// Strings of a source outside its tests, without their quotes, each with the number of its first line.
+pub fn strings(text: &str) -> Vec<(usize, String)> {
     let chars: Vec<char> = text.chars().collect();
+    let code = blanked(text);
+    let index = |byte: usize| code[..byte].chars().count();
+    let tests: Vec<Range<usize>> =
+        test_items(&code).into_iter().map(|item| index(item.start)..index(item.end)).collect();
+    let (mut done, mut line, mut found) = (0, 1, Vec::new());
+    for span in spans(&chars) {
+        line += chars[done..span.start].iter().filter(|c| **c == '\n').count();
+        done = span.start;
+        if matches!(chars[done], '"' | 'r') && !tests.iter().any(|test| test.contains(&done)) {
+            let string: String = chars[span].iter().collect();
+            found.push((line, string.trim_matches(['r', '#', '"']).to_owned()));
+        }
+    }
+    found
+}
+
+fn blank(c: char) -> char {
+    if c == '\n' { '\n' } else { ' ' }
+}
+
+/// Ranges of comments, strings and characters.
+fn spans(chars: &[char]) -> Vec<Range<usize>> {
     let at = |i: usize| chars.get(i).copied().unwrap_or('\0');
-    let mut out = String::with_capacity(text.len());
+    let mut found = Vec::new();
     let mut i = 0;
-    let blank = |c: char| if c == '\n' { '\n' } else { ' ' };
     while i < chars.len() {
         let end = match at(i) {
             '/' if at(i + 1) == '/' => (i..chars.len()).find(|&k| at(k) == '\n').unwrap_or(chars.len()),
             '/' if at(i + 1) == '*' => {
                 (i + 2..chars.len()).find(|&k| at(k) == '*' && at(k + 1) == '/').map_or(chars.len(), |k| k + 2)
             }
-            '"' => string_end(&chars, i),
+            '"' => string_end(chars, i),
             'r' if matches!(at(i + 1), '#' | '"') && !(i > 0 && (at(i - 1).is_alphanumeric() || at(i - 1) == '_')) => {
-                raw_end(&chars, i).unwrap_or(i)
+                raw_end(chars, i).unwrap_or(i)
             }
             // A character, and no lifetime.
             '\'' if at(i + 1) == '\\' => (i + 3..chars.len()).find(|&k| at(k) == '\'').map_or(chars.len(), |k| k + 1),
@@ -111,14 +147,11 @@ fn blanked(text: &str) -> String {
             _ => i,
         };
         if end > i {
-            out.extend(chars[i..end].iter().map(|c| blank(*c)));
-            i = end;
-        } else {
-            out.push(at(i));
-            i += 1;
+            found.push(i..end);
         }
+        i = end.max(i + 1);
     }
-    out
+    found
 }
 
 /// Index behind a string that begins at `i`.
@@ -159,13 +192,13 @@ fn test_files(code: &str) -> Vec<String> {
     found
 }
 
-/// Blanks every item under `#[cfg(test)]`: to its semicolon or its closing brace.
-fn without_tests(code: &str) -> String {
-    let mut out = String::with_capacity(code.len());
-    let mut rest = code;
-    while let Some(start) = rest.find(CFG_TEST) {
-        out.push_str(&rest[..start]);
-        let item = &rest[start..];
+/// Ranges of bytes of the items under `#[cfg(test)]`: each to its semicolon or its closing brace.
+fn test_items(code: &str) -> Vec<Range<usize>> {
+    let mut found: Vec<Range<usize>> = Vec::new();
+    for (start, _) in code.match_indices(CFG_TEST) {
+        if found.last().is_some_and(|last| last.contains(&start)) {
+            continue;
+        }
         let mut depth = 0_usize;
         let ends = |(_, c): &(usize, char)| match c {
             '{' => {
@@ -179,12 +212,22 @@ fn without_tests(code: &str) -> String {
             ';' => depth == 0,
             _ => false,
         };
-        let end = item.char_indices().find(ends).map_or(item.len(), |(at, c)| at + c.len_utf8());
-        out.extend(item[..end].chars().map(|c| if c == '\n' { '\n' } else { ' ' }));
-        rest = &item[end..];
+        let end = code[start..].char_indices().find(ends).map_or(code.len(), |(at, c)| start + at + c.len_utf8());
+        found.push(start..end);
     }
-    out.push_str(rest);
-    out
+    found
+}
+
+/// A blanked text whose items under `#[cfg(test)]` are blanks too.
+fn without_tests(code: &str) -> String {
+    let mut out = String::with_capacity(code.len());
+    let mut done = 0;
+    for item in test_items(code) {
+        out.push_str(&code[done..item.start]);
+        out.extend(code[item.clone()].chars().map(blank));
+        done = item.end;
+    }
+    out + &code[done..]
 }
 
 /// Lines of a blanked text that have anything on them.

@@ -759,7 +759,8 @@ fn a_satellite_sent_astray_while_samples_flow_is_left_out_and_the_verdict_knows_
     // A step of one chip 32 s after the start, on an observation that no loop has noticed it by, and between
     // two observations right after a subframe has begun, so that a half cycle shows 7 s later.
     for (sample, from_s) in [(83_200_000, 32.0), (83_330_000, 32.05)] {
-        std::fs::write(path("record/events.csv"), format!("sample,event\n{sample},astray G23 300.0 0.0\n")).unwrap();
+        std::fs::write(path("record/events.csv"), format!("sample,event\n{sample},range_error G23 300.0 0.0\n"))
+            .unwrap();
         let out = sample.to_string();
         run_in(directory.path(), &["run", "record/replay.toml", "--out", &out, "--check"]);
 

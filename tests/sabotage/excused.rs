@@ -44,7 +44,7 @@ pub fn kinds() -> Vec<Kind> {
             "of 1",
             Some(1.001),
             2.0,
-            &["dilutions and condition against the true geometry, largest departure"],
+            &["dilutions and condition against the true geometry, largest difference"],
             Bounded,
             |rx, factor| {
                 for name in ["gdop", "pdop", "hdop", "vdop", "tdop"] {

@@ -10,7 +10,7 @@ pub fn kinds() -> Vec<Kind> {
 }
 
 fn columns() -> Vec<Kind> {
-    const PLACE: [&str; 1] = ["fixes whose latitude, longitude and height are another place than x, y and z"];
+    const PLACE: [&str; 1] = ["fixes whose latitude, longitude and height are another position than x, y and z"];
     const TIME: [&str; 1] = ["UTC of fixes against GPS time, largest difference"];
     vec![
         kind!("latitude beside a right place", "°", Some(1e-7), 1.0, &PLACE, AtRest, |rx, by| {
@@ -107,7 +107,7 @@ fn sentences(text: &mut String, change: impl Fn(&mut Vec<String>)) {
 
 fn nmea() -> Vec<Kind> {
     const LACKS: [&str; 1] = ["fixes that fixes.nmea lacks"];
-    const PLACE: [&str; 1] = ["fixes that have another place in fixes.nmea"];
+    const PLACE: [&str; 1] = ["fixes that have another position in fixes.nmea"];
     const SPEED: [&str; 1] = ["velocity over ground of fixes.nmea, largest difference"];
     const LINES: [&str; 1] = ["sentences of fixes.nmea that cannot be read"];
     vec![

@@ -291,8 +291,8 @@ fn stated() -> Vec<Kind> {
     const OF_CLOCK: [&str; 2] =
         ["clock sigma over the expected one, largest", "clock sigma over the expected one, smallest"];
     const GEOMETRY: [&str; 2] = [
-        "dilutions and condition against the true geometry, largest departure",
-        "dilutions against one another, largest departure",
+        "dilutions and condition against the true geometry, largest difference",
+        "dilutions against one another, largest difference",
     ];
     const ALL: [&str; 4] = ["sigma_east_m", "sigma_north_m", "sigma_up_m", "sigma_clock_m"];
     const CORRELATIONS: [&str; 1] = ["formal correlations (artanh) against the expected ones, 95 %"];

@@ -193,7 +193,7 @@ fn dopplers() -> Vec<Variant> {
         unsound(
             "Dopplers a hundredth high",
             TWO,
-            "scale of Doppler, departure from one",
+            "scale of Doppler, difference from one",
             Rinex(|file| {
                 all(file, 'D', |_, value| 1.01 * value);
             }),
@@ -318,7 +318,7 @@ fn places() -> Vec<Variant> {
     const HORIZONTAL: &str = "horizontal position error, mean";
     const AGE: &str = "age of positions";
     const VELOCITY: &str = "velocity over ground error, largest";
-    const COURSE: &str = "course over ground, departure";
+    const COURSE: &str = "course over ground, error";
     vec![
         unsound("positions 30 m north", REST, HORIZONTAL, Nmea(|file| file.north(|_| 30.0))),
         unsound("positions 30 m south in motion", MOTION, HORIZONTAL, Nmea(|file| file.north(|_| -30.0))),
@@ -392,7 +392,7 @@ fn places() -> Vec<Variant> {
         unsound(
             "speeds in km/h",
             MOTION,
-            "speed over ground, departure of its scale",
+            "speed over ground, error of its scale",
             Nmea(|file| {
                 file.number("RMC", 7, |value| 1.852 * value);
             }),

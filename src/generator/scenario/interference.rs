@@ -224,9 +224,9 @@ fn strength(table: &Table<'_>, placed: bool) -> Result<Strength, ScenarioError> 
     }
     match (strength, distance_m, placed) {
         (Strength::Radiated { distance_m: None, .. }, _, false) => {
-            Err(table.bad("eirp_dbw", "a place with it (latitude_deg, longitude_deg and height_m), or distance_m"))
+            Err(table.bad("eirp_dbw", "a position with it (latitude_deg, longitude_deg and height_m), or distance_m"))
         }
-        (_, Some(_), true) => Err(table.bad("distance_m", "nothing, because a place is given")),
+        (_, Some(_), true) => Err(table.bad("distance_m", "nothing, because a position is given")),
         (Strength::OverSignal { .. } | Strength::Received { .. }, Some(_), _) => {
             Err(table.bad("distance_m", format!("nothing with {first}: only eirp_dbw needs it")))
         }

@@ -87,7 +87,7 @@ impl Source<'_> {
         let path = spec.place.map(|place| Way { emitter_m: place.to_ecef(), antenna: self.scene.trajectory.clone() });
         let jn0_dbhz = self.jn0_dbhz(path.as_ref())? + 10.0 * libm::log10(fitted.share);
         let on = self.tuning.sample_at(spec.on_s)..spec.off_s.map_or(u64::MAX, |t_s| self.tuning.sample_at(t_s));
-        let place = if path.is_some() { " from its place" } else { "" };
+        let place = if path.is_some() { " from its position" } else { "" };
         let end = spec.off_s.map_or(String::new(), |t_s| format!(" to {t_s} s"));
         let description = format!(
             "{kind} at L1 {:+.6} MHz{}{place}, {jn0_dbhz:.1} dB-Hz over the noise, from {} s{end}",
@@ -141,7 +141,7 @@ impl Source<'_> {
             }
             (Strength::Radiated { dbw, distance_m: None }, Some(path)) => Ok(radiated(dbw, path.travel_s(0.0))),
             (Strength::Radiated { distance_m: None, .. }, None) => {
-                Err(self.refuse("eirp_dbw needs a place, or distance_m"))
+                Err(self.refuse("eirp_dbw needs a position, or distance_m"))
             }
             (Strength::OverSignal { db }, _) => {
                 let strongest = strongest(self.scene).map_err(|e| self.refuse(&e.to_string()))?;

@@ -156,7 +156,7 @@ pub fn observe_by(
         elevation_deg: sight.look.elevation_rad.to_degrees(),
         range_m: sight.range_m,
         satellite_clock_m: SPEED_OF_LIGHT_MPS * (seen.satellite_clock_s + departed_s)
-            - switched.astray_m(sample as f64, scene.clock.rate),
+            - switched.range_error_m(sample as f64, scene.clock.rate),
         ionosphere_m: 0.5 * SPEED_OF_LIGHT_MPS * (ray.code_delay_s - ray.carrier_delay_s),
         troposphere_m: 0.5 * SPEED_OF_LIGHT_MPS * (ray.code_delay_s + ray.carrier_delay_s),
     };

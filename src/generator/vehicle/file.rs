@@ -211,7 +211,7 @@ fn place(geodetic: bool, [a, b, c]: [(&str, &str); 3]) -> Result<Vector3<f64>, F
         let position_m = Vector3::new(read(a)?, read(b)?, read(c)?);
         if position_m.norm() < LEAST_RADIUS_M {
             let value = format!("{}, {}, {}", a.1, b.1, c.1);
-            let expected = "a place at least 6300 km from the Earth's centre";
+            let expected = "a position at least 6300 km from the Earth's centre";
             return Err(Fault::Number { column: "x_m, y_m, z_m".to_owned(), value, expected });
         }
         Ok(position_m)

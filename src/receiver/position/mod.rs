@@ -252,7 +252,7 @@ pub enum NoFix {
     },
     /// Exactly as many ranges as unknowns, and two positions that explain them.
     #[error(
-        "the ranges agree on two places, {separation_m:.0} m apart, and one more satellite is needed to tell which"
+        "the ranges agree on two positions, {separation_m:.0} m apart, and one more satellite is needed to tell which"
     )]
     TwoPlaces {
         /// Distance of both.
@@ -260,7 +260,7 @@ pub enum NoFix {
     },
     /// Exactly as many ranges as unknowns, and no position that explains them.
     #[error(
-        "the ranges agree on no place that sees its satellites past the Earth and moves at less than 12 km/s: at \
+        "the ranges agree on no position that sees its satellites past the Earth and moves at less than 12 km/s: at \
          least one of them is wrong"
     )]
     Nowhere,
@@ -277,7 +277,7 @@ pub enum NoFix {
     },
     /// A fault that several satellites explain.
     #[error(
-        "the ranges contradict each other, and without {} they agree as well as without {}, on places \
+        "the ranges contradict each other, and without {} they agree as well as without {}, on positions \
          {separation_m:.1} m apart",
         names(one),
         names(other)

@@ -392,7 +392,7 @@ fn plot(table: &Table<'_>, axes: &[Axis], grid: &Grid, keep: &[String]) -> Resul
     for digit in grid.signal.iter().chain(&grid.receiver) {
         let names: Vec<&str> = digit.axes.iter().filter_map(|&n| keys.get(n)).copied().collect();
         if digit.length > 1 && !names.iter().any(|name| placed.contains(name)) {
-            let expected = format!("a place for axis {} too: in x, series, panel or where", names.join(" and "));
+            let expected = format!("a use of axis {} too: in x, series, panel or where", names.join(" and "));
             return Err(table.bad("x", expected));
         }
     }

@@ -95,7 +95,7 @@ fn record(directory: &Path, seed: u64) -> Recorded {
         for (at, event) in [
             (6, "power G13 -6.5"),
             (9, "jammer 1 off"),
-            (9, "astray G23 12.0 250.0"),
+            (9, "range_error G23 12.0 250.0"),
             (14, "jammer 1 3.0"),
             (17, "spoofer 1 off"),
             (20, "power G13 off"),

@@ -15,11 +15,7 @@ use gnss::signal::Link;
 
 pub(super) fn findings(run: &Run) -> Result<Vec<Finding>, JudgeError> {
     let mut all = vec![
-        Finding::none(
-            "parameters missing of complete messages",
-            missing(run),
-            "a set of elements is whole or not there",
-        ),
+        Finding::none("parameters missing of complete messages", missing(run), "an ephemeris is complete or absent"),
         Finding::none("messages of unknown satellites", strangers(run), "no such satellite in the scene"),
         Finding::none("events out of their natural order", order(run)?, "found, locked, bits, frame, then observed"),
     ];

@@ -36,7 +36,7 @@ pub(super) fn findings(run: &Run) -> Result<Vec<Finding>, JudgeError> {
     let reading_m = readings.percentile(0.5)?;
     let mut all = vec![
         Finding::most("lock time against the samples", lock_s, "s", LOCK_S, "an update's length"),
-        Finding::none("breaks of lock without an event", breaks, "a lock begins anew with an event"),
+        Finding::none("breaks of lock without an event", breaks, "lock time starts again with an event"),
         Finding::none("lock times longer than the run", impossible, "no lock is older than its acquisition"),
     ];
     if let Some(reading_m) = reading_m {
@@ -105,7 +105,7 @@ fn fixes(run: &Run, reading_m: Option<f64>) -> Result<Vec<Finding>, JudgeError> 
     }
     if let Some(most) = most {
         let source = "squares of dilutions add up";
-        found.push(Finding::most("dilutions against one another, largest departure", most, "of 1", IDENTITY, source));
+        found.push(Finding::most("dilutions against one another, largest difference", most, "of 1", IDENTITY, source));
     }
     Ok(found)
 }

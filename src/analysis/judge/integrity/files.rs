@@ -112,8 +112,8 @@ fn geographic(path: &Path) -> Result<Vec<Finding>, JudgeError> {
     })?;
     let mut found = Vec::new();
     if placed > 0 {
-        let figure = "fixes whose latitude, longitude and height are another place than x, y and z";
-        let source = "the same place twice, within the fix's own sigma";
+        let figure = "fixes whose latitude, longitude and height are another position than x, y and z";
+        let source = "the same position twice, within the fix's own sigma";
         found.push(Finding::most(figure, percent(elsewhere, placed), "%", ODD_PERCENT, source));
     }
     if let Some(late_s) = late_s {
@@ -367,11 +367,11 @@ fn sentences(run: &Run, mut file: BufReader<File>, path: &Path) -> Result<Vec<Fi
         Finding::none("sentences of fixes.nmea that cannot be read", all.damaged, "NMEA 0183"),
         Finding::most("fixes that fixes.nmea lacks", lacking, "%", ODD_PERCENT, "each fix, at its own time"),
         Finding::most(
-            "fixes that have another place in fixes.nmea",
+            "fixes that have another position in fixes.nmea",
             percent(all.elsewhere, all.fixes_found),
             "%",
             ODD_PERCENT,
-            "the same place, within the fix's own sigma",
+            "the same position, within the fix's own sigma",
         ),
         Finding::most(
             "velocity over ground of fixes.nmea, largest difference",

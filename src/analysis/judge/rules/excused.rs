@@ -94,7 +94,12 @@ impl Verdict {
         }
         self.excused_velocity(run, errors, &reach)?;
         for (figure, unit, worst, source) in [
-            ("code error where any is expected, 95 %", "m", code, "half a chip, reflections and the spoofer's place"),
+            (
+                "code error where any is expected, 95 %",
+                "m",
+                code,
+                "half a chip, reflections and the spoofer's position",
+            ),
             (
                 "Doppler error where any is expected, 95 %",
                 "Hz",

@@ -145,7 +145,7 @@ impl Verdict {
         }
         if let Some(value) = farthest {
             let source = "directions to the satellites in the truth";
-            let figure = "dilutions and condition against the true geometry, largest departure";
+            let figure = "dilutions and condition against the true geometry, largest difference";
             self.judge(figure, "", value, "of 1", Bound::Max(GEOMETRY), source);
         }
         let figure = |which: &str| format!("formal correlations (artanh) against the expected ones, {which}");
@@ -154,7 +154,7 @@ impl Verdict {
             let (bound, source) = (Bound::Max(libm::log(DECIBEL)), "weights within 1 dB of those at the true C/N0");
             self.judge(&figure("95 %"), "", usual, "", bound, source);
             let (bound, source) = (Bound::Max(2.0 * libm::log(SIGMA)), "weights as the limits of sigmas have them");
-            self.judge(&figure("largest departure"), "", most, "", bound, source);
+            self.judge(&figure("largest difference"), "", most, "", bound, source);
         }
         Ok(())
     }

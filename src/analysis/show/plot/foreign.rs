@@ -40,7 +40,7 @@ pub(crate) fn all(directory: &Path, judged: &Judged) -> Result<Vec<Picture>, Jud
 
 const OBSERVABLES: &str = "Errors of the receiver's observables against the truth over its own time. What all \
                            satellites share at an epoch is the clock's and removed; the clock stands below.";
-const POSITION: &str = "Errors of the receiver's positions over its own time, and in plan.";
+const POSITION: &str = "Errors of the receiver's positions over its own time, and horizontal errors.";
 
 /// A chart over the times of its points.
 fn over_time(title: &str, label: &str, least: f64, series: Vec<Series>) -> Chart {

@@ -138,7 +138,7 @@ pub(crate) const PICTURES: [Picture; 17] = [
     },
     Picture {
         name: "trajectory",
-        caption: "The way in plan and the height over time, as it was and as the receiver found it.",
+        caption: "The horizontal track and the height over time, true and as the receiver found them.",
         numbers: &["truth/trajectory.csv", "rx/fixes.csv"],
         sketch: position::trajectory,
     },

@@ -30,7 +30,7 @@ pub(crate) const INTERFERENCE: &[Key] = &[
     number("power_dbw", -250.0, 0.0, "dBW", "power at the antenna port; needs a link budget"),
     number("eirp_dbw", -200.0, 60.0, "dBW", "radiated power at its position, or at distance_m; needs a link budget"),
     number("distance_m", 1.0, 1e9, "m", "constant distance in place of a position: free-space loss without Doppler")
-        .or_else("from its place"),
+        .or_else("from its position"),
     number("on_s", 0.0, LONGEST_S, "s", "begin, in true time since the scene's start").or(0.0),
     number("off_s", 0.0, LONGEST_S, "s", "end, in true time since the scene's start").or_else("never"),
     PLACE_IF_ANY[0],

@@ -35,7 +35,9 @@ fn interference_that_contradicts_itself_is_refused_with_its_remedy() {
     let twice = refused(&cw("js_db = 3\ncenter_hz = 1.57e9\noffset_hz = 0"));
     assert!(twice.contains("interference[1].offset_hz = 0: expected nothing beside center_hz"), "{twice}");
     let far = "eirp_dbw = 3\ndistance_m = 100\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 1130";
-    assert!(refused(&cw(far)).contains("interference[1].distance_m = 100: expected nothing, because a place is given"));
+    assert!(
+        refused(&cw(far)).contains("interference[1].distance_m = 100: expected nothing, because a position is given")
+    );
     assert!(refused(&cw("power_dbw = -130\ndistance_m = 100")).contains("expected nothing with power_dbw"));
     let empty = refused(&format!("[satellites]\nmask_deg = 89\n{}", cw("js_db = 3")));
     assert!(empty.contains("number 1 (cw)") && empty.contains("there is none"), "{empty}");

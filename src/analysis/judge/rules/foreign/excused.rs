@@ -36,7 +36,7 @@ impl Verdict {
             let limit = LOOP_HZ + scene.rate_mps / link.wavelength_m();
             dopplers.extend(high(|row| row.doppler_hz).map(|value| Found { name, value, limit }));
         }
-        let source = "half a chip, reflections and the spoofer's place";
+        let source = "half a chip, reflections and the spoofer's position";
         self.nearest("code error where any is expected, 95 %", "", "m", codes, source);
         let source = "a loop's pull-in, mirrors and the spoofer's motion";
         self.nearest("Doppler error where any is expected, 95 %", "", "Hz", dopplers, source);

@@ -203,16 +203,9 @@ impl Verdict {
         let limit = COURSE_RAD + largest(1, 1) * sigma;
         let source = "the true course and speed: 5 degrees, and a plain receiver's Dopplers";
         let angle = libm::atan2(product.1, product.0).abs();
-        self.judge(
-            "course over ground, departure",
-            "",
-            angle.to_degrees(),
-            "°",
-            Bound::Max(limit.to_degrees()),
-            source,
-        );
+        self.judge("course over ground, error", "", angle.to_degrees(), "°", Bound::Max(limit.to_degrees()), source);
         let scale = (libm::hypot(product.0, product.1) / squares - 1.0).abs();
-        self.judge("speed over ground, departure of its scale", "", scale, "of 1", Bound::Max(limit), source);
+        self.judge("speed over ground, error of its scale", "", scale, "of 1", Bound::Max(limit), source);
     }
 
     /// Positions that repeat the ones before to the last digit.

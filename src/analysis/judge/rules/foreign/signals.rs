@@ -187,7 +187,7 @@ impl Verdict {
             let limit = SCALE + largest(1, 1) * scale.sigma;
             let source = "one, a thousandth, and the scatter between satellites";
             let value = (scale.value.abs() - 1.0).abs();
-            self.judge("scale of Doppler, departure from one", "", value, "", Bound::Max(limit), source);
+            self.judge("scale of Doppler, difference from one", "", value, "", Bound::Max(limit), source);
         }
     }
 
