@@ -23,6 +23,9 @@ done
 (cd "$root" && "$bin/maturin" build --quiet --locked --manifest-path python/Cargo.toml --profile "$profile" "${levels[@]}" \
     --out "$work/wheels")
 "$bin/pip" install --quiet --disable-pip-version-check --no-deps "$work"/wheels/*.whl
+# The wheel carries every licence: the project's, and those of crates, data and fonts.
+licences=$(python3 -m zipfile -l "$work"/wheels/*.whl | grep -c 'dist-info/licenses/LICENSE-')
+[ "$licences" -eq "$(ls "$root"/python/LICENSE-* | wc -l)" ]
 # Elsewhere, so that what is tested is what was installed.
 cd "$work"
 "$bin/python" -m pytest -q -p no:cacheprovider "$root/python/tests"
