@@ -10,6 +10,8 @@ use crate::analysis::judge::judgement::Status;
 use crate::analysis::judge::verdict::Verdict;
 use crate::cli::error::CliError;
 use crate::cli::scenario;
+use crate::gnss::earth::Geodetic;
+use crate::gnss::record::Fix;
 
 /// Flags of a command with results.
 #[derive(Args, Clone, Copy, Debug, Default)]
@@ -36,6 +38,32 @@ impl Printed {
     pub fn in_words(self) -> bool {
         !self.quiet && !self.json
     }
+}
+
+/// Position and GPS time of the last fix in words: a line to be printed, or nothing without a fix.
+pub fn last_fix_line(fix: Option<&Fix>) -> String {
+    fix.map_or_else(String::new, |fix| {
+        let Geodetic { latitude_rad, longitude_rad, height_m } = Geodetic::from_ecef(&fix.position_m());
+        let [latitude_deg, longitude_deg] = [latitude_rad, longitude_rad].map(f64::to_degrees);
+        let (north, east) = (if latitude_deg < 0.0 { "S" } else { "N" }, if longitude_deg < 0.0 { "W" } else { "E" });
+        let (latitude_deg, longitude_deg, time) = (latitude_deg.abs(), longitude_deg.abs(), fix.time());
+        format!(
+            "last fix      {latitude_deg:.7}° {north}, {longitude_deg:.7}° {east}, {height_m:.2} m at {time} GPS time\n"
+        )
+    })
+}
+
+/// Position and GPS time of the last fix as an object; null without a fix.
+pub fn last_fix(fix: Option<&Fix>) -> Value {
+    fix.map_or(Value::Null, |fix| {
+        let position = Geodetic::from_ecef(&fix.position_m());
+        json!({
+            "gps_time": fix.time().to_string(),
+            "latitude_deg": position.latitude_rad.to_degrees(),
+            "longitude_deg": position.longitude_rad.to_degrees(),
+            "height_m": position.height_m,
+        })
+    })
 }
 
 /// A verdict: how many figures have which status, each of those that fail, and what is not judged.

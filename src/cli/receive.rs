@@ -10,7 +10,7 @@ use crate::cli::args;
 use crate::cli::error::{CliError, shown};
 use crate::cli::interrupt;
 use crate::cli::lines::{self, Made};
-use crate::cli::printed::Printed;
+use crate::cli::printed::{Printed, last_fix, last_fix_line};
 use crate::cli::progress::Progress;
 use crate::cli::recording::{self, Recording};
 use crate::cli::run::{output_error, receiver_error};
@@ -32,7 +32,7 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
         None => Settings::default(),
         Some(path) => {
             let (name, text) = scenario::text(path)?;
-            Settings::parse(&text, &name).map_err(CliError::input)?
+            Settings::parse(&text, &name).map_err(|error| scenario::refused(&error))?
         }
     };
     let taken = to_lines(arguments).filter(|spec| **spec == lines::Spec::Stdout).count();
@@ -120,7 +120,7 @@ fn report(arguments: &args::Receive, outcome: &Outcome, summary: &Value) -> Resu
     for warning in &outcome.warnings {
         scenario::warn(warning);
     }
-    let mut text = format!("{outcome}\n{}\n", outcome.conditioning);
+    let mut text = format!("{outcome}\n{}{}\n", last_fix_line(outcome.last_fix.as_ref()), outcome.conditioning);
     if let Some(diagnosis) = &outcome.diagnosis {
         text += &format!("{diagnosis}\n");
     }
@@ -130,7 +130,13 @@ fn report(arguments: &args::Receive, outcome: &Outcome, summary: &Value) -> Resu
         scenario::note(text.trim_end());
         return Ok(());
     }
-    printed.results(&text, || json!({ "results": arguments.out, "receiver": summary }))
+    printed.results(&text, || {
+        json!({
+            "results": arguments.out,
+            "last_fix": last_fix(outcome.last_fix.as_ref()),
+            "receiver": summary,
+        })
+    })
 }
 
 /// Form of the printed results. `--json` without a target for lines selects the object.

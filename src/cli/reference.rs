@@ -8,8 +8,8 @@ use crate::cli::args;
 use crate::cli::error::CliError;
 use crate::cli::scenario;
 use crate::generator::scenario::keys::SCENARIO;
-use crate::generator::scenario::read::nearest;
 use crate::generator::scenario::schema::{Listed, tables_of};
+use crate::gnss::place::nearest;
 use crate::receiver::settings::reference as receiver;
 use crate::study::sweep::keys::STUDY;
 

@@ -109,6 +109,7 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     if let Some(diagnosis) = &both.outcome.diagnosis {
         text += &format!("{diagnosis}\n");
     }
+    text += &printed::last_fix_line(both.outcome.last_fix.as_ref());
     text += &format!("margins       {}\n", both.outcome.conditioning);
     for generated in &both.generated {
         text += &format!("made          {generated}\n");
@@ -119,6 +120,7 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
         json!({
             "results": target,
             "made": both.generated,
+            "last_fix": printed::last_fix(both.outcome.last_fix.as_ref()),
             "diagnosis": both.outcome.diagnosis.as_ref().map(ToString::to_string),
             "margins": both.outcome.conditioning,
             "summary": summary,

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::cli::error::{CliError, escaped, shown};
 use crate::generator::scenario::{Overrides, Scenario, ScenarioError};
 use crate::generator::scene::Scene;
-use crate::receiver::settings::Settings;
+use crate::receiver::settings::{Settings, SettingsError};
 
 /// The scene that runs when none is named.
 const EMBEDDED: &str = include_str!("../../scenarios/two_systems.toml");
@@ -49,8 +49,8 @@ pub fn read(path: Option<&Path>) -> Result<Named, CliError> {
         // What is wrong with the receiver's own table is said with the rest.
         let syntax = matches!(error, ScenarioError::Toml { .. });
         let settings = if syntax { None } else { Settings::of_scenario(&text, &name).err() };
-        let all = error.each().iter().map(ToString::to_string).chain(settings.map(|error| error.to_string()));
-        CliError::input(all.collect::<Vec<_>>().join("\nerror: "))
+        let settings = settings.iter().flat_map(SettingsError::each).map(ToString::to_string);
+        all(error.each().iter().map(ToString::to_string).chain(settings))
     })?;
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     Ok(Named { scenario, text, name, directory: directory.to_owned() })
@@ -100,7 +100,17 @@ pub fn scenario_error(error: ScenarioError) -> CliError {
 
 /// The receiver's settings that the scenario carries for it.
 pub fn receiver_settings(named: &Named) -> Result<Settings, CliError> {
-    Settings::of_scenario(&named.text, &named.name).map_err(CliError::input)
+    Settings::of_scenario(&named.text, &named.name).map_err(|error| refused(&error))
+}
+
+/// Error that lists all errors of receiver's settings, each as one of its own.
+pub fn refused(error: &SettingsError) -> CliError {
+    all(error.each().iter().map(ToString::to_string))
+}
+
+/// Error that lists several messages, each as one of its own.
+fn all(messages: impl Iterator<Item = String>) -> CliError {
+    CliError::input(messages.collect::<Vec<_>>().join("\nerror: "))
 }
 
 /// A directory's name made of a scene's name.

@@ -14,7 +14,7 @@ use crate::cli::error::CliError;
 use crate::cli::scenario;
 use crate::cli::schema;
 use crate::cli::staging::Staging;
-use crate::generator::scenario::read::nearest;
+use crate::gnss::place::nearest;
 
 static SHIPPED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/scenarios");
 /// The scene of [`init`]. Lines that begin with `#` and a letter or a bracket are TOML to be uncommented.

@@ -1,4 +1,4 @@
-//! Line and column of keys and values in a TOML text, for error messages.
+//! Line and column of keys and values in a TOML text, and the nearest right word, for error messages.
 //!
 //! Source: TOML 1.0, through the spans of the `toml` crate. Keys are named from the top, with dots between: a
 //! quoted key that has dots of its own is one with the tables that it abbreviates. Arrays are not looked
@@ -46,13 +46,18 @@ impl<'t> Keys<'t> {
     /// Position of a key, or of the nearest enclosing table if the key is absent. Without either it is the
     /// name of the text.
     pub fn place_of(&self, path: &str) -> String {
+        self.start_of(path).map_or_else(|| self.origin.to_owned(), |start| self.place(start))
+    }
+
+    /// Byte at which a key begins, or the nearest enclosing table if the key is absent. `None` without
+    /// either.
+    pub fn start_of(&self, path: &str) -> Option<usize> {
         let mut path = path;
         loop {
             if let Some((_, key, _)) = self.entries.iter().find(|(name, ..)| name == path) {
-                return self.place(key.start);
+                return Some(key.start);
             }
-            let Some((above, _)) = path.rsplit_once('.') else { return self.origin.to_owned() };
-            path = above;
+            (path, _) = path.rsplit_once('.')?;
         }
     }
 
@@ -62,6 +67,17 @@ impl<'t> Keys<'t> {
             self.entries.iter().filter(|(_, _, value)| value.start <= byte && byte < value.end.max(value.start + 1));
         inside.max_by_key(|(name, ..)| name.len()).map(|(name, ..)| name.as_str())
     }
+}
+
+/// Candidate most similar to `word`, if any is similar: likeness by Jaro and Winkler above 0.7, whatever the case.
+pub fn nearest(word: &str, candidates: &[&str]) -> Option<String> {
+    let lower = word.to_lowercase();
+    candidates
+        .iter()
+        .map(|candidate| (strsim::jaro_winkler(&lower, &candidate.to_lowercase()), *candidate))
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .filter(|(likeness, _)| *likeness > 0.7)
+        .map(|(_, candidate)| candidate.to_owned())
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use crate::output::OutputError;
 use crate::parting::Parted;
 use crate::settings::SettingsError;
 use crate::track::LoopMargin;
-use gnss::record::LineRow;
+use gnss::record::{Fix, LineRow};
 use gnss::satellite::Sv;
 
 /// Error that ends a reception.
@@ -71,6 +71,8 @@ pub struct Outcome {
     pub fixes: u64,
     /// Time of the first fix since the first sample.
     pub first_fix_s: Option<f64>,
+    /// The last of them.
+    pub last_fix: Option<Fix>,
     /// Channels lost or dropped.
     pub losses: u64,
     /// Bytes of a sample that the end cut off.

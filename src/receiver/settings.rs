@@ -1,7 +1,8 @@
 //! The receiver's settings as a TOML file writes them.
 //!
 //! Every key has a default, an unknown key is refused with the nearest right one, every value has a range.
-//! The known keys are those of the defaults themselves, so the list cannot go stale.
+//! All errors of a text are reported at once, in its order. The known keys are those of the defaults
+//! themselves, so the list cannot go stale.
 
 pub mod reference;
 
@@ -13,7 +14,7 @@ use crate::acquire::{AcquireError, AcquisitionSettings};
 use crate::described::described;
 use crate::position::PositionSettings;
 use crate::track::{TrackingSettings, TrackingSettingsError};
-use gnss::place::Keys;
+use gnss::place::{Keys, nearest};
 use gnss::time::{Epoch, TimeError};
 
 /// All choices of the receiver.
@@ -72,7 +73,7 @@ impl Default for OperationSettings {
 /// Error of refused settings. `origin` is the file's name, with line and column where they are known.
 #[derive(Debug, Error)]
 pub enum SettingsError {
-    /// A text that is no TOML, or a value of the wrong type.
+    /// A text that is no TOML.
     #[error("{origin}: {message}")]
     Toml {
         /// Name of the file, with line and column where they are known.
@@ -81,14 +82,27 @@ pub enum SettingsError {
         message: String,
     },
     /// A key that there is not.
-    #[error("{origin}: unknown key '{}': expected {expected}", key.escape_debug())]
+    #[error("{origin}: unknown key '{}'{}; known here: {known}", key.escape_debug(),
+            nearest.as_ref().map_or(String::new(), |near| format!(": did you mean '{near}'?")))]
     UnknownKey {
         /// Name of the file, with line and column where they are known.
         origin: String,
         /// The key with its tables.
         key: String,
-        /// Keys that are expected instead.
-        expected: String,
+        /// The known key that is spelled most alike.
+        nearest: Option<String>,
+        /// The keys that the table has.
+        known: String,
+    },
+    /// A value of the wrong type.
+    #[error("{origin}: {key}: {message}")]
+    Type {
+        /// Name of the file, with line and column where they are known.
+        origin: String,
+        /// The key with its tables.
+        key: String,
+        /// The type as found, and the type as expected.
+        message: String,
     },
     /// A value out of its range.
     #[error("{origin}: {key} = {value}: expected {expected}")]
@@ -126,16 +140,19 @@ pub enum SettingsError {
         /// Error of the week's reference time.
         source: TimeError,
     },
+    /// All that is wrong, in the order of the text: two at least.
+    #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+    Several(Vec<SettingsError>),
 }
 
 impl Settings {
     /// Reads a TOML text; `origin` names it in errors.
     ///
     /// # Errors
-    /// Text that is no TOML, an unknown key, a value of the wrong type or out of its range, each with its
-    /// position.
+    /// Text that is no TOML, or all unknown keys, values of the wrong type and values out of their range, each
+    /// with its position.
     pub fn parse(text: &str, origin: &str) -> Result<Self, SettingsError> {
-        Self::read(text, origin, "", |text| toml::from_str(text))
+        Self::read(text, origin, "")
     }
 
     /// Reads the table `[receiver]` of a scenario's text; defaults if it has none.
@@ -143,41 +160,31 @@ impl Settings {
     /// # Errors
     /// Errors of [`Self::parse`].
     pub fn of_scenario(text: &str, origin: &str) -> Result<Self, SettingsError> {
-        #[derive(Deserialize)]
-        struct Scenario {
-            #[serde(default)]
-            receiver: Settings,
-        }
-        Self::read(text, origin, "receiver", |text| toml::from_str::<Scenario>(text).map(|scenario| scenario.receiver))
+        Self::read(text, origin, "receiver")
     }
 
-    /// Reads the table `above` of a text by `typed`, and gives errors their positions.
-    fn read(
-        text: &str,
-        origin: &str,
-        above: &str,
-        typed: impl Fn(&str) -> Result<Self, toml::de::Error>,
-    ) -> Result<Self, SettingsError> {
-        let syntax = |error: toml::de::Error| {
-            let keys = Keys::new(origin, text);
-            let byte = error.span().map_or(0, |span| span.start);
-            let key = keys.holding(byte).map_or(String::new(), |key| format!("{key}: "));
-            SettingsError::Toml {
-                origin: keys.place(byte),
-                message: format!("{key}{}", error.message().replace("wanted ", "expected ")),
+    /// Reads the table `above` of a text, or all of it, and gives errors their positions.
+    fn read(text: &str, origin: &str, above: &str) -> Result<Self, SettingsError> {
+        let keys = Keys::new(origin, text);
+        let syntax = |error: toml::de::Error| SettingsError::Toml {
+            origin: keys.place(error.span().map_or(0, |span| span.start)),
+            message: error.message().replace("wanted ", "expected "),
+        };
+        let mut table = text.parse::<Table>().map_err(syntax)?;
+        let table = match table.remove(above) {
+            _ if above.is_empty() => table,
+            None => Table::new(),
+            Some(Value::Table(table)) => table,
+            Some(other) => {
+                let message = format!("invalid type: {}, expected a table", other.type_str());
+                return Err(SettingsError::Type { origin: keys.place_of(above), key: above.to_owned(), message });
             }
         };
-        let table = text.parse::<Table>().map_err(syntax)?;
-        let table = if above.is_empty() { Some(&table) } else { table.get(above).and_then(Value::as_table) };
-        let checked = match table {
-            Some(table) => check_keys(table, &known(), above, origin),
-            None => Ok(()),
-        };
-        let checked = checked.and_then(|()| {
-            let settings = typed(text).map_err(syntax)?;
-            settings.validate(origin).map(|()| settings)
-        });
-        checked.map_err(|error| error.at(&Keys::new(origin, text), above))
+        Self::checked(table, origin).map_err(|faults| {
+            let mut faults: Vec<_> = faults.into_iter().map(|fault| fault.at(&keys, above)).collect();
+            faults.sort_by_key(|(start, _)| *start);
+            several(faults.into_iter().map(|(_, fault)| fault).collect())
+        })
     }
 
     /// Reads a TOML table that is in no text.
@@ -185,13 +192,34 @@ impl Settings {
     /// # Errors
     /// Errors of [`Self::parse`], without positions.
     pub fn from_table(table: Table, origin: &str) -> Result<Self, SettingsError> {
-        check_keys(&table, &known(), "", origin)?;
-        let settings: Self = table.try_into().map_err(|error: toml::de::Error| {
-            let message = error.to_string().trim_end().replace('\n', ", ");
-            SettingsError::Toml { origin: origin.to_owned(), message }
-        })?;
-        settings.validate(origin)?;
-        Ok(settings)
+        Self::checked(table, origin).map_err(several)
+    }
+
+    /// Settings of a table, or all that is wrong with it. A key that is refused is left out, so that the rest
+    /// is checked against its default.
+    fn checked(mut table: Table, origin: &str) -> Result<Self, Vec<SettingsError>> {
+        let mut faults = without_unknown(&mut table, &known(), "", origin);
+        faults.extend(without_mistyped(&mut table, origin));
+        loop {
+            let settings: Self = match table.clone().try_into() {
+                Ok(settings) => settings,
+                Err(error) => {
+                    faults.push(mistyped(&error, String::new(), origin));
+                    return Err(faults);
+                }
+            };
+            match settings.validate(origin) {
+                Ok(()) if faults.is_empty() => return Ok(settings),
+                Ok(()) => return Err(faults),
+                Err(fault) => {
+                    let is_written = remove(&mut table, &fault.key().unwrap_or_default());
+                    faults.push(fault);
+                    if !is_written {
+                        return Err(faults);
+                    }
+                }
+            }
+        }
     }
 
     /// Checks every value's range.
@@ -254,41 +282,78 @@ impl Settings {
 }
 
 impl SettingsError {
-    /// The file's name, with line and column where they are known: what the message begins with.
+    /// Lists the single errors.
+    pub fn each(&self) -> &[Self] {
+        match self {
+            Self::Several(errors) => errors,
+            one => std::slice::from_ref(one),
+        }
+    }
+
+    /// The file's name, with line and column where they are known: the beginning of the message. Empty for
+    /// several errors.
     pub fn place(&self) -> &str {
         match self {
             Self::Toml { origin, .. }
             | Self::UnknownKey { origin, .. }
+            | Self::Type { origin, .. }
             | Self::Range { origin, .. }
             | Self::Acquisition { origin, .. }
             | Self::Tracking { origin, .. }
             | Self::Week { origin, .. } => origin,
+            Self::Several(_) => "",
         }
     }
 
-    /// The error with the position of its key instead of the file's name alone; settings are below `above`.
-    fn at(mut self, keys: &Keys<'_>, above: &str) -> Self {
-        let below = |key: String| if above.is_empty() { key } else { format!("{above}.{key}") };
-        let (origin, key) = match &mut self {
-            Self::Toml { .. } => return self,
-            Self::UnknownKey { origin, key, .. } => {
-                let key = key.clone();
-                (origin, key)
-            }
-            Self::Range { origin, key, .. } => (origin, below((*key).to_owned())),
-            Self::Acquisition { origin, source } => {
-                let AcquireError::Setting { key, .. } = source else { return self };
-                (origin, below(format!("acquisition.{key}")))
-            }
-            Self::Tracking { origin, source } => {
+    /// Key that is at fault, from the settings' own top.
+    fn key(&self) -> Option<String> {
+        match self {
+            Self::Toml { .. } | Self::Several(_) => None,
+            Self::UnknownKey { key, .. } | Self::Type { key, .. } => Some(key.clone()),
+            Self::Range { key, .. } => Some((*key).to_owned()),
+            Self::Acquisition { source: AcquireError::Setting { key, .. }, .. } => Some(format!("acquisition.{key}")),
+            Self::Acquisition { .. } => None,
+            Self::Tracking { source, .. } => {
                 let (TrackingSettingsError::Range { key, .. } | TrackingSettingsError::Bandwidth { key, .. }) = source;
-                (origin, below(format!("tracking.{key}")))
+                Some(format!("tracking.{key}"))
             }
-            Self::Week { origin, .. } => (origin, below("operation.week_reference".to_owned())),
-        };
-        *origin = keys.place_of(&key);
-        self
+            Self::Week { .. } => Some("operation.week_reference".to_owned()),
+        }
     }
+
+    /// The error with the position of its key in place of the file's name alone, and the byte at which the key
+    /// begins; settings are below `above`.
+    fn at(mut self, keys: &Keys<'_>, above: &str) -> (usize, Self) {
+        let Some(key) = self.key() else { return (0, self) };
+        let whole = if above.is_empty() { key } else { format!("{above}.{key}") };
+        match &mut self {
+            Self::UnknownKey { origin, key, .. } | Self::Type { origin, key, .. } => {
+                (*origin, *key) = (keys.place_of(&whole), whole.clone());
+            }
+            Self::Range { origin, .. }
+            | Self::Acquisition { origin, .. }
+            | Self::Tracking { origin, .. }
+            | Self::Week { origin, .. } => *origin = keys.place_of(&whole),
+            Self::Toml { .. } | Self::Several(_) => {}
+        }
+        (keys.start_of(&whole).unwrap_or_default(), self)
+    }
+}
+
+/// One error for all: the only one as it is.
+fn several(mut faults: Vec<SettingsError>) -> SettingsError {
+    match faults.pop() {
+        Some(only) if faults.is_empty() => only,
+        last => {
+            faults.extend(last);
+            SettingsError::Several(faults)
+        }
+    }
+}
+
+/// Error of a value that serde refuses.
+fn mistyped(error: &toml::de::Error, key: String, origin: &str) -> SettingsError {
+    SettingsError::Type { origin: origin.to_owned(), key, message: error.message().to_owned() }
 }
 
 /// The keys of the defaults, with their defaults.
@@ -296,26 +361,56 @@ fn known() -> Table {
     Table::try_from(Settings::default()).unwrap_or_default()
 }
 
-/// Refuses the first key of `table` that `known` does not have, by walking both.
-fn check_keys(table: &Table, known: &Table, path: &str, origin: &str) -> Result<(), SettingsError> {
-    for (key, value) in table {
-        let whole = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+/// Takes the keys that `known` does not have out of `table`, by walking both, and returns their errors.
+fn without_unknown(table: &mut Table, known: &Table, path: &str, origin: &str) -> Vec<SettingsError> {
+    let names: Vec<&str> = known.keys().map(String::as_str).collect();
+    let mut faults = Vec::new();
+    table.retain(|key, value| {
+        let whole = if path.is_empty() { key.to_owned() } else { format!("{path}.{key}") };
         match (known.get(key), value) {
-            (None, _) => {
-                let nearest = known.keys().max_by(|a, b| {
-                    strsim::jaro_winkler(a, key).total_cmp(&strsim::jaro_winkler(b, key)).then_with(|| b.cmp(a))
-                });
-                let expected = match nearest {
-                    Some(near) if strsim::jaro_winkler(near, key) > 0.7 => format!("perhaps '{near}'"),
-                    _ => format!("one of {}", known.keys().cloned().collect::<Vec<_>>().join(", ")),
-                };
-                return Err(SettingsError::UnknownKey { origin: origin.to_owned(), key: whole, expected });
+            (None, _) => faults.push(SettingsError::UnknownKey {
+                origin: origin.to_owned(),
+                key: whole,
+                nearest: nearest(key, &names),
+                known: names.join(", "),
+            }),
+            (Some(Value::Table(inner)), Value::Table(given)) => {
+                faults.extend(without_unknown(given, inner, &whole, origin));
             }
-            (Some(Value::Table(inner)), Value::Table(given)) => check_keys(given, inner, &whole, origin)?,
             _ => {}
         }
-    }
-    Ok(())
+        known.contains_key(key)
+    });
+    faults
+}
+
+/// Takes the values of the wrong type out of `table`, and returns their errors. Each key is read alone.
+fn without_mistyped(table: &mut Table, origin: &str) -> Vec<SettingsError> {
+    let mut faults = Vec::new();
+    let mut keep = |path: String, alone: Table| {
+        let refused = alone.try_into::<Settings>().err().map(|error| mistyped(&error, path, origin));
+        let is_sound = refused.is_none();
+        faults.extend(refused);
+        is_sound
+    };
+    table.retain(|section, value| match value {
+        Value::Table(given) => {
+            given.retain(|key, value| {
+                let alone = Table::from_iter([(key.to_owned(), value.clone())]);
+                keep(format!("{section}.{key}"), Table::from_iter([(section.to_owned(), alone.into())]))
+            });
+            true
+        }
+        other => keep(section.to_owned(), Table::from_iter([(section.to_owned(), other.clone())])),
+    });
+    faults
+}
+
+/// Takes a key, `section.name`, out of a table; true if it was there.
+fn remove(table: &mut Table, key: &str) -> bool {
+    let Some((section, name)) = key.split_once('.') else { return false };
+    let given = table.get_mut(section).and_then(Value::as_table_mut);
+    given.is_some_and(|given| given.remove(name).is_some())
 }
 
 #[cfg(test)]
@@ -348,13 +443,32 @@ mod tests {
         let text = |line: &str| format!("name = \"x\"\n[receiver.tracking]\n{line}\n");
         for (line, expected) in [
             ("pll_order = 7", "s.toml:3:1: tracking.pll_order = 7: expected 2 or 3"),
-            ("pll_order = \"x\"", "s.toml:3:13: receiver.tracking.pll_order: invalid type"),
+            ("pll_order = \"x\"", "s.toml:3:1: receiver.tracking.pll_order: invalid type"),
             ("pll_ordr = 3", "s.toml:3:1: unknown key 'receiver.tracking.pll_ordr'"),
         ] {
             let error = Settings::of_scenario(&text(line), "s.toml").unwrap_err().to_string();
             assert!(error.starts_with(expected), "{error}");
         }
         assert_eq!(Settings::of_scenario("name = 1", "s.toml").unwrap(), Settings::default());
+    }
+
+    #[test]
+    fn all_errors_are_reported_at_once_in_the_order_of_the_text() {
+        let text = "[tracking]\npll_order = 7\ndll_order = 'two'\npll_bandwith_hz = 15.0\n[positon]\nmask_deg = 3\n\
+                    [position]\nmask_deg = 91\n[operation]\nmeasurement_interval_ms = 5\nfram_limit_s = 3\n";
+        let error = Settings::parse(text, "rx.toml").unwrap_err();
+        let shown: Vec<String> = error.each().iter().map(ToString::to_string).collect();
+        let expected = [
+            "rx.toml:2:1: tracking.pll_order = 7: expected 2 or 3",
+            "rx.toml:3:1: tracking.dll_order: invalid type: string \"two\"",
+            "rx.toml:4:1: unknown key 'tracking.pll_bandwith_hz': did you mean 'pll_bandwidth_hz'?",
+            "rx.toml:5:2: unknown key 'positon': did you mean 'position'?",
+            "rx.toml:8:1: position.mask_deg = 91: expected 0 to 90",
+            "rx.toml:10:1: operation.measurement_interval_ms = 5: expected 10 to 60000",
+            "rx.toml:11:1: unknown key 'operation.fram_limit_s': did you mean 'frame_limit_s'?",
+        ];
+        assert_eq!(shown.len(), expected.len(), "{shown:#?}");
+        assert!(shown.iter().zip(expected).all(|(shown, expected)| shown.starts_with(expected)), "{shown:#?}");
     }
 
     #[test]

@@ -16,6 +16,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::ScenarioError;
 use super::schema::{Absent, Key, Value};
+use gnss::place::nearest;
 
 /// Table of the scenario.
 #[derive(Clone)]
@@ -414,15 +415,4 @@ pub fn plain(value: &DeValue<'_>) -> Option<toml::Value> {
         }
         DeValue::Table(_) => return None,
     })
-}
-
-/// Candidate most similar to `word`, if any is similar.
-pub fn nearest(word: &str, candidates: &[&str]) -> Option<String> {
-    let lower = word.to_lowercase();
-    candidates
-        .iter()
-        .map(|candidate| (strsim::jaro_winkler(&lower, &candidate.to_lowercase()), *candidate))
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .filter(|(likeness, _)| *likeness > 0.7)
-        .map(|(_, candidate)| candidate.to_owned())
 }

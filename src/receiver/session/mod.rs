@@ -168,6 +168,7 @@ impl Session {
             used: shared.used.iter().copied().collect(),
             fixes: shared.fixes,
             first_fix_s: shared.first_fix_s,
+            last_fix: shared.latest.clone(),
             losses: shared.losses,
             cut_bytes: 0,
             format_warning: None,

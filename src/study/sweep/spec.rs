@@ -12,8 +12,9 @@ use toml::de::DeTable;
 use super::axis::{self, Axis, Grid};
 use super::{fixes, keys, model, sampled, words};
 use generator::scenario::ScenarioError;
-use generator::scenario::read::{Source, Table, nearest};
-use receiver::settings::Settings;
+use generator::scenario::read::{Refusals, Source, Table};
+use gnss::place::nearest;
+use receiver::settings::{Settings, SettingsError};
 
 /// Level of the simulation that a case runs on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -261,6 +262,13 @@ fn scenario(root: &Table<'_>, level: Level, axes: &[Axis]) -> Result<Option<Path
     }
 }
 
+/// Error of a receiver's setting as one of a study.
+fn conflict(error: &SettingsError) -> ScenarioError {
+    let whole = error.to_string();
+    let reason = whole.strip_prefix(&format!("{}: ", error.place())).unwrap_or(&whole).to_owned();
+    ScenarioError::Conflict { origin: error.place().to_owned(), key: "receiver", reason }
+}
+
 /// The tables of the base, at correlator level.
 fn base(
     root: &Table<'_>,
@@ -273,11 +281,11 @@ fn base(
         return written.map_or_else(|| Ok(toml::Table::new()), |name| Err(Ok(root.bad(name, expected))));
     }
     let mut whole: toml::Table = toml::from_str(text).map_err(|e| Err(Box::new(e)))?;
-    Settings::of_scenario(text, origin).map_err(|e| {
-        let reason = e.to_string();
-        let reason = reason.strip_prefix(&format!("{}: ", e.place())).unwrap_or(&reason).to_owned();
-        Ok(ScenarioError::Conflict { origin: e.place().to_owned(), key: "receiver", reason })
-    })?;
+    let mut refusals = Refusals::default();
+    if let Err(error) = Settings::of_scenario(text, origin) {
+        error.each().iter().map(conflict).for_each(|error| refusals.add(error));
+    }
+    refusals.finish().map_err(Ok)?;
     whole.retain(|key, _| BASE.contains(&key));
     // As written and in its place, so that errors of the base itself carry theirs.
     model::Model::read(root).map_err(Ok)?;
