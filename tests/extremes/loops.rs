@@ -12,7 +12,7 @@ use gnss_twin::receiver::correlate::{Edge, Nco, Replica, chips_to_units};
 use gnss_twin::receiver::decode::{Decoder, News};
 use gnss_twin::receiver::position::CodeNoise;
 use gnss_twin::receiver::track::loops::{self, Gains, Rates, bandwidth_time};
-use gnss_twin::receiver::track::{Symbol, TrackingSettings};
+use gnss_twin::receiver::track::{CodeDiscriminator, Symbol, TrackingSettings};
 use num_complex::Complex64;
 
 use crate::figures::{CA, NONE, Worst, case};
@@ -133,6 +133,7 @@ fn a_correlator_too_narrow_or_too_wide_is_refused_and_its_noise_stays_finite() {
             chip_m: 293.0,
             share: 1.0,
             shape: loops::CodeShape::triangle(**d),
+            discriminator: CodeDiscriminator::EarlyMinusLate,
             bandwidth_hz: 0.5,
             integration_s: 1e-3,
         };

@@ -19,6 +19,7 @@ use gnss_twin::gnss::sbas;
 use gnss_twin::gnss::signal::SIGNALS;
 use gnss_twin::gnss::time::{Epoch, Rate, SampleClock};
 use gnss_twin::receiver::position::{CodeNoise, IonosphereChoice, NoFix, PositionSettings, Solver, TroposphereChoice};
+use gnss_twin::receiver::track::CodeDiscriminator;
 use gnss_twin::receiver::track::loops::CodeShape;
 
 use crate::figures::{ALL, CA, NONE, Worst, case};
@@ -157,6 +158,7 @@ fn an_old_set_is_sent_by_no_satellite_and_used_by_no_receiver() {
         chip_m: 293.05,
         share: 1.0,
         shape: CodeShape::triangle(0.5),
+        discriminator: CodeDiscriminator::EarlyMinusLate,
         bandwidth_hz: 0.5,
         integration_s: 0.004,
     };

@@ -20,6 +20,7 @@ use gnss_twin::gnss::record::{IonosphereModel, Observation, TrajectoryRow};
 use gnss_twin::gnss::signal::Signal;
 use gnss_twin::gnss::time::{BDT, Epoch};
 use gnss_twin::receiver::position::{CodeNoise, IonosphereChoice, PositionSettings, Sets, Solver, TroposphereChoice};
+use gnss_twin::receiver::track::CodeDiscriminator;
 use gnss_twin::receiver::track::loops::CodeShape;
 use nalgebra::Vector3;
 
@@ -105,8 +106,14 @@ fn fixes(
     (sets, sent): &(Sets, Option<Coefficients>),
 ) -> (Vector3<f64>, f64, IonosphereModel) {
     let chip_m = SPEED_OF_LIGHT_MPS / signal.components[0].chip_rate_hz;
-    let noise =
-        CodeNoise { chip_m, share: 1.0, shape: CodeShape::triangle(0.5), bandwidth_hz: 0.5, integration_s: 0.004 };
+    let noise = CodeNoise {
+        chip_m,
+        share: 1.0,
+        shape: CodeShape::triangle(0.5),
+        discriminator: CodeDiscriminator::EarlyMinusLate,
+        bandwidth_hz: 0.5,
+        integration_s: 0.004,
+    };
     let settings = PositionSettings {
         smoothing_s: 0.0,
         // Without a correction slant delays fit no position: their misfit counts as the model's then.

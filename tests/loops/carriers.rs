@@ -20,6 +20,7 @@ use gnss_twin::gnss::signal::{Carrier, Signal, register};
 use gnss_twin::receiver::output::Record;
 use gnss_twin::receiver::position::{CodeNoise, Sets, Solver};
 use gnss_twin::receiver::settings::Settings;
+use gnss_twin::receiver::track::CodeDiscriminator;
 use gnss_twin::receiver::track::loops::CodeShape;
 use gnss_twin::receiver::{Outcome, Receiver};
 use nalgebra::Vector3;
@@ -208,6 +209,7 @@ fn fixes_from_two_carriers_have_the_covariance_that_they_state() {
         chip_m: 293.05,
         share: 1.0,
         shape: CodeShape::triangle(0.5),
+        discriminator: CodeDiscriminator::EarlyMinusLate,
         bandwidth_hz: 0.5,
         integration_s: 0.004,
     };

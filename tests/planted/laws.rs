@@ -27,6 +27,7 @@ use gnss_twin::receiver::correlate::sums::{RunningSums, Samples};
 use gnss_twin::receiver::correlate::{Arithmetic, Edge, Nco, Replica, chips_to_units};
 use gnss_twin::receiver::position::smooth::Smoother;
 use gnss_twin::receiver::position::{CodeNoise, NoFix, Noises, PositionSettings, Sets, Solved, Solver, SystemClocks};
+use gnss_twin::receiver::track::CodeDiscriminator;
 use gnss_twin::receiver::track::loops::CodeShape;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -265,7 +266,14 @@ fn with_the_broadcast_offset_any_four_satellites_of_two_systems_give_place_and_t
 /// A code loop of 1 Hz with early and late half a chip apart.
 pub fn noise() -> CodeNoise {
     let chip_m = SPEED_OF_LIGHT_MPS / 1.023e6;
-    CodeNoise { chip_m, share: 1.0, shape: CodeShape::triangle(0.5), bandwidth_hz: 1.0, integration_s: 4e-3 }
+    CodeNoise {
+        chip_m,
+        share: 1.0,
+        shape: CodeShape::triangle(0.5),
+        discriminator: CodeDiscriminator::EarlyMinusLate,
+        bandwidth_hz: 1.0,
+        integration_s: 4e-3,
+    }
 }
 
 #[test]

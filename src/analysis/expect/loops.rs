@@ -44,6 +44,8 @@ pub struct Settings {
     pub dll_order: u32,
     /// One-sided noise bandwidth of the code loop, Hz.
     pub dll_bandwidth_hz: f64,
+    /// Discriminator of the code loop.
+    pub dll_discriminator: dll::Discriminator,
     /// Distance of early and late, chips.
     pub spacing_chips: f64,
     /// True if the replica's samples are means over their intervals.
@@ -51,22 +53,23 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Settings that `receiver.json` states; `None` where it names no bandwidths.
+    /// Settings that `receiver.json` states; `None` where it names no bandwidths, or a discriminator that has
+    /// no theory here.
     pub fn of(run: &Run) -> Option<Self> {
         let number = |key| run.tracking_setting(key);
         let settings = run.receiver.get("settings").unwrap_or(&run.receiver);
+        let word = |key| settings.get("tracking").and_then(|tracking| tracking.get(key)?.as_str());
         Some(Self {
             pll_order: number("pll_order")? as u32,
             pll_bandwidth_hz: number("pll_bandwidth_hz")?,
             dll_order: number("dll_order")? as u32,
             dll_bandwidth_hz: number("dll_bandwidth_hz")?,
+            dll_discriminator: dll::Discriminator::named(word("dll_discriminator").unwrap_or("early_minus_late"))?,
             spacing_chips: number("spacing_chips")?,
-            averaged_replica: settings.get("tracking").and_then(|t| t.get("replica")?.as_str()) == Some("area"),
+            averaged_replica: word("replica") == Some("area"),
         })
     }
-}
 
-impl Settings {
     /// Settings as the receiver fits them to a signal.
     pub(crate) fn fitted(self, followed: &Followed) -> Self {
         Self {
@@ -334,7 +337,8 @@ impl Theory {
         };
         let (found, assumed) = (peak(&followed.found), peak(&followed.assumed));
         let own = Peak::new(&followed.own, width_chips, 2 * of_replica).between(followed.sides);
-        let dll_gain = found.steepness(settings.spacing_chips) / assumed.steepness(settings.spacing_chips);
+        let steepness = |peak: &Peak| peak.steepness(settings.dll_discriminator, settings.spacing_chips);
+        let dll_gain = steepness(&found) / steepness(&assumed);
         let dll = PhaseLoop { gains: made_for.gains.map(|gain| dll_gain * gain), ..made_for };
         // Of the component's power at the antenna.
         let efficiency = found.value(0.0) * found.value(0.0) / own.value(0.0);
@@ -380,7 +384,7 @@ impl Theory {
         let (loop_, code) = (&self.pll.1, &self.dll.1);
         match which {
             Loop::Dll => {
-                let raw = raw_chips(&self.peaks.0, &self.peaks.1, self.settings.spacing_chips, snr);
+                let raw = raw_chips(self.settings.dll_discriminator, &self.peaks, self.settings.spacing_chips, snr);
                 (self.dll_gain * raw * code.put_out.sqrt(), raw * code.phase.sqrt())
             }
             // In an interval the phase runs at the loop's rate.

@@ -1,37 +1,55 @@
-//! The code error that the truth's reflected rays leave in an early-minus-late loop.
+//! The code error that the truth's reflected rays leave in a code loop.
 //!
-//! The loop rests where |E|² = |L|², E and L the sums over the rays of amplitude, phase and correlation at
-//! half a spacing to either side. Limits: the front end's rounding of the correlation is left out, and rays
-//! are taken as steady over the loop's time constant, so that what moves fast is overrated.
+//! E, P and L are the sums over the rays of amplitude, phase and correlation, at the loop's estimate and half
+//! a spacing to either side. A loop of early minus late power rests where |E|² = |L|², one of the dot product
+//! where Re((E−L)·P*) = 0. Limits: the front end's rounding of the correlation is left out, and rays are
+//! taken as steady over the loop's time constant, so that what moves fast is overrated.
 
 use std::collections::HashMap;
 use std::iter::Peekable;
 
 use crate::error::JudgeError;
+use crate::expect::loops::{Settings, Theory};
 use crate::expect::peak::Code;
+use crate::expect::theory::dll::Discriminator;
 use crate::read::Run;
 use crate::read::spill_store::Cursor;
 use gnss::record::RayRow;
 use gnss::signal::Link;
+use num_complex::Complex64;
+
+impl Theory {
+    /// Code error of the loop for rays of (excess in chips, amplitude, phase in cycles), metres late.
+    pub fn ray_m(&self, rays: &[Ray]) -> f64 {
+        let Settings { dll_discriminator, spacing_chips, .. } = self.settings;
+        self.chip_m * error_chips(&self.code, rays, dll_discriminator, spacing_chips)
+    }
+}
 
 /// Code error of the loop in chips late of the direct ray, for rays of (excess in chips, amplitude, phase in
 /// cycles).
-pub(crate) fn error_chips(code: &Code, rays: &[(f64, f64, f64)], spacing_chips: f64) -> f64 {
+fn error_chips(code: &Code, rays: &[Ray], discriminator: Discriminator, spacing_chips: f64) -> f64 {
     if rays.iter().all(|ray| ray.1 == 0.0) {
         return 0.0;
     }
-    let power = |at: f64| {
-        let (mut i, mut q) = (code.value(at), 0.0);
-        for (excess, amplitude, phase) in rays {
+    let sum = |at: f64| {
+        let direct = Complex64::from(code.value(at));
+        rays.iter().fold(direct, |sum, (excess, amplitude, phase)| {
             let (sin, cos) = libm::sincos(std::f64::consts::TAU * phase);
-            let value = amplitude * code.value(at - excess);
-            (i, q) = (i + value * cos, q + value * sin);
-        }
-        i * i + q * q
+            sum + amplitude * code.value(at - excess) * Complex64::new(cos, sin)
+        })
     };
     // Falls through zero where the loop rests, between half a spacing before the direct ray and one behind
     // it, before early leaves the main peak.
-    let discriminator = |at: f64| power(at + 0.5 * spacing_chips) - power(at - 0.5 * spacing_chips);
+    let discriminator = |at: f64| {
+        let [early, late] = [0.5, -0.5].map(|side| sum(at + side * spacing_chips));
+        match discriminator {
+            Discriminator::EarlyMinusLate => early.norm_sqr() - late.norm_sqr(),
+            // The carrier's loop turns the prompt onto the real axis, which is all that the coherent one
+            // assumes.
+            Discriminator::DotProduct | Discriminator::Coherent => ((early - late) * sum(at).conj()).re,
+        }
+    };
     let (mut low, mut high) = (-0.5 * spacing_chips, spacing_chips.min(code.reach_chips - 0.5 * spacing_chips));
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
@@ -121,6 +139,7 @@ impl<'r> Rays<'r> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::expect::theory::dll::Discriminator::{DotProduct, EarlyMinusLate};
     use crate::waveform::Waveform;
     use gnss::gps::l1ca::L1_CA;
     use gnss::signal::synthetic::LONG_BOC;
@@ -130,11 +149,32 @@ mod tests {
         // In phase the error of an early-minus-late envelope is α·d/2 where the ray is late by d/2(1 + α) or
         // more; out of phase the same early.
         let code = Code::of(&Waveform::of(&L1_CA).unwrap());
-        let error = |phase| error_chips(&code, &[(0.3, 0.25, phase)], 0.2);
+        let error = |phase| error_chips(&code, &[(0.3, 0.25, phase)], EarlyMinusLate, 0.2);
         assert!((error(0.0) - 0.25 * 0.1).abs() < 3e-3, "{}", error(0.0));
         assert!((error(0.5) + 0.25 * 0.1).abs() < 3e-3, "{}", error(0.5));
-        assert_eq!(error_chips(&code, &[(0.3, 0.0, 0.0)], 0.2), 0.0);
-        assert!(error_chips(&code, &[(2.0, 0.5, 0.0)], 0.5).abs() < 1e-6, "beyond the correlation");
+        assert_eq!(error_chips(&code, &[(0.3, 0.0, 0.0)], EarlyMinusLate, 0.2), 0.0);
+        let far = error_chips(&code, &[(2.0, 0.5, 0.0)], EarlyMinusLate, 0.5);
+        assert!(far.abs() < 1e-6, "beyond the correlation");
+    }
+
+    /// A ray of amplitude α comes δ late, δ below d/2, at a quarter of a turn. On the triangle E and L are
+    /// (1−d/2∓e) + iα(1−d/2∓(e−δ)), so that |E|² = |L|² at e = α²δ/(1+α²). P is (1−e) + iα(1−δ+e), so that
+    /// Re((E−L)·P*) = 0 where e(1−e) + α²(e−δ)(1−δ+e) is: (1−α²)e² − (1+α²(1−2δ))e + α²δ(1−δ) = 0.
+    #[test]
+    fn a_discriminator_rests_where_its_own_formula_is_zero() {
+        let code = Code::of(&Waveform::of(&L1_CA).unwrap());
+        let (delay, amplitude, d) = (0.1, 0.5, 0.4);
+        let error = |which, phase| error_chips(&code, &[(delay, amplitude, phase)], which, d);
+        for phase in [0.0, 0.5] {
+            let [one, other] = [EarlyMinusLate, DotProduct].map(|which| error(which, phase));
+            assert!((one - other).abs() < 1e-9, "in phase both are zero where early equals late: {one}, {other}");
+        }
+        let square = amplitude * amplitude;
+        let (found, expected) = (error(EarlyMinusLate, 0.25), square * delay / (1.0 + square));
+        assert!((found - expected).abs() < 1e-9, "{found}, {expected}");
+        let (a, b, c) = (1.0 - square, 1.0 + square * (1.0 - 2.0 * delay), square * delay * (1.0 - delay));
+        let (found, expected) = (error(DotProduct, 0.25), (b - (b * b - 4.0 * a * c).sqrt()) / (2.0 * a));
+        assert!((found - expected).abs() < 1e-9, "{found}, {expected}");
     }
 
     #[test]
@@ -142,7 +182,7 @@ mod tests {
         // R falls by 3 a chip and rises by 1 beyond half a chip: late minus early of the direct ray is −6e,
         // of the other one 3αd on the steep flank and −αd on the gentle one.
         let code = Code::of(&Waveform::of(&LONG_BOC).unwrap());
-        let error = |excess: f64, phase: f64| error_chips(&code, &[(excess, 0.25, phase)], 0.1);
+        let error = |excess: f64, phase: f64| error_chips(&code, &[(excess, 0.25, phase)], EarlyMinusLate, 0.1);
         assert!((error(0.2, 0.0) - 0.25 * 0.05).abs() < 1e-4, "{}", error(0.2, 0.0));
         assert!((error(0.2, 0.5) + 0.25 * 0.05).abs() < 1e-4, "{}", error(0.2, 0.5));
         let far = error(0.8, 0.0);

@@ -1,12 +1,12 @@
-//! Correlation of a signal with a replica about its peak, and the noise of early minus late there.
+//! Correlation of a signal with a replica about its peak, and the noise of a code discriminator there.
 
 use crate::expect::followed::Followed;
 use crate::expect::theory::dll::{self, Discriminator, Taps};
 use crate::waveform::Waveform;
 use gnss::signal::Tone;
 
-/// Correlation of a signal with a replica, either or both of them averaged over the sampler's interval, for
-/// early minus late.
+/// Correlation of a signal with a replica, either or both of them averaged over the sampler's interval, for a
+/// code discriminator.
 ///
 /// A polygon is a sum of |x|/2 about its corners, each times the bend there; an average over w adds an
 /// integral and a difference of 1/w.
@@ -56,10 +56,17 @@ impl Peak {
         }
     }
 
-    /// Slope of early less late over their sum, per chip, for a distance of `spacing_chips`.
-    pub fn steepness(&self, spacing_chips: f64) -> f64 {
+    /// Slope of a discriminator per chip, but for a factor, at a distance of `spacing_chips` from early to
+    /// late.
+    ///
+    /// Early minus late power is divided by the power of early and late, the others by the prompt's.
+    pub fn steepness(&self, discriminator: Discriminator, spacing_chips: f64) -> f64 {
         let half = 0.5 * spacing_chips;
-        self.slope(half) / self.value(half)
+        let height = match discriminator {
+            Discriminator::EarlyMinusLate => self.value(half),
+            Discriminator::DotProduct | Discriminator::Coherent => self.value(0.0),
+        };
+        self.slope(half) / height
     }
 
     /// Minus its slope at a delay, by a difference that errs by 1e-9.
@@ -118,12 +125,12 @@ impl Code {
     }
 }
 
-/// Standard deviation of one early-minus-late value, in chips, for the shapes of signal and noise.
-pub(super) fn raw_chips(signal: &Peak, noise: &Peak, d: f64, snr: f64) -> f64 {
+/// Standard deviation of one discriminator value, in chips, for the shapes of signal and noise.
+pub(super) fn raw_chips(discriminator: Discriminator, (signal, noise): &(Peak, Peak), d: f64, snr: f64) -> f64 {
     let height = signal.value(0.5 * d) / signal.value(0.0);
     let slope = signal.slope(0.5 * d) / signal.value(0.0);
     let rho = noise.value(d) / noise.value(0.0);
-    dll::raw_on_chips(Discriminator::EarlyMinusLate, Taps { height, slope, common: rho }, snr)
+    dll::raw_on_chips(discriminator, Taps { height, slope, common: rho }, snr)
 }
 
 #[cfg(test)]
@@ -136,10 +143,13 @@ mod tests {
     #[test]
     fn peaks_are_the_triangle_without_averages_and_rounded_with_them() {
         let chips = Waveform::of(&L1_CA).unwrap();
-        let plain = Peak::new(&chips, 0.4, 0);
-        for cn0_hz in [1e3, 1e4, 1e5] {
-            let known = dll::raw_chips(Discriminator::EarlyMinusLate, 0.5, 4e-3, cn0_hz);
-            assert!((raw_chips(&plain, &plain, 0.5, 4e-3 * cn0_hz) / known - 1.0).abs() < 1e-9);
+        let plain = (Peak::new(&chips, 0.4, 0), Peak::new(&chips, 0.4, 0));
+        for discriminator in [Discriminator::EarlyMinusLate, Discriminator::DotProduct] {
+            for cn0_hz in [1e3, 1e4, 1e5] {
+                let known = dll::raw_chips(discriminator, 0.5, 4e-3, cn0_hz);
+                let found = raw_chips(discriminator, &plain, 0.5, 4e-3 * cn0_hz);
+                assert!((found / known - 1.0).abs() < 1e-9, "{discriminator:?}: {found}, {known}");
+            }
         }
         // The mean of a triangle over ±w/2 is 1 − w/4, over a triangle of ±w it is 1 − w/3; far from corners
         // nothing changes.
@@ -188,7 +198,7 @@ mod tests {
     fn a_steeper_peak_has_less_jitter() {
         let raw = |signal: &Signal, d: f64| {
             let peak = Peak::new(&Waveform::of(signal).unwrap(), 0.0, 0);
-            raw_chips(&peak, &peak, d, 1e6)
+            raw_chips(Discriminator::EarlyMinusLate, &(peak.clone(), peak), d, 1e6)
         };
         // With slope s and 1 − ρ = s·d the variance is d/(4·s·snr): s is 1 of BPSK and 3 of BOC(1,1). Of MBOC
         // it is 10/11 · 3 + 1/11 · 23, BOC(6,1) falling by 2·12 − 1 a chip.

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::described::described;
+use crate::track::CodeDiscriminator;
 use crate::track::loops::CodeShape;
 use gnss::augmentation::Content;
 use gnss::earth::Geodetic;
@@ -196,6 +197,8 @@ pub struct CodeNoise {
     pub share: f64,
     /// The correlation that early and late meet: averaging replicas round it and correlate its noise.
     pub shape: CodeShape,
+    /// Discriminator of the code loop.
+    pub discriminator: CodeDiscriminator,
     /// Bandwidth of the code loop.
     pub bandwidth_hz: f64,
     /// Time of an integration.
@@ -206,17 +209,22 @@ pub struct CodeNoise {
 pub type Noises = Vec<(&'static Signal, CodeNoise)>;
 
 impl CodeNoise {
-    /// Standard deviation of a non-coherent early-minus-late loop, metres, of a signal of `cn0_hz`.
+    /// Standard deviation of a code loop, metres, of a signal of `cn0_hz`.
     ///
-    /// With C the power that the loop follows: B·(1−ρ)/(2·C/N0·a′²)·(1 + (1+ρ)/(2·T·C/N0·a²)) with height a,
-    /// slope a′ and noise correlation ρ of early and late; on a triangle that is Kaplan and Hegarty's
-    /// equation 5.23 (2nd ed.), first branch.
+    /// With C the power that the loop follows: B·(1−ρ)/(2·C/N0·a′²)·(1 + s) with slope a′ and noise
+    /// correlation ρ of early and late. The squaring loss s is (1+ρ)/(2·T·C/N0·a²) of early minus late power,
+    /// with height a; on a triangle that is Kaplan and Hegarty's equation 5.23 (2nd ed.), first branch. It is
+    /// 1/(T·C/N0) of the dot product, whose prompt has the whole height.
     pub fn sigma_m(&self, cn0_hz: f64) -> f64 {
         let CodeShape { value, slope, common } = self.shape;
         let cn0_hz = planted!("receiver.position.share", self.share, 1.0) * cn0_hz;
-        let squaring = 1.0 + (1.0 + common) / (2.0 * self.integration_s * cn0_hz * value * value);
+        let snr = self.integration_s * cn0_hz;
+        let squaring = match self.discriminator {
+            CodeDiscriminator::EarlyMinusLate => (1.0 + common) / (2.0 * snr * value * value),
+            CodeDiscriminator::DotProduct => 1.0 / snr,
+        };
         let spread = (1.0 - common) / (slope * slope);
-        self.chip_m * (self.bandwidth_hz * spread / (2.0 * cn0_hz) * squaring).sqrt()
+        self.chip_m * (self.bandwidth_hz * spread / (2.0 * cn0_hz) * (1.0 + squaring)).sqrt()
     }
 }
 

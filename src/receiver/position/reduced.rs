@@ -46,6 +46,7 @@ impl Solver {
 mod tests {
     use super::*;
     use crate::position::{CodeNoise, PositionSettings, Sets};
+    use crate::track::CodeDiscriminator;
     use crate::track::loops::CodeShape;
     use gnss::galileo::e1::E1;
     use gnss::record::Observation;
@@ -61,6 +62,7 @@ mod tests {
             chip_m: 293.0,
             share: 1.0,
             shape: CodeShape::triangle(0.5),
+            discriminator: CodeDiscriminator::EarlyMinusLate,
             bandwidth_hz: 1.0,
             integration_s: 4e-3,
         };

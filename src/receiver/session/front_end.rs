@@ -364,6 +364,7 @@ pub(super) fn noise(signal: &'static Signal, metadata: &IfMetadata, settings: &S
         chip_m: SPEED_OF_LIGHT_MPS / chip_rate_hz,
         share: power_share * model.as_ref().map_or(1.0, |model| model.efficiency),
         shape: model.map_or(CodeShape::triangle(tracking.spacing_chips), |model| model.shape),
+        discriminator: tracking.dll_discriminator,
         bandwidth_hz: tracking.dll_bandwidth_hz,
         integration_s: followed::Followed::of(signal, settings)
             .map_or(period_s * f64::from(tracking.integration), |followed| followed.integration_s),
@@ -387,6 +388,7 @@ fn within(ticks: &[u64], first: u64, end: u64) -> &[u64] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::track::CodeDiscriminator;
     use gnss::galileo::e1::E1;
     use gnss::gps::l1ca::L1_CA;
     use gnss::gps::l5::L5;
@@ -394,9 +396,15 @@ mod tests {
     use gnss::time::Rate;
 
     fn of(signal: &'static Signal) -> CodeNoise {
+        with(signal, CodeDiscriminator::EarlyMinusLate)
+    }
+
+    fn with(signal: &'static Signal, discriminator: CodeDiscriminator) -> CodeNoise {
         let (rate, center_hz) = (Rate::from_hz(25e6).unwrap(), signal.centre_hz());
         let metadata = IfMetadata { format: Format::Ci8, rate, center_hz, inverted: false, start: None };
-        noise(signal, &metadata, &Settings::default())
+        let mut settings = Settings::default();
+        settings.tracking.dll_discriminator = discriminator;
+        noise(signal, &metadata, &settings)
     }
 
     /// Shares of the pilots: half of L5's power (IS-GPS-705, 3.3.1.6), half of E1's (OS SIS ICD 2.1, 2.3.3)
@@ -410,6 +418,19 @@ mod tests {
             let (found_m, expected_m) = (own.sigma_m(1e4), whole.sigma_m(1e4 * own.share));
             assert!((found_m / expected_m - 1.0).abs() < 1e-12, "{}", signal.name);
         }
+    }
+
+    /// Squaring adds 2/((2−d)·T·C/N0) on a triangle where early and late are squared, and 1/(T·C/N0) where
+    /// they are multiplied by the prompt (Kaplan and Hegarty 2nd ed., eq. 5.23).
+    #[test]
+    fn a_code_is_as_noisy_as_its_loop_s_own_discriminator_makes_it() {
+        let (shape, d, cn0_hz) = (CodeShape::triangle(0.5), 0.5, 1e3);
+        let both = [CodeDiscriminator::EarlyMinusLate, CodeDiscriminator::DotProduct];
+        let [early, dot] = both.map(|discriminator| CodeNoise { shape, ..with(&L1_CA, discriminator) });
+        let snr = dot.integration_s * dot.share * cn0_hz;
+        let found = (dot.sigma_m(cn0_hz) / early.sigma_m(cn0_hz)).powi(2);
+        let expected = (1.0 + 1.0 / snr) / (1.0 + 2.0 / ((2.0 - d) * snr));
+        assert!((found / expected - 1.0).abs() < 1e-12 && expected < 0.95, "{found}, {expected}");
     }
 
     /// Squaring in the discriminator adds as much noise as the integration is short: ranges of different

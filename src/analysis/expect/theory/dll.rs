@@ -18,6 +18,17 @@ pub enum Discriminator {
     Coherent,
 }
 
+impl Discriminator {
+    /// Discriminator by the name that a receiver's settings have for it; `None` of another name.
+    pub fn named(name: &str) -> Option<Self> {
+        match name {
+            "early_minus_late" => Some(Self::EarlyMinusLate),
+            "dot_product" => Some(Self::DotProduct),
+            _ => None,
+        }
+    }
+}
+
 /// Squaring loss of a discriminator on a triangle, added to 1.
 fn squaring(discriminator: Discriminator, d: f64, snr: f64) -> f64 {
     match discriminator {

@@ -17,7 +17,7 @@ use crate::expect::beats::Beats;
 use crate::expect::due::satellite::{FADE_DB, is_stepping};
 use crate::expect::loops::{Places, Theory, update_s};
 use crate::expect::message::Message;
-use crate::expect::multipath::{self, Rays};
+use crate::expect::multipath::Rays;
 use crate::expect::smoothing::Smoothing;
 use crate::expect::stated::Stated;
 use crate::expect::theory::edges;
@@ -375,10 +375,7 @@ impl Ranges<'_, '_> {
         let (scene, theory, link) = (self.scene, &self.theory, self.link);
         let fading = self.fades.take(row.time_s, true_row.cn0_dbhz);
         let parted_m = true_row.pseudorange_m - link.wavelength_m() * true_row.carrier_cycles;
-        let ray_m = match self.rays.at(row.sample)? {
-            [] => 0.0,
-            rays => theory.chip_m * multipath::error_chips(&theory.code, rays, theory.settings.spacing_chips),
-        };
+        let ray_m = theory.ray_m(self.rays.at(row.sample)?);
         let smooth = self.parting.take(row.time_s, row.locked_s, parted_m + ray_m);
         let bounced = self.reflected.take(row.time_s, row.locked_s, ray_m.abs());
         let Some(place) = place.filter(|_| row.sample == fix.sample && scene.heard.usable(link, row.sample)) else {

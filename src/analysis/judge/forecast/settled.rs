@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use crate::error::JudgeError;
 use crate::expect::due::satellite::is_stepping;
 use crate::expect::loops::{Places, Theory};
-use crate::expect::multipath::{self, Rays};
+use crate::expect::multipath::Rays;
 use crate::expect::multiple_access::MultipleAccess;
 use crate::expect::stated::Stated;
 use crate::measure::errors::{Errors, PULL_IN_S, SignalError};
@@ -91,10 +91,7 @@ impl Settled {
             if !run.scene.expect.bounded(row.time_s) || is_stepping(&run.scene.faults, link.sv, row.time_s) {
                 continue;
             }
-            let ray_m = match rays.at(row.sample)? {
-                [] => 0.0,
-                rays => multipath::error_chips(&theory.code, rays, theory.settings.spacing_chips) * theory.chip_m,
-            };
+            let ray_m = theory.ray_m(rays.at(row.sample)?);
             let own_hz = libm::pow(10.0, row.cn0_true_dbhz / 10.0);
             let white_hz = access.white_hz(row.sample, link, own_hz) / libm::pow(10.0, cost_db / 10.0);
             let lacks_db = stated.cost_db(link, row.cn0_effective_dbhz - cost_db);
