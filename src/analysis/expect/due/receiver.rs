@@ -265,7 +265,7 @@ fn turns(signal: &'static Signal, component: &Component, coherent_s: f64) -> (f6
 
 /// Losses of each signal in filter, converter and edges between samples, in dB. A truth that does not state
 /// its noise has the loss of a converter of few bits (Van Vleck; optimal steps, white noise).
-fn front_end_costs_db(run: &Run) -> BTreeMap<&'static Signal, f64> {
+pub(crate) fn front_end_costs_db(run: &Run) -> BTreeMap<&'static Signal, f64> {
     let mut costs_db = spectrum::costs_db(run);
     for (signal, cost_db) in &mut costs_db {
         *cost_db += spectrum::edge_cost_db(run, signal);

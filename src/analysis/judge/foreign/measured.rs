@@ -1,11 +1,13 @@
 //! Measurements of a foreign receiver's observables: rows of its tables, and their figures.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use super::fit::Estimate;
 use crate::expect::timeline::State;
 use crate::read::rinex_obs::Values;
-use gnss::signal::Link;
+use gnss::signal::{Link, Signal};
 
 /// One observation against the truth: a row of `foreign_observations.csv`. Errors are measured minus true;
 /// what is common to the satellites of its epoch is taken out, of carriers also an arc's constant.
@@ -164,8 +166,10 @@ pub struct Measured {
     pub doppler_scale: Option<Estimate>,
     /// Root mean square of the Doppler errors, Hz.
     pub doppler_rms_hz: Option<f64>,
-    /// Mean error of C/N0, dB.
+    /// Mean error of C/N0 against that in the samples, dB.
     pub cn0_db: Option<Estimate>,
+    /// Decibels that filter, converter and edges between samples take of each observed signal's C/N0.
+    pub front_end_costs_db: BTreeMap<&'static Signal, f64>,
     /// Drift of the receiver's clock by its code, seconds a second.
     pub drift_code: Option<f64>,
     /// Drift of the receiver's clock by its carrier, seconds a second.

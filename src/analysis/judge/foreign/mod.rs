@@ -21,6 +21,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::error::JudgeError;
+use crate::expect::due::receiver::front_end_costs_db;
 use crate::expect::timeline;
 use crate::read::{Fault, Run, nmea, rinex_obs};
 use gnss::time::{Epoch, WEEK_S};
@@ -72,7 +73,8 @@ pub fn judge(truth: &Path, files: &Files) -> Result<Judgement, JudgeError> {
         judged.receiver = Some(read.receiver).filter(|name| !name.is_empty());
         let labels: Vec<Epoch> = read.epochs.iter().map(|epoch| epoch.label).collect();
         judged.rollover_s[0] = rollover(&labels, &timeline).ok_or_else(|| elsewhere(path, &labels, &timeline))?;
-        let mut measured = observables::measure(&read.epochs, &timeline, judged.rollover_s[0]);
+        let costs_db = front_end_costs_db(&run);
+        let mut measured = observables::measure(&read.epochs, &timeline, judged.rollover_s[0], &costs_db);
         measured.stated_interval_s = read.interval_s;
         if measured.rows.is_empty() {
             return Err(elsewhere(path, &labels, &timeline));

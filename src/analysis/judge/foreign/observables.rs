@@ -30,8 +30,14 @@ const OUTLIER_M: f64 = 30.0;
 
 const MILLISECOND_M: f64 = 1e-3 * SPEED_OF_LIGHT_MPS;
 
-/// Joins and measures; `shift_s` is taken from every label first (a week's rollover).
-pub fn measure(epochs: &[ObservedEpoch], timeline: &Timeline, shift_s: i64) -> Measured {
+/// Joins and measures; `shift_s` is taken from every label first (a week's rollover). `costs_db` is what the
+/// front end takes of each signal's C/N0 before any receiver has its samples.
+pub fn measure(
+    epochs: &[ObservedEpoch],
+    timeline: &Timeline,
+    shift_s: i64,
+    costs_db: &BTreeMap<&'static Signal, f64>,
+) -> Measured {
     let label = |epoch: &ObservedEpoch| epoch.label.since(timeline.origin) - shift_s as f64;
     let mut measured = Measured { epochs: epochs.len(), ..Measured::default() };
     let (mut late_s, mut clock_s) = (0.0, vec![0.0; epochs.len()]);
@@ -53,6 +59,11 @@ pub fn measure(epochs: &[ObservedEpoch], timeline: &Timeline, shift_s: i64) -> M
         if moved.fold((late_s - before_s.0).abs(), f64::max) < 1e-9 {
             break;
         }
+    }
+    for pair in &mut pairs {
+        let cost_db = costs_db.get(pair.link.signal).copied().unwrap_or(0.0);
+        measured.front_end_costs_db.insert(pair.link.signal, cost_db);
+        pair.truth.effective_dbhz -= cost_db;
     }
     measured.observations = epochs.iter().map(|epoch| epoch.values.len()).sum();
     measured.unmatched = measured.observations - pairs.len();

@@ -4,6 +4,7 @@
 //! deviations. Otherwise the report states that it is absent, with the bound that the file allows. The clock
 //! is not an error. It is named for users of the file.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::OnceLock;
 
@@ -16,6 +17,7 @@ use super::measured::Measured;
 use crate::judge::schema::{Figures, Leaf};
 use crate::statistics::mean;
 use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::signal::Signal;
 
 /// Paths of `foreign.json` that a user's limits may name.
 pub static FIGURES: Figures = Figures { file: "foreign.json", listed: "any foreign.json", leaves };
@@ -167,7 +169,8 @@ pub struct Doppler {
     pub minus_carrier_rate_sigma_hz: Option<f64>,
 }
 
-/// C/N0 against what the scene allows: other satellites and interference counted as noise.
+/// C/N0 against that in the samples: the antenna's, less what band edge, filter and converter take; other
+/// satellites and interference count as noise.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Cn0 {
     /// Mean error, dB.
@@ -318,7 +321,8 @@ impl ForeignSummary {
                 "ppm",
             );
             named(&mut found, "Doppler plus the carrier's rate", measured.doppler_carrier_hz, 0.0, "Hz");
-            named(&mut found, "C/N0", measured.cn0_db, 0.0, "dB against what the scene allows");
+            let unit = format!("dB against that in the samples{}", front_end(&measured.front_end_costs_db));
+            named(&mut found, "C/N0", measured.cn0_db, 0.0, &unit);
             if self.carrier.slips > 0 {
                 found.push(format!(
                     "{} breaks of the carrier, {} of them undeclared",
@@ -410,6 +414,17 @@ fn named(found: &mut Vec<String>, what: &str, estimate: Option<Estimate>, neutra
     } else {
         format!("{what}: no bias beyond {:.3} {unit} (found {value:+.3}, sigma {sigma:.3})", 3.0 * sigma)
     });
+}
+
+/// Loss of each signal's C/N0 between antenna and samples, in words; empty where there is none.
+fn front_end(costs_db: &BTreeMap<&'static Signal, f64>) -> String {
+    let costs = costs_db.iter().filter(|(_, cost_db)| cost_db.abs() >= 0.005);
+    let costs: Vec<String> = costs.map(|(signal, cost_db)| format!("{cost_db:.2} dB of {}", signal.name)).collect();
+    if costs.is_empty() {
+        String::new()
+    } else {
+        format!(" (band's edge, filter and converter take {})", costs.join(", "))
+    }
 }
 
 fn position(judged: &Judged) -> Position {

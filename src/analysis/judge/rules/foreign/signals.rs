@@ -10,7 +10,6 @@ use std::collections::BTreeMap;
 use super::plain::{self, PHASE_CYCLES, PHASE_HZ, Scene};
 use crate::expect::due::Expectations;
 use crate::expect::quantile::largest;
-use crate::expect::spectrum::{costs_db, edge_cost_db};
 use crate::judge::foreign::measured::{Measured, ObservationError};
 use crate::judge::judgement::Bound;
 use crate::judge::rules::kind::THEORY;
@@ -201,7 +200,7 @@ impl Verdict {
                 of_signal.push((one, value - scene.reach(&one.link).cn0_db));
             }
         }
-        let (mut biases, mut satellites, front_ends_db) = (Vec::new(), Vec::new(), costs_db(scene.run));
+        let (mut biases, mut satellites) = (Vec::new(), Vec::new());
         for (signal, all) in &signals {
             let Some(middle_db) = median(&all.iter().map(|(_, value)| *value).collect::<Vec<_>>()) else { continue };
             let scatter = |one: &One<'_>| scene.reach(&one.link).cn0_sigma_db;
@@ -209,18 +208,15 @@ impl Verdict {
             // Who follows one component alone measures its part.
             let shares = signal.components.iter().map(|component| component.power_share);
             let part_db = -10.0 * libm::log10(shares.fold(1.0, f64::min));
-            // C/N0 is at the antenna: filter and edges between samples take their part.
-            let band_db = front_ends_db.get(signal).copied().unwrap_or(0.0) + edge_cost_db(scene.run, signal);
-            let below_db = part_db + band_db.max(0.0);
-            let limit = ONE_BIT_LOSS_DB + scatter_db + if middle_db < 0.0 { below_db } else { 0.0 };
+            let limit = ONE_BIT_LOSS_DB + scatter_db + if middle_db < 0.0 { part_db } else { 0.0 };
             biases.push(Found { name: signal.name.to_owned(), value: middle_db.abs(), limit });
             satellites.extend(all.iter().map(|(one, value)| {
                 let limit = CN0_DB + scatter(one);
                 Found { name: one.name.clone(), value: (value - middle_db).abs(), limit }
             }));
         }
-        let source =
-            "loss of a one-bit quantiser, 10 lg(π/2), one component's part, filter, edges, fades: more is unexplained";
+        let source = "C/N0 in the samples: the antenna's less what band edge, filter and converter take; loss of a \
+                      one-bit quantiser, 10 lg(π/2), one component's part, fades: more is unexplained";
         self.nearest("C/N0 bias, magnitude", "", "dB", biases, source);
         let source =
             "the scene's C/N0 and the other satellites of the signal: half a sample at two samples a chip, and fades";
