@@ -20,6 +20,7 @@ use crate::read::rinex_obs::{ObservedEpoch, Reader};
 use crate::read::{Fault, Run, each};
 use crate::statistics::larger;
 use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::nmea::KNOT_MPS;
 use gnss::record::{Fix, Observation};
 use gnss::satellite::{Sv, System};
 use gnss::signal::Link;
@@ -34,7 +35,8 @@ const CARRIER_CYCLES: f64 = 0.05;
 const DOPPLER_HZ: f64 = 1.0;
 /// Half a step of the digit for strength, dB (RINEX 3.05, table 9).
 const CN0_DB: f64 = 3.0;
-const SPEED_MPS: f64 = 0.5;
+/// Half a tenth of a knot: from there on a program that shows tenths shows another speed.
+const SPEED_MPS: f64 = 0.05 * KNOT_MPS;
 /// Share of a table's rows that a file may lack, or have elsewhere: a row that somebody mended misleads
 /// nobody.
 const ODD_PERCENT: f64 = 1.0;
