@@ -39,13 +39,13 @@ use measure::errors::Errors;
 use measure::jitter::Jitter;
 use measure::slips::Slips;
 use read::Run;
-use show::plot::{Judged, Picture, Sketch};
-#[cfg(feature = "pdf")]
+use show::document::Forms;
+use show::plot::{Detail, Judged, Sketched};
 use show::run_report::RunReport;
 use show::{plot, tables};
 
-/// Judges the run in a directory: writes `summary.json`, tables, pictures and `report.pdf` there and returns
-/// the summary.
+/// Judges the run in a directory: writes `summary.json`, tables, pictures, `report.pdf` and `report.html`
+/// there and returns the summary.
 ///
 /// Reads `truth/{observations,sky,trajectory,navigation}.csv`, `truth/scene.json`,
 /// `rx/{observations,fixes,acquisition,tracking,navigation,events}.csv`, and where they exist
@@ -64,8 +64,17 @@ pub fn judge(run: &Path) -> Result<Summary, JudgeError> {
 ///
 /// Same as [`judge()`].
 pub fn judge_against(run: &Path, limits: Option<&Limits>) -> Result<Summary, JudgeError> {
+    judge_into(run, limits, Forms::BOTH)
+}
+
+/// [`judge_against`] with the report in the forms that are asked for.
+///
+/// # Errors
+///
+/// Same as [`judge()`].
+pub fn judge_into(run: &Path, limits: Option<&Limits>, forms: Forms) -> Result<Summary, JudgeError> {
     // On one of the threads that draw: what it needed before serves again.
-    rayon::scope(|_| judged(run, limits))
+    rayon::scope(|_| judged(run, limits, forms))
 }
 
 /// The verdict alone: what [`judge_against`] finds of the tables as they lie there, with nothing written or
@@ -77,15 +86,11 @@ pub fn assess(run: &Path, limits: Option<&Limits>) -> Result<Summary, JudgeError
     Ok(measure(Run::read(run)?, run, limits)?.summary)
 }
 
-fn judged(run: &Path, limits: Option<&Limits>) -> Result<Summary, JudgeError> {
-    let Found { summary, sketches, report } = find(run, limits)?;
+fn judged(run: &Path, limits: Option<&Limits>, forms: Forms) -> Result<Summary, JudgeError> {
+    let Found { summary, sketches, report } = find(run, limits, forms)?;
     // What was read is gone by now: drawing takes memory of its own.
-    let pictures = plot::draw(run, &sketches)?;
-    drop(sketches);
-    #[cfg(feature = "pdf")]
-    report.write(run, pictures)?;
-    #[cfg(not(feature = "pdf"))]
-    drop((pictures, report));
+    let figures = plot::draw(run, sketches)?;
+    report.write(run, forms, figures)?;
     let path = run.join("summary.json");
     let mut json =
         serde_json::to_vec_pretty(&summary).map_err(|source| JudgeError::Json { path: path.clone(), source })?;
@@ -97,11 +102,8 @@ fn judged(run: &Path, limits: Option<&Limits>) -> Result<Summary, JudgeError> {
 /// Results of a run whose tables are written and whose pictures are not drawn yet.
 struct Found {
     summary: Summary,
-    sketches: Vec<(&'static Picture, Sketch)>,
-    #[cfg(feature = "pdf")]
+    sketches: Vec<Sketched>,
     report: RunReport,
-    #[cfg(not(feature = "pdf"))]
-    report: (),
 }
 
 /// Measurements of a run.
@@ -136,18 +138,17 @@ fn measure(read: Run, run: &Path, limits: Option<&Limits>) -> Result<Measured, J
     Ok(Measured { read, errors, clock, consistency, slips, jitter, summary })
 }
 
-fn find(run: &Path, limits: Option<&Limits>) -> Result<Found, JudgeError> {
+fn find(run: &Path, limits: Option<&Limits>, forms: Forms) -> Result<Found, JudgeError> {
     let measured = measure(Run::read(run)?, run, limits)?;
     let Measured { read, errors, clock, consistency, slips, jitter, summary } = measured;
     let elevations = Elevations::measure(&read, &errors, &summary.details.stated)?;
-    let judged = Judged { run: &read, errors: &errors, clock: &clock, consistency: &consistency, summary: &summary };
+    let detail = Detail::Paper;
+    let judged =
+        Judged { run: &read, errors: &errors, clock: &clock, consistency: &consistency, summary: &summary, detail };
     tables::write_measured(run, &judged, &elevations, &slips, &jitter)?;
     tables::write(run, &judged)?;
-    let sketches = plot::sketches(&judged)?;
-    #[cfg(feature = "pdf")]
+    let sketches = plot::sketches(&judged, forms.html)?;
     let report = RunReport::new(&judged)?;
-    #[cfg(not(feature = "pdf"))]
-    let report = ();
     read.sound()?;
     errors.sound()?;
     Ok(Found { summary, sketches, report })

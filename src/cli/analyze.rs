@@ -26,7 +26,7 @@ pub fn execute(arguments: &args::Analyze) -> Result<(), CliError> {
         return Err(CliError::usage("analyze: expected a run's directory, or --truth"));
     };
     let gate = Gate::read(arguments.check.as_ref(), &SUMMARY)?;
-    let summary = analysis::judge_against(run, gate.limits()).map_err(judge_error)?;
+    let summary = analysis::judge_into(run, gate.limits(), arguments.report.forms()).map_err(judge_error)?;
     let verdict = &summary.details.verdict;
     arguments.printed.results(
         &format!("{summary}\nresults in {}\n", run.display()),
@@ -49,7 +49,7 @@ fn another_receiver(truth: &Path, arguments: &args::Analyze) -> Result<(), CliEr
         PathBuf::from("reports").join(name)
     });
     std::fs::create_dir_all(&out).map_err(|error| CliError::create(out.display(), &error))?;
-    show::foreign::write(&judgement, &verdict, &out).map_err(judge_error)?;
+    show::foreign::write(&judgement, &verdict, &out, arguments.report.forms()).map_err(judge_error)?;
     let text = format!("{}\n{verdict}\nresults in {}\n", judgement.summary, out.display());
     arguments.printed.results(
         &text,

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::analysis::show::document::Forms;
 use crate::cli::lines;
 use crate::cli::live::intake::Origin;
 use crate::cli::packed::{Bits, Packed};
@@ -160,6 +161,9 @@ pub struct Run {
     /// limits for figures of summary.json
     #[arg(long, value_name = "LIMITS.toml", num_args = 0..=1)]
     pub check: Option<Option<PathBuf>>,
+    /// Report to write
+    #[arg(long, value_name = "FORM", value_enum, default_value_t)]
+    pub report: ReportForm,
     /// Allow the scene to read files outside its own directory
     #[arg(long)]
     pub allow_outside: bool,
@@ -288,6 +292,27 @@ pub struct Live {
     /// Allow the scene to read files outside its own directory
     #[arg(long)]
     pub allow_outside: bool,
+}
+
+/// Forms of a report.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum ReportForm {
+    /// report.pdf, for paper
+    Pdf,
+    /// report.html, one page for a browser, with plots that zoom
+    Html,
+    /// Both files
+    #[default]
+    Both,
+    /// No report
+    None,
+}
+
+impl ReportForm {
+    /// Files that are written.
+    pub fn forms(self) -> Forms {
+        Forms { pdf: matches!(self, Self::Pdf | Self::Both), html: matches!(self, Self::Html | Self::Both) }
+    }
 }
 
 /// Source of the pace of a live run.
@@ -427,6 +452,9 @@ pub struct Analyze {
     /// Directory for the results about another receiver [default: reports/SCENE-foreign]
     #[arg(long, value_name = "DIR", requires = "truth")]
     pub out: Option<PathBuf>,
+    /// Report to write
+    #[arg(long, value_name = "FORM", value_enum, default_value_t)]
+    pub report: ReportForm,
     #[command(flatten)]
     pub printed: Printed,
 }

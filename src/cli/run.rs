@@ -99,7 +99,7 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     write_json(&run.join("speed.json"), &speed)?;
     let path = run.join("scenario.toml");
     fs::write(&path, &named.text).map_err(|error| CliError::output(path.display(), &error))?;
-    let summary = analysis::judge_against(run, gate.limits()).map_err(judge_error)?;
+    let summary = analysis::judge_into(run, gate.limits(), arguments.report.forms()).map_err(judge_error)?;
     staging.commit()?;
 
     for warning in &both.outcome.warnings {

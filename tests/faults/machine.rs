@@ -299,6 +299,9 @@ fn lasting(name: &str, bytes: Vec<u8>) -> Vec<u8> {
         Some("report.pdf") if bytes.starts_with(b"%PDF-") && bytes.trim_ascii_end().ends_with(b"%%EOF") => {
             b"report".to_vec()
         }
+        Some("report.html") if bytes.starts_with(b"<!DOCTYPE html>") && bytes.ends_with(b"</html>\n") => {
+            b"report".to_vec()
+        }
         Some("summary.json") => match serde_json::from_slice::<serde_json::Value>(&bytes) {
             Ok(mut summary) => {
                 summary.as_object_mut().map(|fields| fields.remove("speed"));

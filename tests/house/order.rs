@@ -154,16 +154,26 @@ pub const ORDER: Order<'static> = &[
     ),
     (
         "analysis/show",
-        &[&["report", "staged"], &["write"], &["plot"], &["pdf", "tables", "trade"], &["run_report"], &["foreign"]],
+        &[
+            &["report", "staged"],
+            &["write"],
+            &["plot"],
+            &["document", "tables", "trade"],
+            &["page", "pdf"],
+            &["run_report"],
+            &["foreign"],
+        ],
     ),
     (
         "analysis/show/plot",
         &[
             &["clip", "drawing", "marks", "ticks"],
             &["chart"],
-            &["judged", "series"],
+            &["series"],
             &["canvas"],
+            &["dome"],
             &["sketch"],
+            &["judged"],
             &["clock", "consistency", "delays", "foreign", "jitter", "position", "signals", "sky", "spectrum"],
             &["elevation", "multipath"],
         ],

@@ -265,6 +265,8 @@ fn broken_limits_exit_with_three_and_say_by_how_much_and_unusable_ones_stop_befo
     assert_eq!(fs::read_to_string(here.path().join("run/scenario.toml")).unwrap(), SHORT);
     let report = fs::read(here.path().join("run/report.pdf")).unwrap();
     assert!(report.starts_with(b"%PDF-"));
+    let page = fs::read(here.path().join("run/report.html")).unwrap();
+    assert!(page.starts_with(b"<!DOCTYPE html>") && page.ends_with(b"</html>\n"));
 
     let output = twin(&["analyze", "run", "--check", "broken.toml"], here.path());
     assert_eq!(code(&output), 3);
@@ -288,6 +290,17 @@ fn broken_limits_exit_with_three_and_say_by_how_much_and_unusable_ones_stop_befo
     let text = String::from_utf8_lossy(&damaged.stdout).into_owned();
     assert!(text.contains("satellites in view never acquired") && text.contains("G23: 45.0 dB-Hz"), "{text}");
     assert!(fs::read(here.path().join("run/report.pdf")).unwrap() != report, "the limits are in the report");
+    assert!(fs::read(here.path().join("run/report.html")).unwrap() != page, "the limits are in the page");
+
+    // A report is written in the forms that are asked for, and what is there of others stays.
+    for (form, written) in [("pdf", [true, false]), ("html", [false, true]), ("none", [false; 2]), ("both", [true; 2])]
+    {
+        let names = ["run/report.pdf", "run/report.html"].map(|name| here.path().join(name));
+        names.iter().for_each(|path| drop(fs::remove_file(path)));
+        let output = twin(&["analyze", "run", "--report", form], here.path());
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+        assert_eq!(names.map(|path| path.exists()), written, "{form}");
+    }
 }
 
 #[test]

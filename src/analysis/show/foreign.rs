@@ -5,14 +5,15 @@ use std::path::Path;
 use crate::error::JudgeError;
 use crate::judge::foreign::Judgement;
 use crate::judge::verdict::Verdict;
-use crate::show::plot;
+use crate::show::document::Forms;
 use crate::show::write::{write_rows, write_whole};
+use crate::show::{plot, run_report};
 
-/// Writes tables, verdict, pictures, `foreign_report.pdf` and `foreign.json` into an existing directory.
+/// Writes tables, verdict, pictures, the report in its forms and `foreign.json` into an existing directory.
 ///
 /// # Errors
 /// The file that cannot be written or drawn.
-pub fn write(judgement: &Judgement, verdict: &Verdict, out: &Path) -> Result<(), JudgeError> {
+pub fn write(judgement: &Judgement, verdict: &Verdict, out: &Path, forms: Forms) -> Result<(), JudgeError> {
     let judged = &judgement.judged;
     if let Some(measured) = &judged.observables {
         write_rows(&out.join("foreign_observations.csv"), measured.rows.iter())?;
@@ -24,11 +25,8 @@ pub fn write(judgement: &Judgement, verdict: &Verdict, out: &Path) -> Result<(),
         write_rows(&out.join("foreign_fixes.csv"), places.rows.iter())?;
     }
     write_rows(&out.join("foreign_verdict.csv"), verdict.csv_rows())?;
-    let pictures = plot::foreign::all(out, judged)?;
-    #[cfg(feature = "pdf")]
-    crate::show::run_report::foreign::write(out, judgement, verdict, pictures)?;
-    #[cfg(not(feature = "pdf"))]
-    drop(pictures);
+    let figures = plot::foreign::all(out, judged)?;
+    run_report::foreign::write(out, judgement, verdict, figures, forms)?;
     let path = out.join("foreign.json");
     let mut json = serde_json::to_vec_pretty(&judgement.summary)
         .map_err(|source| JudgeError::Json { path: path.clone(), source })?;

@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use clap::{Args, Subcommand, ValueEnum};
 
+use crate::cli::args::ReportForm;
 use crate::study::sweep::export::Directive;
 use crate::study::sweep::part::Part;
 
@@ -25,6 +26,9 @@ pub struct Study {
     /// Threads to use [default: one per core]
     #[arg(long, value_name = "J", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
+    /// Report to write
+    #[arg(long, value_name = "FORM", value_enum, default_value_t)]
+    pub report: ReportForm,
     /// Discard results of an earlier plan in that directory
     #[arg(long)]
     pub fresh: bool,
@@ -122,6 +126,9 @@ pub struct StudyMerge {
 pub struct StudyReport {
     /// Directory of the study
     pub directory: PathBuf,
+    /// Report to write
+    #[arg(long, value_name = "FORM", value_enum, default_value_t)]
+    pub report: ReportForm,
 }
 
 #[derive(Args, Debug)]

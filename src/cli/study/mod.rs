@@ -9,6 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use crate::analysis::show::document::Forms;
 use crate::cli::error::CliError;
 use crate::cli::progress::Progress;
 use crate::cli::run::{generator_error, judge_error, output_error, receiver_error};
@@ -27,7 +28,9 @@ pub fn execute(arguments: &args::Study) -> Result<(), CliError> {
         (Some(args::StudyAction::Run(arguments)), _) => run(arguments),
         (Some(args::StudyAction::Status(arguments)), _) => status(arguments),
         (Some(args::StudyAction::Merge(arguments)), _) => merge(arguments),
-        (Some(args::StudyAction::Report(arguments)), _) => report(&load(&arguments.directory)?),
+        (Some(args::StudyAction::Report(arguments)), _) => {
+            report(&load(&arguments.directory)?, arguments.report.forms())
+        }
         (Some(args::StudyAction::Export(arguments)), _) => engine::export(arguments),
         (Some(args::StudyAction::Submit(arguments)), _) => engine::submit(arguments),
         (None, Some(study)) => whole(study, arguments),
@@ -52,7 +55,7 @@ fn whole(study: &Path, arguments: &args::Study) -> Result<(), CliError> {
     }
     let plan = Plan::create(study, &directory, Cut::Default, &build()?).map_err(study_error)?;
     compute(&plan, &missing(&plan)?)?;
-    report(&plan)
+    report(&plan, arguments.report.forms())
 }
 
 fn plan(arguments: &args::StudyPlan) -> Result<(), CliError> {
@@ -207,10 +210,10 @@ fn write_parquet(_: &[u8], _: &Path) -> Result<(), CliError> {
     Err(crate::cli::no_parquet())
 }
 
-fn report(plan: &Plan) -> Result<(), CliError> {
+fn report(plan: &Plan, forms: Forms) -> Result<(), CliError> {
     let lines = result::merge(plan).map_err(study_error)?;
     let results = Results::new(plan, &lines).map_err(study_error)?;
-    publish::write(plan, &lines, &results).map_err(study_error)?;
+    publish::write(plan, &lines, &results, forms).map_err(study_error)?;
     let text = publish::in_short(&results);
     scenario::print(&format!("{text}report in {}\n", plan.directory.join("report.md").display()))
 }

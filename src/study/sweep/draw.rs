@@ -16,7 +16,8 @@ use super::publish::short;
 use super::result::{Cell, Results, THEORY};
 use super::spec::{Plot, PlotKind};
 use super::words;
-use analysis::show::plot::canvas::{Axis, Chart, Drawing, Failure, GREY, Mark, Series, WIDTH_PX, compose, figure};
+use analysis::show::plot::canvas::{Axis, Chart, Failure, GREY, Mark, Series, WIDTH_PX, figure};
+use analysis::show::plot::sketch::{Figure, Sketch};
 
 /// A picture of a study.
 #[derive(Clone, Debug)]
@@ -49,10 +50,12 @@ impl Picture {
     ///
     /// # Errors
     /// Errors of the drawing library.
-    pub fn drawing(&self) -> Result<Drawing, Failure> {
+    pub fn figure(&self) -> Result<Figure, Failure> {
         let columns = self.charts.len().clamp(1, 2);
         let rows = self.charts.len().div_ceil(columns).max(1);
-        compose((WIDTH_PX, 300 * rows as u32 + 40), columns, &self.charts, &self.legend)
+        let size = (WIDTH_PX, 300 * rows as u32 + 40);
+        let sketch = Sketch::of(size, columns, self.charts.clone(), self.legend.clone());
+        Figure::new(&self.stem, sketch, &self.title)
     }
 
     /// Table of the crossings in Markdown; empty for other pictures.

@@ -20,7 +20,6 @@ pub mod export;
 pub mod fixes;
 pub mod keys;
 pub mod model;
-#[cfg(feature = "pdf")]
 mod paper;
 pub mod part;
 pub mod plan;

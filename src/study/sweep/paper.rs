@@ -1,21 +1,20 @@
-//! A finished study on paper: `report.pdf`, of the same figures as `report.md`.
+//! A finished study as a report: `report.pdf` and `report.html`, of the same figures as `report.md`.
 
 use super::StudyError;
 use super::draw::Picture;
-use super::plan::Plan;
+use super::plan::{self, Plan};
 use super::publish::{self, Rows};
 use super::result::{Compared, Results};
 use super::spec::Level;
 use analysis::JudgeError;
-use analysis::show::pdf::{Item, Report, Side, Table, Tone};
+use analysis::show::document::{Forms, Item, Report, Side, Table, Tone};
 
-/// The report's bytes; they follow from plan and results alone.
+/// The report; it follows from plan and results alone.
 ///
 /// # Errors
 /// A picture that cannot be drawn.
-pub(super) fn pdf(plan: &Plan, results: &Results, pictures: &[Picture]) -> Result<Vec<u8>, StudyError> {
-    let failed =
-        |reason: String| StudyError::Judge(JudgeError::Plot { path: plan.directory.join("report.pdf"), reason });
+pub(super) fn report(plan: &Plan, results: &Results, pictures: &[Picture]) -> Result<Report, StudyError> {
+    let failed = |reason: String| StudyError::Judge(JudgeError::Plot { path: plan.directory.join("report"), reason });
     let (study, grid) = (&results.study, &results.study.grid);
     // A study's words are broken into lines where it suits their file.
     let about = study.about.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -58,7 +57,7 @@ pub(super) fn pdf(plan: &Plan, results: &Results, pictures: &[Picture]) -> Resul
     }
     report.heading("Pictures");
     for picture in pictures {
-        report.figure(picture.drawing().map_err(|error| failed(error.to_string()))?, &picture.title);
+        report.figure(picture.figure().map_err(|error| failed(error.to_string()))?);
         if let Some(rows) = &picture.crossings {
             report.table(table(&picture.title, rows.clone()));
         }
@@ -70,7 +69,24 @@ pub(super) fn pdf(plan: &Plan, results: &Results, pictures: &[Picture]) -> Resul
         report.heading("Cells");
         report.table(table("Figures with their intervals of 95 %", narrow(rows, study.axes.len())));
     }
-    report.pdf().map_err(|error| failed(error.to_string()))
+    Ok(report)
+}
+
+/// Writes the report in the forms that are asked for into the study's directory.
+///
+/// # Errors
+/// A report that cannot be made or written.
+pub(super) fn write(plan: &Plan, report: &Report, forms: Forms) -> Result<(), StudyError> {
+    #[cfg(feature = "pdf")]
+    if forms.pdf {
+        let path = plan.directory.join("report.pdf");
+        let failed = |reason: String| StudyError::Judge(JudgeError::Plot { path: path.clone(), reason });
+        plan::write(&path, &report.pdf().map_err(|error| failed(error.to_string()))?)?;
+    }
+    if forms.html {
+        plan::write(&plan.directory.join("report.html"), report.html().as_bytes())?;
+    }
+    Ok(())
 }
 
 /// Largest number of columns that a page holds without breaking words.

@@ -1,5 +1,5 @@
-//! Writes a finished study down: `cases.csv`, `cells.csv`, pictures, `report.md` and `report.pdf` in its
-//! directory.
+//! Writes a finished study down: `cases.csv`, `cells.csv`, pictures, `report.md`, `report.pdf` and
+//! `report.html` in its directory.
 //!
 //! Bytes follow from plan and results alone: how long it took and where is not in them. Other forms of report
 //! start from [`Results`] and [`draw::pictures`] as this one does.
@@ -12,6 +12,7 @@ use super::result::{self, Agreement, Compared, Results, THEORY};
 use super::spec::Level;
 use super::{StudyError, axis, plan};
 use crate::proof::LEAST_SNR;
+use analysis::show::document::Forms;
 
 /// Cells that the report lists; the rest are in `cells.csv`.
 const MOST_LISTED: usize = 60;
@@ -19,11 +20,11 @@ const MOST_LISTED: usize = 60;
 /// Values of an axis that the report lists; all are in `cells.csv`.
 const MOST_VALUES: usize = 40;
 
-/// Writes everything.
+/// Writes everything, the report in the forms that are asked for.
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write(plan: &Plan, lines: &[String], results: &Results) -> Result<(), StudyError> {
+pub fn write(plan: &Plan, lines: &[String], results: &Results, forms: Forms) -> Result<(), StudyError> {
     let directory = &plan.directory;
     plan::write(&directory.join("cases.csv"), &result::table(plan, lines))?;
     plan::write(&directory.join("cells.csv"), &results.table()?)?;
@@ -36,8 +37,7 @@ pub fn write(plan: &Plan, lines: &[String], results: &Results) -> Result<(), Stu
             picture.draw(&directory.join(format!("{}.{ending}", picture.stem)))?;
         }
     }
-    #[cfg(feature = "pdf")]
-    plan::write(&directory.join("report.pdf"), &super::paper::pdf(plan, results, &pictures)?)?;
+    super::paper::write(plan, &super::paper::report(plan, results, &pictures)?, forms)?;
     plan::write(&directory.join("report.md"), text(plan, results, &pictures).as_bytes())
 }
 

@@ -11,6 +11,7 @@ use crate::judge::judgement::Status;
 use crate::judge::limits::Limits;
 use crate::judge::verdict::Verdict;
 use crate::measure::independent::tests::Draw;
+use crate::show::document::Forms;
 use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use gnss::gps::l1ca::L1_CA;
 use gnss::record::{Observation, SkyRow, TrajectoryRow};
@@ -281,7 +282,7 @@ fn every_planted_bias_is_named_with_its_size() {
     near("up", position.bias_up_m, -2.0, 5.0 * 0.4 / 50.0_f64.sqrt());
     near("time tag of positions", position.time_tag_offset_s, 3e-3, 5.0 * 0.4 / 20.0 / 50.0_f64.sqrt());
     let verdict = Verdict::of_foreign(&judgement).unwrap();
-    crate::show::foreign::write(&judgement, &verdict, place.path()).unwrap();
+    crate::show::foreign::write(&judgement, &verdict, place.path(), Forms::BOTH).unwrap();
     for name in [
         "foreign.json",
         "foreign_observations.csv",

@@ -1,8 +1,10 @@
 //! Items onto pages: what is placed where, before any file is written.
 
 use super::fonts::{Face, Fonts};
-use super::{Item, Report, Tone, table};
+use super::table;
+use crate::show::document::{Item, Report, Tone};
 use crate::show::plot::drawing::Drawing;
+use crate::show::plot::sketch::Figure;
 
 /// A4 in points, and its margins.
 pub(super) const PAGE: (f32, f32) = (595.28, 841.89);
@@ -173,11 +175,7 @@ pub(super) fn lay_out<'a>(report: &'a Report, fonts: &'a Fonts) -> Pages<'a> {
                 sheet.lines(&lines, Face::Regular, TEXT, LEADING, INK);
                 sheet.skip(6.0);
             }
-            Item::Note(text) => {
-                let lines = fonts.wrap(Face::Regular, SMALL, text, WIDTH, 0.0);
-                sheet.lines(&lines, Face::Regular, SMALL, SMALL_LEADING, FAINT);
-                sheet.skip(6.0);
-            }
+            Item::Note(text) => note(&mut sheet, text),
             Item::Banner(text, tone) => banner(&mut sheet, text, *tone),
             Item::Facts(pairs) => facts(&mut sheet, pairs),
             Item::Table(one) => {
@@ -190,13 +188,18 @@ pub(super) fn lay_out<'a>(report: &'a Report, fonts: &'a Fonts) -> Pages<'a> {
                     sheet.skip(3.0);
                 }
                 table::lay_out(&mut sheet, one);
+                let left = one.rows.len() - one.printed().len();
+                if left > 0 {
+                    note(&mut sheet, &format!("{left} more are below."));
+                }
             }
-            Item::Figure(drawing, caption) => {
+            Item::Figure(Figure { drawing, caption, .. }) => {
                 figures += 1;
                 figure(&mut sheet, drawing, figures, caption);
             }
-            Item::Pair(left, right) => {
-                pair(&mut sheet, [left, right], figures + 1);
+            Item::Pair(both) => {
+                let [left, right] = &**both;
+                pair(&mut sheet, [&left.drawing, &right.drawing], figures + 1);
             }
             Item::Listing(text) => listing(&mut sheet, text),
         }
@@ -207,7 +210,7 @@ pub(super) fn lay_out<'a>(report: &'a Report, fonts: &'a Fonts) -> Pages<'a> {
 /// Height without which an item does not begin on a page.
 fn least_height(item: &Item, fonts: &Fonts) -> f32 {
     match item {
-        Item::Figure(drawing, caption) => picture_height(drawing, caption, fonts).1,
+        Item::Figure(one) => picture_height(&one.drawing, &one.caption, fonts).1,
         Item::Table(one) => table::least_height(one, fonts),
         Item::NewPage => 0.0,
         _ => 3.0 * LEADING,
@@ -222,6 +225,12 @@ fn title(sheet: &mut Sheet<'_>, report: &Report) {
         sheet.lines(&lines, Face::Regular, TEXT, LEADING, FAINT);
     }
     sheet.skip(8.0);
+}
+
+fn note(sheet: &mut Sheet<'_>, text: &str) {
+    let lines = sheet.fonts.wrap(Face::Regular, SMALL, text, WIDTH, 0.0);
+    sheet.lines(&lines, Face::Regular, SMALL, SMALL_LEADING, FAINT);
+    sheet.skip(6.0);
 }
 
 fn heading(sheet: &mut Sheet<'_>, text: &str, size: f32, next: f32) {

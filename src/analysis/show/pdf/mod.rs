@@ -1,10 +1,10 @@
 //! Reports as PDF: text, tables and vector pictures on A4 pages, with nothing but the bundled fonts.
 //!
-//! A [`Report`] is a list of items that flow down the pages: headings, wrapped text, facts, tables whose
-//! header is repeated on every page, pictures with numbered captions, listings. It knows nothing of runs or
-//! studies. The same report gives the same bytes: no clock, no random identifiers. krilla writes the file,
-//! krilla-svg the pictures; text stays text, to be searched and copied. Limits: left to right; no
-//! hyphenation; characters that the fonts lack become question marks.
+//! The items of a [`Report`] flow down the pages: headings, wrapped text, facts, tables whose header is
+//! repeated on every page, pictures with numbered captions, listings. The same report gives the same bytes:
+//! no clock, no random identifiers. krilla writes the file, krilla-svg the pictures; text stays text, to be
+//! searched and copied. Limits: left to right; no hyphenation; characters that the fonts lack become question
+//! marks.
 
 mod fonts;
 mod layout;
@@ -15,7 +15,7 @@ mod write;
 
 use thiserror::Error;
 
-use crate::show::plot::drawing::Drawing;
+use super::document::Report;
 
 /// Error in the making of a report. Each is a fault of the program, not of its data.
 #[derive(Debug, Error)]
@@ -36,156 +36,7 @@ pub enum PdfError {
     Write(String),
 }
 
-/// Meaning of a cell or a banner. Its colours are distinct for colour-blind people, and the words say it too.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Tone {
-    /// Same weight as the surrounding text.
-    #[default]
-    Plain,
-    /// Less weight than the surrounding text.
-    Faint,
-    /// Bold text.
-    Strong,
-    /// Green: passed.
-    Good,
-    /// Orange: marginal.
-    Caution,
-    /// Red: failed.
-    Bad,
-}
-
-/// One cell of a table.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Cell {
-    /// Text of the cell.
-    pub text: String,
-    /// Meaning of the cell, which sets its colour.
-    pub tone: Tone,
-}
-
-impl Cell {
-    /// A cell with a tone.
-    pub fn toned(text: impl Into<String>, tone: Tone) -> Self {
-        Self { text: text.into(), tone }
-    }
-}
-
-impl<T: Into<String>> From<T> for Cell {
-    fn from(text: T) -> Self {
-        Self { text: text.into(), tone: Tone::Plain }
-    }
-}
-
-/// Side on which a column's text is aligned; numbers are aligned right.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
-    /// Words, flush left.
-    Left,
-    /// Numbers, flush right.
-    Right,
-}
-
-/// A table; rows shorter than the header end in empty cells.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Table {
-    /// Heading and side of each.
-    pub columns: Vec<(String, Side)>,
-    /// Cells of each row, as many as there are columns.
-    pub rows: Vec<Vec<Cell>>,
-    /// Above it, with its number; empty for a table without either.
-    pub caption: String,
-}
-
-impl Table {
-    /// A table without rows.
-    pub fn new<'a>(caption: impl Into<String>, columns: impl IntoIterator<Item = (&'a str, Side)>) -> Self {
-        let columns = columns.into_iter().map(|(title, side)| (title.to_owned(), side)).collect();
-        Self { columns, rows: Vec::new(), caption: caption.into() }
-    }
-
-    /// Adds a row.
-    pub fn row<C: Into<Cell>>(&mut self, cells: impl IntoIterator<Item = C>) {
-        self.rows.push(cells.into_iter().map(Into::into).collect());
-    }
-}
-
-/// Element in the flow of the pages.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Item {
-    /// Heading of a chapter, listed in the outline.
-    Heading(String),
-    /// Heading within a chapter.
-    Subheading(String),
-    /// A paragraph.
-    Text(String),
-    /// Paragraph in small letters.
-    Note(String),
-    /// A bar across the page.
-    Banner(String, Tone),
-    /// Names and values, two pairs a row.
-    Facts(Vec<(String, String)>),
-    /// A table, over several pages where it is long.
-    Table(Table),
-    /// A picture as wide as the text, and its caption below.
-    Figure(Drawing, String),
-    /// Two pictures side by side, without captions.
-    Pair(Drawing, Drawing),
-    /// Lines as they are, in a font of equal widths.
-    Listing(String),
-    /// Page break.
-    NewPage,
-}
-
-/// A report to be printed.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Report {
-    /// Title on the first page and at the head of the others.
-    pub title: String,
-    /// Text below the title.
-    pub subtitle: String,
-    /// Text at the right of every page's head; the title is at its left.
-    pub head: String,
-    /// Elements in the order of the pages.
-    pub items: Vec<Item>,
-}
-
 impl Report {
-    /// An empty report.
-    pub fn new(title: impl Into<String>, subtitle: impl Into<String>, head: impl Into<String>) -> Self {
-        Self { title: title.into(), subtitle: subtitle.into(), head: head.into(), items: Vec::new() }
-    }
-
-    /// Adds an item.
-    pub fn add(&mut self, item: Item) -> &mut Self {
-        self.items.push(item);
-        self
-    }
-
-    /// Starts a chapter.
-    pub fn heading(&mut self, text: impl Into<String>) -> &mut Self {
-        self.add(Item::Heading(text.into()))
-    }
-
-    /// Starts a part of a chapter.
-    pub fn subheading(&mut self, text: impl Into<String>) -> &mut Self {
-        self.add(Item::Subheading(text.into()))
-    }
-
-    /// Adds a paragraph.
-    pub fn text(&mut self, text: impl Into<String>) -> &mut Self {
-        self.add(Item::Text(text.into()))
-    }
-
-    /// Adds a table.
-    pub fn table(&mut self, table: Table) -> &mut Self {
-        self.add(Item::Table(table))
-    }
-
-    /// Adds a picture with what to look at in it.
-    pub fn figure(&mut self, drawing: Drawing, caption: impl Into<String>) -> &mut Self {
-        self.add(Item::Figure(drawing, caption.into()))
-    }
-
     /// The report as a PDF file.
     ///
     /// # Errors

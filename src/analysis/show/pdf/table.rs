@@ -2,7 +2,7 @@
 
 use super::fonts::{Face, Fonts, words};
 use super::layout::{FAINT, INK, RULE, Sheet, WIDTH, ink};
-use super::{Cell, Side, Table, Tone};
+use crate::show::document::{Cell, Side, Table, Tone};
 
 const SIZE: f32 = 8.0;
 const LEADING: f32 = 10.4;
@@ -21,8 +21,8 @@ struct TableRow {
 /// begin on a page.
 pub(super) fn least_height(table: &Table, fonts: &Fonts) -> f32 {
     let widths = widths(table, fonts);
-    let rows = if table.rows.len() <= SHORT { SHORT } else { 2 };
-    let rows = table.rows.iter().take(rows).map(|cells| row(cells, &widths, fonts).height).sum::<f32>();
+    let rows = if table.printed().len() <= SHORT { SHORT } else { 2 };
+    let rows = table.printed().iter().take(rows).map(|cells| row(cells, &widths, fonts).height).sum::<f32>();
     26.0 + header(table, &widths, fonts).height + rows
 }
 
@@ -36,7 +36,7 @@ pub(super) fn lay_out(sheet: &mut Sheet<'_>, table: &Table) {
         sheet.rule(0.0, WIDTH, 0.5, INK);
     };
     draw_header(sheet);
-    for (index, cells) in table.rows.iter().enumerate() {
+    for (index, cells) in table.printed().iter().enumerate() {
         let row = row(cells, &widths, sheet.fonts);
         if sheet.room() < row.height {
             sheet.rule(0.0, WIDTH, 0.8, INK);

@@ -2,10 +2,11 @@
 
 use super::fonts::{Face, Fonts};
 use super::layout::{LEFT, Mark, PAGE, WIDTH, lay_out};
-use super::*;
-use crate::show::plot::canvas::{Axis, BLUE, Chart, Mark as Look, ORANGE, Series, WIDTH_PX, compose};
+use crate::show::document::{Cell, Item, Report, Side, Table, Tone};
+use crate::show::plot::canvas::{Axis, BLUE, Chart, Mark as Look, ORANGE, Series, WIDTH_PX};
+use crate::show::plot::sketch::{Figure, Sketch};
 
-fn drawing(points: i32) -> Drawing {
+fn figure(points: i32) -> Figure {
     let wave = |n: i32| (f64::from(n), libm::sin(f64::from(n) * 0.1));
     let dots = Series::new("dots", BLUE, Look::Dots, (0..points).map(wave).collect());
     let line = Series::new("a line", ORANGE, Look::Line, (0..points).map(wave).collect());
@@ -16,7 +17,8 @@ fn drawing(points: i32) -> Drawing {
         vec![],
     );
     let chart = Chart { series: vec![dots.clone(), line.clone()], ..chart };
-    compose((WIDTH_PX, 300), 1, &[chart], &[dots, line]).unwrap()
+    let sketch = Sketch::charts((WIDTH_PX, 300), 1, [chart], [dots, line]);
+    Figure::new("waves", sketch, "What to look at in a picture of waves. ".repeat(4)).unwrap()
 }
 
 const ROWS: usize = 150;
@@ -53,7 +55,7 @@ fn everything() -> Report {
     report.table(table);
     report.heading("Pictures");
     (0..3).for_each(|n| {
-        report.figure(drawing(400 + n), "What to look at in a picture of waves. ".repeat(4));
+        report.figure(figure(400 + n));
     });
     report.heading("Listing").add(Item::Listing(format!("a = 1\n\n\tb = \"{}\"\n", "long".repeat(60))));
     report

@@ -13,9 +13,10 @@ use krilla::surface::Surface;
 use krilla::text::{Font, GlyphId, KrillaGlyph};
 use krilla_svg::{SurfaceExt, SvgSettings};
 
+use super::PdfError;
 use super::fonts::{Face, Fonts};
 use super::layout::{Colour, FAINT, LEFT, Mark, PAGE, Pages, RULE, WIDTH};
-use super::{PdfError, Report};
+use crate::show::document::Report;
 
 /// The PDF's fonts beside their widths.
 struct Pens<'a> {

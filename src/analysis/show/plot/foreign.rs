@@ -7,35 +7,28 @@ use crate::error::JudgeError;
 use crate::judge::foreign::Judged;
 use crate::judge::foreign::measured::ObservationError;
 use crate::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
-use crate::show::plot::drawing::{Drawing, Failure, PNG_SCALE};
-use crate::show::plot::sketch::Sketch;
+use crate::show::plot::drawing::{Failure, PNG_SCALE};
+use crate::show::plot::sketch::{Figure, Sketch};
 use crate::statistics::{mean, percentile};
 
 type Points = Vec<(f64, f64)>;
 
-/// A picture with the words below it.
-#[cfg_attr(not(feature = "pdf"), allow(dead_code, reason = "they are for paper"))]
-pub(crate) struct Picture {
-    pub caption: &'static str,
-    pub drawing: Drawing,
-}
-
 /// Draws what there is to draw into a directory.
-pub(crate) fn all(directory: &Path, judged: &Judged) -> Result<Vec<Picture>, JudgeError> {
+pub(crate) fn all(directory: &Path, judged: &Judged) -> Result<Vec<Figure>, JudgeError> {
     let sketches = [
         ("foreign_observables", OBSERVABLES, judged.observables.as_ref().map(|_| observables(judged))),
         ("foreign_position", POSITION, judged.places.as_ref().map(|_| position(judged))),
     ];
-    let mut pictures = Vec::new();
+    let mut figures = Vec::new();
     for (name, caption, sketch) in sketches {
         let Some(sketch) = sketch.flatten() else { continue };
         let path = directory.join(name).with_extension("png");
         let failed = |error: Failure| JudgeError::Plot { path: path.clone(), reason: error.to_string() };
-        let drawing = sketch.draw().map_err(failed)?;
-        drawing.write_png(&path, PNG_SCALE)?;
-        pictures.push(Picture { caption, drawing });
+        let figure = Figure::new(name, sketch, caption).map_err(failed)?;
+        figure.drawing.write_png(&path, PNG_SCALE)?;
+        figures.push(figure);
     }
-    Ok(pictures)
+    Ok(figures)
 }
 
 const OBSERVABLES: &str = "Errors of the receiver's observables against the truth over its own time. What all \

@@ -5,7 +5,17 @@ use crate::measure::clock::Clock;
 use crate::measure::consistency::Consistency;
 use crate::measure::errors::Errors;
 use crate::read::Run;
-use crate::show::plot::chart::Axis;
+use crate::show::plot::chart::{Axis, Chart, Mark, Series};
+use crate::show::plot::sketch::Sketch;
+
+/// Reader of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Detail {
+    /// Paper: no more marks than the eye can resolve, evenly chosen.
+    Paper,
+    /// A screen that magnifies: more points, the least and the greatest of every run of neighbours.
+    Screen,
+}
 
 /// Everything that a picture is drawn from.
 pub(crate) struct Judged<'a> {
@@ -14,9 +24,29 @@ pub(crate) struct Judged<'a> {
     pub clock: &'a Clock,
     pub consistency: &'a Consistency,
     pub summary: &'a Summary,
+    pub detail: Detail,
 }
 
 impl Judged<'_> {
+    /// The mark by whose rule points of another are thinned.
+    pub(super) fn thinned_as(&self, mark: Mark) -> Mark {
+        if self.detail == Detail::Screen { Mark::Line } else { mark }
+    }
+
+    /// Charts in the detail that is asked for.
+    pub(super) fn sketch(
+        &self,
+        size: (u32, u32),
+        columns: usize,
+        charts: impl Into<Vec<Chart>>,
+        legend: impl Into<Vec<Series>>,
+    ) -> Sketch {
+        match self.detail {
+            Detail::Paper => Sketch::charts(size, columns, charts, legend),
+            Detail::Screen => Sketch::of(size, columns, charts.into(), legend.into()),
+        }
+    }
+
     /// An axis over the times at which there is something, or the whole run if there is nothing.
     pub(super) fn time_axis(&self, times_s: impl Iterator<Item = f64>) -> Axis {
         let first_s = times_s.fold(self.run.scene.duration_s, f64::min);

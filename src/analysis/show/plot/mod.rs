@@ -12,6 +12,7 @@ mod clip;
 mod clock;
 mod consistency;
 mod delays;
+pub(crate) mod dome;
 pub mod drawing;
 mod elevation;
 pub(crate) mod foreign;
@@ -22,7 +23,7 @@ mod multipath;
 mod position;
 mod series;
 mod signals;
-mod sketch;
+pub mod sketch;
 mod sky;
 mod spectrum;
 pub mod ticks;
@@ -33,15 +34,14 @@ use rayon::prelude::*;
 
 use crate::error::JudgeError;
 use canvas::Failure;
-use drawing::{Drawing, PNG_SCALE};
-pub(crate) use judged::Judged;
-pub(crate) use sketch::Sketch;
+use drawing::PNG_SCALE;
+pub(crate) use judged::{Detail, Judged};
+use sketch::{Figure, Sketch};
 
 /// One picture of a run; `None` where the run has nothing of the kind.
 type Sketcher = fn(&Judged<'_>) -> Result<Option<Sketch>, JudgeError>;
 
 /// A picture by its name, what to look at in it, and the files with its numbers.
-#[cfg_attr(not(feature = "pdf"), allow(dead_code, reason = "captions are for paper, and a test holds the tables"))]
 pub(crate) struct Picture {
     /// The PNG's, without its ending.
     pub name: &'static str,
@@ -178,30 +178,43 @@ pub(crate) const PICTURES: [Picture; 17] = [
 ];
 
 /// Sky and horizontal errors half as wide as a page's text, for its first page.
-#[cfg_attr(not(feature = "pdf"), allow(dead_code, reason = "they are for paper alone"))]
 pub(crate) fn front(judged: &Judged<'_>) -> Result<[Sketch; 2], JudgeError> {
     Ok([sky::narrow(judged)?, position::narrow(judged)?])
 }
 
-/// Content of each picture that a run has.
-pub(crate) fn sketches(judged: &Judged<'_>) -> Result<Vec<(&'static Picture, Sketch)>, JudgeError> {
-    let one = |picture: &'static Picture| (picture.sketch)(judged).map(|sketch| Some((picture, sketch?)));
+/// Names of the pictures that a page magnifies with more points, and shows first.
+pub(crate) const ZOOMED: [&str; 3] = ["position_time", "cn0", "observables"];
+
+/// A picture of a run before it is drawn.
+pub(crate) struct Sketched {
+    pub picture: &'static Picture,
+    pub paper: Sketch,
+    /// Content with more points, for a page that magnifies them.
+    pub screen: Option<Sketch>,
+}
+
+/// Content of each picture that a run has; with `pages`, also what a page magnifies.
+pub(crate) fn sketches(judged: &Judged<'_>, pages: bool) -> Result<Vec<Sketched>, JudgeError> {
+    let magnified = Judged { detail: Detail::Screen, ..*judged };
+    let one = |picture: &'static Picture| {
+        let Some(paper) = (picture.sketch)(judged)? else { return Ok(None) };
+        let screen = if pages && ZOOMED.contains(&picture.name) { (picture.sketch)(&magnified)? } else { None };
+        Ok(Some(Sketched { picture, paper, screen }))
+    };
     PICTURES.iter().filter_map(|picture| one(picture).transpose()).collect()
 }
 
-/// Draws them into the run's directory.
-pub(crate) fn draw(
-    directory: &Path,
-    sketches: &[(&'static Picture, Sketch)],
-) -> Result<Vec<(&'static Picture, Drawing)>, JudgeError> {
-    let one = |(picture, sketch): &(&'static Picture, Sketch)| {
+/// Draws them into the run's directory; the figures of its report.
+pub(crate) fn draw(directory: &Path, sketches: Vec<Sketched>) -> Result<Vec<Figure>, JudgeError> {
+    let one = |Sketched { picture, paper, screen }: Sketched| {
         let path = directory.join(picture.name).with_extension("png");
         let failed = |error: Failure| JudgeError::Plot { path: path.clone(), reason: error.to_string() };
-        let drawing = sketch.draw().map_err(failed)?;
+        let drawing = paper.draw().map_err(failed)?;
         drawing.write_png(&path, PNG_SCALE)?;
-        Ok((*picture, drawing))
+        let caption = format!("{} Numbers: {}.", picture.caption, picture.numbers.join(", "));
+        Ok(Figure { name: picture.name.to_owned(), drawing, sketch: screen.unwrap_or(paper), caption })
     };
-    sketches.par_iter().map(one).collect()
+    sketches.into_par_iter().map(one).collect()
 }
 
 #[cfg(test)]

@@ -139,7 +139,8 @@ pub fn time(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     type Of<T> = fn(&T) -> f64;
     let chart = |title: &str, of: Of<PositionError>, sigma: Of<Fix>| {
         let errors = &judged.errors.positions;
-        let points = Shown::of(Mark::Dots, |see| errors.each(|error| see(error.time_s, of(&error))))?;
+        let mark = judged.thinned_as(Mark::Dots);
+        let points = Shown::of(mark, |see| errors.each(|error| see(error.time_s, of(&error))))?;
         let bounds = |see: &mut dyn FnMut(f64, f64)| {
             let mut formal = judged.run.fixes.finder()?;
             errors.each(|error| {
@@ -176,7 +177,7 @@ pub fn time(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         Series::new("fixes", BLUE, Mark::Dots, Vec::new()),
         Series::new("±1.96 σ of the receiver's covariance", ORANGE, Mark::Line, Vec::new()),
     ];
-    Ok(Some(Sketch::charts((WIDTH_PX, 430), 2, charts, legend)))
+    Ok(Some(judged.sketch((WIDTH_PX, 430), 2, charts, legend)))
 }
 
 /// Quantile of the normal distribution that leaves 2.5 % above.

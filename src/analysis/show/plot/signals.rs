@@ -4,7 +4,7 @@ use crate::error::JudgeError;
 use crate::measure::errors::{Link, SignalError};
 use crate::show::plot::canvas::{Axis, Chart, Mark, Series, WIDTH_PX};
 use crate::show::plot::chart::{Ends, Shown};
-use crate::show::plot::judged::Judged;
+use crate::show::plot::judged::{Detail, Judged};
 use crate::show::plot::sketch::Sketch;
 use crate::statistics::ranked;
 use gnss::record::TrackingRow;
@@ -72,9 +72,11 @@ impl Cloud {
         let (mut series, mut inside) = (Vec::new(), 0);
         for (index, link) in links.iter().enumerate() {
             let mut one = Series::numbered(judged.run.name(*link), index, Vec::new());
-            let shown = Shown::among(links.len(), one.mark, |see| {
+            // A screen that magnifies may look beyond the axis.
+            let all = judged.detail == Detail::Screen;
+            let shown = Shown::among(links.len(), judged.thinned_as(one.mark), |see| {
                 points(*link, &mut |at, value| {
-                    if (y.from..=y.to).contains(&value) {
+                    if all || (y.from..=y.to).contains(&value) {
                         see(at, value);
                     }
                 })
@@ -165,7 +167,21 @@ pub fn cn0(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     above.y = Axis::around("C/N0 (dB-Hz)", all.values(), 4.0);
     let title = "C/N0 measured minus expected";
     let below = chart(title, "difference (dB)", 1.0, &|link, row| row.cn0_dbhz - reference(link, row))?;
-    Ok(Some(Sketch::charts((WIDTH_PX, 430), 1, [above, below], legend(judged, &links))))
+    let mut charts = vec![above, below];
+    if judged.detail == Detail::Screen {
+        charts.push(elevations(judged, &links)?);
+    }
+    Ok(Some(judged.sketch((WIDTH_PX, 430), 1, charts, legend(judged, &links))))
+}
+
+/// Elevations of the satellites over time.
+fn elevations(judged: &Judged<'_>, links: &[Link]) -> Result<Chart, JudgeError> {
+    let frame = Frame { title: "Elevation", y_label: "elevation (degrees)", least: 4.0 };
+    over_time(judged, links, &frame, |link, see| {
+        let places = judged.run.seen(link.sv, |row| (judged.run.time_s(row.sample), row.elevation_deg))?;
+        places.into_iter().for_each(|(time_s, elevation_deg)| see(time_s, elevation_deg));
+        Ok(())
+    })
 }
 
 /// Errors of code, carrier and Doppler.
@@ -179,5 +195,5 @@ pub fn observables(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         chart("Carrier error, a constant removed from each arc", "error (cycles)", 0.01, |row| row.carrier_cycles)?,
         chart("Doppler error", "error (Hz)", 0.1, |row| row.doppler_hz)?,
     ];
-    Ok(Some(Sketch::charts((WIDTH_PX, 540), 1, charts, legend(judged, &links))))
+    Ok(Some(judged.sketch((WIDTH_PX, 540), 1, charts, legend(judged, &links))))
 }

@@ -2,18 +2,26 @@
 
 use super::canvas::compose;
 use super::chart::{Chart, Series};
-use super::drawing::{Area, Drawing, Failure};
-
-/// Draws on a surface whatever it holds.
-pub type Drawer = dyn Fn(&Area<'_>) -> Result<(), Failure> + Send + Sync;
+use super::dome::Sky;
+use super::drawing::{Drawing, Failure};
 
 /// Content of a picture, with no more points than are drawn. Its source data can be released before it is
 /// drawn.
+#[derive(Clone, Debug)]
 pub enum Sketch {
     /// Charts, so many a row, with one legend below all of them.
-    Charts { size: (u32, u32), columns: usize, charts: Vec<Chart>, legend: Vec<Series> },
-    /// Anything else.
-    Free { size: (u32, u32), draw: Box<Drawer> },
+    Charts {
+        /// Width and height, pixels.
+        size: (u32, u32),
+        /// Charts in a row.
+        columns: usize,
+        /// Charts, row by row.
+        charts: Vec<Chart>,
+        /// Series that are named.
+        legend: Vec<Series>,
+    },
+    /// Satellites above the horizon.
+    Sky(Sky),
 }
 
 impl Sketch {
@@ -24,14 +32,20 @@ impl Sketch {
         charts: impl Into<Vec<Chart>>,
         legend: impl Into<Vec<Series>>,
     ) -> Self {
-        let (mut charts, mut legend): (Vec<Chart>, Vec<Series>) = (charts.into(), legend.into());
+        let mut charts: Vec<Chart> = charts.into();
         for chart in &mut charts {
             let clouds = chart.series.iter().filter(|series| series.is_cloud()).count();
             chart.series.iter_mut().for_each(|series| series.thin(clouds));
         }
-        legend.iter_mut().for_each(|series| series.points = Vec::new());
         // What no chart shows is not named.
+        let mut legend: Vec<Series> = legend.into();
         legend.retain(|entry| charts.iter().any(|chart| chart.shows(entry)));
+        Self::of(size, columns, charts, legend)
+    }
+
+    /// Charts with every point and every entry of the legend that they have.
+    pub fn of(size: (u32, u32), columns: usize, charts: Vec<Chart>, mut legend: Vec<Series>) -> Self {
+        legend.iter_mut().for_each(|series| series.points = Vec::new());
         Self::Charts { size, columns, charts, legend }
     }
 
@@ -42,8 +56,31 @@ impl Sketch {
     pub fn draw(&self) -> Result<Drawing, Failure> {
         match self {
             Self::Charts { size, columns, charts, legend } => compose(*size, *columns, charts, legend),
-            Self::Free { size, draw } => Drawing::new(*size, draw),
+            Self::Sky(sky) => sky.draw(),
         }
+    }
+}
+
+/// A picture in a report: drawn for paper, and its content for a page.
+#[derive(Clone, Debug)]
+pub struct Figure {
+    /// Name of the picture's file, without an ending.
+    pub name: String,
+    /// Drawing as wide as the text, or half as wide in a pair.
+    pub drawing: Drawing,
+    /// Content that a page draws.
+    pub sketch: Sketch,
+    /// Words below it, which say what to look at.
+    pub caption: String,
+}
+
+impl Figure {
+    /// A sketch, drawn for paper.
+    ///
+    /// # Errors
+    /// Errors of the drawing library.
+    pub fn new(name: impl Into<String>, sketch: Sketch, caption: impl Into<String>) -> Result<Self, Failure> {
+        Ok(Self { name: name.into(), drawing: sketch.draw()?, sketch, caption: caption.into() })
     }
 }
 

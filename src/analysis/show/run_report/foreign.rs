@@ -1,17 +1,17 @@
-//! `foreign_report.pdf` of a receiver that this project did not write: the verdict, and its pictures.
+//! `foreign_report.pdf` and `.html` of a receiver that this project did not write: the verdict, and its
+//! pictures.
 
 use std::path::Path;
 
-use super::{front, verdict};
+use super::{front, publish, verdict};
 use crate::error::JudgeError;
 use crate::judge::foreign::Judgement;
 use crate::judge::judgement::number;
 use crate::judge::verdict::Verdict;
-use crate::show::pdf::{Item, Report};
-use crate::show::plot::foreign::Picture;
-use crate::show::write::write_whole;
+use crate::show::document::{Forms, Item, Report};
+use crate::show::plot::sketch::Figure;
 
-/// Writes it into an existing directory.
+/// Writes them into an existing directory, as asked.
 ///
 /// # Errors
 /// [`JudgeError::Plot`] where the report cannot be made, [`JudgeError::File`] where it cannot be written.
@@ -19,7 +19,8 @@ pub(crate) fn write(
     out: &Path,
     judgement: &Judgement,
     found: &Verdict,
-    pictures: Vec<Picture>,
+    mut figures: Vec<Figure>,
+    forms: Forms,
 ) -> Result<(), JudgeError> {
     let (run, judged) = (&judgement.run, &judgement.judged);
     let receiver = judged.receiver.clone().unwrap_or_else(|| "receiver under test".to_owned());
@@ -39,19 +40,16 @@ pub(crate) fn write(
     report.add(Item::Facts(facts.collect()));
     front::failures(&mut report, found);
     // Positions come last, and are what the first page shows.
-    let mut pictures = pictures;
-    if let Some(last) = pictures.pop() {
-        report.figure(last.drawing, last.caption);
+    if let Some(last) = figures.pop() {
+        report.figure(last);
     }
     report.add(Item::NewPage).heading("Verdict");
     verdict(&mut report, found);
-    if !pictures.is_empty() {
+    if !figures.is_empty() {
         report.add(Item::NewPage).heading("Figures");
     }
-    for picture in pictures {
-        report.figure(picture.drawing, picture.caption);
+    for figure in figures {
+        report.figure(figure);
     }
-    let path = out.join("foreign_report.pdf");
-    let failed = |reason: String| JudgeError::Plot { path: path.clone(), reason };
-    write_whole(&path, &report.pdf().map_err(|error| failed(error.to_string()))?)
+    publish(&report, &out.join("foreign_report"), forms)
 }

@@ -5,10 +5,10 @@ use crate::judge::judgement::{Judgement, Status, number};
 use crate::judge::summary::Summary;
 use crate::judge::verdict::Verdict;
 use crate::read::Run;
-use crate::show::pdf::{Cell, Item, Report, Side, Table, Tone};
+use crate::show::document::{Cell, Item, Report, Side, Table, Tone};
 use gnss::earth::Geodetic;
 
-/// Failures whose reasons the first page has room for.
+/// Failures whose reasons the first page of paper has room for.
 const MOST_FAILURES: usize = 5;
 
 /// The verdict's rows that the first page shows as figures.
@@ -112,7 +112,7 @@ pub(super) fn groups(report: &mut Report, verdict: &Verdict) {
     report.table(table);
 }
 
-/// Every failure with its reason, as far as the page has room.
+/// Every failure with its reason; paper prints as many as its first page has room for.
 pub(super) fn failures(report: &mut Report, verdict: &Verdict) {
     let failed: Vec<&Judgement> = verdict.rows.iter().filter(|row| row.status == Status::Fail).collect();
     if failed.is_empty() {
@@ -121,14 +121,12 @@ pub(super) fn failures(report: &mut Report, verdict: &Verdict) {
     report.subheading("What failed, and why");
     let columns = [("figure", Side::Left), ("value", Side::Right), ("limit", Side::Right), ("reason", Side::Left)];
     let mut table = Table::new("", columns);
-    for row in failed.iter().take(MOST_FAILURES) {
+    table.printed = Some(MOST_FAILURES);
+    for row in failed {
         let why = if row.why.is_empty() { row.source.clone() } else { row.why.join("; ") };
         let cells =
             [row.figure.clone(), with_unit(row), row.bound.to_string()].map(|text| Cell::toned(text, Tone::Bad));
         table.row(cells.into_iter().chain([Cell::from(why)]));
     }
     report.table(table);
-    if failed.len() > MOST_FAILURES {
-        report.add(Item::Note(format!("{} more are in the verdict below.", failed.len() - MOST_FAILURES)));
-    }
 }

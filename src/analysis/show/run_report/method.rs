@@ -6,7 +6,7 @@ use serde_json::Value;
 use crate::judge::judgement::number;
 use crate::judge::schema;
 use crate::measure::errors::{PULL_IN_S, SLIP_CYCLES};
-use crate::show::pdf::{Report, Side, Table};
+use crate::show::document::{Report, Side, Table};
 use crate::show::plot::Judged;
 
 /// Adds both.

@@ -1,11 +1,12 @@
-//! `report.pdf` of a run: what was run and what came of it on one page, then the whole verdict, tables,
-//! pictures, settings, and how the figures were made.
+//! `report.pdf` and `report.html` of a run: what was run and what came of it on one page, then the whole
+//! verdict, tables, pictures, settings, and how the figures were made.
 
 pub(crate) mod foreign;
 mod front;
 mod method;
 mod tables;
 
+use std::fmt::Display;
 use std::path::Path;
 
 use serde_json::Value;
@@ -13,9 +14,10 @@ use serde_json::Value;
 use crate::error::JudgeError;
 use crate::judge::judgement::{Status, number};
 use crate::judge::verdict::Verdict;
-use crate::show::pdf::{Cell, Item, Report, Side, Table, Tone};
-use crate::show::plot::drawing::Drawing;
-use crate::show::plot::{self, Judged, Picture, Sketch};
+use crate::show::document::{Cell, Forms, Item, Report, Side, Table, Tone};
+use crate::show::plot::canvas::Failure;
+use crate::show::plot::sketch::{Figure, Sketch};
+use crate::show::plot::{self, Judged};
 use crate::show::write::write_whole;
 
 /// A run's report, complete but for its pictures.
@@ -51,21 +53,35 @@ impl RunReport {
         Ok(Self { report, figures, front })
     }
 
-    /// Writes `report.pdf` with its pictures into a run's directory.
-    pub fn write(mut self, directory: &Path, pictures: Vec<(&'static Picture, Drawing)>) -> Result<(), JudgeError> {
-        let path = directory.join("report.pdf");
-        let failed = |reason: String| JudgeError::Plot { path: path.clone(), reason };
-        let ([left, right], front) = &self.front;
-        let [left, right] = [left, right].map(|sketch| sketch.draw().map_err(|error| failed(error.to_string())));
-        let pair = Item::Pair(left?, right?);
-        let item = |(picture, drawing): (&Picture, Drawing)| {
-            Item::Figure(drawing, format!("{} Numbers: {}.", picture.caption, picture.numbers.join(", ")))
-        };
-        self.report.items.splice(self.figures..self.figures, pictures.into_iter().map(item));
-        self.report.items.insert(*front, pair);
-        let pdf = self.report.pdf().map_err(|error| failed(error.to_string()))?;
-        write_whole(&path, &pdf)
+    /// Writes `report.pdf` and `report.html` with their pictures into a run's directory, as asked.
+    pub fn write(mut self, directory: &Path, forms: Forms, figures: Vec<Figure>) -> Result<(), JudgeError> {
+        let ([sky, errors], front) = self.front;
+        let failed = |error: Failure| not_drawn(directory, &error);
+        let pair = [
+            Figure::new("front_sky", sky, "").map_err(failed)?,
+            Figure::new("front_errors", errors, "").map_err(failed)?,
+        ];
+        self.report.items.splice(self.figures..self.figures, figures.into_iter().map(Item::Figure));
+        self.report.items.insert(front, Item::Pair(Box::new(pair)));
+        publish(&self.report, &directory.join("report"), forms)
     }
+}
+
+fn not_drawn(path: &Path, error: &dyn Display) -> JudgeError {
+    JudgeError::Plot { path: path.to_owned(), reason: error.to_string() }
+}
+
+/// Writes a report in the forms that are asked for, each under the name with its ending.
+pub(crate) fn publish(report: &Report, name: &Path, forms: Forms) -> Result<(), JudgeError> {
+    #[cfg(feature = "pdf")]
+    if forms.pdf {
+        let path = name.with_extension("pdf");
+        write_whole(&path, &report.pdf().map_err(|error| not_drawn(&path, &error))?)?;
+    }
+    if forms.html {
+        write_whole(&name.with_extension("html"), report.html().as_bytes())?;
+    }
+    Ok(())
 }
 
 fn tone(status: Status) -> Tone {
@@ -98,6 +114,9 @@ fn verdict(report: &mut Report, verdict: &Verdict) {
         ("origin of the limit", Side::Left),
     ];
     let mut table = Table::new("", columns);
+    if verdict.groups().len() > 1 {
+        table.groups = verdict.rows.iter().map(|row| row.group.words().to_owned()).collect();
+    }
     for row in &verdict.rows {
         // Blanks that bind keep a number with its unit.
         let bound = |text: String| Cell::from(text.replace(' ', "\u{a0}"));

@@ -4,7 +4,7 @@ use crate::error::JudgeError;
 use crate::judge::judgement::number;
 use crate::measure::errors::Link;
 use crate::read::Numbers;
-use crate::show::pdf::{Report, Side, Table};
+use crate::show::document::{Report, Side, Table};
 use crate::show::plot::Judged;
 use crate::statistics::{Spread, Sum};
 use gnss::record::{Event, EventRow};
