@@ -15,6 +15,7 @@ use models::models;
 use serde::Serialize;
 
 use crate::catalogue::Silence;
+use crate::error::GenerateError;
 use crate::fidelity::{self, Choice};
 use crate::levels::{Levels, Span};
 use crate::presence::{Presence, presence};
@@ -117,6 +118,14 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// Computes the plan of `scene` on this machine, with levels measured on parts of its samples.
+    ///
+    /// # Errors
+    /// Errors of [`machinery`], [`Levels::new`] and [`Plan::new`].
+    pub fn of(scene: &Scene) -> Result<Self, GenerateError> {
+        Ok(Self::new(scene, machinery(scene)?, Levels::new(scene)?)?)
+    }
+
     /// Computes the plan of `scene` for a machine.
     ///
     /// # Errors

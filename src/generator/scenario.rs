@@ -8,6 +8,7 @@
 mod attitude;
 mod augmentation;
 mod band;
+mod builder;
 mod compose;
 mod expect;
 mod files;
@@ -39,6 +40,7 @@ use thiserror::Error;
 use toml::de::DeTable;
 
 pub use augmentation::SbasSpec;
+pub use builder::{Builder, put};
 pub use compose::Overrides;
 pub use front_end::{FrontEnd, Tuned};
 pub use hardware::ClockSpec;

@@ -7,6 +7,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use num_complex::Complex;
 use thiserror::Error;
 
 use crate::time::{Epoch, Rate};
@@ -102,6 +103,22 @@ impl Format {
                 pairs.iter_mut().zip(i).for_each(|(out, i)| *out = round_i16(*i).to_le_bytes());
             }
         }
+    }
+
+    /// Packs complex samples, in LSB, like [`Self::pack`].
+    pub fn pack_complex(self, samples: &[Complex<f32>]) -> Vec<u8> {
+        let i: Vec<f32> = samples.iter().map(|sample| sample.re).collect();
+        let q: Vec<f32> = samples.iter().map(|sample| sample.im).collect();
+        let mut bytes = Vec::new();
+        self.pack(&i, &q, &mut bytes);
+        bytes
+    }
+
+    /// Unpacks the whole samples in `bytes` as complex values in LSB, like [`Self::unpack`].
+    pub fn unpack_complex(self, bytes: &[u8]) -> Vec<Complex<f32>> {
+        let (mut i, mut q) = (Vec::new(), Vec::new());
+        self.unpack(bytes, &mut i, &mut q);
+        i.into_iter().zip(q).map(|(re, im)| Complex { re, im }).collect()
     }
 
     /// Unpacks the whole samples in `bytes` into planar LSB values, which replace the content of `i` and `q`.

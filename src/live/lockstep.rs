@@ -64,37 +64,6 @@ pub struct Finished {
 }
 
 /// Generator and receiver in step with a simulation.
-///
-/// ```
-/// use generator::scenario::Scenario;
-/// use generator::vehicle::joining::Push;
-/// use live::lockstep::Lockstep;
-/// use receiver::settings::Settings;
-/// use nalgebra::Vector3;
-///
-/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// let scene = Scenario::from_toml(
-///     r#"
-///     name = "steps"
-///     start = 2010-07-01T08:06:00
-///     duration_s = 0.1
-///     motion = { kind = "pushed", latitude_deg = 48.1, longitude_deg = 11.6, height_m = 520 }
-///     "#,
-/// )?
-/// .scene()?;
-/// let start_m = scene.trajectory.composed_for().position_m;
-/// let mut twin = Lockstep::new(&scene, Some(&Settings::default()))?;
-/// while !twin.is_done() {
-///     // Where the vehicle is at the end of the step, a metre a second upwards.
-///     let t_s = twin.next_s();
-///     let push = Push::at(t_s, start_m + start_m.normalize() * t_s);
-///     let step = twin.step(Some(&push))?;
-///     assert_eq!(twin.samples().len(), 26_000 * scene.metadata.format.bytes());
-///     assert!(step.made.tick.is_some_and(|tick| tick.gap_m < 0.2));
-/// }
-/// # Ok(())
-/// # }
-/// ```
 pub struct Lockstep<'a> {
     driver: Driver<'a>,
     receiver: Option<Receiver>,

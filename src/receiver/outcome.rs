@@ -13,6 +13,7 @@ use crate::parting::Parted;
 use crate::settings::SettingsError;
 use crate::track::LoopMargin;
 use gnss::record::{Fix, LineRow};
+use gnss::samples::Format;
 use gnss::satellite::Sv;
 
 /// Error that ends a reception.
@@ -28,6 +29,12 @@ pub enum ReceiveError {
         number: usize,
         /// Front ends of the reception.
         have: usize,
+    },
+    /// Complex samples for a front end whose samples are real.
+    #[error("complex samples for a front end of {format}, which is real: expected a complex format")]
+    Real {
+        /// Format of the front end.
+        format: Format,
     },
     /// A signal that cannot be followed to a position.
     #[error("acquisition.signals: {signal} cannot be received: {reason}")]

@@ -6,6 +6,7 @@
 
 use std::io::{ErrorKind, Read};
 
+use num_complex::Complex;
 use serde_json::json;
 
 use crate::acquire;
@@ -253,30 +254,6 @@ fn take_blocks(
 }
 
 /// A receiver whose results are values: nothing is written.
-///
-/// ```no_run
-/// use gnss::samples::{Format, IfMetadata};
-/// use gnss::time::Rate;
-/// use receiver::output::Record;
-/// use receiver::{Receiver, settings::Settings};
-///
-/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// let rate = Rate::from_hz(4e6).ok_or("no rate")?;
-/// let (format, center_hz) = (Format::Ci8, 1_575.42e6);
-/// let metadata = IfMetadata { format, rate, center_hz, inverted: false, start: None };
-/// let mut receiver = Receiver::new(&metadata, &Settings::default())?;
-/// for chunk in std::fs::read("recording.ci8")?.chunks(1 << 20) {
-///     for record in receiver.push(chunk)? {
-///         if let Record::Fix(fix) = record {
-///             println!("{} {:?}", fix.time(), fix.position_m());
-///         }
-///     }
-/// }
-/// let (_, outcome) = receiver.finish()?;
-/// println!("{outcome}");
-/// # Ok(())
-/// # }
-/// ```
 pub struct Receiver {
     reception: Reception,
 }
@@ -318,6 +295,20 @@ impl Receiver {
         let mut records = Vec::new();
         self.reception.take(bytes, &mut records)?;
         Ok(records)
+    }
+
+    /// Takes the next samples as complex values, in units of the metadata's least significant bit, and
+    /// returns what they bring. The format of the metadata holds: integers are rounded and saturate. A
+    /// receiver of `cf32_le` takes the values as they are.
+    ///
+    /// # Errors
+    /// [`ReceiveError::Real`] for a front end whose samples are real, and errors of [`Receiver::push`].
+    pub fn push_complex(&mut self, samples: &[Complex<f32>]) -> Result<Vec<Record>, ReceiveError> {
+        match self.reception.metadata.first().map(|metadata| metadata.format) {
+            Some(format) if format.is_complex() => self.push(&format.pack_complex(samples)),
+            Some(format) => Err(ReceiveError::Real { format }),
+            None => Err(ReceiveError::NoFrontEnd),
+        }
     }
 
     /// Ends the reception: returns what was left, and what came of it.

@@ -3,12 +3,16 @@
 use super::{GenerateError, Generated, Options, Stream};
 use crate::scene::Scene;
 use crate::truth::Record;
+use gnss::samples::Format;
+use num_complex::Complex;
 
 /// Batch of consecutive samples of a scene, with their true values.
 #[derive(Clone, Debug)]
 pub struct Batch {
     /// Number of the first of them in the scene.
     pub first_sample: u64,
+    /// Format of the samples.
+    pub format: Format,
     /// Packed samples as the scene's metadata describe them.
     pub samples: Vec<u8>,
     /// Truth records at the ticks within the batch. The last batch ends with the messages that were sent and
@@ -16,36 +20,16 @@ pub struct Batch {
     pub truth: Vec<Record>,
 }
 
+impl Batch {
+    /// The samples as complex values, in units of the format's least significant bit.
+    pub fn complex(&self) -> Vec<Complex<f32>> {
+        self.format.unpack_complex(&self.samples)
+    }
+}
+
 /// Iterates the batches of a scene; ends after the last sample or the first error.
 ///
 /// A batch has half a million samples by default, and memory holds one: how the work is cut changes no byte.
-///
-/// ```
-/// use generator::scenario::Scenario;
-/// use generator::stream::Generator;
-/// use generator::truth::Record;
-///
-/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// let scene = Scenario::from_toml(
-///     r#"
-///     name = "short"
-///     start = 2010-07-01T08:06:00
-///     duration_s = 0.1
-///     motion = { kind = "static", latitude_deg = 48.1, longitude_deg = 11.6, height_m = 520 }
-///     "#,
-/// )?
-/// .scene()?;
-/// let (mut bytes, mut observations) = (0, 0);
-/// for batch in Generator::new(&scene)? {
-///     let batch = batch?;
-///     bytes += batch.samples.len();
-///     observations += batch.truth.iter().filter(|record| matches!(record, Record::Observation(_))).count();
-/// }
-/// assert_eq!(bytes, 2 * 260_000); // 2.6 Msps of complex 8-bit samples
-/// assert!(observations >= 4);
-/// # Ok(())
-/// # }
-/// ```
 pub struct Generator<'a> {
     scene: &'a Scene,
     /// Stream; `None` after the last sample.
@@ -88,7 +72,7 @@ impl<'a> Generator<'a> {
         } else {
             self.done = Some(stream.finish(&mut truth)?);
         }
-        Ok(more.then_some(Batch { first_sample, samples, truth }))
+        Ok(more.then_some(Batch { first_sample, format: self.scene.metadata.format, samples, truth }))
     }
 }
 

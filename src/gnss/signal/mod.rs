@@ -247,15 +247,6 @@ impl Signal {
 
     /// Code of the first component for a satellite number: chips of −1, 0 and +1 over one period. `None` if
     /// the document assigns no code to the number.
-    ///
-    /// ```
-    /// use gnss::gps::l1ca::L1_CA;
-    ///
-    /// // IS-GPS-200, table 3-Ia: the code of PRN 7 begins with 1131 octal, and a 1 is sent as −1.
-    /// let code = L1_CA.code(7).unwrap();
-    /// let first = code[..10].iter().fold(0, |word, &chip| word << 1 | u32::from(chip < 0));
-    /// assert_eq!((code.len(), first), (1023, 0o1131));
-    /// ```
     pub fn code(&self, number: u8) -> Option<Vec<i8>> {
         self.components.first().and_then(|component| (component.code)(number))
     }

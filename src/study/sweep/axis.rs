@@ -287,47 +287,6 @@ impl Grid {
     }
 }
 
-/// Puts a value under a key like `power.cn0_dbhz` or `interference[1].js_db` (counted from 1) of a document.
-///
-/// # Errors
-/// A key that leads through something that is no table, or to an entry that an array does not have.
-pub fn put(document: &mut toml::Table, key: &str, value: &Value) -> Result<(), String> {
-    let mut table = document;
-    let mut segments = key.split('.').peekable();
-    while let Some(segment) = segments.next() {
-        let (name, index) = match segment.strip_suffix(']').and_then(|s| s.split_once('[')) {
-            Some((name, index)) => (name, Some(index.parse::<usize>().map_err(|_| format!("[{index}] is no number"))?)),
-            None => (segment, None),
-        };
-        if name.is_empty() {
-            return Err("expected names between the points".to_owned());
-        }
-        if segments.peek().is_none() && index.is_none() {
-            table.insert(name.to_owned(), value.clone());
-            return Ok(());
-        }
-        let next = table.entry(name).or_insert_with(|| Value::Table(toml::Table::new()));
-        let next = match (next, index) {
-            (Value::Array(items), Some(index)) => {
-                let count = items.len();
-                let item = index.checked_sub(1).and_then(|index| items.get_mut(index));
-                item.ok_or_else(|| format!("{name} has {count} entries, counted from 1"))?
-            }
-            (next, None) => next,
-            (_, Some(_)) => return Err(format!("{name} is no array")),
-        };
-        match next {
-            Value::Table(inner) => table = inner,
-            place if segments.peek().is_none() => {
-                *place = value.clone();
-                return Ok(());
-            }
-            _ => return Err(format!("{name} is no table")),
-        }
-    }
-    Err("expected a key".to_owned())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -19,7 +19,7 @@ use super::sampled::{self, Base};
 use super::spec::{Level, Study};
 use super::{StudyError, axis, sha256_hex, temporary, unit_of};
 use analysis::show::staged::Staged;
-use generator::scenario::{Overrides, Scenario};
+use generator::scenario::{Overrides, Scenario, put};
 
 /// Version of manifest and shards.
 const SCHEMA: u32 = 1;
@@ -465,7 +465,7 @@ pub(super) fn modelled(study: &Study, values: &[(&Axis, &Value)]) -> Result<Mode
                 "{table:?} is no table of this level: expected signal, motion, loop, measure or receiver"
             ));
         }
-        axis::put(&mut document, &axis.key, value)?;
+        put(&mut document, &axis.key, value)?;
     }
     Model::of(&document, "model").map_err(|e| e.without_place())
 }

@@ -29,7 +29,7 @@ use analysis::measure::clock::Clock;
 use analysis::measure::errors::Errors;
 use analysis::read::Run;
 use analysis::statistics::mean;
-use generator::scenario::{Overrides, Scenario};
+use generator::scenario::{Overrides, Scenario, put};
 use generator::{GenerateError, truth};
 use gnss::signal::Signal;
 use receiver::output::Output;
@@ -109,7 +109,7 @@ pub const FIGURES: &[&str] = &[
 pub fn patched(base: &Base, values: &[(&Axis, &Value)]) -> Result<toml::Table, String> {
     let mut document = base.document.clone();
     for (axis, value) in values.iter().filter(|(axis, _)| axis.key != SCENARIO_KEY) {
-        axis::put(&mut document, &axis.key, value).map_err(|reason| format!("{}: {reason}", axis.key))?;
+        put(&mut document, &axis.key, value).map_err(|reason| format!("{}: {reason}", axis.key))?;
     }
     Ok(document)
 }

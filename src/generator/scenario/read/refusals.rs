@@ -21,7 +21,7 @@ pub struct Source<'t> {
 pub struct Place {
     /// The text's name.
     pub origin: String,
-    /// Line, from 1.
+    /// Line, from 1; 0 for a value that is in no text.
     pub line: usize,
     /// Number of the character in the line, from 1.
     pub column: usize,
@@ -29,7 +29,10 @@ pub struct Place {
 
 impl Display for Place {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}:{}:{}", self.origin, self.line, self.column)
+        match self.line {
+            0 => f.write_str(&self.origin),
+            line => write!(f, "{}:{line}:{}", self.origin, self.column),
+        }
     }
 }
 
