@@ -5,8 +5,8 @@
 
 use std::path::Path;
 
-use gnss_twin::generator::truth::Writer;
-use gnss_twin::study::detection::{detections, false_alarms, settings, write};
+use generator::truth::Writer;
+use study::detection::{detections, false_alarms, settings, write};
 
 const TRIALS: u32 = 2000;
 

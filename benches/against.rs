@@ -13,7 +13,7 @@ mod process;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use gnss_twin::analysis::statistics::median;
+use analysis::statistics::median;
 use process::{Spent, remove, spent};
 
 /// Rounds unless others are asked for.

@@ -16,21 +16,21 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use gnss_twin::analysis::statistics::median;
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::scene::{Arithmetic, Fidelity, Grade, Scene};
-use gnss_twin::generator::stream::{Options, generate_with};
-use gnss_twin::generator::synth::chips::CodeTime;
-use gnss_twin::generator::synth::isa::{self, Level, add_noise};
-use gnss_twin::generator::synth::lanes::{Buffers, GROUP};
-use gnss_twin::generator::synth::noise::{BLOCK_SAMPLES, add_block_exact};
-use gnss_twin::generator::synth::waveform::plain;
-use gnss_twin::generator::synth::{CODE_ONE, Edge, Kernel, RUN_SAMPLES, Run};
-use gnss_twin::generator::transmit::{Scratch, Transmitter};
-use gnss_twin::generator::truth;
-use gnss_twin::gnss::gps::l1ca::L1_CA;
-use gnss_twin::gnss::samples::Format;
-use gnss_twin::gnss::satellite::Sv;
+use analysis::statistics::median;
+use generator::scenario::{Overrides, Scenario};
+use generator::scene::{Arithmetic, Fidelity, Grade, Scene};
+use generator::stream::{Options, generate_with};
+use generator::synth::chips::CodeTime;
+use generator::synth::isa::{self, Level, add_noise};
+use generator::synth::lanes::{Buffers, GROUP};
+use generator::synth::noise::{BLOCK_SAMPLES, add_block_exact};
+use generator::synth::waveform::plain;
+use generator::synth::{CODE_ONE, Edge, Kernel, RUN_SAMPLES, Run};
+use generator::transmit::{Scratch, Transmitter};
+use generator::truth;
+use gnss::gps::l1ca::L1_CA;
+use gnss::samples::Format;
+use gnss::satellite::Sv;
 
 /// Nothing but a place: effects are added by name.
 const BARE: &str = "name = \"bench\"\nstart = 2010-07-01T08:05:58\nseed = 1\n[motion]\nkind = \"static\"\n\

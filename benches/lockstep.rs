@@ -8,13 +8,13 @@
 use std::error::Error;
 use std::time::Instant;
 
-use gnss_twin::generator::scenario::Scenario;
-use gnss_twin::generator::vehicle::Motion;
-use gnss_twin::generator::vehicle::joining::Push;
-use gnss_twin::live::lockstep::Lockstep;
-use gnss_twin::receiver::output::Record;
-use gnss_twin::receiver::settings::Settings;
+use generator::scenario::Scenario;
+use generator::vehicle::Motion;
+use generator::vehicle::joining::Push;
+use live::lockstep::Lockstep;
 use nalgebra::Vector3;
+use receiver::output::Record;
+use receiver::settings::Settings;
 
 const SCENE: &str = r#"
 name = "lockstep"

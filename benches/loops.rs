@@ -7,12 +7,12 @@
 use std::path::Path;
 use std::time::Instant;
 
-use gnss_twin::analysis::expect::theory::oscillator;
-use gnss_twin::receiver::track::TrackingSettings;
-use gnss_twin::receiver::track::closed::Mode;
-use gnss_twin::study::correlator::{Case, run};
-use gnss_twin::study::{limits, proof, report};
+use analysis::expect::theory::oscillator;
 use rayon::prelude::*;
+use receiver::track::TrackingSettings;
+use receiver::track::closed::Mode;
+use study::correlator::{Case, run};
+use study::{limits, proof, report};
 
 /// Relative standard error of a cell: three of them are half the bar.
 const UNCERTAINTY: f64 = 0.008;

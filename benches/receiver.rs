@@ -15,16 +15,16 @@ use std::time::Instant;
 
 use num_complex::Complex64;
 
-use gnss_twin::gnss::galileo::e1::{self, E1};
-use gnss_twin::gnss::gps::l1ca::{self, L1_CA};
-use gnss_twin::gnss::samples::{Format, IfMetadata};
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::Link;
-use gnss_twin::gnss::time::Rate;
-use gnss_twin::receiver::acquire::{AcquisitionSettings, Searcher, samples_needed};
-use gnss_twin::receiver::correlate::sums::{RunningSums, Samples};
-use gnss_twin::receiver::correlate::{Arithmetic, CODE_BITS, Edge, Nco, Replica, Wave, chips_to_units};
-use gnss_twin::receiver::source::Block;
+use gnss::galileo::e1::{self, E1};
+use gnss::gps::l1ca::{self, L1_CA};
+use gnss::samples::{Format, IfMetadata};
+use gnss::satellite::Sv;
+use gnss::signal::Link;
+use gnss::time::Rate;
+use receiver::acquire::{AcquisitionSettings, Searcher, samples_needed};
+use receiver::correlate::sums::{RunningSums, Samples};
+use receiver::correlate::{Arithmetic, CODE_BITS, Edge, Nco, Replica, Wave, chips_to_units};
+use receiver::source::Block;
 
 const ROUNDS: usize = 15;
 const CHANNELS: usize = 12;

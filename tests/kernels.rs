@@ -1,15 +1,15 @@
 //! Laws of the sample kernels: the fast one against the obvious one, the noise, the phases.
 #![cfg(feature = "generator")]
 
-use gnss_twin::generator::synth::band::Filter;
-use gnss_twin::generator::synth::chips::CodeTime;
-use gnss_twin::generator::synth::isa::{Level, accumulate, add_noise};
-use gnss_twin::generator::synth::lanes::Buffers;
-use gnss_twin::generator::synth::noise::BLOCK_SAMPLES;
-use gnss_twin::generator::synth::waveform::{Waveform, plain};
-use gnss_twin::generator::synth::{CODE_ONE, Edge, Run, reference};
-use gnss_twin::gnss::gps::l1ca::L1_CA;
-use gnss_twin::gnss::satellite::Sv;
+use generator::synth::band::Filter;
+use generator::synth::chips::CodeTime;
+use generator::synth::isa::{Level, accumulate, add_noise};
+use generator::synth::lanes::Buffers;
+use generator::synth::noise::BLOCK_SAMPLES;
+use generator::synth::waveform::{Waveform, plain};
+use generator::synth::{CODE_ONE, Edge, Run, reference};
+use gnss::gps::l1ca::L1_CA;
+use gnss::satellite::Sv;
 
 const CHIP_HZ: f64 = 1.023e6;
 

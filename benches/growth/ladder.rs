@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use gnss_twin::analysis::show::plot::canvas::{Axis, BLUE, Chart, GREY, Mark, Series, figure};
+use analysis::show::plot::canvas::{Axis, BLUE, Chart, GREY, Mark, Series, figure};
 
 /// A cost where the quantity has one value.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use gnss_twin::analysis::statistics::median;
+use analysis::statistics::median;
 
 use crate::ladder::{Ladder, Step};
 use crate::process::{Spent, remove, spent};

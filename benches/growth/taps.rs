@@ -3,11 +3,11 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use gnss_twin::analysis::statistics::median;
-use gnss_twin::gnss::gps::l1ca;
-use gnss_twin::receiver::correlate::fixed::FixedSamples;
-use gnss_twin::receiver::correlate::sums::{RunningSums, Samples};
-use gnss_twin::receiver::correlate::{Arithmetic, Edge, Nco, Replica, chips_to_units};
+use analysis::statistics::median;
+use gnss::gps::l1ca;
+use receiver::correlate::fixed::FixedSamples;
+use receiver::correlate::sums::{RunningSums, Samples};
+use receiver::correlate::{Arithmetic, Edge, Nco, Replica, chips_to_units};
 
 use crate::ladder::{Ladder, Step};
 

@@ -3,9 +3,9 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use gnss_twin::analysis::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREY, Mark, Series, figure};
-use gnss_twin::generator::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade, allowed_m, kernel_ns};
-use gnss_twin::gnss::signal::{SIGNALS, Signal};
+use analysis::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREY, Mark, Series, figure};
+use generator::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade, allowed_m, kernel_ns};
+use gnss::signal::{SIGNALS, Signal};
 
 use super::machine;
 use super::scenes::SceneRow;
@@ -40,7 +40,7 @@ fn dominated(ladder: &[Rung<'_>]) -> Vec<&'static str> {
 
 /// The lowest measured rate that holds both main lobes, or the highest one.
 fn usual_msps(rows: &[SignalRow], signal: &Signal) -> Option<f64> {
-    let steps = |c: &gnss_twin::gnss::signal::Component| c.strongest().map_or(1, |layer| layer.pulse.len()) as f64;
+    let steps = |c: &gnss::signal::Component| c.strongest().map_or(1, |layer| layer.pulse.len()) as f64;
     let wanted = signal.components.iter().map(|c| 2.001e-6 * c.chip_rate_hz * steps(c)).fold(0.0, f64::max);
     let rates = || rows.iter().filter(|row| row.signal == signal.name).map(|row| row.sample_rate_msps);
     rates().find(|rate| *rate >= wanted).or_else(|| rates().next_back())

@@ -3,15 +3,13 @@
 
 use std::path::Path;
 
-use gnss_twin::analysis;
-use gnss_twin::analysis::statistics::Spread;
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::stream::GenerateError;
-use gnss_twin::generator::truth;
-use gnss_twin::receiver::output::Output;
-use gnss_twin::receiver::settings::Settings;
-use gnss_twin::twin;
+use analysis::statistics::Spread;
+use generator::scenario::{Overrides, Scenario};
+use generator::scene::Scene;
+use generator::stream::GenerateError;
+use generator::truth;
+use receiver::output::Output;
+use receiver::settings::Settings;
 use serde::Serialize;
 use toml::{Table, Value};
 

@@ -4,14 +4,14 @@
 
 use std::time::Instant;
 
-use gnss_twin::generator::fidelity::{Arithmetic, CodeEdge, LOOP_HZ, code_bias_m, moving_bias_m};
-use gnss_twin::generator::synth::band::Filter;
-use gnss_twin::generator::synth::bank::Bank;
-use gnss_twin::generator::synth::isa::Level;
-use gnss_twin::generator::synth::waveform::{Voice, Waveform};
-use gnss_twin::generator::synth::{CODE_ONE, Edge, Kernel, RUN_SAMPLES, Run};
-use gnss_twin::gnss::signal::{Layers, SIGNALS, Signal};
-use gnss_twin::gnss::time::Epoch;
+use generator::fidelity::{Arithmetic, CodeEdge, LOOP_HZ, code_bias_m, moving_bias_m};
+use generator::synth::band::Filter;
+use generator::synth::bank::Bank;
+use generator::synth::isa::Level;
+use generator::synth::waveform::{Voice, Waveform};
+use generator::synth::{CODE_ONE, Edge, Kernel, RUN_SAMPLES, Run};
+use gnss::signal::{Layers, SIGNALS, Signal};
+use gnss::time::Epoch;
 use rayon::prelude::*;
 use serde::Serialize;
 

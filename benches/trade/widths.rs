@@ -4,12 +4,12 @@
 //! narrower form of the same seed. The difference is the rounding. C/N0 is the correlated amplitude's square
 //! over the mean power of the samples; the code is a discriminator over 20 ms.
 
-use gnss_twin::analysis::show::trade::Width;
-use gnss_twin::analysis::statistics::{mean, median};
-use gnss_twin::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade};
-use gnss_twin::generator::stream::{Options, generate_with};
-use gnss_twin::generator::truth;
-use gnss_twin::gnss::samples::Format;
+use analysis::show::trade::Width;
+use analysis::statistics::{mean, median};
+use generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade};
+use generator::stream::{Options, generate_with};
+use generator::truth;
+use gnss::samples::Format;
 use num_complex::Complex;
 
 use super::{CHIP_M, Replicas, STATIC, Site, busy_s, correlate, pieces, scene};

@@ -1,6 +1,6 @@
 //! Samples as arrays: packed bytes get the shape that their format has, without a copy.
 
-use gnss_twin::gnss::samples::Format;
+use gnss::samples::Format;
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;

@@ -3,12 +3,12 @@
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-use gnss_twin::gnss::record::{
+use gnss::record::{
     AcquisitionRow, ClockRow, Event, EventRow, Fix, Geographic, InterferenceRow, IonosphereModel, IonosphereRow,
     LineRow, NavigationRow, Observation, PassEnd, PassRow, RayRow, SightRow, SkyRow, TrackingRow, TrajectoryRow,
 };
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::Signal;
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -2,21 +2,21 @@
 
 use std::io;
 
-use gnss_twin::analysis::JudgeError;
-use gnss_twin::generator::GenerateError;
-use gnss_twin::generator::event::EventError;
-use gnss_twin::generator::scenario::ScenarioError;
-use gnss_twin::generator::truth::TruthError;
-use gnss_twin::gnss::sigmf::SigmfError;
-use gnss_twin::live::lockstep::StepError;
-use gnss_twin::receiver::ReceiveError;
-use gnss_twin::receiver::output::OutputError;
-use gnss_twin::receiver::settings::SettingsError;
-use gnss_twin::study::sweep::StudyError;
-use gnss_twin::twin::TwinError;
+use analysis::JudgeError;
+use generator::GenerateError;
+use generator::event::EventError;
+use generator::scenario::ScenarioError;
+use generator::truth::TruthError;
+use gnss::sigmf::SigmfError;
+use live::lockstep::StepError;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyRuntimeError};
 use pyo3::prelude::*;
+use receiver::ReceiveError;
+use receiver::output::OutputError;
+use receiver::settings::SettingsError;
+use study::sweep::StudyError;
+use twin::TwinError;
 
 create_exception!(gnss_twin, Error, PyException, "What this package refuses; the message names key, value and cure.");
 create_exception!(gnss_twin, ScenarioError_, Error, "A scenario that is refused.");

@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, Mutex};
 
-use gnss_twin::generator::scene::Scene as Composed;
-use gnss_twin::generator::stream::{Options, Stream};
+use generator::scene::Scene as Composed;
+use generator::stream::{Options, Stream};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use self_cell::self_cell;

@@ -2,16 +2,16 @@
 
 use std::sync::{Arc, Mutex};
 
-use gnss_twin::generator::event::Event;
-use gnss_twin::generator::scene::Scene as Composed;
-use gnss_twin::generator::truth::Sink as _;
-use gnss_twin::generator::vehicle::joining::Push;
-use gnss_twin::generator::vehicle::turn::PushedTurn;
-use gnss_twin::live::lockstep::{Finished, Lockstep};
-use gnss_twin::receiver::output::Sink as _;
+use generator::event::Event;
+use generator::scene::Scene as Composed;
+use generator::truth::Sink as _;
+use generator::vehicle::joining::Push;
+use generator::vehicle::turn::PushedTurn;
+use live::lockstep::{Finished, Lockstep};
 use nalgebra::Vector3;
 use pyo3::exceptions::{PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
+use receiver::output::Sink as _;
 use self_cell::self_cell;
 
 use crate::arrays;

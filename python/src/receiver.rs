@@ -2,11 +2,11 @@
 
 use std::sync::Mutex;
 
-use gnss_twin::gnss::samples::{Format, IfMetadata};
-use gnss_twin::receiver::Reception;
+use gnss::samples::{Format, IfMetadata};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use receiver::Reception;
 
 use crate::arrays;
 use crate::call::long;

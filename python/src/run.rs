@@ -4,17 +4,17 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use gnss_twin::analysis::judge_against;
-use gnss_twin::analysis::show::staged::Staged;
-use gnss_twin::generator::scene::Scene as Composed;
-use gnss_twin::generator::truth::{self, Writer};
-use gnss_twin::gnss::samples::IfMetadata;
-use gnss_twin::receiver::Reception;
-use gnss_twin::receiver::output::{self, Output};
-use gnss_twin::receiver::settings::Settings;
-use gnss_twin::twin::feed;
+use analysis::judge_against;
+use analysis::show::staged::Staged;
+use generator::scene::Scene as Composed;
+use generator::truth::{self, Writer};
+use gnss::samples::IfMetadata;
 use pyo3::prelude::*;
+use receiver::Reception;
+use receiver::output::{self, Output};
+use receiver::settings::Settings;
 use serde_json::Value;
+use twin::feed;
 
 use crate::call::{Halt, long};
 use crate::failure::Failure;

@@ -3,20 +3,20 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use gnss_twin::generator::levels::Levels;
-use gnss_twin::generator::plan::{Plan, machinery};
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::scene;
-use gnss_twin::generator::stream::{Options, Stream};
-use gnss_twin::gnss::samples::{Format, IfMetadata};
-use gnss_twin::gnss::sigmf;
-use gnss_twin::gnss::signal::Signal;
-use gnss_twin::gnss::time::{Epoch, Rate};
-use gnss_twin::receiver::settings::Settings;
-use gnss_twin::twin::settings_for;
+use generator::GenerateError;
+use generator::plan::Plan;
+use generator::scenario::{Overrides, Scenario};
+use generator::scene;
+use generator::stream::{Options, Stream};
+use gnss::samples::{Format, IfMetadata};
+use gnss::sigmf;
+use gnss::signal::Signal;
+use gnss::time::{Epoch, Rate};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use receiver::settings::Settings;
+use twin::settings_for;
 
 use crate::arrays;
 use crate::call::long;
@@ -326,12 +326,9 @@ impl Scene {
     /// What will be computed, what not, and why.
     fn plan(&self, py: Python<'_>) -> PyResult<String> {
         long(py, |_| {
-            let mut texts = Vec::new();
-            for scene in self.scenes.iter() {
-                let plan = Plan::new(scene, machinery(scene)?, Levels::new(scene)?);
-                texts.push(plan.map_err(|error| Failure::other(error.to_string()))?.to_string());
-            }
-            Ok(texts.join("\n"))
+            let texts: Result<Vec<String>, GenerateError> =
+                self.scenes.iter().map(|scene| Ok(Plan::of(scene)?.to_string())).collect();
+            Ok(texts?.join("\n"))
         })
     }
 

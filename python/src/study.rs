@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use gnss_twin::study::sweep::engine;
-use gnss_twin::study::sweep::plan::{Cut, Plan};
-use gnss_twin::study::sweep::result::{self, Results};
-use gnss_twin::study::sweep::{publish, sha256_of_file};
+use ::study::sweep::engine;
+use ::study::sweep::plan::{Cut, Plan};
+use ::study::sweep::result::{self, Results};
+use ::study::sweep::{publish, sha256_of_file};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeSet;
 
-use gnss_twin::generator::truth::{self, TruthError};
-use gnss_twin::gnss::record::{
+use generator::truth::{self, TruthError};
+use gnss::record::{
     AcquisitionRow, ClockRow, EventRow, Fix, Geographic, InterferenceRow, IonosphereRow, LineRow, NavigationRow,
     Observation, PassRow, RayRow, SightRow, SkyRow, TrackingRow, TrajectoryRow,
 };
-use gnss_twin::receiver::output::{self, OutputError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use receiver::output::{self, OutputError};
 use serde_json::Value;
 
 use crate::columns::{FrontEnd, Spoofer, Table};

@@ -4,17 +4,16 @@ use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
-use crate::analysis;
-use crate::analysis::judge::foreign::{self, Files};
-use crate::analysis::judge::schema::SUMMARY;
-use crate::analysis::judge::verdict::Verdict;
-use crate::analysis::show;
 use crate::cli::args;
 use crate::cli::check::Gate;
 use crate::cli::error::CliError;
 use crate::cli::printed;
 use crate::cli::run::judge_error;
 use crate::cli::scenario;
+use analysis::judge::foreign::{self, Files};
+use analysis::judge::schema::SUMMARY;
+use analysis::judge::verdict::Verdict;
+use analysis::show;
 
 /// Judges the run in a directory, against a user's limits if there are any, or a receiver against a truth.
 pub fn execute(arguments: &args::Analyze) -> Result<(), CliError> {

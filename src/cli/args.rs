@@ -4,16 +4,16 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::analysis::show::document::Forms;
 use crate::cli::lines;
 use crate::cli::live::intake::Origin;
 use crate::cli::packed::{Bits, Packed};
 use crate::cli::printed::Printed;
 use crate::cli::sink::Spec;
 use crate::cli::study::args::Study;
-use crate::gnss::exchange::Version;
-use crate::gnss::samples::Format;
-use crate::gnss::time::Epoch;
+use analysis::show::document::Forms;
+use gnss::exchange::Version;
+use gnss::samples::Format;
+use gnss::time::Epoch;
 
 /// A GNSS digital twin: generates IF samples from real ephemerides, receives them and judges the receiver.
 ///

@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-use crate::analysis::judge::judgement::{Judgement, Status};
-use crate::analysis::judge::limits::Limits;
-use crate::analysis::judge::schema::Figures;
-use crate::analysis::judge::verdict::Verdict;
 use crate::cli::error::CliError;
 use crate::cli::printed::Printed;
 use crate::cli::scenario;
+use analysis::judge::judgement::{Judgement, Status};
+use analysis::judge::limits::Limits;
+use analysis::judge::schema::Figures;
+use analysis::judge::verdict::Verdict;
 
 /// Conditions under which the program ends with 0.
 pub enum Gate {

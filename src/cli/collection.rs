@@ -14,12 +14,11 @@ use crate::cli::progress::Progress;
 use crate::cli::run::generator_error;
 use crate::cli::scenario;
 use crate::cli::staging::Staging;
-use crate::generator::scene::Scene;
-use crate::generator::stream::Generated;
-use crate::generator::{GenerateError, truth};
-use crate::gnss::sigmf::{self, Beside, Member};
-use crate::study::sweep::sha512_hex;
-use crate::twin;
+use generator::scene::Scene;
+use generator::stream::Generated;
+use generator::{GenerateError, truth};
+use gnss::sigmf::{self, Beside, Member};
+use study::sweep::sha512_hex;
 
 /// Writes the samples of every front end below the directory that `--out` names.
 pub fn generate(arguments: &args::Generate, scenes: &[Scene]) -> Result<(), CliError> {

@@ -17,13 +17,13 @@ use crate::cli::scenario;
 use crate::cli::sidecar;
 use crate::cli::sink;
 use crate::cli::staging::Staging;
-use crate::generator::scenario::Overrides;
-use crate::generator::scene::Scene;
-use crate::generator::stream::Options;
-use crate::generator::{self, GenerateError, truth};
-use crate::gnss::packed::Packer;
-use crate::gnss::samples::{Format, IfMetadata};
-use crate::gnss::sigmf::{self, Beside};
+use generator::scenario::Overrides;
+use generator::scene::Scene;
+use generator::stream::Options;
+use generator::{self, GenerateError, truth};
+use gnss::packed::Packer;
+use gnss::samples::{Format, IfMetadata};
+use gnss::sigmf::{self, Beside};
 
 /// Writes a scene's samples to a file.
 pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {

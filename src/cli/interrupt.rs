@@ -16,8 +16,8 @@ use std::time::Duration;
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
-use crate::analysis::show::staged;
 use crate::cli::error::CliError;
+use analysis::show::staged;
 
 /// Polling interval of that thread where it cannot be woken.
 const LOOK: Duration = Duration::from_millis(50);

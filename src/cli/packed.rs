@@ -3,10 +3,10 @@
 use clap::Args;
 
 use crate::cli::error::CliError;
-use crate::generator::scene::Scene;
-use crate::gnss::facts::StageSpec;
-use crate::gnss::packed::{Components, Encoding, Interleaved, Layout};
-use crate::gnss::recording::Samples;
+use generator::scene::Scene;
+use gnss::facts::StageSpec;
+use gnss::packed::{Components, Encoding, Interleaved, Layout};
+use gnss::recording::Samples;
 
 /// Samples of a few bits.
 #[derive(Args, Clone, Debug, Default)]

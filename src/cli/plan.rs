@@ -9,17 +9,15 @@ use crate::cli::args;
 use crate::cli::error::CliError;
 use crate::cli::run::generator_error;
 use crate::cli::scenario;
-use crate::generator;
-use crate::generator::dynamics::{LineOfSight, lines_of_sight};
-use crate::generator::levels::Levels;
-use crate::generator::plan::{Plan, Together};
-use crate::generator::scenario::Overrides;
-use crate::generator::scene::Scene;
-use crate::gnss::earth::SPEED_OF_LIGHT_MPS;
-use crate::receiver::followed::Followed;
-use crate::receiver::settings::Settings;
-use crate::receiver::track::TrackingSettings;
-use crate::study::demand::{self, Answer, Demand};
+use generator::dynamics::{LineOfSight, lines_of_sight};
+use generator::plan::{Plan, Together};
+use generator::scenario::Overrides;
+use generator::scene::Scene;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use receiver::followed::Followed;
+use receiver::settings::Settings;
+use receiver::track::TrackingSettings;
+use study::demand::{self, Answer, Demand};
 
 /// Standard gravity, for accelerations in g.
 const G_MPS2: f64 = 9.806_65;
@@ -35,9 +33,7 @@ pub fn execute(arguments: &args::Plan) -> Result<(), CliError> {
     }
     let (mut plans, mut texts, mut objects) = (Vec::new(), Vec::new(), Vec::new());
     for scene in &scenes {
-        let machinery = generator::plan::machinery(scene).map_err(generator_error)?;
-        let levels = Levels::new(scene).map_err(generator_error)?;
-        let plan = Plan::new(scene, machinery, levels).map_err(CliError::input)?;
+        let plan = Plan::of(scene).map_err(generator_error)?;
         let loops = Loops::new(scene, &settings.tracking)?;
         let of_it = plan.front_end.as_ref().filter(|_| scenes.len() > 1);
         let of_it = of_it.map_or_else(String::new, |name| format!("front end {name}: "));
@@ -163,8 +159,8 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::generator::scenario::Scenario;
-    use crate::receiver::settings::Settings;
+    use generator::scenario::Scenario;
+    use receiver::settings::Settings;
 
     fn warning(text: &str, settings: Option<TrackingSettings>) -> Option<String> {
         let scenario = Scenario::parse(text, "plan").unwrap();

@@ -6,12 +6,12 @@
 use clap::Args;
 use serde_json::{Value, json};
 
-use crate::analysis::judge::judgement::Status;
-use crate::analysis::judge::verdict::Verdict;
 use crate::cli::error::CliError;
 use crate::cli::scenario;
-use crate::gnss::earth::Geodetic;
-use crate::gnss::record::Fix;
+use analysis::judge::judgement::Status;
+use analysis::judge::verdict::Verdict;
+use gnss::earth::Geodetic;
+use gnss::record::Fix;
 
 /// Flags of a command with results.
 #[derive(Args, Clone, Copy, Debug, Default)]

@@ -17,13 +17,12 @@ use crate::cli::run::{output_error, receiver_error};
 use crate::cli::scenario;
 use crate::cli::source::Ahead;
 use crate::cli::staging::{InSight, Staging};
-use crate::gnss::samples::IfMetadata;
-use crate::gnss::signal::Signal;
-use crate::receiver;
-use crate::receiver::Outcome;
-use crate::receiver::acquire::{ALL, AcquisitionSettings};
-use crate::receiver::output::{JsonLines, Nmea, Output, OutputError, Record, Rinex, Sink};
-use crate::receiver::settings::Settings;
+use gnss::samples::IfMetadata;
+use gnss::signal::Signal;
+use receiver::Outcome;
+use receiver::acquire::{ALL, AcquisitionSettings};
+use receiver::output::{JsonLines, Nmea, Output, OutputError, Record, Rinex, Sink};
+use receiver::settings::Settings;
 
 /// Receives a recording or a stream.
 pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {

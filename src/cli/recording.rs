@@ -5,19 +5,19 @@ use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use crate::analysis::show::staged::present;
 use crate::cli::archive;
 use crate::cli::args;
 use crate::cli::error::{CliError, shown};
 use crate::cli::scenario;
 use crate::cli::source;
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::packed::{Layout, Unpacker};
-use crate::gnss::recording::{Description, Samples, Unblocked};
-use crate::gnss::samples::{Format, IfMetadata};
-use crate::gnss::signal::Signal;
-use crate::gnss::time::{Epoch, Rate};
-use crate::gnss::{ion, sigmf};
+use analysis::show::staged::present;
+use gnss::gps::l1ca::L1_CA;
+use gnss::packed::{Layout, Unpacker};
+use gnss::recording::{Description, Samples, Unblocked};
+use gnss::samples::{Format, IfMetadata};
+use gnss::signal::Signal;
+use gnss::time::{Epoch, Rate};
+use gnss::{ion, sigmf};
 
 /// The samples of a front end.
 pub struct Recording {

@@ -2,16 +2,16 @@
 
 use std::fmt::Write as _;
 
-use crate::analysis::judge::judgement::MARGINAL_SHARE;
-use crate::analysis::judge::schema;
 use crate::cli::args;
 use crate::cli::error::CliError;
 use crate::cli::scenario;
-use crate::generator::scenario::keys::SCENARIO;
-use crate::generator::scenario::schema::{Listed, tables_of};
-use crate::gnss::place::nearest;
-use crate::receiver::settings::reference as receiver;
-use crate::study::sweep::keys::STUDY;
+use analysis::judge::judgement::MARGINAL_SHARE;
+use analysis::judge::schema;
+use generator::scenario::keys::SCENARIO;
+use generator::scenario::schema::{Listed, tables_of};
+use gnss::place::nearest;
+use receiver::settings::reference as receiver;
+use study::sweep::keys::STUDY;
 
 /// One section of the reference.
 struct Section {

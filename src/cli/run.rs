@@ -11,12 +11,6 @@ use std::time::{Duration, Instant};
 
 use serde_json::json;
 
-use crate::analysis::expect::welch::{self, Looks};
-use crate::analysis::judge::schema::SUMMARY;
-use crate::analysis::measure::psd::Psd;
-use crate::analysis::read::psd_name;
-use crate::analysis::show::tables;
-use crate::analysis::{self, JudgeError};
 use crate::cli::args;
 use crate::cli::check::Gate;
 use crate::cli::error::CliError;
@@ -25,18 +19,23 @@ use crate::cli::progress::Progress;
 use crate::cli::scenario;
 use crate::cli::speed::Speed;
 use crate::cli::staging::Staging;
-use crate::generator::scenario::Overrides;
-use crate::generator::scene::Scene;
-use crate::generator::stream::Generated;
-use crate::generator::{GenerateError, truth};
-use crate::gnss::samples::IfMetadata;
-use crate::gnss::sigmf::{self, Beside};
-use crate::gnss::signal::Signal;
-use crate::receiver::lead::undated;
-use crate::receiver::output::{Nmea, Output, OutputError, Rinex, Sink, Tracks};
-use crate::receiver::settings::Settings;
-use crate::receiver::{Outcome, ReceiveError, Reception};
-use crate::twin;
+use analysis::expect::welch::{self, Looks};
+use analysis::judge::schema::SUMMARY;
+use analysis::measure::psd::Psd;
+use analysis::read::psd_name;
+use analysis::show::tables;
+use analysis::{self, JudgeError};
+use generator::scenario::Overrides;
+use generator::scene::Scene;
+use generator::stream::Generated;
+use generator::{GenerateError, truth};
+use gnss::samples::IfMetadata;
+use gnss::sigmf::{self, Beside};
+use gnss::signal::Signal;
+use receiver::lead::undated;
+use receiver::output::{Nmea, Output, OutputError, Rinex, Sink, Tracks};
+use receiver::settings::Settings;
+use receiver::{Outcome, ReceiveError, Reception};
 
 /// Bytes that are made numbers at a time: whole samples of any format.
 const SEEN_BYTES: usize = 1 << 17;

@@ -5,9 +5,9 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 use crate::cli::error::{CliError, escaped, shown};
-use crate::generator::scenario::{Overrides, Scenario, ScenarioError};
-use crate::generator::scene::Scene;
-use crate::receiver::settings::{Settings, SettingsError};
+use generator::scenario::{Overrides, Scenario, ScenarioError};
+use generator::scene::Scene;
+use receiver::settings::{Settings, SettingsError};
 
 /// The scene that runs when none is named.
 const EMBEDDED: &str = include_str!("../../scenarios/two_systems.toml");

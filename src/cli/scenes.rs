@@ -14,7 +14,7 @@ use crate::cli::error::CliError;
 use crate::cli::scenario;
 use crate::cli::schema;
 use crate::cli::staging::Staging;
-use crate::gnss::place::nearest;
+use gnss::place::nearest;
 
 static SHIPPED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/scenarios");
 /// The scene of [`init`]. Lines that begin with `#` and a letter or a bracket are TOML to be uncommented.
@@ -117,7 +117,7 @@ fn with_its_files(scene: &'static File<'static>) -> Vec<(PathBuf, Vec<u8>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generator::scenario::Scenario;
+    use generator::scenario::Scenario;
 
     fn copied(names: &[&str], directory: &Path) -> Result<(), CliError> {
         let names = names.iter().map(|name| (*name).to_owned()).collect();

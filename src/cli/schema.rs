@@ -7,14 +7,14 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value as Json, json};
 
-use crate::analysis::judge::schema::leaves;
 use crate::cli::args::{self, SchemaOf};
 use crate::cli::error::CliError;
 use crate::cli::scenario as files;
-use crate::generator::scenario::keys::SCENARIO;
-use crate::generator::scenario::schema::{Absent, Key, Value};
-use crate::receiver::settings::reference as receiver;
-use crate::study::sweep::keys::STUDY;
+use analysis::judge::schema::leaves;
+use generator::scenario::keys::SCENARIO;
+use generator::scenario::schema::{Absent, Key, Value};
+use receiver::settings::reference as receiver;
+use study::sweep::keys::STUDY;
 
 /// Prints one of them.
 pub fn execute(arguments: &args::Schema) -> Result<(), CliError> {

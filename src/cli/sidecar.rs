@@ -4,12 +4,12 @@
 use std::path::Path;
 
 use crate::cli::error::CliError;
-use crate::generator::scene::Scene;
-use crate::gnss::galileo::e1::E1;
-use crate::gnss::gps::l1ca::L1_CA;
-use crate::gnss::samples::Format;
-use crate::gnss::signal::Signal;
-use crate::gnss::time::Epoch;
+use generator::scene::Scene;
+use gnss::galileo::e1::E1;
+use gnss::gps::l1ca::L1_CA;
+use gnss::samples::Format;
+use gnss::signal::Signal;
+use gnss::time::Epoch;
 
 /// Template of the configuration. Values to fill in are marked by signs.
 const TEMPLATE: &str = include_str!("../../assets/gnss-sdr.conf.in");
@@ -86,7 +86,7 @@ pub fn pocketsdr(scene: &Scene, start: Epoch) -> Result<String, CliError> {
 mod tests {
     use super::*;
     use crate::cli::scenario::{compose_all, read};
-    use crate::generator::scenario::Overrides;
+    use generator::scenario::Overrides;
 
     fn composed(changes: &[(&str, &str)], format: Option<Format>) -> Scene {
         let directory = tempfile::tempdir().unwrap();

@@ -18,7 +18,7 @@ use crate::cli::address::{connect, peer_address};
 use crate::cli::error::{CliError, shown};
 use crate::cli::interrupt;
 use crate::cli::scenario;
-use crate::gnss::samples::IfMetadata;
+use gnss::samples::IfMetadata;
 
 /// A source as the command line names it.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -9,8 +9,8 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crate::analysis::show::staged::{Staged, present, remove};
 use crate::cli::error::CliError;
+use analysis::show::staged::{Staged, present, remove};
 
 /// Files that mark a directory as one of ours, which may be replaced.
 const MARKERS: [&str; 4] = ["truth/scene.json", "rx/receiver.json", "receiver.json", "scene.json"];

@@ -9,12 +9,12 @@
 use std::f64::consts::{PI, TAU};
 
 use fft::Planner;
-use gnss_twin::generator::synth::bank::Bank;
-use gnss_twin::generator::synth::waveform::{Voice, Waveform};
-use gnss_twin::generator::synth::{CODE_ONE, Kernel, RUN_SAMPLES, Run};
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::{Component, Layers, SecondaryCode, Signal};
-use gnss_twin::gnss::time::Epoch;
+use generator::synth::bank::Bank;
+use generator::synth::waveform::{Voice, Waveform};
+use generator::synth::{CODE_ONE, Kernel, RUN_SAMPLES, Run};
+use gnss::satellite::Sv;
+use gnss::signal::{Component, Layers, SecondaryCode, Signal};
+use gnss::time::Epoch;
 use num_complex::{Complex, Complex64};
 
 const LIGHT_MPS: f64 = 299_792_458.0;

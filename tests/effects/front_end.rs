@@ -2,9 +2,9 @@
 
 use std::f64::consts::PI;
 
-use gnss_twin::generator::stage::filter::{Filter, Shape};
-use gnss_twin::generator::stage::{Block, Stage};
-use gnss_twin::gnss::gps::l1ca;
+use generator::stage::filter::{Filter, Shape};
+use generator::stage::{Block, Stage};
+use gnss::gps::l1ca;
 
 /// Share of a BPSK(1) signal's power within ±`half_hz`: ∫ sinc²(f / R) / R df, by the midpoint rule.
 fn share_within(half_hz: f64) -> f64 {

@@ -3,16 +3,16 @@
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
-use gnss_twin::analysis::measure::psd::Psd;
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::stage::{Block, Stage};
-use gnss_twin::generator::stream::{Options, generate_with};
-use gnss_twin::generator::synth::isa::Level;
-use gnss_twin::generator::truth;
-use gnss_twin::generator::vehicle::{Knot, Motion, Trajectory};
-use gnss_twin::gnss::earth::Geodetic;
-use gnss_twin::gnss::samples::Format;
+use analysis::measure::psd::Psd;
+use generator::scenario::{Overrides, Scenario};
+use generator::scene::Scene;
+use generator::stage::{Block, Stage};
+use generator::stream::{Options, generate_with};
+use generator::synth::isa::Level;
+use generator::truth;
+use generator::vehicle::{Knot, Motion, Trajectory};
+use gnss::earth::Geodetic;
+use gnss::samples::Format;
 use nalgebra::Vector3;
 
 /// A scene with that interference; `more` adds to `[front_end]`.

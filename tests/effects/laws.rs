@@ -3,11 +3,11 @@
 
 use std::path::Path;
 
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::stream::{Options, generate_with};
-use gnss_twin::generator::synth::isa::Level;
-use gnss_twin::generator::truth;
+use generator::scenario::{Overrides, Scenario};
+use generator::scene::Scene;
+use generator::stream::{Options, generate_with};
+use generator::synth::isa::Level;
+use generator::truth;
 
 /// A scene for each signal that satellites send, with what its tables call a satellite and precise orbits.
 struct Base {

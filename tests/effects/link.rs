@@ -1,10 +1,10 @@
 //! Strength, antenna and attitude, through samples and the receiver.
 
-use gnss_twin::generator::ray::{Effect, Ray, Sight};
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::Signal;
-use gnss_twin::gnss::time::Epoch;
-use gnss_twin::receiver::track::TrackingSettings;
+use generator::ray::{Effect, Ray, Sight};
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
+use gnss::time::Epoch;
+use receiver::track::TrackingSettings;
 
 use super::single::{scene, track};
 

@@ -1,11 +1,11 @@
 //! Reflected rays against the theory of code multipath, through samples and the receiver's code loop.
 
-use gnss_twin::generator::effect::multipath::{Detour, Echo, Multipath};
-use gnss_twin::gnss::record::{RayRow, SkyRow};
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::receiver::correlate::Edge;
-use gnss_twin::receiver::track::TrackingSettings;
+use generator::effect::multipath::{Detour, Echo, Multipath};
+use gnss::record::{RayRow, SkyRow};
+use gnss::satellite::Sv;
 use nalgebra::Vector3;
+use receiver::correlate::Edge;
+use receiver::track::TrackingSettings;
 
 use super::single::{code_error_m, rows, samples, scene, track};
 

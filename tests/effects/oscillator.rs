@@ -3,10 +3,10 @@
 
 use std::f64::consts::{LN_2, PI};
 
-use gnss_twin::generator::clock::nodes::node_samples;
-use gnss_twin::generator::clock::oscillator::{Oscillator, PowerLaw};
-use gnss_twin::generator::random::Stream;
-use gnss_twin::gnss::time::Rate;
+use generator::clock::nodes::node_samples;
+use generator::clock::oscillator::{Oscillator, PowerLaw};
+use generator::random::Stream;
+use gnss::time::Rate;
 
 fn rate() -> Rate {
     Rate::from_hz(2.6e6).unwrap()

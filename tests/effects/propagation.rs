@@ -4,15 +4,15 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::stream::{Generated, Options, generate_with};
-use gnss_twin::generator::synth::isa::Level;
-use gnss_twin::generator::truth;
-use gnss_twin::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
-use gnss_twin::gnss::record::{Event, EventRow, Fix, Observation, SkyRow, TrajectoryRow};
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::time::Epoch;
+use generator::scenario::{Overrides, Scenario};
+use generator::scene::Scene;
+use generator::stream::{Generated, Options, generate_with};
+use generator::synth::isa::Level;
+use generator::truth;
+use gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
+use gnss::record::{Event, EventRow, Fix, Observation, SkyRow, TrajectoryRow};
+use gnss::rinex;
+use gnss::time::Epoch;
 use serde::de::DeserializeOwned;
 
 const BASE: &str = "name = \"laws\"\nstart = 2010-07-01T08:05:58\nduration_s = 0.3\n[motion]\nkind = \"static\"\n\
@@ -77,7 +77,7 @@ fn slopes_that_step_cost_few_knots() {
         let scene = scenario.compose(&scenes(), &Overrides::default()).unwrap().0;
         let (mut parts, mut roots) = (0, 0);
         let signal = scene.signals[0];
-        let grid = gnss_twin::generator::knots::Grid::new(
+        let grid = generator::knots::Grid::new(
             scene.clock.rate,
             Vec::new(),
             scene.fidelity.knot_tolerance_cycles,

@@ -3,15 +3,15 @@
 use std::f64::consts::TAU;
 use std::io::Write;
 
-use gnss_twin::analysis::expect::theory::oscillator;
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::stream::{Options, generate_with};
-use gnss_twin::generator::truth;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::receiver::track::TrackingSettings;
-use gnss_twin::receiver::track::closed::Mode;
-use gnss_twin::study::expect::carrier_loop;
+use analysis::expect::theory::oscillator;
+use generator::scene::Scene;
+use generator::stream::{Options, generate_with};
+use generator::truth;
+use gnss::satellite::Sv;
 use num_complex::Complex64;
+use receiver::track::TrackingSettings;
+use receiver::track::closed::Mode;
+use study::expect::carrier_loop;
 
 use super::single::{scene, track};
 

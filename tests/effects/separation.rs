@@ -3,11 +3,11 @@
 use std::f64::consts::{PI, TAU};
 use std::process::Command;
 
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::truth;
-use gnss_twin::gnss::gps::l1ca::{self, L1_CA};
-use gnss_twin::gnss::record::Observation;
-use gnss_twin::gnss::satellite::Sv;
+use generator::scene::Scene;
+use generator::truth;
+use gnss::gps::l1ca::{self, L1_CA};
+use gnss::record::Observation;
+use gnss::satellite::Sv;
 
 use super::interference::{alone, generated, scene};
 

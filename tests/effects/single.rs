@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::stream::{Options, generate_with};
-use gnss_twin::generator::truth;
-use gnss_twin::gnss::record::Observation;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::receiver::acquire::Acquired;
-use gnss_twin::receiver::source::Block;
-use gnss_twin::receiver::track::{Channel, Measurement, Report, TrackingSettings};
+use generator::scenario::{Overrides, Scenario};
+use generator::scene::Scene;
+use generator::stream::{Options, generate_with};
+use generator::truth;
+use gnss::record::Observation;
+use gnss::satellite::Sv;
+use receiver::acquire::Acquired;
+use receiver::source::Block;
+use receiver::track::{Channel, Measurement, Report, TrackingSettings};
 
 const PLACE: &str = "name = \"single\"\nstart = 2010-07-01T08:05:58\nseed = 3\n[motion]\nkind = \"static\"\n\
                      latitude_deg = 26.5123\n\

@@ -1,12 +1,12 @@
 //! Cases 44 to 46: sums that are long, full or of awkward length.
 
-use gnss_twin::gnss::gps::l1ca;
-use gnss_twin::gnss::gps::l1ca::L1_CA;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::receiver::acquire::search;
-use gnss_twin::receiver::correlate::sums::{RunningSums, Samples};
-use gnss_twin::receiver::correlate::{Arithmetic, CODE_BITS, Edge, Nco, Replica, chips_to_units};
-use gnss_twin::receiver::source::Block;
+use gnss::gps::l1ca;
+use gnss::gps::l1ca::L1_CA;
+use gnss::satellite::Sv;
+use receiver::acquire::search;
+use receiver::correlate::sums::{RunningSums, Samples};
+use receiver::correlate::{Arithmetic, CODE_BITS, Edge, Nco, Replica, chips_to_units};
+use receiver::source::Block;
 
 use crate::figures::{CA, Worst, case};
 use crate::run;

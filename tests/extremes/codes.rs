@@ -5,21 +5,21 @@ use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use gnss_twin::generator::catalogue::Catalogue;
-use gnss_twin::generator::effect::ionosphere::KlobucharIonosphere;
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::sky;
-use gnss_twin::generator::synth::Edge;
-use gnss_twin::generator::synth::waveform::Waveform;
-use gnss_twin::generator::transmit::Transmitter;
-use gnss_twin::generator::truth;
-use gnss_twin::generator::vehicle::{Motion, Trajectory};
-use gnss_twin::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use gnss_twin::gnss::klobuchar::Klobuchar;
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::signal::{Carrier, Component, Layers, SIGNALS, Signal};
-use gnss_twin::gnss::time::Epoch;
+use generator::catalogue::Catalogue;
+use generator::effect::ionosphere::KlobucharIonosphere;
+use generator::scene::Scene;
+use generator::sky;
+use generator::synth::Edge;
+use generator::synth::waveform::Waveform;
+use generator::transmit::Transmitter;
+use generator::truth;
+use generator::vehicle::{Motion, Trajectory};
+use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::klobuchar::Klobuchar;
+use gnss::rinex;
+use gnss::satellite::{Sv, System};
+use gnss::signal::{Carrier, Component, Layers, SIGNALS, Signal};
+use gnss::time::Epoch;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
@@ -68,7 +68,7 @@ fn on_every_channel(scene: &mut Scene, signal: &'static Signal) {
     let first = own.iter().find_map(|sv| set(*sv)).unwrap();
     let others = signal.satellites().filter(|sv| !own.contains(sv));
     let sets = own.iter().copied().chain(others).filter(|sv| channels.insert(signal.link(*sv).channel()));
-    let sets = sets.map(|sv| gnss_twin::gnss::broadcast::Ephemeris { sv, ..set(sv).unwrap_or_else(|| first.clone()) });
+    let sets = sets.map(|sv| gnss::broadcast::Ephemeris { sv, ..set(sv).unwrap_or_else(|| first.clone()) });
     scene.catalogue = Arc::new(Catalogue::new(sets.collect()).0);
 }
 
@@ -133,9 +133,8 @@ fn errors(signal: &'static Signal, days: u64, ionosphere: Option<Klobuchar>) -> 
             let cycles = signed(exact.carrier(n, delay).wrapping_sub(turns)) + own - carrier_s * signal.carrier_hz(sv);
             let cycles = cycles - cycles.round();
             errors.carrier.take(cycles.abs(), input);
-            let pace = |sequence: &gnss_twin::generator::synth::chips::Spreading| {
-                (sequence.pace().steps, sequence.pace().step_rate_hz())
-            };
+            let pace =
+                |sequence: &generator::synth::chips::Spreading| (sequence.pace().steps, sequence.pace().step_rate_hz());
             let code_m = error_m((code.period, code.phase()), n, delay, pace(sequence)) - code_s * SPEED_OF_LIGHT_MPS;
             errors.code_m.take(code_m.abs(), input);
             errors.ionosphere_m.take((code_s - carrier_s) * SPEED_OF_LIGHT_MPS, input);
@@ -233,7 +232,7 @@ impl Definition {
     /// The wave so many chips into a code period, without secondary code.
     fn within(&self, chips: f64) -> Complex64 {
         let index = chips as usize;
-        let layer = |layer: &gnss_twin::gnss::signal::Layer| {
+        let layer = |layer: &gnss::signal::Layer| {
             let step = ((chips - index as f64) * layer.pulse.len() as f64) as usize;
             let sign = f64::from(layer.pulse[step] * i8::from(layer.covers(index)));
             Complex64::from_polar(layer.weight * sign, TAU * layer.phase_cycles)

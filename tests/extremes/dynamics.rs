@@ -1,19 +1,19 @@
 //! Cases 23 to 28: what shakes, starts, turns or stands still in frequency.
 
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::synth::Edge;
-use gnss_twin::generator::synth::waveform::Waveform;
-use gnss_twin::generator::transmit::Transmitter;
-use gnss_twin::generator::truth;
-use gnss_twin::generator::vehicle::{Knot, Motion, Trajectory};
-use gnss_twin::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use gnss_twin::gnss::gps::l1ca::L1_CA;
-use gnss_twin::gnss::record::Event;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::{Layers, SIGNALS, Signal};
-use gnss_twin::receiver::track::TrackingSettings;
+use generator::scene::Scene;
+use generator::synth::Edge;
+use generator::synth::waveform::Waveform;
+use generator::transmit::Transmitter;
+use generator::truth;
+use generator::vehicle::{Knot, Motion, Trajectory};
+use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::gps::l1ca::L1_CA;
+use gnss::record::Event;
+use gnss::satellite::Sv;
+use gnss::signal::{Layers, SIGNALS, Signal};
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use receiver::track::TrackingSettings;
 
 use crate::exact::{Exact, ONE, signed};
 use crate::figures::{ALL, CA, Worst, case};
@@ -246,7 +246,7 @@ fn a_minute_of_twenty_g_ends_at_sixty_kilohertz_with_code_and_carrier_together()
     // code, 1000 Hz/s.
     let first = (57.5 * 2.6e6) as u64;
     let at = |sv: Sv, sample: u64| {
-        let authentic = gnss_twin::generator::spoof::Constellation::authentic();
+        let authentic = generator::spoof::Constellation::authentic();
         truth::observe(&scene, &authentic, sv, &L1_CA, sample, 0.0).unwrap().unwrap().0
     };
     let fastest = run::in_view(&scene)
@@ -254,7 +254,7 @@ fn a_minute_of_twenty_g_ends_at_sixty_kilohertz_with_code_and_carrier_together()
         .max_by(|a, b| at(*a, first).doppler_hz.abs().total_cmp(&at(*b, first).doppler_hz.abs()))
         .unwrap();
     let begun = at(fastest, first);
-    let start = gnss_twin::receiver::acquire::Acquired {
+    let start = receiver::acquire::Acquired {
         sv: fastest,
         signal: &L1_CA,
         sample: 0,
@@ -309,7 +309,7 @@ fn at_the_zero_of_doppler_nothing_divides() {
     let scene =
         run::scene(3600.0, "[front_end]\nsample_rate_hz = 4.092e6\nformat = \"cf32\"\n[power]\ncn0_dbhz = 45\n");
     let doppler_hz = |sv: Sv, sample: u64| {
-        let authentic = gnss_twin::generator::spoof::Constellation::authentic();
+        let authentic = generator::spoof::Constellation::authentic();
         truth::observe(&scene, &authentic, sv, &L1_CA, sample, 0.0).unwrap().unwrap().0.doppler_hz
     };
     let last = scene.samples - 4_092_000;

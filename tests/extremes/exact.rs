@@ -3,11 +3,11 @@
 //! Everything that grows with time is whole: sample numbers, seconds since a scale began, the receiver's
 //! clock. Only the light time and the satellite's own clock, which stay small, come as `f64`.
 
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::sky;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::Signal;
-use gnss_twin::gnss::time::Epoch;
+use generator::scene::Scene;
+use generator::sky;
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
+use gnss::time::Epoch;
 
 use crate::scales;
 

@@ -239,5 +239,5 @@ fn the_worst_keeps_its_input_and_what_is_no_number_is_the_worst() {
     assert!(worst(&[1.0, f64::NAN, 2.0], Worst::default()).1.is_nan());
     assert!(worst(&[f64::NAN, 2.0], Worst::least()).1.is_nan());
     assert!(worst(&[], Worst::default()).1.is_nan());
-    assert_eq!(ALL, format!("all {}", gnss_twin::gnss::signal::SIGNALS.len()));
+    assert_eq!(ALL, format!("all {}", gnss::signal::SIGNALS.len()));
 }

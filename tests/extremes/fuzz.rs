@@ -2,12 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::truth;
-use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
-use gnss_twin::gnss::gps::l1ca::{self, L1_CA};
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::time::tone_turns;
+use generator::scene::Scene;
+use generator::truth;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::gps::l1ca::{self, L1_CA};
+use gnss::satellite::Sv;
+use gnss::time::tone_turns;
 use num_complex::Complex64;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};

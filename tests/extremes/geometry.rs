@@ -2,26 +2,26 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use gnss_twin::generator::effect::ionosphere::KlobucharIonosphere;
-use gnss_twin::generator::effect::mapping::Mapping;
-use gnss_twin::generator::effect::mapping::niell;
-use gnss_twin::generator::effect::troposphere::{Air, Troposphere, Weather};
-use gnss_twin::generator::sky;
-use gnss_twin::generator::stream::{Options, generate_part};
-use gnss_twin::generator::truth;
-use gnss_twin::generator::vehicle::Motion;
-use gnss_twin::gnss::broadcast::{ClockState, OrbitError, State};
-use gnss_twin::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, look, rotate_earth};
-use gnss_twin::gnss::gps::l1ca::L1_CA;
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::time::{BDT, Epoch, GLONASST, GPST, GST};
-use gnss_twin::receiver::acquire;
-use gnss_twin::receiver::position::least_squares::{Corrections, Ionosphere, Range, position};
-use gnss_twin::receiver::position::{NoFix, consistent};
-use gnss_twin::receiver::source::Block;
-use gnss_twin::receiver::track::TrackingSettings;
+use generator::effect::ionosphere::KlobucharIonosphere;
+use generator::effect::mapping::Mapping;
+use generator::effect::mapping::niell;
+use generator::effect::troposphere::{Air, Troposphere, Weather};
+use generator::sky;
+use generator::stream::{Options, generate_part};
+use generator::truth;
+use generator::vehicle::Motion;
+use gnss::broadcast::{ClockState, OrbitError, State};
+use gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS, look, rotate_earth};
+use gnss::gps::l1ca::L1_CA;
+use gnss::rinex;
+use gnss::satellite::Sv;
+use gnss::time::{BDT, Epoch, GLONASST, GPST, GST};
 use nalgebra::Vector3;
+use receiver::acquire;
+use receiver::position::least_squares::{Corrections, Ionosphere, Range, position};
+use receiver::position::{NoFix, consistent};
+use receiver::source::Block;
+use receiver::track::TrackingSettings;
 
 use crate::figures::{CA, NONE, Worst, case};
 use crate::run;
@@ -189,7 +189,7 @@ fn overhead_there_is_no_azimuth_and_in_the_antenna_no_direction() {
             "[front_end]\nsample_rate_hz = 2.6e6\n[power]\n[troposphere]\nmodel = \"saastamoinen\"\n[ionosphere]\n\
              model = \"klobuchar\"\n",
         );
-        overhead.trajectory = gnss_twin::generator::vehicle::Trajectory::fixed(place);
+        overhead.trajectory = generator::vehicle::Trajectory::fixed(place);
         let seen = truth::seen(&overhead, sv, &L1_CA, at).unwrap().unwrap();
         let towards = seen.emission.sight.look;
         let arrival = seen.arrivals[0];

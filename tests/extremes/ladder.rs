@@ -3,18 +3,18 @@
 
 use std::fmt::Write;
 
-use gnss_twin::analysis::show::plot::canvas::{Axis, BLUE, Chart, GREEN, Mark, ORANGE, Series, figure};
-use gnss_twin::generator::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade};
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::synth::band::Filter;
-use gnss_twin::generator::synth::isa::Level;
-use gnss_twin::generator::synth::{Edge, Kernel};
-use gnss_twin::generator::transmit::{Scratch, Transmitter};
-use gnss_twin::generator::vehicle::{Knot, Motion, Trajectory};
-use gnss_twin::gnss::gps::l1ca::L1_CA;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::time::Epoch;
-use gnss_twin::receiver::correlate;
+use analysis::show::plot::canvas::{Axis, BLUE, Chart, GREEN, Mark, ORANGE, Series, figure};
+use generator::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade};
+use generator::scene::Scene;
+use generator::synth::band::Filter;
+use generator::synth::isa::Level;
+use generator::synth::{Edge, Kernel};
+use generator::transmit::{Scratch, Transmitter};
+use generator::vehicle::{Knot, Motion, Trajectory};
+use gnss::gps::l1ca::L1_CA;
+use gnss::satellite::Sv;
+use gnss::time::Epoch;
+use receiver::correlate;
 
 use crate::arithmetic::{sum_error, twin_error};
 use crate::figures::{self, CA, Worst, case};
@@ -75,7 +75,7 @@ fn scene(rate_hz: f64, grade: Grade, before_s: i64) -> (Scene, u64) {
 
 /// A motion to and fro towards the north at 1 Hz with a largest acceleration.
 fn shaken(acceleration_mps2: f64) -> Trajectory {
-    let place = gnss_twin::gnss::earth::Geodetic::from_degrees(26.5123, 80.2329, 130.0);
+    let place = gnss::earth::Geodetic::from_degrees(26.5123, 80.2329, 130.0);
     let up = place.ecef_to_enu().transpose() * nalgebra::Vector3::z();
     let w = std::f64::consts::TAU;
     let knot = |k: u32| {

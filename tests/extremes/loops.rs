@@ -1,19 +1,19 @@
 //! Cases 47 to 52: loops near their limits and locks that are false.
 
-use gnss_twin::generator::spoof::Constellation;
-use gnss_twin::generator::stream::{Options, generate_with};
-use gnss_twin::generator::truth;
-use gnss_twin::gnss::gps::l1ca::{self, L1_CA};
-use gnss_twin::gnss::gps::lnav::{Broadcast, PREAMBLE};
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::time::{Epoch, WEEK_S};
-use gnss_twin::receiver::correlate::{Edge, Nco, Replica, chips_to_units};
-use gnss_twin::receiver::decode::{Decoder, News};
-use gnss_twin::receiver::position::CodeNoise;
-use gnss_twin::receiver::track::loops::{self, Gains, Rates, bandwidth_time};
-use gnss_twin::receiver::track::{CodeDiscriminator, Symbol, TrackingSettings};
+use generator::spoof::Constellation;
+use generator::stream::{Options, generate_with};
+use generator::truth;
+use gnss::gps::l1ca::{self, L1_CA};
+use gnss::gps::lnav::{Broadcast, PREAMBLE};
+use gnss::rinex;
+use gnss::satellite::Sv;
+use gnss::time::{Epoch, WEEK_S};
 use num_complex::Complex64;
+use receiver::correlate::{Edge, Nco, Replica, chips_to_units};
+use receiver::decode::{Decoder, News};
+use receiver::position::CodeNoise;
+use receiver::track::loops::{self, Gains, Rates, bandwidth_time};
+use receiver::track::{CodeDiscriminator, Symbol, TrackingSettings};
 
 use crate::figures::{CA, NONE, Worst, case};
 use crate::fuzz::Period;

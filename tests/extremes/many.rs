@@ -3,16 +3,16 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::spoof::Constellation;
-use gnss_twin::generator::synth::Edge;
-use gnss_twin::generator::transmit::Transmitter;
-use gnss_twin::generator::truth;
-use gnss_twin::generator::vehicle::Trajectory;
-use gnss_twin::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS, rotate_earth};
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::{SIGNALS, Signal};
-use gnss_twin::gnss::time::Epoch;
+use generator::scene::Scene;
+use generator::spoof::Constellation;
+use generator::synth::Edge;
+use generator::transmit::Transmitter;
+use generator::truth;
+use generator::vehicle::Trajectory;
+use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS, rotate_earth};
+use gnss::satellite::Sv;
+use gnss::signal::{SIGNALS, Signal};
+use gnss::time::Epoch;
 use num_complex::Complex64;
 use rayon::prelude::*;
 
@@ -148,7 +148,7 @@ fn double_differences_are_whole_numbers_all_day() {
     for scene in [&mut base, &mut rover] {
         scene.clock.start = Epoch::parse("2010-07-01T00:00:00").unwrap();
     }
-    told(the, "of a day", double_differences([&base, &rover], &gnss_twin::gnss::gps::l1ca::L1_CA, 300));
+    told(the, "of a day", double_differences([&base, &rover], &gnss::gps::l1ca::L1_CA, 300));
     let of: Vec<_> = SIGNALS
         .par_iter()
         .map(|signal| {

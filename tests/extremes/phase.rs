@@ -1,13 +1,13 @@
 //! Cases 6, 31, 33 and 65: the same phases from a seek as from a stream, in one front end as in another, at
 //! rates that fit no code, and in single as in double precision.
 
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::synth::Edge;
-use gnss_twin::generator::synth::waveform::Waveform;
-use gnss_twin::generator::transmit::Transmitter;
-use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::{Layers, SIGNALS, Signal};
+use generator::scene::Scene;
+use generator::synth::Edge;
+use generator::synth::waveform::Waveform;
+use generator::transmit::Transmitter;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::satellite::Sv;
+use gnss::signal::{Layers, SIGNALS, Signal};
 use rayon::prelude::*;
 
 use crate::codes::{DAY_S, IF_HZ, RATE_HZ, RUN, below, late, senders};

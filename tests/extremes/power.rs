@@ -1,15 +1,15 @@
 //! Cases 34 to 43: from nothing to ninety decibels too much.
 
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::gnss::gps::l1ca::{self, L1_CA};
-use gnss_twin::gnss::record::Event;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::Link;
-use gnss_twin::receiver::acquire::{AcquisitionSettings, Searcher, search};
-use gnss_twin::receiver::correlate::{Edge, Nco, Replica, chips_to_units};
-use gnss_twin::receiver::settings::Settings;
-use gnss_twin::receiver::source::Block;
-use gnss_twin::receiver::track::TrackingSettings;
+use generator::scene::Scene;
+use gnss::gps::l1ca::{self, L1_CA};
+use gnss::record::Event;
+use gnss::satellite::Sv;
+use gnss::signal::Link;
+use receiver::acquire::{AcquisitionSettings, Searcher, search};
+use receiver::correlate::{Edge, Nco, Replica, chips_to_units};
+use receiver::settings::Settings;
+use receiver::source::Block;
+use receiver::track::TrackingSettings;
 
 use crate::figures::{self, CA, Worst, case};
 use crate::run::{self, Received};
@@ -221,8 +221,8 @@ fn a_tone_on_a_line_of_the_code_is_a_constant_of_the_predicted_size_and_no_satel
     );
     let (mut i, mut q) = (vec![0.0_f32; 1_003_520], vec![0.0_f32; 1_003_520]);
     let source = &scene.interference[0];
-    let mut block = gnss_twin::generator::stage::Block::whole(0, &mut i, &mut q);
-    gnss_twin::generator::stage::Stage::act(source, &mut block);
+    let mut block = generator::stage::Block::whole(0, &mut i, &mut q);
+    generator::stage::Stage::act(source, &mut block);
     let replica = Replica::new(l1ca::code(6).unwrap(), Edge::Area).unwrap();
     let step = chips_to_units(1.023e6 / 5e6) as u64;
     let amplitude = f64::from(scene.noise_lsb) * (2.0 * libm::pow(10.0, 4.5) / 5e6).sqrt();
@@ -238,9 +238,8 @@ fn a_tone_on_a_line_of_the_code_is_a_constant_of_the_predicted_size_and_no_satel
     // The wave is 11 dB above the noise of the band: eight deviations are 64 LSB.
     let front = format!("{FRONT}noise_lsb = 8\n");
     let still = run::scene(6.0, &front);
-    let authentic = gnss_twin::generator::spoof::Constellation::authentic();
-    let (row, ..) =
-        gnss_twin::generator::truth::observe(&still, &authentic, sv, &L1_CA, 3 * 2_600_000, 0.0).unwrap().unwrap();
+    let authentic = generator::spoof::Constellation::authentic();
+    let (row, ..) = generator::truth::observe(&still, &authentic, sv, &L1_CA, 3 * 2_600_000, 0.0).unwrap().unwrap();
     let wave_hz = -227e3 * (1.0 + row.doppler_hz / L1_CA.centre_hz()) + row.doppler_hz;
     let scene = jammed(&format!("kind = \"cw\"\noffset_hz = {wave_hz:.3}\njs_db = 30\non_s = 3\n"), 6.0, &front);
     let up: Vec<Sv> = [sv].into_iter().chain(run::in_view(&scene).into_iter().filter(|up| *up != sv).take(3)).collect();
@@ -250,7 +249,7 @@ fn a_tone_on_a_line_of_the_code_is_a_constant_of_the_predicted_size_and_no_satel
     let second = |sample: u64| sample / 2_600_000;
     the.all("seconds under it that are told", lines.iter().filter(|row| second(row.sample) >= 3).count(), 3);
     the.none("seconds before it that are told", lines.iter().filter(|row| second(row.sample) < 3).count());
-    let worst = |of: &dyn Fn(&gnss_twin::gnss::record::LineRow) -> f64| {
+    let worst = |of: &dyn Fn(&gnss::record::LineRow) -> f64| {
         let mut worst = Worst::default();
         lines.iter().for_each(|row| worst.take(of(row), || format!("second {}", second(row.sample))));
         worst
@@ -346,7 +345,7 @@ fn pulses_without_length_and_sweeps_within_a_sample_are_refused() {
     the.all("refused by name", told.count(), bad.len());
     let whole = scene("kind = \"pulse\"\nwidth_s = 1e-3\nrate_hz = 1000\n").unwrap();
     let (mut i, mut q) = (vec![0.0_f32; 8192], vec![0.0_f32; 8192]);
-    let mut block = gnss_twin::generator::stage::Block::whole(0, &mut i, &mut q);
-    gnss_twin::generator::stage::Stage::act(&whole.interference[0], &mut block);
+    let mut block = generator::stage::Block::whole(0, &mut i, &mut q);
+    generator::stage::Stage::act(&whole.interference[0], &mut block);
     the.all("duty 1: on at every sample", i.iter().zip(&q).filter(|(i, q)| i.hypot(**q) > 0.0).count(), 8192);
 }

@@ -3,19 +3,19 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::stream::{Options, generate_part};
-use gnss_twin::generator::truth;
-use gnss_twin::gnss::record::{EventRow, Fix, LineRow, Observation, TrackingRow};
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::time::Epoch;
-use gnss_twin::receiver::acquire::Acquired;
-use gnss_twin::receiver::output::Output;
-use gnss_twin::receiver::settings::Settings;
-use gnss_twin::receiver::source::Block;
-use gnss_twin::receiver::track::{Channel, Report, TrackingSettings};
-use gnss_twin::receiver::{Outcome, receive};
+use generator::scenario::{Overrides, Scenario};
+use generator::scene::Scene;
+use generator::stream::{Options, generate_part};
+use generator::truth;
+use gnss::record::{EventRow, Fix, LineRow, Observation, TrackingRow};
+use gnss::satellite::Sv;
+use gnss::time::Epoch;
+use receiver::acquire::Acquired;
+use receiver::output::Output;
+use receiver::settings::Settings;
+use receiver::source::Block;
+use receiver::track::{Channel, Report, TrackingSettings};
+use receiver::{Outcome, receive};
 
 use crate::figures::Worst;
 
@@ -194,9 +194,8 @@ pub fn track(scene: &Scene, bytes: &[u8], hit: &Acquired, settings: &TrackingSet
 /// Hit of a perfect search for `sv` at sample 0, with errors added.
 pub fn hit(scene: &Scene, sv: Sv, chips: f64, doppler_hz: f64) -> Acquired {
     let signal = scene.signals[0];
-    let (row, ..) = truth::observe(scene, &gnss_twin::generator::spoof::Constellation::authentic(), sv, signal, 0, 0.0)
-        .unwrap()
-        .unwrap();
+    let (row, ..) =
+        truth::observe(scene, &generator::spoof::Constellation::authentic(), sv, signal, 0, 0.0).unwrap().unwrap();
     Acquired {
         sv,
         signal,

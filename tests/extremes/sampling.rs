@@ -2,27 +2,27 @@
 
 use std::f64::consts::{PI, TAU};
 
-use gnss_twin::generator::fidelity::Arithmetic;
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::scene::CodeEdge;
-use gnss_twin::generator::synth::band::Filter;
-use gnss_twin::generator::synth::bank::Bank;
-use gnss_twin::generator::synth::chips::CodeTime;
-use gnss_twin::generator::synth::isa::Level;
-use gnss_twin::generator::synth::waveform::{Waveform, plain};
-use gnss_twin::generator::synth::{Edge, Kernel, Run};
-use gnss_twin::generator::transmit::Transmitter;
-use gnss_twin::generator::truth;
-use gnss_twin::gnss::gps::l1ca::{self, L1_CA};
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::{Layers, SIGNALS};
-use gnss_twin::gnss::time::{Epoch, Rate, tone_turns};
-use gnss_twin::receiver::acquire::search;
-use gnss_twin::receiver::correlate;
-use gnss_twin::receiver::settings::Settings;
-use gnss_twin::receiver::source::Block;
-use gnss_twin::receiver::track::TrackingSettings;
+use generator::fidelity::Arithmetic;
+use generator::scenario::{Overrides, Scenario};
+use generator::scene::CodeEdge;
+use generator::synth::band::Filter;
+use generator::synth::bank::Bank;
+use generator::synth::chips::CodeTime;
+use generator::synth::isa::Level;
+use generator::synth::waveform::{Waveform, plain};
+use generator::synth::{Edge, Kernel, Run};
+use generator::transmit::Transmitter;
+use generator::truth;
+use gnss::gps::l1ca::{self, L1_CA};
+use gnss::satellite::Sv;
+use gnss::signal::{Layers, SIGNALS};
+use gnss::time::{Epoch, Rate, tone_turns};
 use num_complex::Complex64;
+use receiver::acquire::search;
+use receiver::correlate;
+use receiver::settings::Settings;
+use receiver::source::Block;
+use receiver::track::TrackingSettings;
 
 use crate::figures::{ALL, CA, Worst, case};
 use crate::run::{self, Received};

@@ -5,13 +5,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use gnss_twin::generator::message::{self, Senders, Slot};
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::gps::lnav::UtcData;
-use gnss_twin::gnss::message::{Common, Message, Read};
-use gnss_twin::gnss::satellite::System;
-use gnss_twin::gnss::signal::{SIGNALS, Signal};
-use gnss_twin::gnss::time::{Epoch, TimeScale, UTC};
+use generator::message::{self, Senders, Slot};
+use gnss::broadcast::Ephemeris;
+use gnss::gps::lnav::UtcData;
+use gnss::message::{Common, Message, Read};
+use gnss::satellite::System;
+use gnss::signal::{SIGNALS, Signal};
+use gnss::time::{Epoch, TimeScale, UTC};
 
 use crate::figures::{self, NONE, case};
 use crate::skies;
@@ -180,7 +180,7 @@ fn messages() -> Vec<(&'static Signal, &'static Message, Ephemeris)> {
     for signal in SIGNALS {
         let scene = skies::scene(&[signal], 0.01, &skies::front_end(signal, 65e6, 0.0));
         let up = skies::in_view(&scene, signal);
-        let message = |component: &'static gnss_twin::gnss::signal::Component| component.message;
+        let message = |component: &'static gnss::signal::Component| component.message;
         for message in signal.components.iter().filter_map(message).filter(|message| message.is_dated()) {
             // D1 and D2 are two messages in one form.
             for sv in &up {

@@ -1,9 +1,9 @@
 //! Cases 52 and 66: the same bytes on every instruction set that the processor has, and by one thread.
 
-use gnss_twin::generator::stream::Options;
-use gnss_twin::generator::synth::isa::Level;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::SIGNALS;
+use generator::stream::Options;
+use generator::synth::isa::Level;
+use gnss::satellite::Sv;
+use gnss::signal::SIGNALS;
 use rayon::prelude::*;
 
 use crate::figures::{ALL, case};

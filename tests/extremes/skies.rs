@@ -4,19 +4,19 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use gnss_twin::generator::catalogue::Catalogue;
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::sky;
-use gnss_twin::generator::synth::Edge;
-use gnss_twin::generator::synth::waveform::Waveform;
-use gnss_twin::generator::transmit::Transmitter;
-use gnss_twin::generator::truth;
-use gnss_twin::generator::vehicle::Motion;
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::signal::{Layers, SIGNALS, Signal};
-use gnss_twin::gnss::time::{Epoch, WEEK_S};
+use generator::catalogue::Catalogue;
+use generator::scene::Scene;
+use generator::sky;
+use generator::synth::Edge;
+use generator::synth::waveform::Waveform;
+use generator::transmit::Transmitter;
+use generator::truth;
+use generator::vehicle::Motion;
+use gnss::broadcast::Ephemeris;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::satellite::{Sv, System};
+use gnss::signal::{Layers, SIGNALS, Signal};
+use gnss::time::{Epoch, WEEK_S};
 use rayon::prelude::*;
 
 use crate::exact::{ONE, signed};

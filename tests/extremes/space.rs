@@ -1,16 +1,16 @@
 //! Cases 16 and 17, and users in orbit: what they see, how it moves, and whether a receiver finds it.
 
-use gnss_twin::generator::fidelity::Grade;
-use gnss_twin::generator::scene::{Fidelity, SPACE_M, Scene};
-use gnss_twin::generator::spoof::Constellation;
-use gnss_twin::generator::stream::{Options, generate_part};
-use gnss_twin::generator::truth;
-use gnss_twin::gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, SPEED_OF_LIGHT_MPS};
-use gnss_twin::gnss::gps::l1ca::L1_CA;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::receiver::acquire::search;
-use gnss_twin::receiver::source::Block;
+use generator::fidelity::Grade;
+use generator::scene::{Fidelity, SPACE_M, Scene};
+use generator::spoof::Constellation;
+use generator::stream::{Options, generate_part};
+use generator::truth;
+use gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::gps::l1ca::L1_CA;
+use gnss::satellite::Sv;
 use nalgebra::Vector3;
+use receiver::acquire::search;
+use receiver::source::Block;
 
 use crate::figures::{CA, Case, Worst, case};
 use crate::run::{self, Received};
@@ -89,7 +89,7 @@ fn found(name: &str, scene: &Scene, least_dbhz: f64) -> (usize, usize, usize) {
             continue;
         }
         of += 1;
-        let near = |hit: &gnss_twin::receiver::acquire::Acquired| {
+        let near = |hit: &receiver::acquire::Acquired| {
             // Half a sample, and a bin of the refined search.
             run::code_error_m(scene, *sv, 0, hit.code_phase_chips / 1023.0).abs() < 60.0
                 && (hit.doppler_hz - truth.doppler_hz).abs() < 125.0
@@ -126,7 +126,7 @@ fn above_the_satellites_the_earth_hides_what_it_covers_and_side_lobes_carry_the_
     for longitude in (-180..180).step_by(15) {
         let mut scene = run::try_scene(&text("geo")).unwrap();
         let place = Geodetic::from_degrees(0.0, f64::from(longitude), 35_786_000.0).to_ecef();
-        scene.trajectory = gnss_twin::generator::vehicle::Trajectory::fixed(place);
+        scene.trajectory = generator::vehicle::Trajectory::fixed(place);
         for sv in scene.catalogue.satellites() {
             let Some(truth) = truth::seen(&scene, sv, &L1_CA, scene.clock.start).unwrap() else { continue };
             let sight = &truth.emission.sight;
@@ -203,7 +203,7 @@ fn a_low_orbit_has_the_dopplers_of_the_equation_and_a_receiver_finds_its_way() {
     the.at_least("fixes in 40 s from a cold start", (fixes as f64, "of 400 due"), 60.0, "");
     // As on the ground: 0.8 m on a range at 42 dB-Hz on average, PDOP 2, three sigma.
     the.at_most("fixes, 3-D", worst_m, 5.0, "m");
-    let speed = |fix: &gnss_twin::gnss::record::Fix| {
+    let speed = |fix: &gnss::record::Fix| {
         let local = scene.clock.epoch(fix.sample);
         let t_s = scene.receiver_clock.true_elapsed_s(scene.clock.start, local);
         (fix.velocity_mps() - scene.trajectory.at(t_s).velocity_mps).norm()
@@ -246,7 +246,7 @@ fn on_the_way_to_the_moon_signals_are_a_second_old_and_right() {
         let at = scene.clock.start;
         let seen = truth::seen(&scene, sv, &L1_CA, at).unwrap().unwrap();
         let (state, _) = scene.catalogue.truth(sv, at.plus_s(-seen.emission.travel_s)).unwrap().unwrap();
-        let there = gnss_twin::gnss::earth::rotate_earth(&state.position_m, seen.emission.travel_s);
+        let there = gnss::earth::rotate_earth(&state.position_m, seen.emission.travel_s);
         let range_m = (there - scene.trajectory.at(0.0).position_m).norm();
         worst_m.take((range_m - SPEED_OF_LIGHT_MPS * seen.emission.travel_s).abs(), || sv.to_string());
         longest_s.take(seen.emission.travel_s, || sv.to_string());

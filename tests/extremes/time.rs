@@ -2,19 +2,19 @@
 
 use std::sync::Arc;
 
-use gnss_twin::generator::catalogue::Catalogue;
-use gnss_twin::generator::message::Senders;
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::synth::Edge;
-use gnss_twin::generator::transmit::Transmitter;
-use gnss_twin::generator::truth;
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::earth::{EARTH_ROTATION_RADPS, SPEED_OF_LIGHT_MPS};
-use gnss_twin::gnss::gps::l1ca::L1_CA;
-use gnss_twin::gnss::gps::lnav::{self, Broadcast, Subframe, UtcData};
-use gnss_twin::gnss::message::Common;
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::time::{Epoch, WEEK_S};
+use generator::catalogue::Catalogue;
+use generator::message::Senders;
+use generator::scene::Scene;
+use generator::synth::Edge;
+use generator::transmit::Transmitter;
+use generator::truth;
+use gnss::broadcast::Ephemeris;
+use gnss::earth::{EARTH_ROTATION_RADPS, SPEED_OF_LIGHT_MPS};
+use gnss::gps::l1ca::L1_CA;
+use gnss::gps::lnav::{self, Broadcast, Subframe, UtcData};
+use gnss::message::Common;
+use gnss::rinex;
+use gnss::time::{Epoch, WEEK_S};
 
 use crate::figures::{self, CA, Worst, case};
 use crate::run::{self, Received};

@@ -1,8 +1,8 @@
 //! Elements at the bounds of their fields and one unit beyond, in the last of the twelve digits that a file
 //! holds; and times of files and messages against tables from outside.
 
-use gnss_twin::gnss::rinex::read;
-use gnss_twin::gnss::time::Epoch;
+use gnss::rinex::read;
+use gnss::time::Epoch;
 
 use crate::damage::Random;
 use crate::navigation::{bases, with_field};

@@ -5,14 +5,14 @@ use std::fs;
 use std::path::Path;
 use std::process::{Child, Stdio};
 
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::stream::{Options, generate_part};
-use gnss_twin::generator::synth::isa::Level;
-use gnss_twin::generator::truth;
-use gnss_twin::receiver::Reception;
-use gnss_twin::receiver::output::Output;
-use gnss_twin::receiver::settings::Settings;
+use generator::scenario::{Overrides, Scenario};
+use generator::scene::Scene;
+use generator::stream::{Options, generate_part};
+use generator::synth::isa::Level;
+use generator::truth;
+use receiver::Reception;
+use receiver::output::Output;
+use receiver::settings::Settings;
 
 use crate::machine::{Bench, Ended, Files, files, left_over, twin};
 use crate::tally::{End, Tally, cases, long};

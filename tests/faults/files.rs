@@ -1,7 +1,7 @@
 //! Trajectories: damaged in every class, refused with the line.
 
-use gnss_twin::generator::vehicle::file::{Options, read_csv};
-use gnss_twin::gnss::time::Epoch;
+use generator::vehicle::file::{Options, read_csv};
+use gnss::time::Epoch;
 
 use crate::tally::{End, Tally, cases};
 

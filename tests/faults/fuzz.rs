@@ -10,28 +10,28 @@ use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
-use gnss_twin::analysis::expect::stated::Stated;
-use gnss_twin::analysis::judge::limits::Limits;
-use gnss_twin::analysis::measure::clock::Clock;
-use gnss_twin::analysis::measure::consistency::Consistency;
-use gnss_twin::analysis::measure::elevation::Elevations;
-use gnss_twin::analysis::measure::errors::Errors;
-use gnss_twin::analysis::measure::jitter::Jitter;
-use gnss_twin::analysis::measure::slips::Slips;
-use gnss_twin::analysis::read::Run;
-use gnss_twin::analysis::read::{nmea, rinex_obs};
-use gnss_twin::generator::effect::antenna;
-use gnss_twin::generator::scenario::Scenario;
-use gnss_twin::generator::vehicle::Trajectory;
-use gnss_twin::generator::vehicle::file::{Options, read_csv, read_nmea};
-use gnss_twin::gnss::ionex::{Interpolation, Maps};
-use gnss_twin::gnss::time::Epoch;
-use gnss_twin::gnss::vienna::MappingGrid;
-use gnss_twin::gnss::{rinex, sigmf, sp3};
-use gnss_twin::receiver::settings::Settings;
-use gnss_twin::study::sweep::plan::{Cut, Plan};
-use gnss_twin::study::sweep::shard;
-use gnss_twin::study::sweep::spec::Study;
+use analysis::expect::stated::Stated;
+use analysis::judge::limits::Limits;
+use analysis::measure::clock::Clock;
+use analysis::measure::consistency::Consistency;
+use analysis::measure::elevation::Elevations;
+use analysis::measure::errors::Errors;
+use analysis::measure::jitter::Jitter;
+use analysis::measure::slips::Slips;
+use analysis::read::Run;
+use analysis::read::{nmea, rinex_obs};
+use generator::effect::antenna;
+use generator::scenario::Scenario;
+use generator::vehicle::Trajectory;
+use generator::vehicle::file::{Options, read_csv, read_nmea};
+use gnss::ionex::{Interpolation, Maps};
+use gnss::time::Epoch;
+use gnss::vienna::MappingGrid;
+use gnss::{rinex, sigmf, sp3};
+use receiver::settings::Settings;
+use study::sweep::plan::{Cut, Plan};
+use study::sweep::shard;
+use study::sweep::spec::Study;
 
 use crate::damage::Random;
 use crate::navigation::{packed, ranges};
@@ -463,7 +463,7 @@ fn whatever_stands_in_a_study_s_directory_or_a_run_s_tables_is_read_or_refused()
 
 /// Reads a run's tables and measures them, pictures left out.
 fn judge(run: &Path) -> Result<u64, String> {
-    let refused = |error: gnss_twin::analysis::JudgeError| format!("refused: {error}");
+    let refused = |error: analysis::JudgeError| format!("refused: {error}");
     let read = Run::read(run).map_err(refused)?;
     let errors = Errors::measure(&read).map_err(refused)?;
     let clock = Clock::measure(&read, &errors).map_err(refused)?;

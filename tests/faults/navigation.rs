@@ -3,9 +3,9 @@
 
 use std::io::{Read, Write};
 
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::rinex::{Navigation, read};
-use gnss_twin::gnss::time::Epoch;
+use gnss::broadcast::Ephemeris;
+use gnss::rinex::{Navigation, read};
+use gnss::time::Epoch;
 
 use crate::damage::{CLASSES, Random, damaged};
 use crate::tally::{End, Tally, cases};

@@ -5,10 +5,10 @@ use std::io::{ErrorKind, Read, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use gnss_twin::gnss::sigmf;
-use gnss_twin::receiver::output::Output;
-use gnss_twin::receiver::receive;
-use gnss_twin::receiver::settings::Settings;
+use gnss::sigmf;
+use receiver::output::Output;
+use receiver::receive;
+use receiver::settings::Settings;
 
 use crate::damage::Random;
 use crate::machine::{Bench, Ended, Files, NO_FIX, TWIN, files, scene, twin};

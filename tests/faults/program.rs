@@ -5,8 +5,8 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use gnss_twin::gnss::samples::Format;
-use gnss_twin::receiver::format::Check;
+use gnss::samples::Format;
+use receiver::format::Check;
 
 use crate::damage::Random;
 use crate::machine::NO_FIX;

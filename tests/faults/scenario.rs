@@ -3,10 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
-use gnss_twin::analysis::judge::limits::Limits;
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::receiver::settings::Settings;
-use gnss_twin::study::sweep::spec::Study;
+use analysis::judge::limits::Limits;
+use generator::scenario::{Overrides, Scenario};
+use receiver::settings::Settings;
+use study::sweep::spec::Study;
 
 use crate::legal::{Legal, legal};
 use crate::scenes::{LIMITS, SCENES, STUDY};

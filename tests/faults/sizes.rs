@@ -7,10 +7,10 @@ use std::path::Path;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::vehicle::file::{Options, read_csv, read_nmea};
-use gnss_twin::gnss::time::Epoch;
-use gnss_twin::gnss::{ionex, rinex, sp3};
+use generator::scenario::{Overrides, Scenario};
+use generator::vehicle::file::{Options, read_csv, read_nmea};
+use gnss::time::Epoch;
+use gnss::{ionex, rinex, sp3};
 
 use crate::navigation::{bases, packed};
 use crate::tally::{End, Tally, long};

@@ -6,23 +6,23 @@
 
 use std::path::Path;
 
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::stream::{Fronts, Options};
-use gnss_twin::generator::truth::Record;
-use gnss_twin::gnss::beidou::b1c::B1C;
-use gnss_twin::gnss::beidou::b2a::B2A;
-use gnss_twin::gnss::beidou::b2b::B2B;
-use gnss_twin::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use gnss_twin::gnss::ionosphere::{Coefficients, Model};
-use gnss_twin::gnss::message::Read;
-use gnss_twin::gnss::record::{IonosphereModel, Observation, TrajectoryRow};
-use gnss_twin::gnss::signal::Signal;
-use gnss_twin::gnss::time::{BDT, Epoch};
-use gnss_twin::receiver::position::{CodeNoise, IonosphereChoice, PositionSettings, Sets, Solver, TroposphereChoice};
-use gnss_twin::receiver::track::CodeDiscriminator;
-use gnss_twin::receiver::track::loops::CodeShape;
+use generator::scenario::{Overrides, Scenario};
+use generator::scene::Scene;
+use generator::stream::{Fronts, Options};
+use generator::truth::Record;
+use gnss::beidou::b1c::B1C;
+use gnss::beidou::b2a::B2A;
+use gnss::beidou::b2b::B2B;
+use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::ionosphere::{Coefficients, Model};
+use gnss::message::Read;
+use gnss::record::{IonosphereModel, Observation, TrajectoryRow};
+use gnss::signal::Signal;
+use gnss::time::{BDT, Epoch};
 use nalgebra::Vector3;
+use receiver::position::{CodeNoise, IonosphereChoice, PositionSettings, Sets, Solver, TroposphereChoice};
+use receiver::track::CodeDiscriminator;
+use receiver::track::loops::CodeShape;
 
 /// The coefficients of 2026-03-09, of an active Sun: some 60 TECU at noon over Cartagena.
 const COEFFICIENTS: &str = "[30.875, 0.25, 11.625, 10.375, -12.5, 0.75, 0, 3.125, 1.875]";

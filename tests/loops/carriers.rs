@@ -7,23 +7,23 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::stream::{Fronts, Options};
-use gnss_twin::generator::truth;
-use gnss_twin::gnss::earth::Geodetic;
-use gnss_twin::gnss::gps::l1ca::L1_CA;
-use gnss_twin::gnss::record::{Event, Fix, IonosphereModel, Observation, TrajectoryRow};
-use gnss_twin::gnss::samples::IfMetadata;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::{Carrier, Signal, register};
-use gnss_twin::receiver::output::Record;
-use gnss_twin::receiver::position::{CodeNoise, Sets, Solver};
-use gnss_twin::receiver::settings::Settings;
-use gnss_twin::receiver::track::CodeDiscriminator;
-use gnss_twin::receiver::track::loops::CodeShape;
-use gnss_twin::receiver::{Outcome, Receiver};
+use generator::scenario::{Overrides, Scenario};
+use generator::scene::Scene;
+use generator::stream::{Fronts, Options};
+use generator::truth;
+use gnss::earth::Geodetic;
+use gnss::gps::l1ca::L1_CA;
+use gnss::record::{Event, Fix, IonosphereModel, Observation, TrajectoryRow};
+use gnss::samples::IfMetadata;
+use gnss::satellite::Sv;
+use gnss::signal::{Carrier, Signal, register};
 use nalgebra::Vector3;
+use receiver::output::Record;
+use receiver::position::{CodeNoise, Sets, Solver};
+use receiver::settings::Settings;
+use receiver::track::CodeDiscriminator;
+use receiver::track::loops::CodeShape;
+use receiver::{Outcome, Receiver};
 
 /// The codes and the message of L1 C/A on another carrier.
 static ON_L2: Signal = Signal { name: "synthetic L2 C/A", rinex: "2C", carrier: Carrier::Common(1_227.60e6), ..L1_CA };

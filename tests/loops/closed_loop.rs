@@ -6,7 +6,7 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use gnss_twin::gnss::earth::Geodetic;
+use gnss::earth::Geodetic;
 use serde_json::Value;
 
 /// Runs a scene of the repository and returns its summary.

@@ -5,8 +5,8 @@
 use std::path::Path;
 use std::process::Command;
 
-use gnss_twin::gnss::earth::Geodetic;
-use gnss_twin::gnss::record::{Fix, IonosphereModel, TrajectoryRow};
+use gnss::earth::Geodetic;
+use gnss::record::{Fix, IonosphereModel, TrajectoryRow};
 
 fn rows<T: serde::de::DeserializeOwned>(directory: &Path, name: &str) -> Vec<T> {
     csv::Reader::from_path(directory.join(name)).unwrap().deserialize().map(Result::unwrap).collect()

@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use gnss_twin::gnss::sigmf;
-use gnss_twin::study::sweep::sha512_hex;
+use gnss::sigmf;
+use study::sweep::sha512_hex;
 
 /// A static scene of two seconds at two rates.
 const TWO: &str = r#"

@@ -5,7 +5,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use gnss_twin::study::sweep::sha256_hex;
+use study::sweep::sha256_hex;
 
 #[test]
 fn the_samples_of_every_shipped_scene_are_the_bytes_that_they_were() {

@@ -5,24 +5,24 @@ use std::f64::consts::TAU;
 use std::path::Path;
 use std::sync::Arc;
 
-use gnss_twin::generator::catalogue::Catalogue;
-use gnss_twin::generator::clock::ReceiverClock;
-use gnss_twin::generator::clock::nodes::Nodes;
-use gnss_twin::generator::effect::link::FixedCn0;
-use gnss_twin::generator::message::Senders;
-use gnss_twin::generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade, Scene};
-use gnss_twin::generator::stream::{Generated, Options, generate_with};
-use gnss_twin::generator::synth::isa::Level;
-use gnss_twin::generator::truth;
-use gnss_twin::generator::vehicle::Trajectory;
-use gnss_twin::gnss::earth::Geodetic;
-use gnss_twin::gnss::gps::l1ca::{self, L1_CA};
-use gnss_twin::gnss::gps::lnav::UtcData;
-use gnss_twin::gnss::message::Common;
-use gnss_twin::gnss::record::Observation;
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::samples::{Format, IfMetadata};
-use gnss_twin::gnss::time::{Epoch, Rate, SampleClock};
+use generator::catalogue::Catalogue;
+use generator::clock::ReceiverClock;
+use generator::clock::nodes::Nodes;
+use generator::effect::link::FixedCn0;
+use generator::message::Senders;
+use generator::scene::{Arithmetic, CodeEdge, Fidelity, Grade, Scene};
+use generator::stream::{Generated, Options, generate_with};
+use generator::synth::isa::Level;
+use generator::truth;
+use generator::vehicle::Trajectory;
+use gnss::earth::Geodetic;
+use gnss::gps::l1ca::{self, L1_CA};
+use gnss::gps::lnav::UtcData;
+use gnss::message::Common;
+use gnss::record::Observation;
+use gnss::rinex;
+use gnss::samples::{Format, IfMetadata};
+use gnss::time::{Epoch, Rate, SampleClock};
 
 fn scene(rate_hz: f64, duration_s: f64, format: Format, center_hz: f64, inverted: bool) -> Scene {
     let navigation = rinex::embedded().unwrap();
@@ -237,8 +237,8 @@ fn without_satellites_the_noise_has_its_set_power_and_without_noise_the_signal_h
 
 #[test]
 fn a_day_into_the_stream_the_carrier_is_where_the_equation_says() {
-    use gnss_twin::generator::synth::{Edge, Kernel};
-    use gnss_twin::generator::transmit::{Scratch, Transmitter};
+    use generator::synth::{Edge, Kernel};
+    use generator::transmit::{Scratch, Transmitter};
     let mut scene = scene(25e6, 90_000.0, Format::Cf32Le, 1_571.328e6, false);
     scene.clock.start = Epoch::parse("2010-06-30T23:50:00").unwrap();
     scene.fidelity.code_edge = CodeEdge::Nearest;
@@ -274,8 +274,8 @@ fn a_day_into_the_stream_the_carrier_is_where_the_equation_says() {
 
 #[test]
 fn the_data_bits_in_the_samples_are_the_message_and_navigation_rows_are_its_parameters() {
-    use gnss_twin::gnss::gps::lnav::Subframe;
-    use gnss_twin::gnss::record::NavigationRow;
+    use gnss::gps::lnav::Subframe;
+    use gnss::record::NavigationRow;
     let directory = tempfile::tempdir().unwrap();
     let rate_hz = 2.046e6;
     let mut scene = scene(rate_hz, 14.0, Format::Ci8, 1_575.42e6, false);
@@ -327,7 +327,7 @@ fn the_data_bits_in_the_samples_are_the_message_and_navigation_rows_are_its_para
 
 #[test]
 fn the_shipped_scenes_keep_to_their_knot_tolerance() {
-    use gnss_twin::generator::scenario::{Overrides, Scenario};
+    use generator::scenario::{Overrides, Scenario};
     let directory = tempfile::tempdir().unwrap();
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
     for name in ["static", "moderate", "high_dynamics"] {
@@ -354,7 +354,7 @@ fn an_error_of_the_output_stops_the_stream_and_is_told() {
     let scene = scene(2.6e6, 0.1, Format::Ci8, 1_575.42e6, false);
     let mut writer = truth::Writer::create(directory.path()).unwrap();
     let result = generate_with(&scene, &mut Full, &mut writer, &mut |_| (), &Options::default());
-    assert!(matches!(result, Err(gnss_twin::generator::GenerateError::Write(_))));
+    assert!(matches!(result, Err(generator::GenerateError::Write(_))));
 }
 
 #[test]

@@ -10,27 +10,25 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
-use gnss_twin::analysis::assess;
-use gnss_twin::analysis::judge::judgement::Status;
-use gnss_twin::generator::catalogue::Catalogue;
-use gnss_twin::generator::message::Senders;
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::stream::{Options, generate_part};
-use gnss_twin::generator::truth;
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use gnss_twin::gnss::message::Common;
-use gnss_twin::gnss::record::{
-    ClockRow, Event, EventRow, Fix, NavigationRow, Observation, PassEnd, PassRow, TrajectoryRow,
-};
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::signal::register;
-use gnss_twin::gnss::signal::synthetic::{LONG_BOC, OWN_TIME, SIDES};
-use gnss_twin::receiver::output::{Output, Record};
-use gnss_twin::receiver::receive;
-use gnss_twin::receiver::settings::Settings;
+use analysis::assess;
+use analysis::judge::judgement::Status;
+use generator::catalogue::Catalogue;
+use generator::message::Senders;
+use generator::scenario::{Overrides, Scenario};
+use generator::scene::Scene;
+use generator::stream::{Options, generate_part};
+use generator::truth;
+use gnss::broadcast::Ephemeris;
+use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::message::Common;
+use gnss::record::{ClockRow, Event, EventRow, Fix, NavigationRow, Observation, PassEnd, PassRow, TrajectoryRow};
+use gnss::rinex;
+use gnss::satellite::{Sv, System};
+use gnss::signal::register;
+use gnss::signal::synthetic::{LONG_BOC, OWN_TIME, SIDES};
+use receiver::output::{Output, Record};
+use receiver::receive;
+use receiver::settings::Settings;
 
 const SIGNALS: &str = "signals = [\"GPS L1 C/A\", \"synthetic A\"]\n";
 const TABLES: &str = "[front_end]\nsample_rate_hz = 4.3e6\n[power]\ncn0_dbhz = 45\n[noise]\n\

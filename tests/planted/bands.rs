@@ -1,19 +1,19 @@
 //! Laws of two bands, of layers and of the files that a run writes, against documents.
 
-use gnss_twin::generator::synth::Edge;
-use gnss_twin::generator::synth::band::Filter;
-use gnss_twin::generator::synth::waveform::Waveform;
-use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
-use gnss_twin::gnss::exchange::{ObservationFile, Version};
-use gnss_twin::gnss::galileo::e1::E1;
-use gnss_twin::gnss::glonass::fdma::{G1, G2};
-use gnss_twin::gnss::gps::l1ca::L1_CA;
-use gnss_twin::gnss::record::Observation;
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::signal::{Carrier, Layers, Signal};
-use gnss_twin::gnss::time::Rate;
-use gnss_twin::receiver::position::combination::Combination;
-use gnss_twin::receiver::position::smooth::Smoother;
+use generator::synth::Edge;
+use generator::synth::band::Filter;
+use generator::synth::waveform::Waveform;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::exchange::{ObservationFile, Version};
+use gnss::galileo::e1::E1;
+use gnss::glonass::fdma::{G1, G2};
+use gnss::gps::l1ca::L1_CA;
+use gnss::record::Observation;
+use gnss::satellite::{Sv, System};
+use gnss::signal::{Carrier, Layers, Signal};
+use gnss::time::Rate;
+use receiver::position::combination::Combination;
+use receiver::position::smooth::Smoother;
 
 use crate::laws::{Ideal, SAMPLE, noise};
 
@@ -124,7 +124,7 @@ fn a_combination_is_as_old_as_its_younger_carrier_and_may_jump_by_as_much_more_a
 #[test]
 fn half_of_the_power_is_as_noisy_as_a_signal_of_half_the_power() {
     let whole = noise();
-    let half = gnss_twin::receiver::position::CodeNoise { share: 0.5, ..whole };
+    let half = receiver::position::CodeNoise { share: 0.5, ..whole };
     for cn0_hz in [3e3, 3e4] {
         assert!((half.sigma_m(2.0 * cn0_hz) / whole.sigma_m(cn0_hz) - 1.0).abs() < 1e-12);
         assert!(half.sigma_m(cn0_hz) > 1.4 * whole.sigma_m(cn0_hz));

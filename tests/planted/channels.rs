@@ -2,13 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use gnss_twin::gnss::glonass::fdma::G1;
-use gnss_twin::gnss::samples::{Format, IfMetadata};
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::time::Rate;
-use gnss_twin::receiver::acquire::Acquired;
-use gnss_twin::receiver::source::Block;
-use gnss_twin::receiver::track::{Channel, Report, TrackingSettings};
+use gnss::glonass::fdma::G1;
+use gnss::samples::{Format, IfMetadata};
+use gnss::satellite::{Sv, System};
+use gnss::time::Rate;
+use receiver::acquire::Acquired;
+use receiver::source::Block;
+use receiver::track::{Channel, Report, TrackingSettings};
 
 const RATE_HZ: f64 = 4.103e6;
 /// GLONASS ICD L1, L2 (5.1), 3.3.1.1 and 3.3.2.1: channel −7, and a code of 511 chips.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use gnss_twin::analysis::judge::summary::Summary;
+use analysis::judge::summary::Summary;
 use nalgebra::{Matrix3, Vector3};
 use tempfile::TempDir;
 
@@ -221,7 +221,7 @@ fn damaged_tables_fail_by_the_row_that_names_the_damage() {
 
 #[test]
 fn deviations_of_a_clock_are_those_that_sp_1065_prints() {
-    use gnss_twin::analysis::measure::allan::Deviation;
+    use analysis::measure::allan::Deviation;
     // The 1000 frequencies of SP 1065's test suite: a prime-modulus generator, as phases.
     let mut state = 1_234_567_890_u64;
     let mut phases = vec![0.0];

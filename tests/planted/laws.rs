@@ -1,35 +1,35 @@
 //! Laws that need no samples: the position solution against the generator's own geometry, covariances against
 //! a plain inversion, effects and statistics against their definitions.
 
-use gnss_twin::analysis::expect::theory::{dll, pll};
-use gnss_twin::analysis::response::Response;
-use gnss_twin::analysis::statistics;
-use gnss_twin::generator::catalogue::Catalogue;
-use gnss_twin::generator::clock::ReceiverClock;
-use gnss_twin::generator::effect::ionosphere::KlobucharIonosphere;
-use gnss_twin::generator::effect::link::LinkBudget;
-use gnss_twin::generator::effect::mapping::Mapping;
-use gnss_twin::generator::effect::troposphere::{Air, Troposphere, Weather};
-use gnss_twin::generator::ray::{Effect, Ray};
-use gnss_twin::generator::sky::{Emission, emission};
-use gnss_twin::generator::vehicle::Motion;
-use gnss_twin::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use gnss_twin::gnss::facts::{FilterShape, FilterSpec};
-use gnss_twin::gnss::gps::l1ca::L1_CA;
-use gnss_twin::gnss::ionosphere::Coefficients;
-use gnss_twin::gnss::klobuchar::Klobuchar;
-use gnss_twin::gnss::record::Observation;
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::{Carrier, Signal};
-use gnss_twin::gnss::time::{Epoch, Rate, SampleClock, TimePolynomial, TimeScale};
-use gnss_twin::receiver::correlate::sums::{RunningSums, Samples};
-use gnss_twin::receiver::correlate::{Arithmetic, Edge, Nco, Replica, chips_to_units};
-use gnss_twin::receiver::position::smooth::Smoother;
-use gnss_twin::receiver::position::{CodeNoise, NoFix, Noises, PositionSettings, Sets, Solved, Solver, SystemClocks};
-use gnss_twin::receiver::track::CodeDiscriminator;
-use gnss_twin::receiver::track::loops::CodeShape;
+use analysis::expect::theory::{dll, pll};
+use analysis::response::Response;
+use analysis::statistics;
+use generator::catalogue::Catalogue;
+use generator::clock::ReceiverClock;
+use generator::effect::ionosphere::KlobucharIonosphere;
+use generator::effect::link::LinkBudget;
+use generator::effect::mapping::Mapping;
+use generator::effect::troposphere::{Air, Troposphere, Weather};
+use generator::ray::{Effect, Ray};
+use generator::sky::{Emission, emission};
+use generator::vehicle::Motion;
+use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::facts::{FilterShape, FilterSpec};
+use gnss::gps::l1ca::L1_CA;
+use gnss::ionosphere::Coefficients;
+use gnss::klobuchar::Klobuchar;
+use gnss::record::Observation;
+use gnss::rinex;
+use gnss::satellite::Sv;
+use gnss::signal::{Carrier, Signal};
+use gnss::time::{Epoch, Rate, SampleClock, TimePolynomial, TimeScale};
 use nalgebra::{DMatrix, Matrix3, Vector3};
+use receiver::correlate::sums::{RunningSums, Samples};
+use receiver::correlate::{Arithmetic, Edge, Nco, Replica, chips_to_units};
+use receiver::position::smooth::Smoother;
+use receiver::position::{CodeNoise, NoFix, Noises, PositionSettings, Sets, Solved, Solver, SystemClocks};
+use receiver::track::CodeDiscriminator;
+use receiver::track::loops::CodeShape;
 
 const BIAS_S: f64 = 1.3e-4;
 const DRIFT: f64 = 5e-8;
@@ -463,7 +463,7 @@ fn the_link_budget_loses_power_as_friis_says() {
     let ideal = Ideal::new();
     let sv = ideal.observations(SAMPLE)[0].sv;
     let (found, _) = ideal.arriving(sv, ideal.clock.epoch(SAMPLE)).unwrap();
-    let budget = LinkBudget { block: gnss_twin::generator::effect::transmit::Block::Typical, ..LinkBudget::default() };
+    let budget = LinkBudget { block: generator::effect::transmit::Block::Typical, ..LinkBudget::default() };
     let near = budget.cn0_dbhz(&found.sight, L1_CA.centre_hz());
     let mut farther = found.sight.clone();
     farther.range_m *= 10.0;
@@ -504,8 +504,8 @@ fn jitter_is_kaplan_and_hegarty_s() {
 
 #[test]
 fn noise_shows_no_phase_lock_and_a_steady_phase_does() {
-    use gnss_twin::receiver::track::lock::PhaseLock;
     use num_complex::Complex64;
+    use receiver::track::lock::PhaseLock;
     let mut normal = Normal(7);
     let (mut noise, mut steady) = (PhaseLock::new(100.0), PhaseLock::new(100.0));
     for _ in 0..100 {
@@ -517,8 +517,8 @@ fn noise_shows_no_phase_lock_and_a_steady_phase_does() {
 
 #[test]
 fn a_two_bit_converter_has_its_levels_a_step_apart() {
-    use gnss_twin::generator::stage::converter::Converter;
-    use gnss_twin::generator::stage::{Block, Stage};
+    use generator::stage::converter::Converter;
+    use generator::stage::{Block, Stage};
     let converter = Converter { bits: 2, step_sigma: 1.0, window_runs: None, nominal_lsb: 10.0, whole: false };
     let mut i = [-25.0, -15.0, -5.0, 5.0, 15.0, 25.0];
     let mut q = [0.1; 6];
@@ -528,7 +528,7 @@ fn a_two_bit_converter_has_its_levels_a_step_apart() {
 
 #[test]
 fn running_sums_give_what_every_sample_by_itself_does() {
-    let replica = Replica::new(gnss_twin::gnss::gps::l1ca::code(7).unwrap(), Edge::Area).unwrap();
+    let replica = Replica::new(gnss::gps::l1ca::code(7).unwrap(), Edge::Area).unwrap();
     let at = Nco {
         carrier: 1 << 61,
         carrier_step: 1 << 49,

@@ -5,22 +5,22 @@ use std::fs::{self, File};
 use std::io::{Read as _, Write as _};
 use std::path::Path;
 
-use gnss_twin::analysis::assess;
-use gnss_twin::analysis::expect::welch::{BINS, Looks};
-use gnss_twin::analysis::judge::judgement::{Judgement, Status};
-use gnss_twin::analysis::judge::limits::Limits;
-use gnss_twin::analysis::judge::summary::Summary;
-use gnss_twin::analysis::measure::psd::Psd;
-use gnss_twin::analysis::show::tables;
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::stream::{Options, Stream};
-use gnss_twin::generator::truth;
-use gnss_twin::gnss::record::Observation;
-use gnss_twin::gnss::samples::IfMetadata;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::receiver::Reception;
-use gnss_twin::receiver::output::Output;
-use gnss_twin::receiver::settings::Settings;
+use analysis::assess;
+use analysis::expect::welch::{BINS, Looks};
+use analysis::judge::judgement::{Judgement, Status};
+use analysis::judge::limits::Limits;
+use analysis::judge::summary::Summary;
+use analysis::measure::psd::Psd;
+use analysis::show::tables;
+use generator::scenario::{Overrides, Scenario};
+use generator::stream::{Options, Stream};
+use generator::truth;
+use gnss::record::Observation;
+use gnss::samples::IfMetadata;
+use gnss::satellite::Sv;
+use receiver::Reception;
+use receiver::output::Output;
+use receiver::settings::Settings;
 
 use crate::judge;
 
@@ -165,7 +165,7 @@ fn carriers_beside_codes(directory: &Path) -> Vec<String> {
 
 fn holds(scene: &str, limits: &str) {
     let directory = tempfile::tempdir().unwrap();
-    let in_receiver = std::env::var(gnss_twin::gnss::plant::VARIABLE).is_ok_and(|fault| fault.starts_with("receiver."));
+    let in_receiver = std::env::var(gnss::plant::VARIABLE).is_ok_and(|fault| fault.starts_with("receiver."));
     match std::env::var_os(judge::RUN).filter(|_| in_receiver) {
         Some(kept) => receive_again(scene, Path::new(&kept), directory.path()),
         None => run(scene, directory.path()),

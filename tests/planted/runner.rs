@@ -28,7 +28,7 @@ struct Outcome {
 fn child(fault: &Fault, run: &Path, output: &fs::File) -> Child {
     Command::new(std::env::current_exe().unwrap())
         .args(["--exact", fault.check, "--test-threads", "1"])
-        .env(gnss_twin::gnss::plant::VARIABLE, fault.name)
+        .env(gnss::plant::VARIABLE, fault.name)
         .env(judge::RUN, run)
         .env("RAYON_NUM_THREADS", "1")
         .env("RUST_BACKTRACE", "0")

@@ -3,15 +3,15 @@
 
 use std::f64::consts::TAU;
 
-use gnss_twin::gnss::samples::{Format, IfMetadata};
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::synthetic::SIDES;
-use gnss_twin::gnss::signal::{Component, Layer};
-use gnss_twin::gnss::time::Rate;
-use gnss_twin::receiver::acquire::Acquired;
-use gnss_twin::receiver::source::Block;
-use gnss_twin::receiver::track::{Channel, Report, TrackingSettings};
+use gnss::samples::{Format, IfMetadata};
+use gnss::satellite::Sv;
+use gnss::signal::synthetic::SIDES;
+use gnss::signal::{Component, Layer};
+use gnss::time::Rate;
 use num_complex::Complex64;
+use receiver::acquire::Acquired;
+use receiver::source::Block;
+use receiver::track::{Channel, Report, TrackingSettings};
 
 const RATE_HZ: f64 = 6.53e6;
 const CHIP_HZ: f64 = 1.023e6;

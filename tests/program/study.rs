@@ -11,10 +11,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use gnss_twin::study::sweep::StudyError;
-use gnss_twin::study::sweep::estimate::Estimate;
-use gnss_twin::study::sweep::plan::{Cut, Plan};
-use gnss_twin::study::sweep::shard::{self, Found};
+use study::sweep::StudyError;
+use study::sweep::estimate::Estimate;
+use study::sweep::plan::{Cut, Plan};
+use study::sweep::shard::{self, Found};
 
 const TWIN: &str = env!("CARGO_BIN_EXE_gnss-twin");
 

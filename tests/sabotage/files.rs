@@ -3,7 +3,7 @@
 use crate::Kind;
 use crate::fixes::kind;
 use crate::run::{Rx, Scene};
-use gnss_twin::gnss::time::Epoch;
+use gnss::time::Epoch;
 
 pub fn kinds() -> Vec<Kind> {
     [columns(), rinex(), nmea(), scales()].into_iter().flatten().collect()

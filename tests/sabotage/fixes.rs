@@ -1,6 +1,6 @@
 //! Damage to fixes: places, velocities, clocks, sigmas, what is said of geometry, times and rows.
 
-use gnss_twin::gnss::earth::Geodetic;
+use gnss::earth::Geodetic;
 use nalgebra::Vector3;
 
 use crate::Kind;

@@ -9,8 +9,8 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use gnss_twin::analysis::judge::foreign::{Files, judge};
-use gnss_twin::analysis::judge::verdict::Verdict;
+use analysis::judge::foreign::{Files, judge};
+use analysis::judge::verdict::Verdict;
 
 use crate::rinex::{Observations, Sentences};
 use crate::run;
@@ -614,7 +614,7 @@ fn failed(variant: &Variant) -> Result<Vec<String>, String> {
     }
     let judgement = judge(&run.join("truth"), &files).map_err(|error| error.to_string())?;
     let rows = Verdict::of_foreign(&judgement).map_err(|error| error.to_string())?.rows;
-    let text = |row: gnss_twin::analysis::judge::judgement::Judgement| {
+    let text = |row: analysis::judge::judgement::Judgement| {
         (row.figure.clone(), format!("{} = {} {}, {}", row.figure, row.value_text(), row.unit, row.bound))
     };
     let failed = rows.into_iter().filter(|row| row.status.word() == "FAIL").map(text);

@@ -27,7 +27,7 @@ use std::fmt::Write;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use gnss_twin::analysis::{JudgeError, assess};
+use analysis::{JudgeError, assess};
 use run::{Rx, Scene, at_rest, elsewhere, in_motion};
 
 /// One kind of damage.

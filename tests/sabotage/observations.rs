@@ -1,6 +1,6 @@
 //! Damage to observations: code, carrier, Doppler, C/N0, lock times and rows, of one satellite or of all.
 
-use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
 
 use crate::Kind;
 use crate::fixes::kind;

@@ -4,11 +4,11 @@
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
-use gnss_twin::gnss::galileo::altboc::E5;
-use gnss_twin::gnss::galileo::e5::{self, Code, E5A, E5B};
-use gnss_twin::gnss::signal::{Component, Layer, Layers, Shape};
-use gnss_twin::receiver::correlate::{Edge, Nco, Replica, chips_to_units};
+use gnss::galileo::altboc::E5;
+use gnss::galileo::e5::{self, Code, E5A, E5B};
+use gnss::signal::{Component, Layer, Layers, Shape};
 use num_complex::Complex64;
+use receiver::correlate::{Edge, Nco, Replica, chips_to_units};
 
 use super::recording::two_bits;
 use super::recording_e5::{CENTRE_HZ, CHIPS, FILE, IF_HZ, RATE_HZ, assert_found, search, secondary_code_place};

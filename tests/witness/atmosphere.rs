@@ -1,12 +1,12 @@
 //! Atmospheric delays against worked values of another program.
 
-use gnss_twin::generator::effect::mapping::{Coefficients, Mapping, vmf1, vmf3};
-use gnss_twin::generator::effect::troposphere::{zenith_hydrostatic_m, zenith_wet_m};
-use gnss_twin::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
-use gnss_twin::gnss::klobuchar::Klobuchar;
-use gnss_twin::gnss::time::Epoch;
-use gnss_twin::gnss::vienna::{self, Gpt3, MappingA, MappingGrid, Vienna};
-use gnss_twin::gnss::vmf3::Vmf3;
+use generator::effect::mapping::{Coefficients, Mapping, vmf1, vmf3};
+use generator::effect::troposphere::{zenith_hydrostatic_m, zenith_wet_m};
+use gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
+use gnss::klobuchar::Klobuchar;
+use gnss::time::Epoch;
+use gnss::vienna::{self, Gpt3, MappingA, MappingGrid, Vienna};
+use gnss::vmf3::Vmf3;
 
 use super::data::external;
 

@@ -1,18 +1,18 @@
 //! B-CNAV1 and B1C against codes of another program and the subframes of a satellite that a receiver's maker
 //! prints.
 
-use gnss_twin::gnss::bdgim::Bdgim;
-use gnss_twin::gnss::beidou::b1c::{self, Code};
-use gnss_twin::gnss::beidou::bcnav1::{self, B_CNAV1, Frame};
-use gnss_twin::gnss::bits::{bits_of, number};
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::crc::crc24q;
-use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
-use gnss_twin::gnss::fec::ldpc64::product;
-use gnss_twin::gnss::message::{Common, Read};
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::time::{BDT, BDT_WEEK, Epoch};
-use gnss_twin::gnss::{inflate, rinex};
+use gnss::bdgim::Bdgim;
+use gnss::beidou::b1c::{self, Code};
+use gnss::beidou::bcnav1::{self, B_CNAV1, Frame};
+use gnss::bits::{bits_of, number};
+use gnss::broadcast::Ephemeris;
+use gnss::crc::crc24q;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::fec::ldpc64::product;
+use gnss::message::{Common, Read};
+use gnss::satellite::{Sv, System};
+use gnss::time::{BDT, BDT_WEEK, Epoch};
+use gnss::{inflate, rinex};
 
 use super::codes::holds;
 use super::data::external;

@@ -1,19 +1,19 @@
 //! B-CNAV2 and B-CNAV3 with B2a and B2b against codes of another program, messages that a receiver's maker
 //! prints, and records of RINEX 4.
 
-use gnss_twin::gnss::beidou::b2a::{self, B2A, Code};
-use gnss_twin::gnss::beidou::b2b::{self, B2B};
-use gnss_twin::gnss::beidou::bcnav2::{self, B_CNAV2};
-use gnss_twin::gnss::beidou::bcnav3::{self, B_CNAV3};
-use gnss_twin::gnss::bits::{Field, bits_of, number};
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::crc::crc24q;
-use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
-use gnss_twin::gnss::inflate;
-use gnss_twin::gnss::message::{Common, Message, Read};
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::signal::Signal;
-use gnss_twin::gnss::time::{BDT, Epoch, WEEK_S};
+use gnss::beidou::b2a::{self, B2A, Code};
+use gnss::beidou::b2b::{self, B2B};
+use gnss::beidou::bcnav2::{self, B_CNAV2};
+use gnss::beidou::bcnav3::{self, B_CNAV3};
+use gnss::bits::{Field, bits_of, number};
+use gnss::broadcast::Ephemeris;
+use gnss::crc::crc24q;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::inflate;
+use gnss::message::{Common, Message, Read};
+use gnss::satellite::{Sv, System};
+use gnss::signal::Signal;
+use gnss::time::{BDT, Epoch, WEEK_S};
 
 use super::bcnav1::{hex_bits, printed_rows, sets, soft};
 use super::codes::holds;
@@ -397,10 +397,8 @@ fn real_delays_of_b1c_have_the_sign_and_the_size_of_those_of_b1i_beside_it() {
 #[test]
 fn utc_is_four_seconds_behind_bdt_since_2017_and_real_polynomials_are_whole_steps_of_the_fields() {
     let sets = sets();
-    let common = Common {
-        utc: gnss_twin::gnss::gps::lnav::UtcData { leap_s: 18, polynomial: None, event: None },
-        ..Common::default()
-    };
+    let common =
+        Common { utc: gnss::gps::lnav::UtcData { leap_s: 18, polynomial: None, event: None }, ..Common::default() };
     for (message, tables, of, name) in
         [(&B_CNAV2, bcnav2::tables(), 3, "message 34"), (&B_CNAV3, bcnav3::tables(), 1, "message 30")]
     {

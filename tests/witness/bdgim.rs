@@ -3,19 +3,19 @@
 
 use std::collections::BTreeSet;
 
-use gnss_twin::gnss::bdgim::{self, Bdgim, Pierce, UnderSun, forecast_tecu, interval};
-use gnss_twin::gnss::beidou::bcnav1::{self, B_CNAV1};
-use gnss_twin::gnss::beidou::bcnav2::{self, B_CNAV2};
-use gnss_twin::gnss::beidou::bcnav3::{self, B_CNAV3};
-use gnss_twin::gnss::bits::number;
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
-use gnss_twin::gnss::ionex::{Interpolation, Maps};
-use gnss_twin::gnss::ionosphere::{Coefficients, Model};
-use gnss_twin::gnss::message::{Common, Message, Read};
-use gnss_twin::gnss::nequick::NequickG;
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::time::{BDT, Epoch};
+use gnss::bdgim::{self, Bdgim, Pierce, UnderSun, forecast_tecu, interval};
+use gnss::beidou::bcnav1::{self, B_CNAV1};
+use gnss::beidou::bcnav2::{self, B_CNAV2};
+use gnss::beidou::bcnav3::{self, B_CNAV3};
+use gnss::bits::number;
+use gnss::broadcast::Ephemeris;
+use gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
+use gnss::ionex::{Interpolation, Maps};
+use gnss::ionosphere::{Coefficients, Model};
+use gnss::message::{Common, Message, Read};
+use gnss::nequick::NequickG;
+use gnss::rinex;
+use gnss::time::{BDT, Epoch};
 use nalgebra::{DMatrix, DVector};
 
 use super::bcnav1::{sets, soft};
@@ -105,7 +105,7 @@ fn the_authors_own_example_comes_out_but_for_what_the_document_has_otherwise() {
     let here = nalgebra::Vector3::new(-2159945.3149, 4383237.1901, 4085412.3177);
     let there = nalgebra::Vector3::new(-34342443.2642, 24456393.0586, 12949.4754);
     let user = Geodetic::from_ecef(&here);
-    let look = gnss_twin::gnss::earth::look(user, &here, &there);
+    let look = gnss::earth::look(user, &here, &there);
     let ours_m = model.delay_s(user, look, at, 1_575.42e6) * SPEED_OF_LIGHT_MPS;
     println!("{ours_m:.4} m, the authors' program {theirs_m:.4} m");
     assert!((ours_m / theirs_m - 1.0185).abs() < 5e-3, "{ours_m} {theirs_m}");

@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use gnss_twin::gnss::beidou::d1d2::{self, D1_D2, SUBFRAME_BITS, Subframe};
-use gnss_twin::gnss::beidou::in_phase::{B1I, B3I};
-use gnss_twin::gnss::bits::{Bits, bits_of};
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::earth::{GPS_PI, Geodetic, Look};
-use gnss_twin::gnss::klobuchar::Klobuchar;
-use gnss_twin::gnss::message::{Common, Read};
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::time::{BDT, Epoch};
+use gnss::beidou::d1d2::{self, D1_D2, SUBFRAME_BITS, Subframe};
+use gnss::beidou::in_phase::{B1I, B3I};
+use gnss::bits::{Bits, bits_of};
+use gnss::broadcast::Ephemeris;
+use gnss::earth::{GPS_PI, Geodetic, Look};
+use gnss::klobuchar::Klobuchar;
+use gnss::message::{Common, Read};
+use gnss::rinex;
+use gnss::satellite::{Sv, System};
+use gnss::time::{BDT, Epoch};
 
 use super::codes::holds;
 use super::data::external;
@@ -175,9 +175,7 @@ fn real_sets_are_the_records_of_a_converter_and_are_sent_by_us_bit_by_bit() {
             for bit in d1d2::encode(&real.subframe) {
                 for chip in "00000100110101001110".chars() {
                     for read in reader.take(if bit ^ (chip == '1') { -1.0 } else { 1.0 }, near) {
-                        if let Read::Ionosphere(gnss_twin::gnss::ionosphere::Coefficients::KlobucharBeidou(found)) =
-                            read
-                        {
+                        if let Read::Ionosphere(gnss::ionosphere::Coefficients::KlobucharBeidou(found)) = read {
                             klobuchar = Some(found);
                         }
                     }

@@ -2,24 +2,24 @@
 
 use std::collections::BTreeMap;
 
-use gnss_twin::gnss::bits::number;
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::crc::crc24q;
-use gnss_twin::gnss::earth::{GPS_PI, SPEED_OF_LIGHT_MPS};
-use gnss_twin::gnss::exchange::{NavigationSets, Version};
-use gnss_twin::gnss::fec::convolutional::Convolutional;
-use gnss_twin::gnss::gps::cnav::{self, CNAV, CNAV_L2C};
-use gnss_twin::gnss::gps::cnav2::CNAV2;
-use gnss_twin::gnss::gps::l1c::L1C;
-use gnss_twin::gnss::gps::l1ca::L1_CA;
-use gnss_twin::gnss::gps::l2c::L2C;
-use gnss_twin::gnss::gps::l5::L5;
-use gnss_twin::gnss::gps::modernised;
-use gnss_twin::gnss::message::{Common, Message, Read};
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::Signal;
-use gnss_twin::gnss::time::Epoch;
-use gnss_twin::gnss::{inflate, rinex};
+use gnss::bits::number;
+use gnss::broadcast::Ephemeris;
+use gnss::crc::crc24q;
+use gnss::earth::{GPS_PI, SPEED_OF_LIGHT_MPS};
+use gnss::exchange::{NavigationSets, Version};
+use gnss::fec::convolutional::Convolutional;
+use gnss::gps::cnav::{self, CNAV, CNAV_L2C};
+use gnss::gps::cnav2::CNAV2;
+use gnss::gps::l1c::L1C;
+use gnss::gps::l1ca::L1_CA;
+use gnss::gps::l2c::L2C;
+use gnss::gps::l5::L5;
+use gnss::gps::modernised;
+use gnss::message::{Common, Message, Read};
+use gnss::satellite::Sv;
+use gnss::signal::Signal;
+use gnss::time::Epoch;
+use gnss::{inflate, rinex};
 
 use super::data::external;
 
@@ -337,7 +337,7 @@ fn a_set_of_lnav_carried_to_cnav_is_the_same_orbit_and_clock_to_its_steps() {
     let (mut farthest_m, mut latest_m, mut sets) = (0.0_f64, 0.0_f64, 0);
     let all = rinex::embedded().unwrap().ephemerides;
     for set in all.iter().chain(&rinex::embedded_two_systems().unwrap().ephemerides) {
-        if set.sv.number > 32 || set.form != &gnss_twin::gnss::gps::lnav::LNAV_SETS {
+        if set.sv.number > 32 || set.form != &gnss::gps::lnav::LNAV_SETS {
             continue;
         }
         let carried = (CNAV.quantised)(set).unwrap();

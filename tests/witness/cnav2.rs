@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use gnss_twin::gnss::bits::{Field, number};
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::crc::crc24q;
-use gnss_twin::gnss::gps::cnav2::{self, CNAV2, Frame};
-use gnss_twin::gnss::inflate;
-use gnss_twin::gnss::message::{Common, Message, Read};
-use gnss_twin::gnss::qzss::civil;
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::time::Epoch;
+use gnss::bits::{Field, number};
+use gnss::broadcast::Ephemeris;
+use gnss::crc::crc24q;
+use gnss::gps::cnav2::{self, CNAV2, Frame};
+use gnss::inflate;
+use gnss::message::{Common, Message, Read};
+use gnss::qzss::civil;
+use gnss::rinex;
+use gnss::satellite::{Sv, System};
+use gnss::time::Epoch;
 
 use super::cnav::{agrees_in_orbit_and_clock, records};
 use super::data::external;

@@ -1,12 +1,12 @@
 //! Every chip of every code against digests that another program computed from the same tables.
 
-use gnss_twin::gnss::galileo::e1::{self, Code};
-use gnss_twin::gnss::galileo::e5;
-use gnss_twin::gnss::galileo::e6;
-use gnss_twin::gnss::gps::l1ca::{CODE_CHIPS, L1_CA, code};
-use gnss_twin::gnss::gps::{l1c, l2c, l5};
-use gnss_twin::gnss::qzss;
-use gnss_twin::gnss::signal::{SecondaryCode, Signal};
+use gnss::galileo::e1::{self, Code};
+use gnss::galileo::e5;
+use gnss::galileo::e6;
+use gnss::gps::l1ca::{CODE_CHIPS, L1_CA, code};
+use gnss::gps::{l1c, l2c, l5};
+use gnss::qzss;
+use gnss::signal::{SecondaryCode, Signal};
 use sha2::{Digest, Sha256};
 
 /// PRN, ones, first and last 24 chips in hexadecimal, SHA-256 of a byte 0 or 1 for each chip.

@@ -3,8 +3,8 @@
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::time::Epoch;
+use gnss::broadcast::Ephemeris;
+use gnss::time::Epoch;
 
 /// Orbit and clock of a RINEX 4 record by fixed columns, from its line of satellite and epoch on, and a
 /// reader of its numbers by row and column.

@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::crc::crc24q;
-use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
-use gnss_twin::gnss::galileo::fnav::{self, FNAV, FnavReader};
-use gnss_twin::gnss::galileo::inav::{self, INAV, INAV_E5B};
-use gnss_twin::gnss::inflate;
-use gnss_twin::gnss::message::{Common, Message, Read, Reader};
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::time::Epoch;
+use gnss::broadcast::Ephemeris;
+use gnss::crc::crc24q;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::galileo::fnav::{self, FNAV, FnavReader};
+use gnss::galileo::inav::{self, INAV, INAV_E5B};
+use gnss::inflate;
+use gnss::message::{Common, Message, Read, Reader};
+use gnss::rinex;
+use gnss::satellite::{Sv, System};
+use gnss::time::Epoch;
 
 use super::data::external;
 use super::inav::{RealPage, real_pages};

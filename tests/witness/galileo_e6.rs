@@ -1,15 +1,15 @@
 //! Galileo's C/NAV on E6-B against pages that satellites sent, and the time that E6 is given.
 
-use gnss_twin::gnss::bits::{Store, bits_of};
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::crc::crc24q;
-use gnss_twin::gnss::galileo::cnav::{self, CNAV};
-use gnss_twin::gnss::galileo::e6::E6;
-use gnss_twin::gnss::message::{Common, Read};
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::time::{Epoch, WEEK_S};
-use gnss_twin::receiver::decode::{Decoder, News};
-use gnss_twin::receiver::track::Symbol;
+use gnss::bits::{Store, bits_of};
+use gnss::broadcast::Ephemeris;
+use gnss::crc::crc24q;
+use gnss::galileo::cnav::{self, CNAV};
+use gnss::galileo::e6::E6;
+use gnss::message::{Common, Read};
+use gnss::satellite::{Sv, System};
+use gnss::time::{Epoch, WEEK_S};
+use receiver::decode::{Decoder, News};
+use receiver::track::Symbol;
 
 /// Satellite, week and time of week of the end, 496 bits in hexadecimal: 14 reserved, the page of the
 /// service, check, tail and four more.

@@ -2,19 +2,19 @@
 
 use std::collections::BTreeMap;
 
-use gnss_twin::gnss::bits::bits_of;
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::glonass::fdma::{G1, G2};
-use gnss_twin::gnss::glonass::gnav::{self, GNAV, GlonassString, STRING_BITS};
-use gnss_twin::gnss::inflate;
-use gnss_twin::gnss::message::{Common, Read, Reader};
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::samples::{Format, IfMetadata};
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::signal::{Link, Signal};
-use gnss_twin::gnss::time::{Epoch, GLONASST, Rate, UTC};
-use gnss_twin::receiver::acquire::{Acquired, AcquisitionSettings, Searcher};
-use gnss_twin::receiver::source::Block;
+use gnss::bits::bits_of;
+use gnss::broadcast::Ephemeris;
+use gnss::glonass::fdma::{G1, G2};
+use gnss::glonass::gnav::{self, GNAV, GlonassString, STRING_BITS};
+use gnss::inflate;
+use gnss::message::{Common, Read, Reader};
+use gnss::rinex;
+use gnss::samples::{Format, IfMetadata};
+use gnss::satellite::{Sv, System};
+use gnss::signal::{Link, Signal};
+use gnss::time::{Epoch, GLONASST, Rate, UTC};
+use receiver::acquire::{Acquired, AcquisitionSettings, Searcher};
+use receiver::source::Block;
 
 use super::codes::holds;
 use super::data::external;

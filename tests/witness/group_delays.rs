@@ -3,14 +3,14 @@
 
 use std::collections::BTreeMap;
 
-use gnss_twin::gnss::beidou::{b1c::B1C, b2a::B2A, b2b::B2B};
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::gps::{l1c, l2c, l5};
-use gnss_twin::gnss::qzss;
-use gnss_twin::gnss::satellite::System;
-use gnss_twin::gnss::signal::Signal;
-use gnss_twin::gnss::time::{BDT, Epoch};
-use gnss_twin::gnss::{inflate, rinex};
+use gnss::beidou::{b1c::B1C, b2a::B2A, b2b::B2B};
+use gnss::broadcast::Ephemeris;
+use gnss::gps::{l1c, l2c, l5};
+use gnss::qzss;
+use gnss::satellite::System;
+use gnss::signal::Signal;
+use gnss::time::{BDT, Epoch};
+use gnss::{inflate, rinex};
 
 use super::data::external;
 

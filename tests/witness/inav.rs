@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::earth::GPS_PI;
-use gnss_twin::gnss::galileo::inav::{self, INAV, InavReader};
-use gnss_twin::gnss::inflate;
-use gnss_twin::gnss::message::{Common, Read, Reader};
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::time::Epoch;
+use gnss::broadcast::Ephemeris;
+use gnss::earth::GPS_PI;
+use gnss::galileo::inav::{self, INAV, InavReader};
+use gnss::inflate;
+use gnss::message::{Common, Read, Reader};
+use gnss::satellite::{Sv, System};
+use gnss::time::Epoch;
 
 use super::data::{external, keplerian};
 

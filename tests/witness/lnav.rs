@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::earth::GPS_PI;
-use gnss_twin::gnss::gps::lnav::{self, Almanac, Broadcast, FieldError, Subframe, SubframeError};
-use gnss_twin::gnss::klobuchar::Klobuchar;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::time::Epoch;
+use gnss::broadcast::Ephemeris;
+use gnss::earth::GPS_PI;
+use gnss::gps::lnav::{self, Almanac, Broadcast, FieldError, Subframe, SubframeError};
+use gnss::klobuchar::Klobuchar;
+use gnss::satellite::Sv;
+use gnss::time::Epoch;
 use proptest::prelude::*;
 
 use super::data::{external, keplerian};

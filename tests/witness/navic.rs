@@ -2,17 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use gnss_twin::gnss::bits::{Bits, Store, bits_of};
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::crc::crc24q;
-use gnss_twin::gnss::earth::{GPS_PI, Geodetic};
-use gnss_twin::gnss::klobuchar::Klobuchar;
-use gnss_twin::gnss::message::{Common, Read};
-use gnss_twin::gnss::navic::nav::{self, DATA_BITS, SPS_NAV, Subframe};
-use gnss_twin::gnss::navic::sps::{L5, S};
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::time::Epoch;
+use gnss::bits::{Bits, Store, bits_of};
+use gnss::broadcast::Ephemeris;
+use gnss::crc::crc24q;
+use gnss::earth::{GPS_PI, Geodetic};
+use gnss::klobuchar::Klobuchar;
+use gnss::message::{Common, Read};
+use gnss::navic::nav::{self, DATA_BITS, SPS_NAV, Subframe};
+use gnss::navic::sps::{L5, S};
+use gnss::rinex;
+use gnss::satellite::{Sv, System};
+use gnss::time::Epoch;
 
 use super::codes::holds;
 use super::data::{external, keplerian};

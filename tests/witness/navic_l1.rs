@@ -5,20 +5,20 @@
 
 use std::collections::BTreeMap;
 
-use gnss_twin::gnss::bits::{Store, number};
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::crc::crc24q;
-use gnss_twin::gnss::earth::{GPS_PI, Geodetic};
-use gnss_twin::gnss::exchange::{NavigationSets, Version};
-use gnss_twin::gnss::ionosphere::Coefficients;
-use gnss_twin::gnss::klobuchar::Klobuchar;
-use gnss_twin::gnss::message::{Common, Read};
-use gnss_twin::gnss::navic::l1::{CODE_CHIPS, Code, L1, SECONDARY_CODE_CHIPS, code, secondary_code};
-use gnss_twin::gnss::navic::l1nav::{self, L1_NAV};
-use gnss_twin::gnss::navic::sps::{L5, S};
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::time::Epoch;
+use gnss::bits::{Store, number};
+use gnss::broadcast::Ephemeris;
+use gnss::crc::crc24q;
+use gnss::earth::{GPS_PI, Geodetic};
+use gnss::exchange::{NavigationSets, Version};
+use gnss::ionosphere::Coefficients;
+use gnss::klobuchar::Klobuchar;
+use gnss::message::{Common, Read};
+use gnss::navic::l1::{CODE_CHIPS, Code, L1, SECONDARY_CODE_CHIPS, code, secondary_code};
+use gnss::navic::l1nav::{self, L1_NAV};
+use gnss::navic::sps::{L5, S};
+use gnss::rinex;
+use gnss::satellite::{Sv, System};
+use gnss::time::Epoch;
 
 use super::codes::holds;
 use super::data::keplerian;

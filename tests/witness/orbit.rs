@@ -6,13 +6,13 @@ use std::path::Path;
 
 use ::rinex::navigation::NavMessageType;
 use ::rinex::prelude::{Constellation, Rinex, TimeScale};
-use gnss_twin::generator::catalogue::Catalogue;
-use gnss_twin::gnss::broadcast::{Ephemeris, StateVector};
-use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
-use gnss_twin::gnss::rinex::{self, Navigation};
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::sp3;
-use gnss_twin::gnss::time::Epoch;
+use generator::catalogue::Catalogue;
+use gnss::broadcast::{Ephemeris, StateVector};
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::rinex::{self, Navigation};
+use gnss::satellite::{Sv, System};
+use gnss::sp3;
+use gnss::time::Epoch;
 use nalgebra::Vector3;
 
 use super::data::external;
@@ -381,7 +381,7 @@ fn the_rinex_crate_reads_the_same_orbits_of_other_systems() {
 
 #[test]
 fn the_rinex_crate_reads_the_same_observations_of_a_station() {
-    use gnss_twin::analysis::read::rinex_obs;
+    use analysis::read::rinex_obs;
 
     // A reference station's receiver, through two converters: 120 epochs of GPS on three carriers.
     let packed = include_bytes!("../../data/witness/MARE00ESP_R_20203341240_20M_10S_GO.rnx.gz");

@@ -1,14 +1,14 @@
 //! Samples of a few bits as makers of front ends print them, and recordings of them that others made.
 
-use gnss_twin::gnss::gps::l1ca::L1_CA;
-use gnss_twin::gnss::packed::{Components, Encoding, Interleaved, Layout};
-use gnss_twin::gnss::recording::Description;
-use gnss_twin::gnss::samples::IfMetadata;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::time::Rate;
-use gnss_twin::gnss::{ion, signal::Link};
-use gnss_twin::receiver::acquire::{Acquired, AcquisitionSettings, Searcher};
-use gnss_twin::receiver::source::Block;
+use gnss::gps::l1ca::L1_CA;
+use gnss::packed::{Components, Encoding, Interleaved, Layout};
+use gnss::recording::Description;
+use gnss::samples::IfMetadata;
+use gnss::satellite::Sv;
+use gnss::time::Rate;
+use gnss::{ion, signal::Link};
+use receiver::acquire::{Acquired, AcquisitionSettings, Searcher};
+use receiver::source::Block;
 
 use super::data::external;
 
@@ -109,7 +109,7 @@ fn assert_listed(found: &[Acquired], listed: &[(u8, f64)], tolerance_hz: f64) {
 #[test]
 fn a_real_two_bit_recording_holds_the_satellites_that_others_found_in_it() {
     let of = Description {
-        samples: Some(gnss_twin::gnss::recording::Samples::Interleaved(REAL)),
+        samples: Some(gnss::recording::Samples::Interleaved(REAL)),
         rate: Rate::from_hz(20e6),
         center_hz: Some(L1_CA.centre_hz() - 5_000_446.0),
         ..Description::default()

@@ -3,28 +3,28 @@
 
 use std::fmt::Debug;
 
-use gnss_twin::gnss::beidou::in_phase::{B1I, B2I, B3I};
-use gnss_twin::gnss::bits::Store;
-use gnss_twin::gnss::broadcast::{Ephemeris, StateVector};
-use gnss_twin::gnss::crc::crc24q;
-use gnss_twin::gnss::earth::{Geodetic, Look, look, rotate_earth};
-use gnss_twin::gnss::galileo::altboc::E5;
-use gnss_twin::gnss::galileo::e1::E1;
-use gnss_twin::gnss::galileo::e6::E6;
-use gnss_twin::gnss::galileo::fnav::FNAV;
-use gnss_twin::gnss::galileo::inav::{self, INAV_SETS};
-use gnss_twin::gnss::glonass::fdma::{G1, G2};
-use gnss_twin::gnss::glonass::gnav::GNAV_SETS;
-use gnss_twin::gnss::gps::cnav::CNAV_SETS;
-use gnss_twin::gnss::gps::cnav2::CNAV2_SETS;
-use gnss_twin::gnss::gps::l1c::L1C;
-use gnss_twin::gnss::gps::l1ca::L1_CA;
-use gnss_twin::gnss::gps::l2c::L2C;
-use gnss_twin::gnss::gps::l5::L5;
-use gnss_twin::gnss::gps::lnav::{self, Field, Kind};
-use gnss_twin::gnss::navic::sps;
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::time::Epoch;
+use gnss::beidou::in_phase::{B1I, B2I, B3I};
+use gnss::bits::Store;
+use gnss::broadcast::{Ephemeris, StateVector};
+use gnss::crc::crc24q;
+use gnss::earth::{Geodetic, Look, look, rotate_earth};
+use gnss::galileo::altboc::E5;
+use gnss::galileo::e1::E1;
+use gnss::galileo::e6::E6;
+use gnss::galileo::fnav::FNAV;
+use gnss::galileo::inav::{self, INAV_SETS};
+use gnss::glonass::fdma::{G1, G2};
+use gnss::glonass::gnav::GNAV_SETS;
+use gnss::gps::cnav::CNAV_SETS;
+use gnss::gps::cnav2::CNAV2_SETS;
+use gnss::gps::l1c::L1C;
+use gnss::gps::l1ca::L1_CA;
+use gnss::gps::l2c::L2C;
+use gnss::gps::l5::L5;
+use gnss::gps::lnav::{self, Field, Kind};
+use gnss::navic::sps;
+use gnss::satellite::{Sv, System};
+use gnss::time::Epoch;
 use nalgebra::Vector3;
 
 /// Subframe or page; parameter; first bit and length of each piece; signed; power of two of the scale; in
@@ -302,10 +302,10 @@ fn pages_of_i_nav_are_checked_coded_interleaved_and_timed_as_printed() {
 
 #[test]
 fn the_page_with_the_ionosphere_and_the_count_of_the_handover_are_where_they_are_printed() {
-    use gnss_twin::gnss::gps::lnav::{Broadcast, Subframe};
-    use gnss_twin::gnss::klobuchar::Klobuchar;
+    use gnss::gps::lnav::{Broadcast, Subframe};
+    use gnss::klobuchar::Klobuchar;
     let model = Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] };
-    let sets = gnss_twin::gnss::rinex::embedded().unwrap().ephemerides;
+    let sets = gnss::rinex::embedded().unwrap().ephemerides;
     let start = Epoch::from_week(1590, 374_760.0);
     let set = sets.iter().min_by(|a, b| a.toe.since(start).abs().total_cmp(&b.toe.since(start).abs())).unwrap();
     let broadcast = Broadcast::new(Some(model), 15, &sets, start).unwrap();

@@ -1,17 +1,17 @@
 //! The whole pseudorange model against observations of real stations.
 
-use gnss_twin::generator::catalogue::Catalogue;
-use gnss_twin::generator::effect::ionosphere::KlobucharIonosphere;
-use gnss_twin::generator::effect::mapping::Mapping;
-use gnss_twin::generator::effect::troposphere::{Air, Troposphere, Weather};
-use gnss_twin::generator::ray::{Effect, Ray};
-use gnss_twin::generator::sky::emission;
-use gnss_twin::generator::vehicle::Motion;
-use gnss_twin::gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use gnss_twin::gnss::gps::l1ca::L1_CA;
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::time::Epoch;
+use generator::catalogue::Catalogue;
+use generator::effect::ionosphere::KlobucharIonosphere;
+use generator::effect::mapping::Mapping;
+use generator::effect::troposphere::{Air, Troposphere, Weather};
+use generator::ray::{Effect, Ray};
+use generator::sky::emission;
+use generator::vehicle::Motion;
+use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::gps::l1ca::L1_CA;
+use gnss::rinex;
+use gnss::satellite::Sv;
+use gnss::time::Epoch;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::orbit::{outside, shipped};

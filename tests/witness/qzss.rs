@@ -2,26 +2,26 @@
 
 use std::collections::BTreeMap;
 
-use gnss_twin::gnss::bits::number;
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::crc::crc24q;
-use gnss_twin::gnss::fec::convolutional::Convolutional;
-use gnss_twin::gnss::gps::cnav::{message_type, type_at};
-use gnss_twin::gnss::message::{Common, Message, Read};
-use gnss_twin::gnss::qzss::civil::{CNAV, CNAV_L2C, CNAV_SETS};
-use gnss_twin::gnss::qzss::l1c::L1C;
-use gnss_twin::gnss::qzss::l1ca::L1_CA;
-use gnss_twin::gnss::qzss::l2c::L2C;
-use gnss_twin::gnss::qzss::l5::L5;
-use gnss_twin::gnss::qzss::lnav::LNAV;
-use gnss_twin::gnss::qzss::satellites;
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::samples::{Format, IfMetadata};
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::signal::{Link, Signal};
-use gnss_twin::gnss::time::{Epoch, Rate};
-use gnss_twin::receiver::acquire::{AcquisitionSettings, Searcher};
-use gnss_twin::receiver::source::Block;
+use gnss::bits::number;
+use gnss::broadcast::Ephemeris;
+use gnss::crc::crc24q;
+use gnss::fec::convolutional::Convolutional;
+use gnss::gps::cnav::{message_type, type_at};
+use gnss::message::{Common, Message, Read};
+use gnss::qzss::civil::{CNAV, CNAV_L2C, CNAV_SETS};
+use gnss::qzss::l1c::L1C;
+use gnss::qzss::l1ca::L1_CA;
+use gnss::qzss::l2c::L2C;
+use gnss::qzss::l5::L5;
+use gnss::qzss::lnav::LNAV;
+use gnss::qzss::satellites;
+use gnss::rinex;
+use gnss::samples::{Format, IfMetadata};
+use gnss::satellite::{Sv, System};
+use gnss::signal::{Link, Signal};
+use gnss::time::{Epoch, Rate};
+use receiver::acquire::{AcquisitionSettings, Searcher};
+use receiver::source::Block;
 
 use super::cnav;
 use super::data::external;

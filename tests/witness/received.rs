@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use gnss_twin::gnss::record::AcquisitionRow;
+use gnss::record::AcquisitionRow;
 
 use super::data::external;
 use super::packed::HANOI;

@@ -1,17 +1,17 @@
 //! Acquisition on recordings that others made with real antennas.
 
-use gnss_twin::gnss::beidou::b1c::{self, B1C};
-use gnss_twin::gnss::galileo::e1::E1;
-use gnss_twin::gnss::gps::l1c::{self, L1C};
-use gnss_twin::gnss::gps::l1ca::L1_CA;
-use gnss_twin::gnss::qzss;
-use gnss_twin::gnss::samples::{Format, IfMetadata};
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::signal::{Link, Signal};
-use gnss_twin::gnss::time::Rate;
-use gnss_twin::receiver::acquire::{Acquired, AcquisitionSettings, Searcher};
-use gnss_twin::receiver::source::Block;
-use gnss_twin::receiver::track::{Channel, Report, TrackingSettings};
+use gnss::beidou::b1c::{self, B1C};
+use gnss::galileo::e1::E1;
+use gnss::gps::l1c::{self, L1C};
+use gnss::gps::l1ca::L1_CA;
+use gnss::qzss;
+use gnss::samples::{Format, IfMetadata};
+use gnss::satellite::{Sv, System};
+use gnss::signal::{Link, Signal};
+use gnss::time::Rate;
+use receiver::acquire::{Acquired, AcquisitionSettings, Searcher};
+use receiver::source::Block;
+use receiver::track::{Channel, Report, TrackingSettings};
 
 use num_complex::Complex64;
 
@@ -406,7 +406,7 @@ fn half_a_second_of_real_signal_tracks_with_steady_power_and_bit_edges_twenty_mi
 
         // Signal to noise of a 1 ms prompt at 47 dB-Hz is 20 dB: its magnitude wanders by a tenth, so a mean
         // of 240 by 1 %, and the halves of the segment agree to 5 %.
-        let magnitude = |rows: &[gnss_twin::gnss::record::TrackingRow]| {
+        let magnitude = |rows: &[gnss::record::TrackingRow]| {
             rows.iter().map(|row| libm::hypot(row.prompt_i, row.prompt_q)).sum::<f64>() / rows.len() as f64
         };
         let (first, second) = rows.split_at(rows.len() / 2);

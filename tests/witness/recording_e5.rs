@@ -3,14 +3,14 @@
 
 use std::f64::consts::TAU;
 
-use gnss_twin::gnss::galileo::e5::{self, E5A, E5B};
-use gnss_twin::gnss::gps::l5::L5;
-use gnss_twin::gnss::samples::{Format, IfMetadata};
-use gnss_twin::gnss::signal::{Link, Signal};
-use gnss_twin::gnss::time::Rate;
-use gnss_twin::receiver::acquire::{Acquired, AcquisitionSettings, Searcher};
-use gnss_twin::receiver::source::Block;
+use gnss::galileo::e5::{self, E5A, E5B};
+use gnss::gps::l5::L5;
+use gnss::samples::{Format, IfMetadata};
+use gnss::signal::{Link, Signal};
+use gnss::time::Rate;
 use num_complex::Complex64;
+use receiver::acquire::{Acquired, AcquisitionSettings, Searcher};
+use receiver::source::Block;
 
 use super::recording::two_bits;
 

@@ -3,13 +3,13 @@
 
 use std::collections::BTreeMap;
 
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::earth::SPEED_OF_LIGHT_MPS;
-use gnss_twin::gnss::galileo::inav::{self, INAV, InavReader, REDUCED_VALID_S};
-use gnss_twin::gnss::message::{Common, Read, Reader};
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::satellite::{Sv, System};
-use gnss_twin::gnss::time::Epoch;
+use gnss::broadcast::Ephemeris;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::galileo::inav::{self, INAV, InavReader, REDUCED_VALID_S};
+use gnss::message::{Common, Read, Reader};
+use gnss::rinex;
+use gnss::satellite::{Sv, System};
+use gnss::time::Epoch;
 use nalgebra::Vector3;
 
 use super::inav::real_pages;

@@ -3,11 +3,11 @@
 
 use std::collections::BTreeMap;
 
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::galileo::inav::{self, INAV, InavReader, redundancy};
-use gnss_twin::gnss::message::{Common, Read, Reader};
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::time::Epoch;
+use gnss::broadcast::Ephemeris;
+use gnss::galileo::inav::{self, INAV, InavReader, redundancy};
+use gnss::message::{Common, Read, Reader};
+use gnss::satellite::Sv;
+use gnss::time::Epoch;
 
 use super::inav::real_pages;
 

@@ -1,15 +1,15 @@
 //! SBAS's places by real records, its blocks read from any symbol on, and its corrections by printed blocks.
 
-use gnss_twin::gnss::augmentation::grid::{Point, points};
-use gnss_twin::gnss::augmentation::{Content, Degradation, GridMask, Mask};
-use gnss_twin::gnss::bits::number;
-use gnss_twin::gnss::broadcast::Ephemeris;
-use gnss_twin::gnss::fec::convolutional::Convolutional;
-use gnss_twin::gnss::message::{Common, Read};
-use gnss_twin::gnss::rinex;
-use gnss_twin::gnss::satellite::System;
-use gnss_twin::gnss::sbas::message::{SBAS, tables, type_at};
-use gnss_twin::gnss::time::Epoch;
+use gnss::augmentation::grid::{Point, points};
+use gnss::augmentation::{Content, Degradation, GridMask, Mask};
+use gnss::bits::number;
+use gnss::broadcast::Ephemeris;
+use gnss::fec::convolutional::Convolutional;
+use gnss::message::{Common, Read};
+use gnss::rinex;
+use gnss::satellite::System;
+use gnss::sbas::message::{SBAS, tables, type_at};
+use gnss::time::Epoch;
 
 use super::orbit::outside;
 

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use gnss_twin::analysis::measure::allan::Deviation;
+use analysis::measure::allan::Deviation;
 
 use super::data::external;
 

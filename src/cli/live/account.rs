@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use crate::generator::vehicle::joining::{Kind, Refusal, Tick};
-use crate::gnss::time::Rate;
+use generator::vehicle::joining::{Kind, Refusal, Tick};
+use gnss::time::Rate;
 
 /// Width of a bin of ages.
 const BIN: Duration = Duration::from_micros(100);

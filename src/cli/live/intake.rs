@@ -15,7 +15,7 @@ use super::account::Intake;
 use crate::cli::address::{listen, listen_address};
 use crate::cli::error::CliError;
 use crate::cli::scenario;
-use crate::live::wire::{MOST_BYTES, MOST_DATAGRAM_BYTES, Message, Reader, WireError, pieces};
+use live::wire::{MOST_BYTES, MOST_DATAGRAM_BYTES, Message, Reader, WireError, pieces};
 
 /// Messages that wait for the next tick at most; older ones give way.
 const MOST_WAITING: usize = 4096;
@@ -201,7 +201,7 @@ fn lines(mut input: impl BufRead, inbox: &Inbox, mut reader: Reader) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::time::Epoch;
+    use gnss::time::Epoch;
 
     #[test]
     fn lines_of_any_length_are_bounded_and_the_next_one_counts() {

@@ -10,7 +10,7 @@ use super::ring::{Block, Ring};
 use crate::cli::args::{self, Clock};
 use crate::cli::error::CliError;
 use crate::cli::sink::{Sink, Spec};
-use crate::gnss::time::Rate;
+use gnss::time::Rate;
 
 /// Blocks that a ring holds at most, however short ticks are.
 const MOST_BLOCKS: usize = 4096;

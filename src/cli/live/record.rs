@@ -11,14 +11,14 @@ use crate::cli::error::CliError;
 use crate::cli::run::truth_error;
 use crate::cli::scenario::Named;
 use crate::cli::staging::Staging;
-use crate::generator::event::{self, Event};
-use crate::generator::scenario::Overrides;
-use crate::generator::scene::Scene;
-use crate::generator::truth;
-use crate::generator::vehicle::grown::Grown;
-use crate::generator::vehicle::joining::Push;
-use crate::generator::vehicle::log;
-use crate::live::drive::Made;
+use generator::event::{self, Event};
+use generator::scenario::Overrides;
+use generator::scene::Scene;
+use generator::truth;
+use generator::vehicle::grown::Grown;
+use generator::vehicle::joining::Push;
+use generator::vehicle::log;
+use live::drive::Made;
 
 /// Error of a record that cannot be written.
 fn failed(error: &std::io::Error) -> CliError {

@@ -15,7 +15,7 @@ use std::str::FromStr;
 
 use crate::cli::address::{listen_address, path};
 use crate::cli::error::{CliError, shown};
-use crate::gnss::samples::IfMetadata;
+use gnss::samples::IfMetadata;
 
 /// A sink as the command line names it.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -18,7 +18,7 @@ use super::Sink;
 use super::plain::{Client, PARTING, is_silence};
 use crate::cli::error::CliError;
 use crate::cli::scenario;
-use crate::gnss::samples::{Format, IfMetadata};
+use gnss::samples::{Format, IfMetadata};
 
 /// `RTL0`, tuner 5 (R820T), 29 gains: what such a dongle says of itself.
 const GREETING: [u8; 12] = *b"RTL0\0\0\0\x05\0\0\0\x1d";
@@ -153,7 +153,7 @@ impl Commands {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::time::Rate;
+    use gnss::time::Rate;
 
     #[test]
     fn samples_lie_around_127_5_and_255_never_comes() {

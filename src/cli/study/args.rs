@@ -6,8 +6,8 @@ use std::str::FromStr;
 use clap::{Args, Subcommand, ValueEnum};
 
 use crate::cli::args::ReportForm;
-use crate::study::sweep::export::Directive;
-use crate::study::sweep::part::Part;
+use study::sweep::export::Directive;
+use study::sweep::part::Part;
 
 #[derive(Args, Debug)]
 #[command(

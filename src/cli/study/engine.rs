@@ -18,10 +18,10 @@ use crate::cli::error::CliError;
 use crate::cli::progress::Progress;
 use crate::cli::scenario;
 use crate::cli::staging::Staging;
-use crate::study::sweep::engine::{Status, status};
-use crate::study::sweep::export::{self, Engine, Terms};
-use crate::study::sweep::plan::Plan;
-use crate::study::sweep::shard;
+use study::sweep::engine::{Status, status};
+use study::sweep::export::{self, Engine, Terms};
+use study::sweep::plan::Plan;
+use study::sweep::shard;
 
 /// Arrays of GNU parallel have no size of their own; a script has a line a task.
 const MOST_LINES: u32 = 100_000;

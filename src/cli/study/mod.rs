@@ -9,17 +9,17 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::analysis::show::document::Forms;
 use crate::cli::error::CliError;
 use crate::cli::progress::Progress;
 use crate::cli::run::{generator_error, judge_error, output_error, receiver_error};
 use crate::cli::scenario;
 use crate::cli::staging::Staging;
-use crate::study::sweep::engine::{Status, run as run_shards, status as status_of};
-use crate::study::sweep::plan::{Cut, Plan};
-use crate::study::sweep::result::{self, Results};
-use crate::study::sweep::spec::Level;
-use crate::study::sweep::{StudyError, publish, sha256_of_file, shard};
+use analysis::show::document::Forms;
+use study::sweep::engine::{Status, run as run_shards, status as status_of};
+use study::sweep::plan::{Cut, Plan};
+use study::sweep::result::{self, Results};
+use study::sweep::spec::Level;
+use study::sweep::{StudyError, publish, sha256_of_file, shard};
 
 /// Does what is asked of a study.
 pub fn execute(arguments: &args::Study) -> Result<(), CliError> {

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use crate::cli::error::CliError;
-use crate::study::sweep::export::MOST_TASKS;
+use study::sweep::export::MOST_TASKS;
 
 /// State of a job in a queue.
 #[derive(Clone, Debug, PartialEq, Eq)]

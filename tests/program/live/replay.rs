@@ -3,16 +3,16 @@
 use std::fs;
 use std::path::Path;
 
-use gnss_twin::generator::event::Event;
-use gnss_twin::generator::generate_part;
-use gnss_twin::generator::scenario::{Overrides, Scenario};
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::generator::stream::{Options, Stream, generate_with};
-use gnss_twin::generator::truth::Record;
-use gnss_twin::generator::vehicle::joining::{Kind, Push};
-use gnss_twin::generator::vehicle::turn::PushedTurn;
-use gnss_twin::generator::vehicle::{Motion, log};
-use gnss_twin::live::drive::Driver;
+use generator::event::Event;
+use generator::generate_part;
+use generator::scenario::{Overrides, Scenario};
+use generator::scene::Scene;
+use generator::stream::{Options, Stream, generate_with};
+use generator::truth::Record;
+use generator::vehicle::joining::{Kind, Push};
+use generator::vehicle::turn::PushedTurn;
+use generator::vehicle::{Motion, log};
+use live::drive::Driver;
 use nalgebra::Vector3;
 
 /// All that keeps a copy of the trajectory: wind-up, a turned antenna, obstacles, a jammer at a place, a

@@ -104,7 +104,7 @@ fn every_figure_that_a_study_may_keep_is_one_of_the_summary() {
     let run = Command::new(TWIN).args(["run", "short.toml", "--out", "run"]).current_dir(here.path()).output().unwrap();
     assert!(run.status.success(), "{}", text(&run));
     let summary: Value = serde_json::from_slice(&fs::read(here.path().join("run/summary.json")).unwrap()).unwrap();
-    for name in gnss_twin::study::sweep::sampled::FIGURES {
+    for name in study::sweep::sampled::FIGURES {
         let own = ["acquisition.", "theory.", "spoofing."].iter().any(|start| name.starts_with(start));
         // Lists are null in a run without fixes.
         let path = name.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.');
