@@ -5,15 +5,8 @@
 
 use std::error::Error;
 
-use gnss_twin::generator::Generator;
-use gnss_twin::generator::scenario::Scenario;
-use gnss_twin::generator::scene::Scene;
-use gnss_twin::gnss::earth::Geodetic;
-use gnss_twin::gnss::record::Fix;
-use gnss_twin::receiver::output::Record;
-use gnss_twin::receiver::position::{IonosphereChoice, TroposphereChoice};
-use gnss_twin::receiver::{Receiver, settings::Settings};
-use gnss_twin::twin;
+use gnss_twin::prelude::*;
+use gnss_twin::settings::{IonosphereChoice, TroposphereChoice};
 
 const SCENARIO: &str = r#"
 name = "closed_loop"
@@ -30,16 +23,16 @@ height_m = 520
 "#;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let scene = Scenario::from_toml(SCENARIO)?.scene()?;
+    let scenario = Scenario::from_toml(SCENARIO)?;
     let mut settings = Settings::default();
     // The scene has no atmosphere.
     settings.position.ionosphere = IonosphereChoice::None;
     settings.position.troposphere = TroposphereChoice::None;
 
-    let mut records: Vec<Record> = Vec::new();
-    let done = twin::run(std::slice::from_ref(&scene), &settings, &mut (), &mut records)?;
-    println!("{}\n{}", done.generated[0], done.outcome);
+    let run = Twin::new(&scenario)?.with_settings(settings.clone()).run()?;
+    println!("{}\n{}", run.generated[0], run.outcome);
 
+    let scene = scenario.scene()?;
     let mut receiver = Receiver::new(&scene.metadata, &settings)?;
     for batch in Generator::new(&scene)? {
         for record in receiver.push(&batch?.samples)? {
@@ -49,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     let (_, outcome) = receiver.finish()?;
-    assert_eq!(outcome.fixes, done.outcome.fixes, "both ways give the same");
+    assert_eq!(outcome.fixes, run.outcome.fixes, "both ways give the same");
     Ok(())
 }
 

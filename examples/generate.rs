@@ -8,10 +8,9 @@ use std::error::Error;
 use std::fs::{self, File};
 use std::io::Write;
 
-use gnss_twin::generator::Generator;
-use gnss_twin::generator::scenario::Scenario;
-use gnss_twin::generator::truth::Record;
-use gnss_twin::gnss::sigmf;
+use gnss_twin::prelude::*;
+use gnss_twin::samples::write_sigmf;
+use gnss_twin::truth::Record;
 
 const SCENARIO: &str = r#"
 name = "generate"
@@ -50,7 +49,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     generator.done().iter().for_each(|done| println!("{done}"));
-    fs::write(data.with_extension("sigmf-meta"), sigmf::write(&scene.metadata))?;
+    fs::write(data.with_extension("sigmf-meta"), write_sigmf(&scene.metadata))?;
     println!("samples in {}", data.display());
     Ok(())
 }

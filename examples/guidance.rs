@@ -12,15 +12,11 @@ use std::collections::VecDeque;
 use std::error::Error;
 use std::time::Instant;
 
-use gnss_twin::generator::scenario::Scenario;
-use gnss_twin::generator::vehicle::Motion;
-use gnss_twin::generator::vehicle::joining::Push;
-use gnss_twin::gnss::earth::Geodetic;
-use gnss_twin::live::lockstep::Lockstep;
-use gnss_twin::receiver::output::Record;
-use gnss_twin::receiver::position::{IonosphereChoice, TroposphereChoice};
-use gnss_twin::receiver::settings::Settings;
-use nalgebra::{Matrix3, Vector3};
+use gnss_twin::live::{Lockstep, Push};
+use gnss_twin::prelude::*;
+use gnss_twin::scene::Motion;
+use gnss_twin::settings::{IonosphereChoice, TroposphereChoice};
+use nalgebra::Matrix3;
 
 const SCENARIO: &str = r#"
 name = "guidance"

@@ -6,14 +6,8 @@
 use std::collections::BTreeMap;
 use std::error::Error;
 
-use gnss_twin::generator::ray::{Effect, Ray, Sight};
-use gnss_twin::generator::scenario::Scenario;
-use gnss_twin::generator::truth;
-use gnss_twin::gnss::satellite::Sv;
-use gnss_twin::gnss::signal::Signal;
-use gnss_twin::receiver::output::Record;
-use gnss_twin::receiver::settings::Settings;
-use gnss_twin::twin;
+use gnss_twin::effect::{Ray, Sight};
+use gnss_twin::prelude::*;
 
 /// A layer of leaves over the antenna: what a ray loses is in proportion to its way through it.
 struct Canopy {
@@ -59,14 +53,14 @@ cn0_dbhz = 47
 "#;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut scene = Scenario::from_toml(SCENARIO)?.scene()?;
-    scene.effects.push(Box::new(Canopy { height_m: 3.0, loss_db_per_m: 0.7 }));
-
-    let (mut truth, mut found) = (Vec::new(), Vec::new());
-    twin::run(std::slice::from_ref(&scene), &Settings::default(), &mut truth, &mut found)?;
+    let mut twin = Twin::from_toml(SCENARIO)?;
+    for scene in twin.scenes_mut() {
+        scene.effects.push(Box::new(Canopy { height_m: 3.0, loss_db_per_m: 0.7 }));
+    }
+    let run = twin.run()?;
     let mut elevation_deg: BTreeMap<Sv, f64> = BTreeMap::new();
     let mut true_dbhz: BTreeMap<Sv, f64> = BTreeMap::new();
-    for record in truth {
+    for record in run.truth {
         match record {
             truth::Record::Sky(row) => _ = elevation_deg.insert(row.sv, row.elevation_deg),
             truth::Record::Observation(row) => _ = true_dbhz.insert(row.sv, row.cn0_dbhz),
@@ -74,7 +68,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     let mut measured_dbhz: BTreeMap<Sv, f64> = BTreeMap::new();
-    for record in found {
+    for record in run.records {
         if let Record::Tracking(row) = record {
             measured_dbhz.insert(row.sv, row.cn0_dbhz);
         }

@@ -8,18 +8,16 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::PathBuf;
 
-use gnss_twin::gnss::earth::Geodetic;
-use gnss_twin::gnss::record::Event;
-use gnss_twin::gnss::sigmf;
-use gnss_twin::receiver::output::Record;
-use gnss_twin::receiver::{Receiver, settings::Settings};
+use gnss_twin::prelude::*;
+use gnss_twin::record::Event;
+use gnss_twin::samples::read_sigmf;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let usual = || std::env::temp_dir().join("gnss-twin-example.sigmf-data");
     let data = std::env::args().nth(1).map_or_else(usual, PathBuf::from);
     let meta = data.with_extension("sigmf-meta");
     let text = fs::read_to_string(&meta).map_err(|error| format!("{}: {error}", meta.display()))?;
-    let metadata = sigmf::parse(&text, &meta.display().to_string())?;
+    let metadata = read_sigmf(&text, &meta.display().to_string())?;
     let mut receiver = Receiver::new(&metadata, &Settings::default())?;
     let mut file = File::open(&data)?;
     let mut bytes = vec![0; 1 << 18];

@@ -2,44 +2,63 @@
 //!
 //! ```text
 //!  ephemerides, motion,             samples               records
-//!  environment  ──────►  generator  ──────►  receiver  ──────►  analysis ──► verdict, pictures, report
-//!                            │                                     ▲
-//!                            └─────────────── truth ───────────────┘
+//!  environment  ──────►  generator  ──────►  receiver  ──────►  judge ──► verdict, pictures, report
+//!                            │                                    ▲
+//!                            └─────────────── truth ──────────────┘
 //! ```
 //!
-//! Three worlds meet only in [`gnss`], which holds what is *printed* in interface documents
-//! and standards: time, coordinates, codes, messages, broadcast orbits, file formats.
-//!
-//! - [`generator`] is nature and hardware: it turns ephemerides, a user's motion and a
-//!   described environment into IF samples, and writes the truth beside them.
-//! - [`receiver`] is one designer's choice of how to undo that: acquisition, tracking,
-//!   decoding, position. It sees IF metadata and samples, never truth.
-//! - [`analysis`] is the judge: it joins what the receiver found with the truth on
-//!   (sample number, satellite, signal) and measures every error.
-//!
-//! Above the three are [`twin`], which closes the loop, [`live`], which takes motion while samples go out,
-//! and [`study`]: the receiver's loops on modelled correlations, compared with the judge's theory.
-//!
-//! Results are values: the generator iterates samples with their truth, the receiver returns records, and
-//! files are one sink among others.
+//! A [`Twin`] runs a scene; records and truth are values. [`Twin::run_judged`] adds the verdict,
+//! [`Twin::run_in`] writes tables instead:
 //!
 //! ```
-//! use gnss_twin::generator::{Generator, scenario::Scenario};
-//! use gnss_twin::receiver::{Receiver, output::Record, settings::Settings};
+//! use gnss_twin::prelude::*;
 //!
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let scenario = r#"
-//!     name = "glimpse"
-//!     start = 2010-07-01T08:06:00
-//!     duration_s = 0.3
-//!     motion = { kind = "static", latitude_deg = 48.1, longitude_deg = 11.6, height_m = 520 }
-//!     noise = {}
-//! "#;
-//! let scene = Scenario::from_toml(scenario)?.scene()?;
+//! # let scenario = r#"
+//! #     name = "glimpse"
+//! #     start = 2010-07-01T08:06:00
+//! #     duration_s = 0.3
+//! #     motion = { kind = "static", latitude_deg = 48.1, longitude_deg = 11.6, height_m = 520 }
+//! #     noise = {}
+//! # "#;
+//! let run = Twin::from_toml(scenario)?.run()?;
+//! println!("{}", run.outcome);
+//! run.fixes().for_each(|fix| println!("{} {:?}", fix.time(), fix.position_m()));
+//! # assert!(run.outcome.acquired.len() >= 4);
+//! # Ok::<(), gnss_twin::Error>(())
+//! ```
+//!
+//! Modules, in the order in which a program meets them:
+//!
+//! | module | items |
+//! | --- | --- |
+//! | [`prelude`] | names that most programs use |
+//! | [`twin`] | the loop in one call: [`Twin`], [`Run`], [`Error`] |
+//! | [`scene`] | scenarios from a text, a file or code; scenes; plans |
+//! | [`generator`], [`truth`] | samples of a scene in batches, and what is true of them |
+//! | [`receiver`], [`settings`], [`record`] | samples to records, the receiver's settings, the rows |
+//! | [`judge`] | errors against theory, limits, verdict, report |
+//! | [`samples`], [`time`], [`satellite`], [`orbit`] | formats and metadata, instants, satellites, orbits |
+//! | [`effect`], [`signal`], [`message`] | effects, stages, signals and messages of one's own |
+//! | [`live`], [`study`] | a scene that moves while it is sent; sweeps of parameters |
+//!
+//! The same loop in single steps: a [`Generator`](generator::Generator) iterates batches of samples, and a
+//! [`Receiver`](receiver::Receiver) takes them as bytes or as complex values. It sees metadata and samples,
+//! never truth.
+//!
+//! ```
+//! use gnss_twin::prelude::*;
+//!
+//! let scene = Scenario::builder("steps")
+//!     .start(Epoch::parse("2010-07-01T08:06:00")?)
+//!     .duration_s(0.3)
+//!     .fixed(Geodetic::from_degrees(48.1, 11.6, 520.0))
+//!     .noise()
+//!     .build()?
+//!     .scene()?;
 //! let mut receiver = Receiver::new(&scene.metadata, &Settings::default())?;
 //! let mut found = Vec::new();
 //! for batch in Generator::new(&scene)? {
-//!     for record in receiver.push(&batch?.samples)? {
+//!     for record in receiver.push_complex(&batch?.complex())? {
 //!         match record {
 //!             Record::Acquisition(row) if row.acquired => found.push(row.sv),
 //!             _ => {}
@@ -47,40 +66,12 @@
 //!     }
 //! }
 //! assert!(found.len() >= 4, "{found:?}");
-//! # Ok(())
-//! # }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! What the two wrote into a directory, [`analysis::judge`](analysis::judge()) measures, judges and draws:
-//!
-//! ```
-//! use gnss_twin::generator::{scenario::Scenario, truth};
-//! use gnss_twin::receiver::{output::Output, settings::Settings};
-//! use gnss_twin::{analysis, twin};
-//!
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let scenario = r#"
-//!     name = "judged"
-//!     start = 2010-07-01T08:06:00
-//!     duration_s = 4
-//!     motion = { kind = "static", latitude_deg = 48.1, longitude_deg = 11.6, height_m = 520 }
-//!     noise = {}
-//! "#;
-//! let scene = Scenario::from_toml(scenario)?.scene()?;
-//! let run = tempfile::tempdir()?;
-//! let [truth, rx] = ["truth", "rx"].map(|name| run.path().join(name));
-//! std::fs::create_dir(&truth)?;
-//! std::fs::create_dir(&rx)?;
-//! let (mut truth, mut rx) = (truth::Writer::create(&truth)?, Output::create(&rx)?);
-//! twin::run(std::slice::from_ref(&scene), &Settings::default(), &mut truth, &mut rx)?;
-//! let summary = analysis::assess(run.path(), None)?;
-//! assert_eq!(summary.satellites.false_acquired, 0);
-//! # Ok(())
-//! # }
-//! ```
-//!
-//! Each part is a crate of its own, named as its module here, and this crate hands them on: no crate of the
-//! three worlds depends on another. A program that needs generator and receiver takes the package with
+//! This crate is a facade: its items come from the crates of the rooms in `src`, none of which depends on
+//! another of generator, receiver and judge. What a room exports beyond this facade is internal and may
+//! change with any version. A program that needs generator and receiver takes the package with
 //! `default-features = false, features = ["generator", "receiver"]`. Units: SI and radians inside, cycles for
 //! carrier phase, GPS time; a name ends with its unit.
 //!
@@ -90,20 +81,26 @@
 
 #![warn(missing_docs)]
 
-pub use ::gnss;
+mod facade;
+
+pub use facade::{message, orbit, prelude, record, samples, satellite, signal, time};
+
+#[cfg(feature = "generator")]
+pub use facade::{effect, generator, scene, truth};
+#[cfg(feature = "receiver")]
+pub use facade::{receiver, settings};
 
 #[cfg(feature = "analysis")]
-pub use ::analysis;
-#[cfg(feature = "generator")]
-pub use ::generator;
-#[cfg(all(feature = "generator", feature = "receiver"))]
-pub use ::live;
-#[cfg(feature = "receiver")]
-pub use ::receiver;
+pub use facade::judge;
 #[cfg(feature = "study")]
-pub use ::study;
+pub use facade::study;
 #[cfg(all(feature = "generator", feature = "receiver"))]
-pub use ::twin;
+pub use facade::{live, twin};
+#[cfg(all(feature = "generator", feature = "receiver"))]
+#[doc(no_inline)]
+pub use twin::{Error, Run, Twin};
 
+/// Command line, for the program alone.
 #[cfg(feature = "cli")]
+#[doc(hidden)]
 pub mod cli;

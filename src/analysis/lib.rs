@@ -12,6 +12,8 @@
 //!
 //! Below all of them lie [`error`], [`statistics`] and [`waveform`], the spectrum and the correlation of a
 //! signal.
+//!
+//! Internal crate: programs use the facade `gnss_twin`. What it does not hand on may change with any version.
 
 #[macro_use(planted)]
 extern crate gnss;

@@ -11,6 +11,8 @@
 //! Planner::<f32>::new().plan_fft_forward(12).process(&mut samples);
 //! assert!((samples[0].re - 12.0).abs() < 1e-6 && samples[1].norm() < 1e-6);
 //! ```
+//!
+//! Internal crate: programs use the facade `gnss_twin`. What it does not hand on may change with any version.
 
 use std::sync::Arc;
 

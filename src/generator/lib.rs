@@ -37,6 +37,8 @@
 //! 4. [`scene`], which holds all of these, and what follows from it: [`event`], [`presence`], [`geometry`],
 //!    [`arrival`], [`truth`], [`error`], [`transmit`], [`mod@stream`];
 //! 5. the reports before a run: [`levels`], [`plan`], [`dynamics`]; and [`scenario`], the scene as written.
+//!
+//! Internal crate: programs use the facade `gnss_twin`. What it does not hand on may change with any version.
 
 #[macro_use(planted)]
 extern crate gnss;

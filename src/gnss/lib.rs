@@ -21,6 +21,8 @@
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! Internal crate: programs use the facade `gnss_twin`. What it does not hand on may change with any version.
 
 #[macro_use]
 pub mod plant;

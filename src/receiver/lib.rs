@@ -34,6 +34,8 @@
 //! source, format, thresholds · [`correlate`] · [`lead`] · [`gap`], [`interference`], [`parting`] ·
 //! [`acquire`], looks · [`track`] · [`decode`] · [`observe`], [`position`] · [`settings`] (of all those) ·
 //! [`diagnosis`], [`output`], outcome · session · run.
+//!
+//! Internal crate: programs use the facade `gnss_twin`. What it does not hand on may change with any version.
 
 #[macro_use(planted)]
 extern crate gnss;

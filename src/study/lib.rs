@@ -28,6 +28,8 @@
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! Internal crate: programs use the facade `gnss_twin`. What it does not hand on may change with any version.
 
 pub mod correlation;
 pub mod correlator;

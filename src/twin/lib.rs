@@ -30,6 +30,8 @@
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! Internal crate: programs use the facade `gnss_twin`. What it does not hand on may change with any version.
 
 #![cfg(all(feature = "generator", feature = "receiver"))]
 
