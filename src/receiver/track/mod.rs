@@ -12,6 +12,7 @@ mod bits;
 mod channel;
 pub mod closed;
 pub mod cn0;
+mod correlator;
 #[cfg(test)]
 mod ensemble_tests;
 mod halves;
@@ -34,7 +35,8 @@ mod tests;
 #[cfg(test)]
 mod weak_tests;
 
-pub use channel::{Channel, Glance, Shown, pilot_group};
+pub use channel::{Channel, Glance, pilot_group};
+pub use correlator::{Correlator, Interval, Shown};
 pub use model::ReplicaModel;
 pub use settings::{CodeDiscriminator, LoopMargin, TrackingSettings, TrackingSettingsError};
 

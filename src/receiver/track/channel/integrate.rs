@@ -3,201 +3,168 @@
 
 use num_complex::Complex64;
 
+use super::accumulator::{Correlations, Period};
 use super::{Channel, Stage};
-use crate::correlate::sums::Samples;
-use crate::correlate::{Nco, Replica, TURN, chips_to_units};
+use crate::correlate::chips_to_units;
+use crate::track::closed::Mode;
+use crate::track::correlator::Correlator;
+use crate::track::secondary_code::SecondaryCodePhase;
 use crate::track::side::SidePeaks;
 use crate::track::{Report, Symbol};
 
-/// Periods over which the power of the samples is averaged.
-const POWER_PERIODS: f64 = 100.0;
 /// Halves of periods are compared in one of this many, once they have shown a true lock.
 const HALVES_EVERY: u64 = 16;
-/// The power is measured in one of this many periods.
-const POWER_EVERY: u64 = 8;
-
-/// Correlations of a code period.
-#[derive(Clone, Copy, Debug, Default)]
-struct Correlations {
-    /// Early, prompt and late.
-    sums: [Complex64; 3],
-    /// Correlation at a delay where the code does not correlate with itself, if it was requested.
-    noise: Option<Complex64>,
-    /// Correlations on the neighbouring peaks, ahead and behind, of a signal that has them.
-    sides: Option<[Complex64; 2]>,
-}
 
 impl Channel {
-    /// Correlates the running period, whose last samples these are, and moves on to the next, which begins at
-    /// `next`.
-    pub(super) fn correlate(&mut self, replica: &Replica, samples: Samples, next: u64, report: &mut Report) {
-        let nco = self.oscillators();
-        let Correlations { sums, noise, sides } = self.correlations(replica, samples, &nco);
-        let read = self.whole && self.confirmed && !self.held && self.secondary_code_phase.is_some();
-        if self.whole && (self.power.is_none() || self.period.is_multiple_of(POWER_EVERY)) {
-            let power = samples.power() / samples.count().max(1) as f64;
-            self.power =
-                Some(self.power.map_or(power, |mean| mean + (power - mean) * POWER_EVERY as f64 / POWER_PERIODS));
+    /// Correlates the running code period and moves on to the next.
+    pub(super) fn correlate<C: Correlator>(&mut self, period: &Period<C>, report: &mut Report) {
+        let Correlations { sums, noise, sides } = self.correlations(period);
+        let scale = self.accumulator.scale(period, self.whole);
+        if let Some(phase) = self.signs.phase.filter(|_| self.whole && self.signs.confirmed && !self.held)
+            && let Some(data) = &mut self.companions.data
+        {
+            report.symbols.extend(data.read(period, phase, scale));
         }
-        let mean = self.power.unwrap_or_default();
-        let count = next - self.first;
-        // Noise of a correlation, per component: half the samples' power (real samples too) times the
-        // replica's energy.
-        let deviation = (0.5 * mean * count as f64 * self.replica_power).sqrt();
-        let scale = if deviation > 0.0 { 1.0 / deviation } else { 0.0 };
-        if read && let Some(data) = &mut self.data {
-            let phase = self.secondary_code_phase.unwrap_or_default();
-            report.symbols.extend(data.read(samples, self.arithmetic, &nco, (self.period, phase, next), scale));
-        }
-        let first = self.first_half(replica, samples, &nco);
-        let found = self.seek_segment(samples, &nco, scale);
-        self.pass(next);
-        self.code -= replica.period();
-        let finished = self.period;
-        self.period += 1;
+        let first = self.first_half(period);
+        let found = self.seek_segment(period, scale);
+        self.pass(period.interval.to);
+        self.nco.end_period();
         if !self.whole {
             // The first period was met on its way.
             self.whole = true;
-            self.update_since = next;
+            self.accumulator.since = self.nco.first;
             return;
         }
-        let signed = scale * self.secondary_code_chip(finished);
-        let mut taps = [Complex64::ZERO; 3];
-        taps.iter_mut().zip(&sums).for_each(|(tap, sum)| *tap = sum * signed);
+        let signed = scale * self.signs.chip(period.number);
+        let taps = sums.map(|sum| sum * signed);
         if !self.held && !self.moved {
-            self.cn0.add(taps[1], noise.map(|sum| (sum * scale).norm_sqr()));
+            self.detectors.cn0.add(taps[1], noise.map(|sum| (sum * scale).norm_sqr()));
         }
         if let Some(sides) = sides {
             self.watch_side_peaks(taps[1], sides.map(|sum| sum * scale), report);
         }
         if let Some(first) = first {
-            self.halves.add(sums[1] * scale, first * scale);
+            self.detectors.halves.add(sums[1] * scale, first * scale);
         }
-        self.take(finished, taps, report);
+        self.take(period.number, taps, report);
         if let Some(phase) = found {
             self.follow_long(phase);
         }
     }
 
+    /// All taps of the running period.
+    fn correlations<C: Correlator>(&self, period: &Period<C>) -> Correlations {
+        let wants_noise = self.whole && self.detectors.cn0.needs_reference();
+        let quiet = self.accumulator.quiet_tap(period.number).filter(|_| wants_noise);
+        let sides = self.detectors.side_peaks.as_ref().filter(|_| self.whole && !self.held).map(SidePeaks::taps);
+        self.accumulator.correlate(period, quiet, sides)
+    }
+
     /// The prompt of the running period's first half, where a false lock shows there alone.
-    fn first_half(&self, replica: &Replica, samples: Samples, nco: &Nco) -> Option<Complex64> {
-        let is_due = !self.is_true || self.period.is_multiple_of(HALVES_EVERY);
+    fn first_half<C: Correlator>(&self, period: &Period<C>) -> Option<Complex64> {
+        let is_due = !self.detectors.is_true || period.number.is_multiple_of(HALVES_EVERY);
         // The frequency loop alone has come to rest before.
-        let rests = matches!(self.stage, Stage::Assisted | Stage::Tracking(_));
-        let is_wanted = self.has_single_periods() && self.whole && !self.held && rests;
-        (is_wanted && is_due).then(|| {
-            let [sum] = replica.correlate_in(self.arithmetic, samples.part(0, samples.count() / 2), nco, &[0]);
-            sum
-        })
+        let rests = matches!(self.stage, Stage::Assisted(_) | Stage::Tracking(_));
+        let is_wanted = self.signs.are_single() && self.whole && !self.held && rests && is_due;
+        self.accumulator.replica.as_ref().filter(|_| is_wanted).map(|replica| period.first_half(replica))
     }
 
-    /// All taps of the running period in one pass.
-    fn correlations(&self, replica: &Replica, samples: Samples, nco: &Nco) -> Correlations {
-        let arithmetic = self.arithmetic;
-        let [e, p, l] = self.taps;
-        let sides = self.side_peaks.as_ref().filter(|_| self.whole && !self.held).map(SidePeaks::taps);
-        match (self.quiet_tap(), sides) {
-            (None, None) => Correlations {
-                sums: replica.correlate_in(arithmetic, samples, nco, &self.taps),
-                ..Correlations::default()
-            },
-            (Some(quiet), None) => {
-                let [e, p, l, noise] = replica.correlate_in(arithmetic, samples, nco, &[e, p, l, quiet]);
-                Correlations { sums: [e, p, l], noise: Some(noise), sides: None }
-            }
-            (None, Some([a, b])) => {
-                let [e, p, l, a, b] = replica.correlate_in(arithmetic, samples, nco, &[e, p, l, a, b]);
-                Correlations { sums: [e, p, l], noise: None, sides: Some([a, b]) }
-            }
-            (Some(quiet), Some([a, b])) => {
-                let [e, p, l, noise, a, b] = replica.correlate_in(arithmetic, samples, nco, &[e, p, l, quiet, a, b]);
-                Correlations { sums: [e, p, l], noise: Some(noise), sides: Some([a, b]) }
-            }
+    /// Correlates the running period with all segments of the long code, where the carrier is locked to
+    /// symbols; gives the long code's phase once it is beyond doubt.
+    fn seek_segment<C: Correlator>(&mut self, period: &Period<C>, scale: f64) -> Option<SecondaryCodePhase> {
+        let ready = self.whole && self.signs.confirmed && !self.held && !self.moved && self.signs.phase.is_none();
+        if !ready || self.stage.begin().is_none() || !self.detectors.lock.is_locked() {
+            return None;
         }
-    }
-
-    /// Tap at which the noise of the current period is measured, if it has to be.
-    fn quiet_tap(&self) -> Option<i64> {
-        let wanted = self.whole && self.cn0.needs_reference();
-        let place = self.period as usize % self.noise_taps.len().max(1);
-        self.noise_taps.get(place).copied().filter(|_| wanted)
+        self.companions.long.as_mut()?.add(period.number, |replica| scale * period.prompt(replica).re)
     }
 
     /// Takes the early, prompt and late correlations of code period `number`.
     fn take(&mut self, number: u64, taps: [Complex64; 3], report: &mut Report) {
         let prompt = taps[1];
-        self.sums.iter_mut().zip(taps).for_each(|(sum, tap)| *sum += tap);
-        self.summed += 1;
-        self.glances.add(number, prompt, self.previous);
-        match self.stage {
-            Stage::Open => self.batch.add(prompt),
-            Stage::Frequency | Stage::Assisted => self.phase_lock.add(prompt, self.noise()),
-            Stage::Tracking(begin) => self.take_in_symbol(number, begin, prompt, report),
+        self.accumulator.add(taps);
+        self.glances.add(number, prompt, self.accumulator.previous);
+        match &mut self.stage {
+            Stage::Open(batch) => batch.add(prompt),
+            Stage::Frequency(lock) | Stage::Assisted(lock) => lock.add(prompt, self.detectors.noise()),
+            Stage::Tracking(_) => self.take_in_symbol(number, prompt, report),
         }
-        if self.summed >= self.periods_per_update() {
+        if self.accumulator.periods >= self.periods_per_update() {
             self.update();
-            self.sums = [Complex64::ZERO; 3];
-            self.summed = 0;
-            self.update_since = self.first;
+            self.accumulator.clear(self.nco.first);
         }
         self.keep_to_symbols(number);
-        self.previous = Some(prompt);
+        self.accumulator.previous = Some(prompt);
         self.supervise(number, prompt, report);
         self.take_offset();
         self.set_steps();
     }
 
     /// Collects the prompts of a symbol and gives it out at its end.
-    fn take_in_symbol(&mut self, number: u64, begin: u64, prompt: Complex64, report: &mut Report) {
+    fn take_in_symbol(&mut self, number: u64, prompt: Complex64, report: &mut Report) {
+        let Stage::Tracking(tracking) = &mut self.stage else { return };
         if self.held {
             return;
         }
-        let is_in_bit = self.bit_begin.is_some();
-        if is_in_bit && self.confirmed {
+        let (signs, first) = (&self.signs, self.nco.first);
+        let is_in_bit = signs.bit_begin.is_some();
+        if is_in_bit && signs.confirmed {
             // As it was sent, with the sign that its bit's code has there.
-            let soft = (prompt.re * self.secondary_code_chip(number)) as f32;
-            report.symbols.push(Symbol { first_period: number, end: self.first, soft });
+            let soft = (prompt.re * signs.chip(number)) as f32;
+            report.symbols.push(Symbol { first_period: number, end: first, soft });
         }
-        self.symbol.0 += prompt;
-        self.symbol.1 += 1;
-        self.rotation.add(prompt, self.symbol.1, self.group);
-        let length = u64::from(self.group);
-        if (number + 1) % length != begin {
+        tracking.symbol.0 += prompt;
+        tracking.symbol.1 += 1;
+        tracking.rotation.add(prompt, tracking.symbol.1, signs.group);
+        if !signs.ends_symbol(number, tracking.begin) {
             return;
         }
-        if self.symbol.1 == self.group {
-            let symbol_s = self.period_s * f64::from(self.group);
-            let slipped = self.symbol_lock.add(self.symbol.0, self.cn0.hz().map(|hz| hz * symbol_s));
-            if slipped && self.lock.slip(self.first) {
-                self.break_count(report);
-            }
-            if self.has_symbols && self.confirmed && !is_in_bit {
-                let soft = (self.symbol.0.re / f64::from(self.group).sqrt()) as f32;
-                report.symbols.push(Symbol { first_period: number + 1 - length, end: self.first, soft });
-            }
+        let (sum, periods) = std::mem::take(&mut tracking.symbol);
+        if periods != signs.group {
+            return;
         }
-        self.symbol = (Complex64::ZERO, 0);
+        let symbol_s = self.period_s * f64::from(signs.group);
+        let slipped = tracking.lock.add(sum, self.detectors.cn0.hz().map(|hz| hz * symbol_s));
+        let (first_period, length) = (number + 1 - u64::from(signs.group), f64::from(signs.group));
+        let (has_symbols, confirmed) = (signs.has_symbols, signs.confirmed);
+        if slipped && self.detectors.lock.slip(first) {
+            self.break_count(report);
+        }
+        if has_symbols && confirmed && !is_in_bit {
+            report.symbols.push(Symbol { first_period, end: first, soft: (sum.re / length.sqrt()) as f32 });
+        }
     }
 
     /// Closes the loops with the sums of an integration.
     fn update(&mut self) {
-        let t_s = self.period_s * f64::from(self.summed);
+        let sums = self.accumulator.sums;
+        let periods = self.accumulator.periods;
         // With a secondary code out of place nothing but the code is where it seems.
         let astray = self.held && self.has_secondary_code();
         let before = match self.stage {
             _ if astray => None,
-            Stage::Tracking(_) => self.previous_sum,
+            Stage::Tracking(_) => self.accumulator.previous_sum,
             // The batch gives the frequency to tenths of a hertz; pairs of weak prompts would add hertz.
-            Stage::Assisted if self.is_batched => None,
-            Stage::Frequency | Stage::Assisted => self.previous,
+            Stage::Assisted(_) if self.pull_in.is_batched => None,
+            Stage::Frequency(_) | Stage::Assisted(_) => self.accumulator.previous,
             // Nothing may correct the frequency.
-            Stage::Open => None,
+            Stage::Open(_) => None,
         };
-        self.previous_sum = Some(self.sums[1]);
-        let mode = if astray { Stage::Open.mode() } else { self.stage.mode() };
-        self.last = self.loops.close(mode, self.sums, before, self.summed, t_s, Some(self.cn0_hz()));
-        self.carrier += (self.last.carrier_jump_cycles * TURN) as i128;
+        self.accumulator.previous_sum = Some(sums[1]);
+        let mode = if astray { Mode::Frequency } else { self.stage.mode() };
+        let t_s = self.period_s * f64::from(periods);
+        self.last = self.loops.close(mode, sums, before, periods, t_s, Some(self.detectors.cn0_hz()));
+        self.nco.turn(self.last.carrier_jump_cycles);
         self.glances.close(self.last.dll_chips, self.last.code_jump_chips);
-        self.code += chips_to_units(self.last.code_jump_chips);
+        self.nco.code += chips_to_units(self.last.code_jump_chips);
+    }
+
+    /// Takes over a new offset between carrier and code, and moves the code to where the loop would settle
+    /// with it.
+    fn take_offset(&mut self) {
+        let Some(chips_per_s) = self.nco.take_offset() else { return };
+        let jump_chips = self.loops.aid_code(chips_per_s, self.update_s());
+        self.glances.move_by(jump_chips);
+        self.nco.code += chips_to_units(jump_chips);
     }
 }

@@ -1,25 +1,76 @@
-//! A channel's oscillators: where they begin, what they run at, and how many code periods an update has.
+//! The numerically controlled oscillators of a channel, carrier and code, at the beginning of a code period.
 
-use super::Channel;
-use crate::correlate::{Nco, Replica, TURN, chips_to_units};
-use gnss::time::tone_turns;
+use crate::acquire::Acquired;
+use crate::correlate::{Nco, TURN, chips_to_units, units_to_chips};
+use crate::parting::Phases;
+use crate::track::loops::Rates;
+use gnss::samples::IfMetadata;
+use gnss::time::{Rate, tone_turns};
 
-/// Positions of the code at which the noise is measured, in turn.
-const NOISE_PLACES: usize = 16;
+/// Phases of code and carrier at the first sample of the running code period, and their steps.
+#[derive(Clone, Debug)]
+pub(super) struct Oscillators {
+    pub rate: Rate,
+    /// Nominal intermediate frequency, in hertz.
+    if_hz: f64,
+    /// Turns a sample at the nominal IF, in 2⁻⁶⁴ turns.
+    if_step: u64,
+    /// Sense of Doppler in the samples: +1, or −1 where the spectrum is inverted.
+    pub sense: f64,
+    chip_rate_hz: f64,
+    /// Frequency of the carrier by whose Doppler the code is aided, in hertz.
+    aid_hz: f64,
+    /// Length of a code period in code phase units.
+    pub length: i64,
+    /// Excess of the carrier's Doppler over the code's now, in hertz.
+    pub offset_hz: f64,
+    /// Excess from the next code period on, in hertz.
+    pub next_offset_hz: f64,
+    /// Sample at which the running code period begins.
+    pub first: u64,
+    /// Number of the running code period.
+    pub period: u64,
+    pub code: i64,
+    pub code_step: i64,
+    /// Carrier without the nominal IF, in 2⁻⁶⁴ turns, never wrapped.
+    pub carrier: i128,
+    pub carrier_step: i128,
+}
 
-impl Channel {
-    /// Carries the hit's code phase to the first sample that the channel sees.
-    pub(super) fn begin(&mut self, first: u64, replica: &Replica) {
-        let samples = i128::from(first) - i128::from(self.hit.sample);
-        let moved = samples * i128::from(self.code_step) + i128::from(chips_to_units(self.hit.code_phase_chips));
-        self.code = moved.rem_euclid(i128::from(replica.period())) as i64;
-        (self.start, self.first, self.stage_since, self.update_since) = (Some(first), first, first, first);
-        self.pull_in_since = first;
-        self.noise_taps = replica.quiet_taps(NOISE_PLACES);
+impl Oscillators {
+    /// Oscillators at rest, for what the search found and a code of `chip_rate_hz` with periods of `length`.
+    pub fn new(hit: &Acquired, metadata: &IfMetadata, chip_rate_hz: f64, length: i64) -> Self {
+        let carrier_hz = hit.link().carrier_hz();
+        let if_hz = metadata.if_hz(carrier_hz);
+        Self {
+            rate: metadata.rate,
+            if_hz,
+            if_step: tone_turns(if_hz, metadata.rate, 1),
+            sense: if metadata.inverted { -1.0 } else { 1.0 },
+            chip_rate_hz,
+            aid_hz: planted!("receiver.nco.channel", carrier_hz, hit.signal.centre_hz()),
+            length,
+            offset_hz: 0.0,
+            next_offset_hz: 0.0,
+            first: 0,
+            period: 0,
+            code: 0,
+            code_step: 0,
+            carrier: 0,
+            carrier_step: 0,
+        }
+    }
+
+    /// Carries the code phase of a hit to the first sample that the channel sees.
+    pub fn begin(&mut self, first: u64, hit: &Acquired) {
+        let samples = i128::from(first) - i128::from(hit.sample);
+        let moved = samples * i128::from(self.code_step) + i128::from(chips_to_units(hit.code_phase_chips));
+        self.code = moved.rem_euclid(i128::from(self.length)) as i64;
+        self.first = first;
     }
 
     /// The oscillators at the running period's first sample.
-    pub(super) fn oscillators(&self) -> Nco {
+    pub fn nco(&self) -> Nco {
         Nco {
             carrier: tone_turns(self.if_hz, self.rate, self.first).wrapping_add(self.carrier as u64),
             carrier_step: self.if_step.wrapping_add(self.carrier_step as u64),
@@ -28,49 +79,97 @@ impl Channel {
         }
     }
 
-    /// Samples from the running period's first to the next one's.
-    pub(super) fn samples_left(&self, replica: &Replica) -> u64 {
-        let left = replica.period() - self.code;
-        (left.max(1) as u64).div_ceil(self.code_step.max(1) as u64)
-    }
-
-    /// Sets the oscillators to what the loops know.
-    pub(super) fn set_steps(&mut self) {
-        let rate_hz = self.rate.hz();
-        let update_s = self.period_s * f64::from(self.periods_per_update());
-        let offset_hz = self.loops.carrier.mean(update_s);
-        self.carrier_step = (offset_hz / rate_hz * TURN) as i128;
-        let link = self.link();
-        let carrier_hz = planted!("receiver.nco.channel", link.carrier_hz(), link.signal.centre_hz());
-        let aid_hz = (self.sense * offset_hz - self.carrier_offset_hz) * self.chip_rate_hz / carrier_hz;
-        let aid_hz = planted!("receiver.nco.carrier_aid", aid_hz, -aid_hz);
-        self.code_step = chips_to_units((self.chip_rate_hz + aid_hz + self.loops.code.mean(update_s)) / rate_hz).max(1);
-    }
-
-    /// Takes over a new offset, and moves the code to where the loop would settle with it.
-    pub(super) fn take_offset(&mut self) {
-        let less_hz = self.carrier_offset_hz - self.next_offset_hz;
-        if less_hz == 0.0 {
-            return;
+    /// The oscillators at `sample` with the code moved by `chips` and the carrier at `carrier_hz` from phase
+    /// zero.
+    pub fn predicted(&self, sample: u64, chips: f64, carrier_hz: f64) -> Nco {
+        let code = self.code_at(sample) + i128::from(chips_to_units(chips));
+        Nco {
+            carrier: 0,
+            carrier_step: self.if_step.wrapping_add(self.turns(carrier_hz) as u64),
+            code: code.rem_euclid(i128::from(self.length)) as i64,
+            code_step: self.code_step as u64,
         }
-        self.carrier_offset_hz = self.next_offset_hz;
-        let update_s = self.period_s * f64::from(self.periods_per_update());
-        let jump_chips = self.loops.aid_code(less_hz * self.chip_rate_hz / self.link().carrier_hz(), update_s);
-        self.glances.move_by(jump_chips);
-        self.code += chips_to_units(jump_chips);
     }
 
-    pub(super) fn periods_per_update(&self) -> u32 {
-        self.stage.mode().periods_per_update(&self.settings, self.group)
+    /// First sample of the next code period.
+    pub fn next(&self) -> u64 {
+        let left = self.length - self.code;
+        self.first + (left.max(1) as u64).div_ceil(self.code_step.max(1) as u64)
     }
 
-    /// Gains for the present stage.
-    pub(super) fn design(&mut self) {
-        let update_s = self.period_s * f64::from(self.periods_per_update());
-        self.loops.design(&self.settings, self.stage.mode(), self.wide, update_s);
+    /// Code phase at `sample`, counted from the beginning of the running period.
+    pub fn code_at(&self, sample: u64) -> i128 {
+        i128::from(self.code) + self.samples_to(sample) * i128::from(self.code_step)
     }
 
-    pub(super) fn since_s(&self, sample: u64) -> f64 {
+    /// Samples from the beginning of the running period to `sample`.
+    pub fn samples_to(&self, sample: u64) -> i128 {
+        i128::from(sample) - i128::from(self.first)
+    }
+
+    /// Seconds from `sample` to the beginning of the running period.
+    pub fn since_s(&self, sample: u64) -> f64 {
         self.first.saturating_sub(sample) as f64 / self.rate.hz()
+    }
+
+    /// Phases that the replica has counted at the beginning of the running code period.
+    pub fn phases(&self) -> Phases {
+        let carrier = if self.sense < 0.0 { -self.carrier } else { self.carrier };
+        Phases { sample: self.first, periods: self.period, chips: units_to_chips(self.code), carrier }
+    }
+
+    /// Sets the steps to the rates of the loops, whose next update is `update_s` away.
+    pub fn set_steps(&mut self, carrier: &Rates, code: &Rates, update_s: f64) {
+        let offset_hz = carrier.mean(update_s);
+        self.carrier_step = self.turns(offset_hz);
+        let aid_hz = (self.sense * offset_hz - self.offset_hz) * self.chip_rate_hz / self.aid_hz;
+        let aid_hz = planted!("receiver.nco.carrier_aid", aid_hz, -aid_hz);
+        let code_hz = self.chip_rate_hz + aid_hz + code.mean(update_s);
+        self.code_step = chips_to_units(code_hz / self.rate.hz()).max(1);
+    }
+
+    /// Takes over the next offset between carrier and code. Gives what the code's aid then brings more, in
+    /// chips a second.
+    pub fn take_offset(&mut self) -> Option<f64> {
+        let less_hz = self.offset_hz - self.next_offset_hz;
+        self.offset_hz = self.next_offset_hz;
+        (less_hz != 0.0).then(|| less_hz * self.chip_rate_hz / self.aid_hz)
+    }
+
+    /// The oscillators run on to `next`. Gives the number of samples that pass.
+    pub fn pass(&mut self, next: u64) -> u64 {
+        let samples = next.saturating_sub(self.first);
+        self.carrier += self.carrier_step * i128::from(samples);
+        self.code += (i128::from(self.code_step) * i128::from(samples)) as i64;
+        self.first = next;
+        samples
+    }
+
+    /// Begins the next code period.
+    pub fn end_period(&mut self) {
+        self.code -= self.length;
+        self.period += 1;
+    }
+
+    /// Turns the carrier at once.
+    pub fn turn(&mut self, cycles: f64) {
+        self.carrier += (cycles * TURN) as i128;
+    }
+
+    /// Moves the code at once, to another code period where it comes to lie in one.
+    pub fn shift(&mut self, chips: f64) {
+        let code = self.code + chips_to_units(chips);
+        self.code = code.rem_euclid(self.length);
+        self.count(i128::from(code.div_euclid(self.length)));
+    }
+
+    /// Adds code periods to their count.
+    pub fn count(&mut self, periods: i128) {
+        self.period = (i128::from(self.period) + periods).max(0) as u64;
+    }
+
+    /// Step of a carrier in 2⁻⁶⁴ turns a sample.
+    fn turns(&self, hz: f64) -> i128 {
+        (hz / self.rate.hz() * TURN) as i128
     }
 }

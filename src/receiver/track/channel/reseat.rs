@@ -2,17 +2,14 @@
 
 use num_complex::Complex64;
 
-use super::pilot::Data;
 use super::{Channel, Stage};
-use crate::correlate::{Nco, Replica, TURN, chips_to_units};
+use crate::correlate::{Nco, Replica};
 use crate::gap::Edges;
 use crate::track::Report;
-use crate::track::lock::{LockState, PhaseLock, Rotation, SymbolLock};
+use crate::track::lock::LockState;
 use crate::track::loops::Rates;
 use crate::track::secondary_code::SecondaryCodeSync;
 use crate::track::sync::SymbolSync;
-
-use super::LOCK_PERIODS;
 
 /// Means over the code periods since the last glance.
 #[derive(Clone, Copy, Debug)]
@@ -71,7 +68,7 @@ impl Channel {
     pub fn glance(&mut self) -> Option<Glance> {
         let (code, updates) = std::mem::take(&mut self.glances.code);
         let (power, periods) = std::mem::take(&mut self.glances.power);
-        let noise = self.noise();
+        let noise = self.detectors.noise();
         (updates > 0 && periods > 0 && noise > 0.0).then(|| Glance {
             code_chips: code / f64::from(updates),
             moved_chips: self.glances.moved_chips,
@@ -84,11 +81,11 @@ impl Channel {
     /// The code period modulo a symbol's in which symbols begin, where that is beyond doubt; 0 where a
     /// secondary code or the code under bits is known, which numbers periods itself.
     pub fn symbols_begin(&self) -> Option<u64> {
-        match self.stage {
-            Stage::Tracking(_) if self.has_secondary_code() || self.bit_begin.is_some() => Some(0),
-            Stage::Tracking(begin) if self.confirmed && self.has_symbols => Some(begin),
-            _ => None,
+        let begin = self.stage.begin()?;
+        if self.has_secondary_code() || self.signs.bit_begin.is_some() {
+            return Some(0);
         }
+        (self.signs.confirmed && self.signs.has_symbols).then_some(begin)
     }
 
     /// Edges at which the signs of prompts have turned since the code was last reseated, or
@@ -110,51 +107,32 @@ impl Channel {
 
     /// True if a secondary code has been recognised, and is removed from the prompts.
     pub fn has_secondary_code(&self) -> bool {
-        self.secondary_code_phase.is_some()
+        self.signs.phase.is_some()
     }
 
     /// Signs turn where a secondary code has them turn.
     pub(super) fn watch_secondary_code(&mut self) {
-        let periods = self.secondary_code.as_ref().map_or(0, SecondaryCodeSync::periods);
-        let chips: Vec<f64> = (0..periods as u64).map(|number| self.secondary_code_chip(number)).collect();
+        let periods = self.signs.secondary_code.as_ref().map_or(0, SecondaryCodeSync::periods);
+        let chips: Vec<f64> = (0..periods as u64).map(|number| self.signs.chip(number)).collect();
         self.glances.edges = Edges::of_secondary_code(&chips);
     }
 
     /// The carrier's Doppler at these rates, less what the code does not share.
     pub fn code_doppler_hz(&self, rates: &[Rates; 2]) -> f64 {
-        self.sense * rates[0].rate - self.carrier_offset_hz
+        self.nco.sense * rates[0].rate - self.nco.offset_hz
     }
 
     /// The replica and its oscillators at `sample`, as they would be had the loop moved the code by
     /// `moved_chips` and no other amount, and at these rates.
     pub fn predicted(&self, sample: u64, moved_chips: f64, rates: &[Rates; 2]) -> Option<(&Replica, Nco)> {
-        // A segment of a long code is there once, and both sidebands of a sub-carrier have signs of their
-        // own; the code beside comes in every period.
-        let passes = self.segment.is_some() || self.sides.is_some();
-        let beside = self.data.as_ref().filter(|_| passes).map(Data::replica);
-        let replica = beside.or(self.replica.as_ref())?;
-        let samples = i128::from(sample) - i128::from(self.first);
-        let code = i128::from(self.code)
-            + samples * i128::from(self.code_step)
-            + i128::from(chips_to_units(moved_chips - self.glances.moved_chips));
-        let carrier_step = (rates[0].rate / self.rate.hz() * TURN) as i128;
-        let nco = Nco {
-            carrier: 0,
-            carrier_step: self.if_step.wrapping_add(carrier_step as u64),
-            code: code.rem_euclid(i128::from(replica.period())) as i64,
-            code_step: self.code_step as u64,
-        };
-        Some((replica, nco))
+        let replica = self.companions.constant_replica().or(self.accumulator.replica.as_ref())?;
+        Some((replica, self.nco.predicted(sample, moved_chips - self.glances.moved_chips, rates[0].rate)))
     }
 
     /// The oscillators run on to `next`.
     pub(super) fn pass(&mut self, next: u64) {
-        let samples = next.saturating_sub(self.first);
-        let update_s = self.period_s * f64::from(self.periods_per_update());
-        self.glances.moved_chips += self.loops.code.mean(update_s) * samples as f64 / self.rate.hz();
-        self.carrier += self.carrier_step * i128::from(samples);
-        self.code += (i128::from(self.code_step) * i128::from(samples)) as i64;
-        self.first = next;
+        let samples = self.nco.pass(next);
+        self.glances.moved_chips += self.loops.code.mean(self.update_s()) * samples as f64 / self.nco.rate.hz();
     }
 
     /// Moves the replica at sample `now`, up to which the channel has come, to where the code is when it has
@@ -175,7 +153,7 @@ impl Channel {
         self.shift(now, ahead_chips + moved_chips - self.glances.moved_chips);
         self.glances.moved_chips = moved_chips;
         self.interrupt(report);
-        self.lock = LockState::default();
+        self.detectors.lock = LockState::default();
         self.held = true;
         self.forget_edges();
     }
@@ -186,34 +164,32 @@ impl Channel {
         let moved_chips = moved_chips.unwrap_or(self.glances.moved_chips);
         self.shift(now, chips + moved_chips - self.glances.moved_chips);
         self.glances.moved_chips = moved_chips;
-        self.period = (i128::from(self.period) + i128::from(periods)).max(0) as u64;
+        self.nco.count(i128::from(periods));
         self.held = false;
-        self.lock = LockState::default();
-        self.pull_in_since = now;
-        self.sync = SymbolSync::new(self.group);
-        self.rotation = Rotation::default();
-        self.symbol_lock = SymbolLock::new(self.period_s * f64::from(self.group));
-        self.phase_lock = PhaseLock::new(LOCK_PERIODS);
-        if !begins && matches!(self.stage, Stage::Tracking(_)) {
+        self.detectors.lock = LockState::default();
+        self.pull_in.since = now;
+        self.signs.sync = SymbolSync::new(self.signs.group);
+        let symbol_s = self.symbol_s();
+        self.stage.restart(symbol_s);
+        if !begins && self.stage.begin().is_some() {
             // The frequency may be another after the gap.
-            self.is_batched = false;
-            self.enter(Stage::Assisted);
+            self.pull_in.is_batched = false;
+            self.enter(Stage::assisted());
         }
         self.forget_edges();
     }
 
     /// Moves the code by `chips` at sample `now`. The running code period is not used.
     fn shift(&mut self, now: u64, chips: f64) {
-        let Some(length) = self.replica.as_ref().map(Replica::period).filter(|_| self.start.is_some()) else { return };
+        if self.start.is_none() || self.accumulator.replica.is_none() {
+            return;
+        }
         self.pass(now);
-        let code = self.code + chips_to_units(chips);
-        self.code = code.rem_euclid(length);
-        self.period = (i128::from(self.period) + i128::from(code.div_euclid(length))).max(0) as u64;
+        self.nco.shift(chips);
         (self.whole, self.moved) = (false, true);
-        self.update_since = now;
-        (self.sums, self.summed) = ([Complex64::ZERO; 3], 0);
-        (self.previous, self.previous_sum) = (None, None);
-        self.symbol = (Complex64::ZERO, 0);
+        self.accumulator.clear(now);
+        self.accumulator.forget();
+        self.stage.forget_symbol();
         self.set_steps();
     }
 
@@ -222,14 +198,13 @@ impl Channel {
         if !self.moved || self.held {
             return;
         }
-        if let Stage::Tracking(begin) = self.stage {
-            if (number + 1) % u64::from(self.group) != begin {
+        if let Some(begin) = self.stage.begin() {
+            if !self.signs.ends_symbol(number, begin) {
                 return;
             }
-            self.cn0.know_symbols();
+            self.detectors.cn0.know_symbols();
         }
         self.moved = false;
-        (self.sums, self.summed) = ([Complex64::ZERO; 3], 0);
-        self.update_since = self.first;
+        self.accumulator.clear(self.nco.first);
     }
 }
