@@ -18,6 +18,7 @@ use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::signal::{Component, Layers, Shape, Tone};
 
 mod carrier;
+pub mod correlator;
 pub mod fixed;
 mod kernel;
 #[cfg(test)]

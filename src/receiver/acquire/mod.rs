@@ -56,6 +56,7 @@ use std::collections::BTreeMap;
 use fft::Planner;
 use rayon::prelude::*;
 
+use crate::correlate::correlator::Shown;
 use crate::lead::{beside, followed_db, lead};
 use crate::source::{Block, Stretch};
 use gnss::record::AcquisitionRow;
@@ -496,6 +497,7 @@ impl Searcher {
         let spectra: Vec<dwells::Spectra<'_>> = codes.iter().map(|(_, code)| code.spectra()).collect();
         let coherent_s = component.period_s() * f64::from(coherent);
         let peaks = grid.search(block, &spectra, again, rooms);
+        let shown = &Shown::whole(block.first, (block.i, block.q).into());
         let findings = (peaks.of)
             .into_par_iter()
             .zip(codes)
@@ -509,7 +511,7 @@ impl Searcher {
                 };
                 let replica = if peak.statistic > peak.threshold { code.correlator() } else { None };
                 let periods = grid.periods as usize;
-                let hit = replica.map(|replica| refine::refine(grid, block, component, &replica, coarse, periods));
+                let hit = replica.map(|replica| refine::refine(grid, shown, component, &replica, coarse, periods));
                 Finding { statistic: peak.statistic, threshold: peak.threshold, coarse, hit }
             })
             .collect();

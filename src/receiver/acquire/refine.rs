@@ -11,8 +11,8 @@ use num_complex::Complex;
 
 use super::grid::Grid;
 use super::settings::sign_turns_often;
-use crate::correlate::{self, Nco, TURN, chips_to_units, steps_of_chip, units_to_chips};
-use crate::source::Block;
+use crate::correlate::correlator::{Correlator, Interval};
+use crate::correlate::{Arithmetic, Nco, Replica, TURN, chips_to_units, steps_of_chip, units_to_chips};
 use gnss::signal::{Component, Layer, Shape};
 
 /// Correlators that measure the noise.
@@ -33,26 +33,26 @@ pub(super) struct Refined {
 }
 
 /// One satellite's correlators over the samples that the search saw.
-struct Correlators<'a> {
+struct Correlators<'a, C> {
     grid: &'a Grid,
-    block: &'a Block<'a>,
-    replica: &'a correlate::Replica,
+    correlator: &'a C,
+    replica: &'a Replica,
     code_chips: f64,
     periods: usize,
 }
 
 /// Refines what the search made of a satellite; its C/N0 is kept if the refined power does not exceed the
 /// noise.
-pub(super) fn refine(
+pub(super) fn refine<C: Correlator>(
     grid: &Grid,
-    block: &Block,
+    correlator: &C,
     component: &Component,
-    replica: &correlate::Replica,
+    replica: &Replica,
     coarse: Refined,
     periods: usize,
 ) -> Refined {
     let code_chips = f64::from(component.code_chips);
-    let correlators = Correlators { grid, block, replica, code_chips, periods };
+    let correlators = Correlators { grid, correlator, replica, code_chips, periods };
     let mut phase = coarse.code_phase_chips.rem_euclid(code_chips);
     let doppler_hz = if sign_turns_often(component) {
         correlators.unsplit_doppler_hz(phase, coarse.doppler_hz)
@@ -116,7 +116,7 @@ fn fraction_of_turn(turns: f64) -> u64 {
     ((turns - turns.round()) * TURN) as i64 as u64
 }
 
-impl Correlators<'_> {
+impl<C: Correlator> Correlators<'_, C> {
     /// Prompt sums over whole code periods with the replica ahead by `offsets` chips: `[offset][period]`.
     fn sums<const T: usize>(&self, phase_chips: f64, doppler_hz: f64, offsets: &[f64; T]) -> [Vec<Complex<f64>>; T] {
         let step = self.grid.received_chips_per_sample(doppler_hz);
@@ -126,7 +126,10 @@ impl Correlators<'_> {
         let begin = |period: usize| ((((period + 1) as f64) * self.code_chips - phase_chips) / step).ceil() as usize;
         for period in 0..self.periods {
             let (from, to) = (begin(period), begin(period + 1));
-            let (Some(i), Some(q)) = (self.block.i.get(from..to), self.block.q.get(from..to)) else { break };
+            let [first, end] = [from, to].map(|sample| self.correlator.fresh() + sample as u64);
+            if first > end || end > self.correlator.end() {
+                break;
+            }
             let nco = Nco {
                 carrier: fraction_of_turn(turns * from as f64),
                 carrier_step: fraction_of_turn(turns),
@@ -135,7 +138,8 @@ impl Correlators<'_> {
                 code: chips_to_units(phase_chips + from as f64 * step - (period + 1) as f64 * self.code_chips),
                 code_step: chips_to_units(step) as u64,
             };
-            let taps = self.replica.correlate(i, q, &nco, &taps);
+            let interval = Interval { nco, from: first, to: end };
+            let taps = self.correlator.sums(&interval, self.replica, Arithmetic::F32, &taps);
             sums.iter_mut().zip(taps).for_each(|(sum, tap)| sum.push(tap));
         }
         sums

@@ -10,12 +10,12 @@
 
 use super::closed::{Loops, Update};
 use super::cn0::Cn0;
-use super::correlator::{Correlator, Interval, Shown};
 use super::loops::CodeShape;
 use super::model::ReplicaModel;
 use super::pull_in::Batch;
 use super::{Report, TrackingSettings};
 use crate::acquire::Acquired;
+use crate::correlate::correlator::{Correlator, Interval, Shown};
 use crate::correlate::fixed::FixedSamples;
 use crate::correlate::sums::{RunningSums, Samples};
 use crate::lead::lead;

@@ -12,7 +12,6 @@ mod bits;
 mod channel;
 pub mod closed;
 pub mod cn0;
-mod correlator;
 #[cfg(test)]
 mod ensemble_tests;
 mod halves;
@@ -36,7 +35,6 @@ mod tests;
 mod weak_tests;
 
 pub use channel::{Channel, Glance, pilot_group};
-pub use correlator::{Correlator, Interval, Shown};
 pub use model::ReplicaModel;
 pub use settings::{CodeDiscriminator, LoopMargin, TrackingSettings, TrackingSettingsError};
 

@@ -3,9 +3,9 @@
 
 use num_complex::Complex64;
 
+use crate::correlate::correlator::{Correlator, Interval};
 use crate::correlate::{Arithmetic, Nco, Replica, chips_to_units};
 use crate::track::TrackingSettings;
-use crate::track::correlator::{Correlator, Interval};
 use gnss::samples::{Format, IfMetadata};
 use gnss::signal::Component;
 

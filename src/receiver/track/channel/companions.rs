@@ -6,9 +6,9 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use super::accumulator::Period;
+use crate::correlate::correlator::Correlator;
 use crate::correlate::{Replica, Wave};
 use crate::lead::beside;
-use crate::track::correlator::Correlator;
 use crate::track::long::LongCode;
 use crate::track::model::ReplicaModel;
 use crate::track::secondary_code::{SecondaryCodePhase, SecondaryCodeSync};

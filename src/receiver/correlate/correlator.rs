@@ -1,12 +1,12 @@
-//! The question that a channel asks, and its answer from samples.
+//! The question that a channel asks, and a search that refines its hits, with its answer from samples.
 //!
-//! A channel knows the phases and rates of its oscillators, and asks for the sums of a replica's taps over an
-//! interval. Whoever answers is a [`Correlator`]. [`Shown`] answers by multiplication of samples.
+//! Who asks knows the phases and rates of the oscillators, and wants the sums of a replica's taps over an
+//! interval. Who answers is a [`Correlator`]. [`Shown`] answers by multiplication of samples.
 
 use num_complex::Complex64;
 
-use crate::correlate::sums::Samples;
-use crate::correlate::{Arithmetic, Nco, Replica};
+use super::sums::Samples;
+use super::{Arithmetic, Nco, Replica};
 
 /// An interval of samples, counted from the beginning of the stream, and the oscillators of a replica there.
 #[derive(Clone, Copy, Debug)]
@@ -52,6 +52,11 @@ pub struct Shown<'a> {
 }
 
 impl<'a> Shown<'a> {
+    /// Samples from number `first` on, all of them for the first time.
+    pub fn whole(first: u64, samples: Samples<'a>) -> Self {
+        Self { first, samples, from: first }
+    }
+
     fn part(&self, from: u64, to: u64) -> Samples<'a> {
         self.samples.part(from.saturating_sub(self.first) as usize, to.saturating_sub(self.first) as usize)
     }
