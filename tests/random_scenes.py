@@ -73,7 +73,7 @@ SKIES = [
     Sky("gps_2010", None, "2010-07-01T00:30:00", "2010-07-01T22:00:00", (-75, 75), (-180, 180), {"G": "klobuchar"},
         alone("GPS", "L1 C/A")),
     Sky("day_2020", None, "2020-11-29T11:35:00", "2020-11-29T13:20:00", (25, 55), (-25, 25), {"E": "nequick_g"},
-        alone("Galileo", "E1", "E5a", "E5b", "E6", "E5") + alone("GLONASS", "G1", "G2")
+        alone("Galileo", "E1", "E5a", "E5b", "E5") + alone("GLONASS", "G1", "G2")
         + alone("BeiDou", "B1I", "B2I", "B3I", "B1C", "B2a", "B2b")
         + [["Galileo E1", "Galileo E5a"], ["Galileo E1", "Galileo E5b"], ["Galileo E1", "Galileo E6"],
            ["GLONASS G1", "GLONASS G2"], ["BeiDou B1I", "BeiDou B2I"], ["BeiDou B1I", "BeiDou B1C"],
