@@ -16,17 +16,12 @@ use crate::judge::judgement::Bound;
 use crate::judge::rules::kind::THEORY;
 use crate::judge::verdict::Verdict;
 use crate::statistics::{mean, median, rms};
-use crate::waveform::leading;
 use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::satellite::Sv;
 use gnss::signal::{Link, Signal};
 
 const RINEX: &str =
     "RINEX 3.05, 5.2: carriers grow with range, Doppler is positive for an approaching satellite; each satellite";
-/// Lateness of labels that nobody notices: a satellite moves by 3 m at the most.
-const LATE_S: f64 = 3e-3;
-/// Part of a chip by which signals of one front end may be late against each other: replicas and filters.
-const SIGNALS_CHIPS: f64 = 0.1;
 /// Difference between a Doppler and its carrier's rate, Hz: a Doppler that is cut to whole hertz, in place of
 /// rounded, is half a hertz off on average.
 const RATE_HZ: f64 = 0.5;
@@ -34,8 +29,6 @@ const RATE_HZ: f64 = 0.5;
 const INTERVAL_S: f64 = 2.0;
 /// Doppler from which on its sign can be told.
 const SIGN_HZ: f64 = 100.0;
-/// Rate between the clock by code and by carrier that nobody notices, m/s.
-const DRIFT_MPS: f64 = 0.02;
 /// Epochs that must have the same value before it is called frozen.
 const FROZEN: usize = 20;
 /// Time over which they must have it.
@@ -133,15 +126,15 @@ impl Verdict {
         let theory_s = if squares > 0.0 { bias_m / squares.sqrt() } else { f64::INFINITY };
         // The scatter between satellites is itself uncertain where there are few.
         let sigma_s = theory_s.min(2.0 * late.sigma);
-        let limit = 1e3 * (LATE_S + largest(1, 1) * sigma_s);
+        let limit = 1e3 * largest(1, 1) * sigma_s;
         let source = "labels less the receiver's own clock are the time of reception: the slope of pseudoranges over \
-                      Doppler, 3 ms, and biases of satellites";
+                      Doppler, by biases of satellites and the scatter between them";
         let path = "join.time_tag_offset_s";
         self.judge("time tags of observations, late", path, 1e3 * late.value.abs(), "ms", Bound::Max(limit), source);
     }
 
     /// The clock by one signal against that by another.
-    pub(super) fn offsets(&mut self, measured: &Measured, scene: &Scene<'_>) {
+    pub(super) fn offsets(&mut self, measured: &Measured, ones: &[One<'_>], scene: &Scene<'_>) {
         let mut errors: BTreeMap<(u64, &'static Signal), Vec<f64>> = BTreeMap::new();
         for row in measured.rows.iter().filter(|row| scene.judges(row)) {
             if let Some(code_m) = row.values.pseudorange_m {
@@ -160,16 +153,23 @@ impl Verdict {
                 *satellites = (*satellites).max(values.len());
             }
         }
-        let chip_m = |signal| leading(signal).map_or(0.0, |own| SPEED_OF_LIGHT_MPS / own.chip_rate_hz);
+        // A sample stands for the beginning of its interval or for the middle, in all front ends alike.
+        let half_m = |signal| 0.5 * SPEED_OF_LIGHT_MPS / scene.run.rate_hz(signal);
         let delay_m = |signal: &Signal| SPEED_OF_LIGHT_MPS * scene.run.common.code_delay_s(signal);
+        let noise_m = |signal: &Signal| {
+            let own = ones.iter().filter(|one| one.link.signal == signal);
+            let (variances, satellites) = own.map(One::mean_m2).fold((0.0, 0.0), |(sum, n), m2| (sum + m2, n + 1.0));
+            variances.sqrt() / f64::max(satellites, 1.0)
+        };
         let found = offsets.into_iter().filter_map(|(signal, (all, satellites))| {
             let biases_m = libm::hypot(scene.usual_edges_m(), scene.reach_m()) / (satellites as f64).sqrt();
+            let sigma_m = libm::hypot(biases_m, libm::hypot(noise_m(signal), noise_m(usual)));
             let value = median(&all)? - (delay_m(signal) - delay_m(usual));
-            let limit = SIGNALS_CHIPS * chip_m(signal).max(chip_m(usual)) + largest(1, 1) * THEORY * biases_m;
+            let limit = (half_m(signal) - half_m(usual)).abs() + largest(1, 1) * THEORY * sigma_m;
             Some(Found { name: format!("{} against {}", signal.name, usual.name), value: value.abs(), limit })
         });
-        let source = "one front end, one clock: a tenth of a chip between replicas, the filters' delays, and biases of \
-                      satellites";
+        let source = "one clock: half a sample where rates differ, the filters' delays, biases of satellites, and a \
+                      plain receiver's noise";
         self.nearest("offset of pseudoranges between signals", "", "m", found.collect(), source);
     }
 
@@ -206,7 +206,7 @@ impl Verdict {
             let count = plain::independent(1 + (span_s / interval_s.max(1e-3)) as usize, span_s, plain::PLAIN_HZ);
             let noise = plain_m * 12.0_f64.sqrt() / (span_s * (count * satellites).sqrt());
             let slow = (2.0 * scene.usual_edges_m() / satellites.sqrt() + 2.0 * scene.reach_m()) / span_s;
-            let limit = DRIFT_MPS + largest(1, 1) * (THEORY * noise + slow.min(drift.sigma));
+            let limit = largest(1, 1) * (THEORY * noise + slow.min(drift.sigma));
             let source = "one clock moves both: noise of codes, and the scatter between satellites";
             let path = "code.minus_carrier_drift_mps";
             self.judge("code against carrier, drift", path, drift.value.abs(), "m/s", Bound::Max(limit), source);

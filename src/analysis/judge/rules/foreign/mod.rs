@@ -164,7 +164,7 @@ impl Verdict {
             self.judge("carrier, rms", "carrier.rms_cycles", rms, "cycles", bound, source);
         }
         self.codes(&ones, scene);
-        self.offsets(measured, scene);
+        self.offsets(measured, &ones, scene);
         self.dopplers(&ones, scene, measured);
         self.arcs(measured, &ones, scene);
         self.rates(measured, &ones, scene);

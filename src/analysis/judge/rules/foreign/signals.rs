@@ -53,6 +53,14 @@ pub(super) struct One<'m> {
     pub plain_m: f64,
 }
 
+impl One<'_> {
+    /// Variance of the mean of its codes by a plain receiver's noise, m².
+    pub(super) fn mean_m2(&self) -> f64 {
+        let span_s = self.code_m.first().zip(self.code_m.last()).map_or(0.0, |(first, last)| last.0 - first.0);
+        self.plain_m * self.plain_m / plain::independent(self.code_m.len(), span_s, plain::PLAIN_HZ)
+    }
+}
+
 /// Median of each epoch and signal.
 fn middles(
     rows: &[&ObservationError],

@@ -35,9 +35,6 @@ const RESERVE_S: f64 = 6.0;
 /// A page of the ionosphere that comes within so long after the orbits is waited for: one subframe of NavIC,
 /// the longest unit of a message.
 const PAGE_S: f64 = 12.5;
-/// Seconds that a recording may end early: a receiver's last block and its queues.
-const END_S: f64 = 10.0;
-
 /// Truth's epochs that lie as near to a receiver's labels as those lie to each other.
 pub(super) struct Labels {
     /// Sample and time of the truth's rows.
@@ -119,6 +116,13 @@ impl Observed for Labels {
     }
 }
 
+/// Longest unit of the scene's messages, seconds. Who gives epochs out when a unit confirms their time loses
+/// those of the last one.
+fn unit_s(run: &Run) -> f64 {
+    let components = run.signals.iter().flat_map(|signal| signal.components);
+    components.filter_map(|component| component.message).map(|message| message.unit_s as f64).fold(0.0, f64::max)
+}
+
 /// Latest times of the first observation and the first fix, in seconds from sample 0.
 pub(super) struct Begin {
     pub observation_s: Option<f64>,
@@ -194,8 +198,9 @@ impl Verdict {
             return;
         }
         let left_s = scene.run.scene.duration_s - scene.time_s(last_s);
-        let source = "a receiver's last block and its queues, and two intervals";
-        let limit_s = END_S.max(2.0 * step_s);
+        let source = "the longest unit of the scene's messages, with which a receiver may give its epochs out, and two \
+                      intervals";
+        let limit_s = unit_s(scene.run) + 2.0 * step_s;
         let figure = format!("time without {what} at the end");
         self.judge(&figure, "", left_s, "s", Bound::Max(limit_s), source);
     }
