@@ -121,7 +121,7 @@ impl Plan {
     /// Computes the plan of `scene` on this machine, with levels measured on parts of its samples.
     ///
     /// # Errors
-    /// Errors of [`machinery`], [`Levels::new`] and [`Plan::new`].
+    /// Errors of [`machinery()`], [`Levels::new`] and [`Plan::new`].
     pub fn of(scene: &Scene) -> Result<Self, GenerateError> {
         Ok(Self::new(scene, machinery(scene)?, Levels::new(scene)?)?)
     }
