@@ -37,10 +37,11 @@ impl Staircase {
         let step_lsb =
             adc.map_or(1.0, |adc| adc.step_sigma * if adc.gain_control { sigma_lsb } else { adc.nominal_lsb });
         match (adc.filter(|adc| !adc.whole), full_scale_lsb) {
-            // Levels 2k + 1 between edges at whole steps.
-            (Some(adc), _) => {
+            // Levels 2k + 1 between edges at whole steps, or k + 1/2 where those are the format's numbers.
+            (Some(adc), full) => {
                 let edges = ((1_i64 << (adc.bits - 1)) - 1) as f64;
-                Some(Self { step_lsb, jump: 2.0, rises: true, edges })
+                let jump = if full.is_some_and(|full| full.fract() != 0.0) { 1.0 } else { 2.0 };
+                Some(Self { step_lsb, jump, rises: true, edges })
             }
             // The format's own numbers: whole ones, or those between.
             (None, Some(full)) => {

@@ -174,6 +174,7 @@ impl Stages {
                 window_runs: spec.agc_window_s.map(runs),
                 nominal_lsb: sigma_lsb * passed as f32,
                 whole: spec.bits == room(format),
+                level_lsb: if format == Format::Cu8 { 0.5 } else { 1.0 },
             }));
         }
         Ok(stages)

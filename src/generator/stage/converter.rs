@@ -1,8 +1,9 @@
 //! Gain control and analogue-to-digital conversion.
 //!
-//! The converter is uniform with odd levels ±1, ±3, … ±(2^b − 1), so that no level is zero; with as
-//! many bits as the format has it rounds to the format's own integers. Its step against the standard
-//! deviation of what comes in is that of least loss (Max 1960; losses in Hegarty 2011): 1.96 dB with one bit,
+//! The converter is uniform with odd levels ±1, ±3, … ±(2^b − 1), so that no level is zero, or with half of
+//! them where the format's numbers lie halfway between whole ones; with as many bits as the format has it
+//! rounds to the format's own integers. Its step against the standard deviation of what comes in is that of
+//! least loss (Max 1960; losses in Hegarty 2011): 1.96 dB with one bit,
 //! 0.55 with two. With gain control the deviation is measured over the window before each run of 4096
 //! samples; without, it is the thermal noise's as the scene sets it. The scene's first run has nothing before
 //! it and is measured itself, whole, whatever part of it is asked for. Limits: the gain of a run is constant.
@@ -26,8 +27,10 @@ pub struct Converter {
     pub window_runs: Option<u32>,
     /// Standard deviation for which a fixed gain is set, in LSB.
     pub nominal_lsb: f32,
-    /// True if levels are the format's integers; otherwise they are odd ones.
+    /// True if levels are the format's own numbers; otherwise they are odd multiples of `level_lsb`.
     pub whole: bool,
+    /// Level next to zero, LSB: 1, or 1/2 where the format's numbers lie halfway between whole ones.
+    pub level_lsb: f32,
 }
 
 impl Converter {
@@ -103,7 +106,7 @@ impl Stage for Converter {
                 for (n, x) in plane.iter_mut().enumerate() {
                     let y = *x * scale;
                     clipped += u64::from(self.bits > 1 && y.abs() > half && sent.contains(&n));
-                    *x = if self.whole { y } else { 2.0 * level(y, half) + 1.0 };
+                    *x = if self.whole { y } else { self.level_lsb * (2.0 * level(y, half) + 1.0) };
                 }
             }
         }
@@ -123,6 +126,7 @@ pub(super) fn level(y: f32, half: f32) -> f32 {
 mod tests {
     use super::*;
     use crate::synth::noise::add_block;
+    use gnss::samples::Format;
 
     /// Correlation loss of a weak signal, in dB: 10 lg of (E[x Q(x)])² / E[Q(x)²], for Gaussian x.
     fn loss_db(converter: &Converter, sigma: f32) -> f64 {
@@ -153,6 +157,7 @@ mod tests {
                     window_runs,
                     nominal_lsb: 28.0,
                     whole: false,
+                    level_lsb: 1.0,
                 };
                 let found = loss_db(&converter, 28.0);
                 assert!((found - expected_db).abs() < 0.02, "{bits} bits: {found} dB");
@@ -169,6 +174,7 @@ mod tests {
             window_runs: None,
             nominal_lsb,
             whole: false,
+            level_lsb: 1.0,
         };
         assert!((loss_db(&fixed(28.0), 56.0) - 0.86).abs() < 0.03, "{}", loss_db(&fixed(28.0), 56.0));
         assert!((loss_db(&fixed(28.0), 14.0) - 1.22).abs() < 0.03, "{}", loss_db(&fixed(28.0), 14.0));
@@ -176,9 +182,39 @@ mod tests {
         assert!((loss_db(&controlled, 56.0) - 0.549).abs() < 0.02);
     }
 
+    /// A level between the format's numbers would be rounded to one side: half a step of DC.
+    #[test]
+    fn levels_of_few_bits_are_numbers_of_the_format() {
+        for (format, level_lsb) in [(Format::Ci8, 1.0), (Format::Cu8, 0.5)] {
+            let converter = Converter {
+                bits: 3,
+                step_sigma: Converter::best_step_sigma(3),
+                window_runs: None,
+                nominal_lsb: 28.0,
+                whole: false,
+                level_lsb,
+            };
+            let (mut i, mut q) = (vec![0.0; RUN_SAMPLES], vec![0.0; RUN_SAMPLES]);
+            add_block(5, 0, 28.0, &mut i, &mut q);
+            converter.act(&mut Block::whole(0, &mut i, &mut q));
+            let mut bytes = Vec::new();
+            format.pack(&i, &q, &mut bytes);
+            let (mut read_i, mut read_q) = (Vec::new(), Vec::new());
+            format.unpack(&bytes, &mut read_i, &mut read_q);
+            assert!(read_i == i && read_q == q, "{format}");
+        }
+    }
+
     #[test]
     fn silence_and_overload_give_levels_and_no_more() {
-        let converter = Converter { bits: 2, step_sigma: 1.0, window_runs: Some(1), nominal_lsb: 1.0, whole: false };
+        let converter = Converter {
+            bits: 2,
+            step_sigma: 1.0,
+            window_runs: Some(1),
+            nominal_lsb: 1.0,
+            whole: false,
+            level_lsb: 1.0,
+        };
         for (value, expected) in [(0.0, 1.0), (1e30, 3.0), (-1e30, -3.0)] {
             let (mut i, mut q) = (vec![value; 100], vec![0.0; 100]);
             i[0] = 1.0;
