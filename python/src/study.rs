@@ -6,6 +6,7 @@ use ::study::sweep::engine;
 use ::study::sweep::plan::{Cut, Plan};
 use ::study::sweep::result::{self, Results};
 use ::study::sweep::{publish, sha256_of_file};
+use analysis::show::document::Forms;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -25,7 +26,7 @@ pub fn study<'py>(py: Python<'py>, study: PathBuf, out: PathBuf) -> PyResult<(Bo
         engine::run_while(&plan, &missing, &|_| (), &|| !halt.is_set())?;
         let lines = result::merge(&plan)?;
         let results = Results::new(&plan, &lines)?;
-        publish::write(&plan, &lines, &results)?;
+        publish::write(&plan, &lines, &results, Forms::BOTH)?;
         Ok((results.table()?, result::table(&plan, &lines)))
     })?;
     Ok((columns(py, &cells)?, columns(py, &cases)?))

@@ -69,7 +69,8 @@ impl<'t> Keys<'t> {
     }
 }
 
-/// Candidate most similar to `word`, if any is similar: likeness by Jaro and Winkler above 0.7, whatever the case.
+/// Candidate most similar to `word`, if any is similar: likeness by Jaro and Winkler above 0.7, whatever the
+/// case.
 pub fn nearest(word: &str, candidates: &[&str]) -> Option<String> {
     let lower = word.to_lowercase();
     candidates

@@ -149,8 +149,8 @@ impl Settings {
     /// Reads a TOML text; `origin` names it in errors.
     ///
     /// # Errors
-    /// Text that is no TOML, or all unknown keys, values of the wrong type and values out of their range, each
-    /// with its position.
+    /// Text that is no TOML, or all unknown keys, values of the wrong type and values out of their range,
+    /// each with its position.
     pub fn parse(text: &str, origin: &str) -> Result<Self, SettingsError> {
         Self::read(text, origin, "")
     }
@@ -321,8 +321,8 @@ impl SettingsError {
         }
     }
 
-    /// The error with the position of its key in place of the file's name alone, and the byte at which the key
-    /// begins; settings are below `above`.
+    /// The error with the position of its key in place of the file's name alone, and the byte at which the
+    /// key begins; settings are below `above`.
     fn at(mut self, keys: &Keys<'_>, above: &str) -> (usize, Self) {
         let Some(key) = self.key() else { return (0, self) };
         let whole = if above.is_empty() { key } else { format!("{above}.{key}") };

@@ -519,7 +519,8 @@ fn noise_shows_no_phase_lock_and_a_steady_phase_does() {
 fn a_two_bit_converter_has_its_levels_a_step_apart() {
     use generator::stage::converter::Converter;
     use generator::stage::{Block, Stage};
-    let converter = Converter { bits: 2, step_sigma: 1.0, window_runs: None, nominal_lsb: 10.0, whole: false };
+    let converter =
+        Converter { bits: 2, step_sigma: 1.0, window_runs: None, nominal_lsb: 10.0, whole: false, level_lsb: 1.0 };
     let mut i = [-25.0, -15.0, -5.0, 5.0, 15.0, 25.0];
     let mut q = [0.1; 6];
     converter.act(&mut Block::whole(0, &mut i, &mut q));
