@@ -312,6 +312,9 @@ impl SettingsError {
             Self::UnknownKey { key, .. } | Self::Type { key, .. } => Some(key.clone()),
             Self::Range { key, .. } => Some((*key).to_owned()),
             Self::Acquisition { source: AcquireError::Setting { key, .. }, .. } => Some(format!("acquisition.{key}")),
+            Self::Acquisition { source: AcquireError::UnknownSignal { .. }, .. } => {
+                Some("acquisition.signals".to_owned())
+            }
             Self::Acquisition { .. } => None,
             Self::Tracking { source, .. } => {
                 let (TrackingSettingsError::Range { key, .. } | TrackingSettingsError::Bandwidth { key, .. }) = source;
@@ -454,18 +457,20 @@ mod tests {
 
     #[test]
     fn all_errors_are_reported_at_once_in_the_order_of_the_text() {
-        let text = "[tracking]\npll_order = 7\ndll_order = 'two'\npll_bandwith_hz = 15.0\n[positon]\nmask_deg = 3\n\
+        let text = "[acquisition]\nsignals = ['GPS L9']\n\
+                    [tracking]\npll_order = 7\ndll_order = 'two'\npll_bandwith_hz = 15.0\n[positon]\nmask_deg = 3\n\
                     [position]\nmask_deg = 91\n[operation]\nmeasurement_interval_ms = 5\nfram_limit_s = 3\n";
         let error = Settings::parse(text, "rx.toml").unwrap_err();
         let shown: Vec<String> = error.each().iter().map(ToString::to_string).collect();
         let expected = [
-            "rx.toml:2:1: tracking.pll_order = 7: expected 2 or 3",
-            "rx.toml:3:1: tracking.dll_order: invalid type: string \"two\"",
-            "rx.toml:4:1: unknown key 'tracking.pll_bandwith_hz': did you mean 'pll_bandwidth_hz'?",
-            "rx.toml:5:2: unknown key 'positon': did you mean 'position'?",
-            "rx.toml:8:1: position.mask_deg = 91: expected 0 to 90",
-            "rx.toml:10:1: operation.measurement_interval_ms = 5: expected 10 to 60000",
-            "rx.toml:11:1: unknown key 'operation.fram_limit_s': did you mean 'frame_limit_s'?",
+            "rx.toml:2:1: acquisition.signals names 'GPS L9': expected some of",
+            "rx.toml:4:1: tracking.pll_order = 7: expected 2 or 3",
+            "rx.toml:5:1: tracking.dll_order: invalid type: string \"two\"",
+            "rx.toml:6:1: unknown key 'tracking.pll_bandwith_hz': did you mean 'pll_bandwidth_hz'?",
+            "rx.toml:7:2: unknown key 'positon': did you mean 'position'?",
+            "rx.toml:10:1: position.mask_deg = 91: expected 0 to 90",
+            "rx.toml:12:1: operation.measurement_interval_ms = 5: expected 10 to 60000",
+            "rx.toml:13:1: unknown key 'operation.fram_limit_s': did you mean 'frame_limit_s'?",
         ];
         assert_eq!(shown.len(), expected.len(), "{shown:#?}");
         assert!(shown.iter().zip(expected).all(|(shown, expected)| shown.starts_with(expected)), "{shown:#?}");

@@ -259,7 +259,7 @@ fn values_that_contradict_each_other_are_refused_with_the_number_that_decides() 
                                                                                                           samples, 7.69"),
         ("off before on", jam("kind = \"cw\"\njs_db = 9\noff_s = 0.5"), "from 1 s (on_s) upwards"),
         ("two strengths", jam("kind = \"cw\"\njs_db = 9\npower_dbw = -90"), "exactly one of"),
-        ("radiated from nowhere", jam("kind = \"cw\"\neirp_dbw = -9"), "a place with it"),
+        ("radiated from nowhere", jam("kind = \"cw\"\neirp_dbw = -9"), "a position with it"),
         ("watts against a fixed C/N0", jam("kind = \"cw\"\npower_dbw = -90"), "link_budget"),
         ("a ratio at a distance", jam("kind = \"cw\"\njs_db = 9\ndistance_m = 5"), "only eirp_dbw needs it"),
         ("a line outside the band", jam("kind = \"cw\"\njs_db = 9\noffset_hz = 5e6"), "outside the samples' band"),

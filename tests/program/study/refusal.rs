@@ -34,7 +34,7 @@ fn a_bad_study_is_refused_with_place_key_and_remedy() {
     // With updates every 4 ms.
     refused("18]", "18, 120]", &["receiver.tracking.pll_bandwidth_hz = 120", "at most 100 Hz"]);
     refused("repetitions = 5", "repetitions = 1000000", &["cases", "10000000"]);
-    refused("panel = ", "#panel = ", &["a place for axis receiver.tracking.pll_order"]);
+    refused("panel = ", "#panel = ", &["a use of axis receiver.tracking.pll_order"]);
     refused(
         "series = \"receiver.tracking.pll_b",
         "series = \"receiver.tracking.dll_b",
