@@ -43,7 +43,7 @@ fn interference_that_contradicts_itself_is_refused_with_its_remedy() {
     assert!(empty.contains("number 1 (cw)") && empty.contains("there is none"), "{empty}");
     let radiated = refused(&(fixed.to_owned() + &cw("eirp_dbw = 3\ndistance_m = 100")));
     assert!(radiated.contains("eirp_dbw is in dBW"), "{radiated}");
-    assert!(refused(&cw("eirp_dbw = 3")).contains("a place with it"));
+    assert!(refused(&cw("eirp_dbw = 3")).contains("a position with it"));
     assert!(refused(&(fixed.to_owned() + &cw("power_dbw = -120"))).contains("write js_db instead"));
     assert!(refused(&cw("js_db = 3\non_s = 5\noff_s = 4")).contains("off_s"));
     assert!(refused(&cw("js_db = 3\nsweep_hz = 5")).contains("unknown key 'interference[1].sweep_hz'"));
