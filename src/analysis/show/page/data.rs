@@ -5,10 +5,11 @@
 
 use std::collections::HashMap;
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use plotters::style::RGBColor;
 use serde_json::{Value, json};
 
-use super::encode::base64;
 use crate::show::plot::chart::{Axis, Chart, Mark, Scale, Series, Shape};
 use crate::show::plot::dome::{Sky, Track, shade};
 use crate::show::plot::sketch::{Figure, Sketch};
@@ -97,7 +98,7 @@ impl Data {
 
     fn floats(&mut self, values: &[f64]) -> usize {
         let bytes: Vec<u8> = values.iter().flat_map(|value| (*value as f32).to_le_bytes()).collect();
-        self.array(json!({ "f": base64(&bytes) }))
+        self.array(json!({ "f": STANDARD.encode(&bytes) }))
     }
 
     /// 16-bit integers where their step is no larger than `most`.
@@ -110,7 +111,7 @@ impl Data {
         }
         let number = |value: &f64| if step > 0.0 { ((value - low) / step).round() as u16 } else { 0 };
         let bytes: Vec<u8> = values.iter().flat_map(|value| number(value).to_le_bytes()).collect();
-        self.array(json!({ "q": base64(&bytes), "low": low, "step": step }))
+        self.array(json!({ "q": STANDARD.encode(&bytes), "low": low, "step": step }))
     }
 
     fn array(&mut self, value: Value) -> usize {

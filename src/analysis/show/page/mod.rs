@@ -11,12 +11,15 @@ mod items;
 #[cfg(test)]
 mod tests;
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+
 use crate::show::document::{Item, Report};
 use crate::show::plot::ZOOMED;
 use crate::show::plot::chart::Scale;
 use crate::show::plot::sketch::{Figure, Sketch};
 use data::Data;
-use encode::{base64, escaped, inert};
+use encode::{escaped, inert};
 use items::Writer;
 
 /// Draws the plots and filters the tables.
@@ -120,5 +123,5 @@ fn is_over_time(figure: &Figure) -> bool {
 /// Hash of an element's text, as a content security policy names it.
 fn hash(text: &str) -> String {
     use sha2::Digest;
-    base64(&sha2::Sha256::digest(text.as_bytes()))
+    STANDARD.encode(sha2::Sha256::digest(text.as_bytes()))
 }

@@ -1,8 +1,10 @@
 //! Laws of the page, on a report whose words come from an enemy.
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 
-use super::encode::{base64, escaped};
+use super::encode::escaped;
 use super::{SCRIPT, STYLE, hash};
 use crate::show::document::{Cell, Item, Report, Side, Table, Tone};
 use crate::show::plot::canvas::{Axis, BLUE, Chart, Mark, Series, WIDTH_PX};
@@ -60,11 +62,6 @@ fn the_policy_names_the_script_and_the_style_of_the_page_and_nothing_else() {
     assert_eq!(policy, expected);
     // `printf abc | openssl dgst -sha256 -binary | base64`.
     assert_eq!(hash("abc"), "ungWv48Bz+pBQUDeXa4iI7ADYaOWF3qctBD/YfIAFa0=");
-    // RFC 4648, section 10.
-    let vectors = ["", "Zg==", "Zm8=", "Zm9v", "Zm9vYg==", "Zm9vYmE=", "Zm9vYmFy"];
-    for (length, text) in vectors.into_iter().enumerate() {
-        assert_eq!(base64(&b"foobar"[..length]), text);
-    }
     for forbidden in ["http://", "https://", "fetch(", "XMLHttpRequest", "eval(", "innerHTML", "style=", "onclick="] {
         assert!(!page.contains(forbidden), "{forbidden}");
     }
@@ -94,5 +91,7 @@ fn values_far_beyond_their_axis_keep_the_axis_resolution() {
     let mut report = Report::new("far", "", "");
     report.heading("Figures").figure(far);
     let page = report.html();
-    assert!(page.contains(&base64(&[0.25_f32, 1e6, 0.5].iter().flat_map(|y| y.to_le_bytes()).collect::<Vec<_>>())));
+    assert!(
+        page.contains(&STANDARD.encode([0.25_f32, 1e6, 0.5].iter().flat_map(|y| y.to_le_bytes()).collect::<Vec<_>>()))
+    );
 }
