@@ -32,7 +32,7 @@ use gnss::gps::l1ca::L1_CA;
 use gnss::samples::Format;
 use gnss::satellite::Sv;
 
-/// Nothing but a place: effects are added by name.
+/// Nothing but a position: effects are added by name.
 const BARE: &str = "name = \"bench\"\nstart = 2010-07-01T08:05:58\nseed = 1\n[motion]\nkind = \"static\"\n\
     latitude_deg = 26.5123\nlongitude_deg = 80.2329\nheight_m = 130\n";
 const IONOSPHERE: &str = "[ionosphere]\nmodel = \"klobuchar\"\n";

@@ -2,8 +2,8 @@
 //! time generator and receiver go step by step, and what a second takes of the processor with and without
 //! the receiver.
 //!
-//! A vehicle on a circle over the place of `scenarios/static.toml`, twelve satellites in noise, 2.6 Msps, a
-//! state for each of a hundred steps a second. The receiver starts cold: its search counts.
+//! A vehicle on a circle over the position of `scenarios/static.toml`, twelve satellites in noise, 2.6 Msps,
+//! a state for each of a hundred steps a second. The receiver starts cold: its search counts.
 
 use std::error::Error;
 use std::time::Instant;

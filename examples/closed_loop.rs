@@ -1,5 +1,5 @@
 //! Generator and receiver in one loop, twice: in one call with the results in memory, and batch by batch with
-//! a receiver that is fed by hand. Fixes are compared with the true place.
+//! a receiver that is fed by hand. Fixes are compared with the true position.
 //!
 //! `cargo run --release --example closed_loop`
 

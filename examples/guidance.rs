@@ -145,7 +145,7 @@ fn fly(seed: u64, more: &str) -> Result<Flight, Box<dyn Error>> {
     Ok(flight)
 }
 
-/// The least distance to the origin on the way from one place to another.
+/// The least distance to the origin on the way from one position to another.
 fn nearest_m(from_m: Vector3<f64>, to_m: Vector3<f64>) -> f64 {
     let way = to_m - from_m;
     let share = (-from_m.dot(&way) / way.norm_squared().max(1e-12)).clamp(0.0, 1.0);
@@ -165,7 +165,7 @@ impl Guide {
         Self { place_m, velocity_mps, commands: VecDeque::new() }
     }
 
-    /// Against the miss without any further command, across the line of sight.
+    /// Acceleration against the miss that no further command would leave, across the line of sight.
     fn command_mps2(&self) -> Vector3<f64> {
         let range_m = self.place_m.norm();
         let closing_mps = -self.place_m.dot(&self.velocity_mps) / range_m;

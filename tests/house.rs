@@ -127,9 +127,12 @@ fn documents_use_the_words_of_the_field() {
     keep(Rule::Word, documents.map(|(path, text)| (path, prose::paragraphs(&text))));
 }
 
-/// Panics where a doc comment of `src` breaks a rule.
+/// Panics where a doc comment or a docstring of the Python module breaks a rule.
 fn hold(rule: Rule) {
-    keep(rule, source::files("src").into_iter().map(|(path, text)| (path, prose::docs(&text))));
+    let sources = ["src", "python", "benches", "examples", "fuzz"].into_iter().flat_map(source::files);
+    let stubs = source::files_of("python", "pyi").into_iter().chain(source::files_of("python", "py"));
+    let docs = sources.map(|(path, text)| (path, prose::docs(&text)));
+    keep(rule, docs.chain(stubs.map(|(path, text)| (path, prose::docstrings(&text)))));
 }
 
 /// Panics where a text of a file breaks a rule.
@@ -297,6 +300,10 @@ mod planted {
         ] {
             assert!(faults_of(text, Rule::Noun).is_empty(), "{text}");
         }
+        let stub = "def f(self):\n    \"\"\"What it does.\"\"\"\n    \"\"\"Rate of the clock.\"\"\"\n";
+        let docs = prose::docstrings(stub);
+        let faults: Vec<usize> = docs.iter().map(|doc| prose::faults("a.pyi", doc, Rule::Noun).len()).collect();
+        assert_eq!(faults, [1, 0]);
         assert_eq!(faults_of("/// In metres.\nx: f64,\n/// From north.\ny: f64,", Rule::Sentence), ["'In'", "'From'"]);
     }
 

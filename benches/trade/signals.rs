@@ -25,7 +25,7 @@ pub const JUDGED: usize = 8;
 pub const ROUNDS: usize = 15;
 /// Codes that repeat after more are left out.
 const LONGEST_S: f64 = 0.0201;
-/// Samples of all places of a code on the grid, at most.
+/// Samples of all code phases on the grid, at most.
 const SAMPLES: f64 = 1e6;
 
 /// A median with what it may be: ranks of the sorted runs that hold it with 95 %.
@@ -62,9 +62,9 @@ pub struct SignalRow {
     pub f64_low_ns: f64,
     pub f64_high_ns: f64,
     /// Error of the code at rest of the component that errs most, root mean square over satellites and
-    /// places.
+    /// code phases.
     pub code_rms_m: f64,
-    /// Satellites and places.
+    /// Satellites and code phases.
     pub draws: usize,
     /// Error that the plan states for it, in metres.
     pub stated_m: f64,
@@ -261,7 +261,7 @@ struct Draw {
     found: [Found; 2],
 }
 
-/// Errors at places all over the grid, of the setting's edge.
+/// Errors at code phases all over the grid, of the setting's edge.
 fn draws(codes: &[(usize, u8, Code)], kernels: [Kernel<'_>; 2], rate_hz: f64) -> Vec<Draw> {
     let all = codes.iter().flat_map(|one| {
         let places = (SAMPLES / (one.2.period_s * rate_hz * codes.len() as f64)).clamp(2.0, 16.0) as usize;

@@ -29,7 +29,7 @@ RADIUS_M, RATE_RADPS, CLIMB_MPS = 200.0, 0.1, 5.0
 
 
 def motion(t_s):
-    """Place, velocity and acceleration: round a circle that climbs, beginning at the start."""
+    """Position, velocity and acceleration: round a circle that climbs, beginning at the start."""
     c, s = np.cos(RATE_RADPS * t_s), np.sin(RATE_RADPS * t_s)
     place = RADIUS_M * (s * east + (1 - c) * north) + CLIMB_MPS * t_s * up
     velocity = RADIUS_M * RATE_RADPS * (c * east + s * north) + CLIMB_MPS * up

@@ -53,7 +53,7 @@ class JudgeError(Error): ...
 
 @final
 class Metadata:
-    """What the samples of a front end are."""
+    """Metadata of a front end's samples."""
 
     def __new__(
         cls,
@@ -133,11 +133,11 @@ class Scene:
     def signals(self) -> list[str]: ...
     @property
     def samples(self) -> int:
-        """How many its first front end has."""
+        """Number of samples of its first front end."""
 
     @property
     def metadata(self) -> Metadata:
-        """Of its only front end."""
+        """Metadata of its only front end."""
 
     @property
     def front_ends(self) -> list[Metadata]: ...
@@ -147,7 +147,7 @@ class Scene:
         """Samples `first` to before `end` of its only front end: the same bits as in the whole."""
 
     def plan(self) -> str:
-        """What will be computed, what not, and why."""
+        """Plan in words: computations, omissions and their reasons."""
 
 @final
 class Batch:
@@ -172,15 +172,15 @@ class Generator:
 
 @final
 class Outcome:
-    """What a reception came to; its text says it in a line."""
+    """Outcome of a reception; its text is one line."""
 
     @property
     def tables(self) -> _Tables:
-        """Of `receive` all, of `Receiver.finish` those since the last push."""
+        """Records: all after `receive`, those since the last push after `Receiver.finish`."""
 
     @property
     def summary(self) -> dict[str, Any]:
-        """What the program writes as receiver.json."""
+        """Content of receiver.json as the program writes it."""
 
 @final
 class Receiver:
@@ -195,7 +195,7 @@ class Receiver:
 
 @final
 class Run:
-    """What generator and receiver came to; its text says it in a few lines."""
+    """Outcome of generator and receiver; its text is a few lines."""
 
     @property
     def truth(self) -> _Tables: ...
@@ -203,15 +203,15 @@ class Run:
     def receiver(self) -> _Tables: ...
     @property
     def summary(self) -> dict[str, Any]:
-        """What the program writes as receiver.json."""
+        """Content of receiver.json as the program writes it."""
 
     @property
     def judgement(self) -> dict[str, Any] | None:
-        """What the program writes as summary.json; of a run whose files were written."""
+        """Content of summary.json as the program writes it; present if the run's files were written."""
 
 @final
 class Step:
-    """What a step brought. The receiver's records are about samples of some steps before."""
+    """Result of a step. The receiver's records are about samples of some steps before."""
 
     @property
     def first_sample(self) -> int: ...
@@ -223,7 +223,7 @@ class Step:
     def receiver(self) -> _Tables: ...
     @property
     def position_m(self) -> list[float]:
-        """Where the vehicle is at the step's end, ECEF."""
+        """ECEF position of the vehicle at the step's end, in metres."""
 
     @property
     def velocity_mps(self) -> list[float]: ...
@@ -233,7 +233,7 @@ class Step:
 
     @property
     def gap_m(self) -> float:
-        """How far that is from the pushed motion."""
+        """Distance from the pushed motion, in metres."""
 
 @final
 class Live:

@@ -12,11 +12,11 @@ use crate::failure::Failure;
 /// Time between looks at signals: an interrupt is answered within it and a batch of samples.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Whether the caller was interrupted.
+/// Flag that is set once the caller is interrupted.
 pub struct Halt(AtomicBool);
 
 impl Halt {
-    /// Whether the work is to end.
+    /// True if the work is to end.
     pub fn is_set(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }

@@ -47,7 +47,7 @@ pub enum Column {
 }
 
 impl Column {
-    /// Of fields as a file has them: numbers where all are, an empty one being none.
+    /// Column of fields as a file has them: numbers where all are, an empty one being none.
     pub fn of_texts<'t, I: Iterator<Item = &'t str>>(fields: impl Fn() -> I) -> Self {
         let number = |field: &str| if field.is_empty() { Some(f64::NAN) } else { field.parse().ok() };
         match fields().map(number).collect() {
@@ -75,7 +75,7 @@ impl Column {
     }
 }
 
-/// What a field of a row is as a column.
+/// Field of a row, and the column that such fields make.
 pub trait Cell {
     /// A column of such fields.
     fn column() -> Column;
@@ -148,7 +148,7 @@ pub type Named = (&'static str, Column);
 
 /// A row of a table.
 pub trait Row {
-    /// Its columns, empty.
+    /// Columns of the row, empty.
     fn columns() -> Vec<Named>;
     /// Appends it to its columns, and returns those that are not its own.
     fn push<'c>(&self, columns: &'c mut [Named]) -> &'c mut [Named];

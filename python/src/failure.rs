@@ -27,7 +27,7 @@ create_exception!(gnss_twin, StepError_, Error, "A step of a live scene that is 
 create_exception!(gnss_twin, StudyError_, Error, "A study that cannot be planned or run.");
 create_exception!(gnss_twin, JudgeError_, Error, "A run that cannot be judged.");
 
-/// What becomes of an error.
+/// Python's exception for an error.
 #[derive(Clone, Copy)]
 enum Kind {
     Other,
@@ -49,7 +49,7 @@ pub struct Failure {
 }
 
 impl Failure {
-    /// Ended by a signal: what the signal raises takes its place.
+    /// Ended by a signal: the exception that the signal raises replaces it.
     pub fn halted() -> Self {
         Self { kind: Kind::Other, text: "interrupted".to_owned() }
     }
@@ -59,7 +59,7 @@ impl Failure {
         Self { kind: Kind::Bug, text: text.to_owned() }
     }
 
-    /// What fits nothing else.
+    /// Failure that fits no other kind.
     pub fn other(text: impl Into<String>) -> Self {
         Self { kind: Kind::Other, text: text.into() }
     }
@@ -69,13 +69,13 @@ impl Failure {
         Self { kind: Kind::File(error.kind()), text: format!("{}: {error}", path.display()) }
     }
 
-    /// A scenario that is in no file as it was read: its places mean nothing.
+    /// A scenario that is in no file as it was read: its line numbers mean nothing.
     pub fn of_table(error: &ScenarioError) -> Self {
         Self { kind: Kind::Scenario, text: error.without_place() }
     }
 }
 
-/// Of an error that may be one of the file system.
+/// Failure for an error that may be one of the file system.
 fn with_file(kind: Kind, text: String, source: Option<&io::Error>) -> Failure {
     Failure { kind: source.map_or(kind, |source| Kind::File(source.kind())), text }
 }

@@ -25,7 +25,7 @@ self_cell!(
     }
 );
 
-/// What is busy in another thread.
+/// Error of an object that is busy in another thread.
 pub fn busy<T>(what: &str) -> impl FnOnce(T) -> PyErr {
     move |_| PyRuntimeError::new_err(format!("the {what} is at work in another thread"))
 }

@@ -32,7 +32,7 @@ self_cell!(
     }
 );
 
-/// What a step brought.
+/// Result of a step.
 #[pyclass(frozen, module = "gnss_twin")]
 pub struct Step {
     #[pyo3(get)]
@@ -105,7 +105,7 @@ impl Live {
         self.with(py, |twin| Ok(twin.next_s()))
     }
 
-    /// Whether the last sample was made.
+    /// True if the last sample was made.
     #[getter]
     fn is_done(&self, py: Python<'_>) -> PyResult<bool> {
         self.with(py, |twin| Ok(twin.is_done()))

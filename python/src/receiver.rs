@@ -18,7 +18,7 @@ use crate::tables::Received;
 /// Bytes between two looks at signals.
 const STEP_BYTES: usize = 1 << 20;
 
-/// What a reception came to.
+/// Outcome of a reception.
 #[pyclass(frozen, module = "gnss_twin")]
 pub struct Outcome {
     #[pyo3(get)]
@@ -122,7 +122,7 @@ fn over() -> PyErr {
 }
 
 impl Outcome {
-    /// Of what was received.
+    /// Outcome of the records that were received.
     pub fn of(py: Python<'_>, received: &mut Received, text: String) -> PyResult<Self> {
         let summary = received.drain_summary(py)?.unbind();
         Ok(Self { tables: received.drain(py)?.into_any().unbind(), summary, text })

@@ -21,7 +21,7 @@ use crate::failure::Failure;
 use crate::scene::Scene;
 use crate::tables::{Received, Truth, object};
 
-/// What a run came to.
+/// Outcome of a run.
 #[pyclass(frozen, module = "gnss_twin")]
 pub struct Run {
     #[pyo3(get)]
@@ -65,7 +65,7 @@ fn closed_loop(
     Ok(format!("{}\n{outcome}", made.join("\n")))
 }
 
-/// Where a run's files grow, out of sight beside their place.
+/// Directory in which a run's files grow, hidden beside the final one.
 struct Files {
     making: Staged,
     truth: Writer,

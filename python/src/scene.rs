@@ -26,7 +26,7 @@ use crate::text::{Source, source, table};
 /// Samples that are made between two looks at signals.
 const STEP_SAMPLES: u64 = 1 << 19;
 
-/// What the samples of a front end are.
+/// Metadata of a front end's samples.
 #[pyclass(frozen, from_py_object, module = "gnss_twin")]
 #[derive(Clone)]
 pub struct Metadata(pub IfMetadata);
@@ -119,7 +119,7 @@ impl Scene {
         Ok(Self { scenario, directory, overrides, scenes: Arc::new(scenes), settings, warnings })
     }
 
-    /// Composes it anew: a scene whose motion is pushed is driven once.
+    /// Composes it again: a scene whose motion is pushed is driven once.
     pub fn fresh(&self) -> Result<Arc<Vec<scene::Scene>>, Failure> {
         Ok(Arc::new(self.scenario.compose_all(&self.directory, &self.overrides)?.0))
     }
@@ -130,7 +130,7 @@ impl Scene {
         Ok(settings_for(&self.scenes, given.as_ref().unwrap_or(&self.settings)))
     }
 
-    /// Its only front end.
+    /// Only front end of the scene.
     pub fn only(&self) -> PyResult<&scene::Scene> {
         match &**self.scenes {
             [only] => Ok(only),
@@ -269,19 +269,19 @@ impl Scene {
         names
     }
 
-    /// Of its first front end.
+    /// Number of samples of its first front end.
     #[getter]
     fn samples(&self) -> u64 {
         self.scenes.first().map_or(0, |scene| scene.samples)
     }
 
-    /// Of its only front end.
+    /// Metadata of its only front end.
     #[getter]
     fn metadata(&self) -> PyResult<Metadata> {
         self.only().map(|scene| Metadata(scene.metadata.clone()))
     }
 
-    /// Of each of its front ends.
+    /// Metadata of each of its front ends.
     #[getter]
     fn front_ends(&self) -> Vec<Metadata> {
         self.scenes.iter().map(|scene| Metadata(scene.metadata.clone())).collect()
@@ -323,7 +323,7 @@ impl Scene {
         arrays::array(py, scene.metadata.format, bytes)
     }
 
-    /// What will be computed, what not, and why.
+    /// Plan in words: computations, omissions and their reasons.
     fn plan(&self, py: Python<'_>) -> PyResult<String> {
         long(py, |_| {
             let texts: Result<Vec<String>, GenerateError> =

@@ -14,7 +14,7 @@ use serde_json::Value;
 
 use crate::columns::{FrontEnd, Spoofer, Table};
 
-/// What is true of a scene.
+/// Truth of a scene, as tables.
 #[derive(Default)]
 pub struct Truth {
     trajectory: Table<(TrajectoryRow, Geographic)>,
@@ -28,7 +28,7 @@ pub struct Truth {
     passes: Table<PassRow>,
 }
 
-/// A row with its place as people have it.
+/// A row with its position in degrees.
 fn placed(row: TrajectoryRow) -> (TrajectoryRow, Geographic) {
     let place = Geographic::of(&row.position_m(), row.time());
     (row, place)
@@ -67,7 +67,7 @@ impl Truth {
     }
 }
 
-/// What a receiver reports.
+/// Records of a receiver, as tables.
 #[derive(Default)]
 pub struct Received {
     acquisition: Table<AcquisitionRow>,
@@ -82,7 +82,7 @@ pub struct Received {
     interference: Table<(LineRow, FrontEnd)>,
     /// Parameters so far: those of one issue are reported once.
     parameters: BTreeSet<NavigationRow>,
-    /// At the end.
+    /// Summary of the reception, once it has ended.
     pub summary: Option<Value>,
 }
 

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use toml::Value;
 
-/// Where keys and values come from.
+/// Source of keys and values.
 pub enum Source {
     Text(String),
     File(PathBuf),

@@ -482,8 +482,8 @@ impl Ephemeris {
     /// reference time in its middle (GLONASS ICD L1, L2 5.1, 4.4, P1). Galileo, NavIC and BeiDou document
     /// none: eight hours, because an ephemeris is used for four hours after its reference time.
     ///
-    /// Of QZSS two hours (IS-QZSS-PNT-005, 4.1.2.4), of SBAS twelve minutes (RTCA DO-229D, table A-25).
-    /// Of GPS four hours, or what the issue of data states when the fit flag is set
+    /// QZSS has two hours (IS-QZSS-PNT-005, 4.1.2.4), SBAS twelve minutes (RTCA DO-229D, table A-25).
+    /// GPS has four hours, or the interval of the issue of data when the fit flag is set
     /// (IS-GPS-200N, 20.3.4.4, table 20-XII; intervals of extended operations beyond 26 h are read as 6 h).
     pub fn fit_interval_s(&self) -> f64 {
         let hours = match (self.long_fit, self.iodc) {

@@ -170,7 +170,7 @@ fn leap_seconds_week_rollovers_and_ends_of_years_are_those_of_tables_from_outsid
             after - 1,
         );
     }
-    // The 10-bit week began anew on these days (GPS time).
+    // The 10-bit week began again on these days (GPS time).
     for (year, month, day, week) in [(1999, 8, 22, 1024), (2019, 4, 7, 2048), (2038, 11, 21, 3072)] {
         let text = format!("{year}-{month:02}-{day:02}T00:00:00");
         let start = Epoch::parse(&text).unwrap();

@@ -94,6 +94,15 @@ pub fn docs(text: &str) -> Vec<Doc> {
     found
 }
 
+/// First lines of the docstrings of a Python source.
+pub fn docstrings(text: &str) -> Vec<Doc> {
+    let first = |(line, text): (usize, &str)| {
+        let text = text.trim_start().strip_prefix("\"\"\"")?.trim_end_matches('"').to_owned();
+        Some(Doc { line, text })
+    };
+    (1..).zip(text.lines()).filter_map(first).collect()
+}
+
 /// Faults of a doc comment in the file `path` against a rule, in words.
 pub fn faults(path: &str, doc: &Doc, rule: Rule) -> Vec<String> {
     let opens = |text: &str, list: &[&str]| -> Vec<String> {

@@ -83,7 +83,7 @@ def notices(root, table, figures):
         if isinstance(source, make.Page) and is_stale(root, row):
             key = (row["commit"], row["date"], source.command)
             part = f", part “{source.mark}”" if source.mark else ""
-            text = f"*Older than the code: measured at commit {row['commit']} on {row['date']}{part}. `{source.command}` makes it anew.*\n"
+            text = f"*Older than the code: measured at commit {row['commit']} on {row['date']}{part}. `{source.command}` makes it again.*\n"
             found[source.page][key] = text
     return {page: "\n".join(texts.values()) + "\n" for page, texts in found.items()}
 
@@ -128,7 +128,7 @@ def check(root, figures):
                 old_runs[name.rpartition(".")[0], row["rooms"], row["commit"]].append(name)
     for (family, rooms, commit), names in old_runs.items():
         place = f"{LEDGER}:{line_of_row(root, names[0])}"
-        found.append(f"{place}: stale: {some(names)}: of {rooms}, made at {commit}; make anew by: --make {family}.")
+        found.append(f"{place}: stale: {some(names)}: of {rooms}, made at {commit}; make again by: --make {family}.")
     expected = notices(root, table, figures)
     for page in measured_pages(figures):
         path = root / page
@@ -136,7 +136,7 @@ def check(root, figures):
             found.append(f"{page}:3: the page does not say which of its figures are older than the code; fill it by: --write")
     warnings = [
         f"{page}: {len(names)} figures are older than the code, made at {commit} ({some(names)}); "
-        f"make them anew by: {command}, then --make"
+        f"make them again by: {command}, then --make"
         for (page, commit, command), names in stale.items()
     ]
     # The first page that a stranger reads shows nothing that is older than the code.
@@ -147,7 +147,7 @@ def check(root, figures):
 def faults_of_row(row, figure):
     """What a row says otherwise than its declaration and its source."""
     name, source = row["id"], figure.source
-    again = f"make it anew by: --make {name}"
+    again = f"make it again by: --make {name}"
     declared = {"what": figure.what, "unit": figure.unit, "command": source.command, "rooms": " ".join(figure.rooms)}
     faults = [f"{name}: {key} is {row[key]!r}, declared {text!r}; {again}" for key, text in declared.items() if row[key] != text]
     if row["met"] != met(row["value"], row["bar"]):
@@ -194,7 +194,7 @@ def of_prose(root, table):
 def old_in_readme(root, old):
     text = (root / "README.md").read_text(encoding="utf8")
     return [
-        f"README.md:{prose.line_of(text, marker.start())}: {marker['id']} is older than the code; make it anew, or leave it out here"
+        f"README.md:{prose.line_of(text, marker.start())}: {marker['id']} is older than the code; make it again, or leave it out here"
         for marker in prose.markers(text)
         if marker["id"] in old
     ]

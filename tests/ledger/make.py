@@ -246,4 +246,4 @@ def warn_of_old_program(rooms):
     paths = [path for room in rooms for path in digest.files(ROOT, room)]
     newer = [path for path in paths if path.stat().st_mtime > program.stat().st_mtime]
     if newer:
-        print(f"warning: {program} is older than {newer[0].relative_to(ROOT)}: build it anew", file=sys.stderr)
+        print(f"warning: {program} is older than {newer[0].relative_to(ROOT)}: build it again", file=sys.stderr)

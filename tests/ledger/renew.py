@@ -1,4 +1,4 @@
-"""Makes figures anew: runs what a figure's declaration names, and writes its row."""
+"""Makes figures again: runs what a figure's declaration names, and writes its row."""
 
 import datetime
 import functools
@@ -43,7 +43,7 @@ def digest_at(commit, rooms):
 
 
 def row_of(figure, old):
-    """A figure made anew."""
+    """A figure made again."""
     source = figure.source
     if isinstance(source, make.Page) and not source.mark and (make.ROOT / source.page).is_file():
         stamp(make.ROOT / source.page)
@@ -97,5 +97,5 @@ def compare(figures, prefixes):
         recorded = table.get(figure.id, {}).get("value", "nothing")
         if value != recorded:
             failed += 1
-            print(f"{figure.id} is {value}, {check.LEDGER} has {recorded}; make it anew by: --make {figure.id}")
+            print(f"{figure.id} is {value}, {check.LEDGER} has {recorded}; make it again by: --make {figure.id}")
     return failed > 0

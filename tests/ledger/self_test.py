@@ -103,14 +103,14 @@ FAULTS = [
     ("a figure in a table of results", [("README.md", "| key |", "| error |")], "README.md:14: '90 °' has no source"),
     ("a marker without an end", [("README.md", "0.31 m<!--/-->", "0.31 m")], "README.md:3: "),
     ("a marker that begins a line", [("README.md", "The error is <", "<")], "README.md:3: a marker begins the line; put a word before it"),
-    ("code", [("src/room/lib.rs", "458.0", "459.0")], "reports/evidence.csv:2: stale: a.bias_m, a.error_m: of src/room, made at 1234567; make anew by: --make a."),
+    ("code", [("src/room/lib.rs", "458.0", "459.0")], "reports/evidence.csv:2: stale: a.bias_m, a.error_m: of src/room, made at 1234567; make again by: --make a."),
     ("text in code", [("src/room/lib.rs", "// no comment", "// a comment")], "stale: a.bias_m, a.error_m: of src/room"),
     ("a comment", [("src/room/lib.rs", "// a comment", "// another comment")], None),
     ("a comment of the library", [("src/room/lib.rs", "/// Speed of light in m/s.", "/// Speed of light.\n\n")], None),
     ("layout", [("src/room/lib.rs", "() -> &'static str {", "() ->\n    &'static str\n{")], None),
     ("a test", [("src/room/lib.rs", "C > 1.0", "C > 2.0")], None),
-    ("a value in the ledger", [("reports/evidence.csv", "3 of 3", "4 of 4")], "reports/evidence.csv:3: a.cells is 4 of 4, its source says 3 of 3; make it anew"),
-    ("a page made anew", [("reports/page.md", "1234567", "7654321")], "a.cells is of 1234567, its page of 7654321"),
+    ("a value in the ledger", [("reports/evidence.csv", "3 of 3", "4 of 4")], "reports/evidence.csv:3: a.cells is 4 of 4, its source says 3 of 3; make it again"),
+    ("a page made again", [("reports/page.md", "1234567", "7654321")], "a.cells is of 1234567, its page of 7654321"),
     ("a page without its commit", [("reports/page.md", "Measured at commit 1234567 on", "Of")], "does not say at which commit it was measured"),
     ("a missed bar that is called met", [("reports/evidence.csv", "≤ 0.5", "≤ 0.2")], "reports/evidence.csv:4: a.error_m: met says yes of 0.31 against ≤ 0.2"),
     ("words of a row", [("reports/evidence.csv", "an error", "a tiny error")], "a.error_m: what is 'a tiny error', declared 'an error'"),
@@ -162,6 +162,6 @@ def a_stale_page_says_so():
             and len(warnings) == len(again) == 1
             and not any(page in one for one in told)
             and any("README.md:16: a.cells is older than the code" in one for one in told)
-            and "*Older than the code: measured at commit 1234567 on 2026-01-02. `bench` makes it anew.*" in text
+            and "*Older than the code: measured at commit 1234567 on 2026-01-02. `bench` makes it again.*" in text
         )
         return [] if good else [f"a stale page: {silent} {warnings} {told}"]

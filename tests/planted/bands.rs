@@ -113,7 +113,7 @@ fn a_combination_is_as_old_as_its_younger_carrier_and_may_jump_by_as_much_more_a
     // A carrier goes on, and the second code counts half.
     let (left_m, ratio) = smoothed(5.1, 1.0);
     assert!(left_m > 0.1 && ratio < 1.0, "{left_m} {ratio}");
-    // Its partner was locked anew: the filter begins with this code.
+    // Its partner was locked again: the filter begins with this code.
     assert_eq!(smoothed(0.05, 1.0), (0.0, 1.0));
     // 15 m on L1 are 34 m in the combination, whose noise is 2.6 times that of a code: 77 m may be noise.
     let (left_m, ratio) = smoothed(5.1, 15.0);

@@ -39,7 +39,7 @@ pub fn run_and_keep(scene: &str, directory: &Path) {
 }
 
 /// Receives the kept samples of a run; its truth is linked. A fault in the receiver shows as if the samples
-/// were made anew.
+/// were made again.
 fn receive_again(scene: &str, kept: &Path, directory: &Path) {
     let truth = directory.join("truth");
     fs::create_dir(&truth).unwrap();

@@ -183,7 +183,7 @@ impl Rx {
     /// Writes what was edited and links the rest.
     pub fn write(&self) {
         if let Some(psd) = &self.psd {
-            // Written anew: what is there is a link to the run's own.
+            // Written again: what is there is a link to the run's own.
             fs::remove_file(self.to.join("psd.csv")).unwrap();
             psd.write(&self.to.join("psd.csv"));
         }

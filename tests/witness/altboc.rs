@@ -61,7 +61,7 @@ fn the_waveform_of_e5_is_what_the_table_of_phases_has_of_its_four_codes() {
             assert!(error < 1e-12, "chip {chip}, step {step}: {found} for {printed}");
         }
     }
-    // Whole periods of the sub-carrier in a code period: the table begins anew where the codes do.
+    // Whole periods of the sub-carrier in a code period: the table begins again where the codes do.
     assert_eq!(12 * e5::CODE_CHIPS % 8, 0);
 }
 

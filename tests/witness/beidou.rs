@@ -66,7 +66,7 @@ fn real_subframes_keep_their_parities_and_come_back_through_our_interleaving() {
     for name in FILES {
         let Some(all) = real(name) else { return };
         for Real { sv, subframe, .. } in all {
-            // Parities are made anew, and are the real ones.
+            // Parities are made again, and are the real ones.
             assert_eq!(d1d2::decode(&d1d2::encode(&subframe)), Some(subframe), "{sv}");
             counts[usize::from(sv.is_geostationary())] += 1;
         }

@@ -64,7 +64,7 @@ fn carriers_are_the_printed_ones_and_channels_those_of_real_records() {
         }
     }
     assert_eq!(seen, 14);
-    // A record on another channel would be left out, with that reason; the field is read here anew.
+    // A record on another channel would be left out, with that reason; the field is read here again.
     let mut files = vec![("CARD", shipped("CARD00ESP_R_20203340900_15H_MN.rnx.gz"))];
     let more =
         ["multi-gnss/BRD400DLR_S_20260680000_01D_MN.rnx.gz", "day177-2020/ESBC00DNK_R_20201770000_01D_MN.rnx.gz"];
@@ -88,7 +88,7 @@ fn carriers_are_the_printed_ones_and_channels_those_of_real_records() {
     }
 }
 
-/// First bit as the document numbers it, length, sign and power of two of every field, written here anew.
+/// First bit as the document numbers it, length, sign and power of two of every field, written here again.
 const PRINTED: [(u8, &str, u16, u8, bool, i32); 22] = [
     (1, "vx_kmps", 64, 24, true, -20),
     (1, "ax_kmps2", 40, 5, true, -30),
@@ -165,7 +165,7 @@ fn real_strings_keep_their_checks_through_our_coding_and_no_wrong_bit_passes() {
     for Real { sv, string, .. } in &all {
         let sent = gnav::encode(string);
         let soft: Vec<f32> = sent.iter().map(|one| if *one { -1.0 } else { 1.0 }).collect();
-        // Checks are made anew, and are the real ones.
+        // Checks are made again, and are the real ones.
         assert_eq!(gnav::decode_soft(&soft), Some(*string), "{sv}");
         let upside_down: Vec<f32> = soft.iter().map(|soft| -soft).collect();
         assert_eq!(gnav::decode_soft(&upside_down), Some(*string), "{sv}");

@@ -41,7 +41,7 @@ fn navic(number: u8) -> Sv {
 }
 
 /// Start bit, length, sign and power of two of every field, by subframe or message, as the document prints
-/// them, written here anew; angles in semicircles.
+/// them, written here again; angles in semicircles.
 const PRINTED: [(&str, &str, u16, u8, bool, i32, bool); 54] = [
     ("subframe 1", "week", 30, 10, false, 0, false),
     ("subframe 1", "af0_s", 40, 22, true, -31, false),

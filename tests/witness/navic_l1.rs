@@ -48,7 +48,7 @@ fn all_chips_of_all_codes_and_secondary_codes_of_l1_are_those_of_another_program
 const NVS_01: Sv = Sv { system: System::Navic, number: 10 };
 
 /// Start bit, length, sign and power of two of every field, by subframe, as decoders have them, written here
-/// anew; angles in semicircles.
+/// again; angles in semicircles.
 const PRINTED: [(&str, &str, u16, u8, bool, i32, bool); 47] = [
     ("subframe 2", "week", 0, 13, false, 0, false),
     ("subframe 2", "itow_2h", 13, 8, false, 0, false),

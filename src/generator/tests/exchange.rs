@@ -33,7 +33,7 @@ fn rinex_of_the_truth_is_its_table_to_the_last_digit_and_flags_its_slips() {
     let mut fronts = Fronts::new(&scenes, &mut records, &Options::default()).unwrap();
     while fronts.next(&mut records, &mut packed, &mut sink).unwrap() {}
     fronts.finish(&mut records).unwrap();
-    // One satellite is gone for two epochs and begins anew; another's lock begins anew between two.
+    // One satellite is gone for two epochs and begins again; another's lock begins again between two.
     let samples: BTreeSet<u64> = records
         .iter()
         .filter_map(|record| if let Record::Trajectory(row) = record { Some(row.sample) } else { None })

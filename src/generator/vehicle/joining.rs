@@ -433,7 +433,7 @@ mod tests {
         assert!((end.velocity_mps - expected).norm() < 1e-6, "{}", end.velocity_mps);
         assert!(end.acceleration_mps2.norm() < 1e-6);
         let largest = ticks.iter().map(|tick| tick.end.acceleration_mps2.norm()).fold(0.0, f64::max);
-        // Ticks that each aim anew are a loop of third order, which overshoots where the fade begins.
+        // Ticks that each aim again are a loop of third order, which overshoots where the fade begins.
         assert!((4.0 - 1e-6..4.04).contains(&largest), "{largest}");
     }
 

@@ -30,7 +30,7 @@ fn both_sides_together_are_chips_and_tones_at_the_place_of_every_tap_and_every_a
         let made = |component| Replica::made_in(component, NUMBER, (Layers::Strongest, edge), inverted).unwrap();
         let mut both = Replica::joined(&made(pilots[0]), &made(pilots[1])).unwrap();
         both.set_second(opposed);
-        // Close to a period's end, so that chips and tones begin anew.
+        // Close to a period's end, so that chips and tones begin again.
         let (code_chips, step_chips, carrier, turns) = (10_000.3, 10.23 / 65.0, 0.3, 0.01);
         let nco = Nco {
             carrier: (carrier * TURN) as u64,

@@ -138,7 +138,7 @@ impl Session {
             all[number].clear();
             in_step[number] = false;
         }
-        // By itself the first front end sets the clock anew.
+        // By itself the first front end sets the clock again.
         if in_step.iter().all(|known| !known)
             && let Some(first) = self.front_ends.first()
         {

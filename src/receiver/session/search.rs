@@ -349,7 +349,7 @@ impl FrontEnd {
             } else if track.dropped || fruitless {
                 let event = Event::LossOfLock;
                 sink.take(Record::Event(EventRow { sample: now.saturating_sub(1), sv, signal, event }))?;
-                // A wrong time may come right when the satellite is acquired anew; an echo does not.
+                // A wrong time may come right when the satellite is acquired again; an echo does not.
                 if track.wrong_time < WRONG_TIME_FIXES {
                     self.refused.insert(link, refused);
                 }

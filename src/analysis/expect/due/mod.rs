@@ -269,7 +269,7 @@ impl Expectations {
         let page_s = signals.iter().filter(brings).map(page_s).fold(f64::INFINITY, f64::min);
         let waited_s = four_s + receiver.ionosphere_wait_s;
         self.fixes_from_s = if receiver.requires_ionosphere { four_s.max(page_s) } else { waited_s } + SOLVE_S;
-        // Where the scene excuses a time, the clock begins anew after it.
+        // Where the scene excuses a time, the clock begins again after it.
         self.first_fix_s = self.epochs.iter().find(|due| self.fix_due(expect, due, None)).map(|due| due.time_s);
     }
 

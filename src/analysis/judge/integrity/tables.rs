@@ -130,7 +130,7 @@ fn tracking(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError> {
         .filter(|row| row.link() == link && matches!(row.event, Event::LossOfLock | Event::Acquired))
         .map(|row| row.sample)
         .collect();
-    // A channel that ended and began anew has nothing between.
+    // A channel that ended and began again has nothing between.
     let goes_on = |old: u64, sample: u64| !lost.iter().any(|at| (old..=sample).contains(at));
     for row in run.tracking.cursor(link) {
         let row = row?;

@@ -100,7 +100,7 @@ impl InavReader {
             REDUCED => self.reduced = Some(begin),
             _ => {}
         }
-        // It says neither its time nor its delays, and is reported anew with either.
+        // It says neither its time nor its delays, and is reported again with either.
         if [0, 5, 6, REDUCED].contains(&word_type(&word)) {
             news.extend(self.in_short());
         }

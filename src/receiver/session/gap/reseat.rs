@@ -96,7 +96,7 @@ impl FrontEnd {
         for track in &mut self.tracks {
             let units = Units::of(&track.channel, reference);
             if open_s.is_some_and(|open_s| whole_number(open_s / units.period_s).is_none()) {
-                // Where its code is remains open: it is searched for anew.
+                // Where its code is remains open: it is searched for again.
                 (track.dropped, track.wrong_time) = (true, WRONG_TIME_FIXES);
                 continue;
             }

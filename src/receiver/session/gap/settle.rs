@@ -128,7 +128,7 @@ impl FrontEnd {
             // Signs that stay in doubt are those of a secondary code that is somewhere else.
             let own = whole_number(missing_s / units.period_s);
             let Some(own) = own.filter(|_| counted || !track.channel.has_secondary_code()) else {
-                // Its code is elsewhere: it is searched for anew.
+                // Its code is elsewhere: it is searched for again.
                 (track.dropped, track.wrong_time) = (true, WRONG_TIME_FIXES);
                 continue;
             };
