@@ -77,6 +77,23 @@ fn workplace(content: &str) -> tempfile::TempDir {
     directory
 }
 
+/// The theory knows no motion: a cell under jerk has none, and the cell at rest is compared with its own.
+#[test]
+fn theory_has_no_value_under_a_jerk() {
+    let directory = workplace(
+        "name = \"jerk\"\nlevel = \"correlator\"\nrepetitions = 4\nkeep = [\"phase_sigma_deg\"]\n[signal]\ncn0_dbhz = 45\n\
+         [measure]\nsettle_s = 1\nduration_s = 20\n[[axis]]\nkey = \"motion.jerk_g_per_s\"\nvalues = [0, 10]\n",
+    );
+    good(&["study.toml", "--out", "out"], directory.path());
+    let cells = fs::read_to_string(directory.path().join("out/cells.csv")).unwrap();
+    let column = cells.lines().next().unwrap().split(',').position(|name| name == "theory.phase_sigma_deg").unwrap();
+    let theory: Vec<&str> = cells.lines().skip(1).map(|line| line.split(',').nth(column).unwrap()).collect();
+    assert!(matches!(theory[..], [at_rest, ""] if !at_rest.is_empty()), "{theory:?}");
+    let report = fs::read_to_string(directory.path().join("out/report.md")).unwrap();
+    assert!(report.contains("phase_sigma_deg: 1 of 1 cells"), "{report}");
+    assert!(!report.contains("\nBeyond:"), "{report}");
+}
+
 /// The merged table of a study that nothing disturbs, and how long its run takes.
 fn undisturbed(here: &Path) -> (Vec<u8>, Duration) {
     good(&["plan", "study.toml", "-o", "calm", "--shards", "100"], here);

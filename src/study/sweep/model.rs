@@ -224,15 +224,21 @@ fn chip_m(case: &Case) -> f64 {
     SPEED_OF_LIGHT_MPS / case.component.chip_rate_hz
 }
 
-fn sigma(jitter: Option<Jitter>) -> Option<f64> {
-    jitter.map(|jitter| jitter.sigma)
+/// Spread by theory, which is of loops in noise alone: there is none where the motion changes.
+fn sigma(case: &Case, of: fn(&Case) -> Option<Jitter>) -> Option<f64> {
+    of(case).filter(|_| is_steady(case)).map(|jitter| jitter.sigma)
+}
+
+fn is_steady(case: &Case) -> bool {
+    case.motion.steps.is_empty()
 }
 
 /// Thermal jitter and the oscillator's, which add in square.
 fn phase_theory_deg(case: &Case) -> Option<f64> {
     let thermal_deg = match case.cn0_dbhz {
-        Some(_) => 360.0 * sigma(expect::phase_cycles(case))?,
-        None => 0.0,
+        Some(_) => 360.0 * sigma(case, expect::phase_cycles)?,
+        None if is_steady(case) => 0.0,
+        None => return None,
     };
     let Some(noise) = &case.oscillator else { return Some(thermal_deg) };
     let update_s = case.update_s();
@@ -264,11 +270,11 @@ pub const FIGURES: &[Figure] = &[
     figure("phase_mean_deg", |_, outcome| kept(outcome, outcome.phase_cycles.mean().map(|x| 360.0 * x))),
     figure("phase_peak_deg", |_, outcome| kept(outcome, Some(360.0 * outcome.phase_peak_cycles))),
     figure("frequency_sigma_hz", |_, outcome| kept(outcome, outcome.frequency_hz.sigma())),
-    figure("theory.frequency_sigma_hz", |case, _| sigma(expect::frequency_hz(case))),
+    figure("theory.frequency_sigma_hz", |case, _| sigma(case, expect::frequency_hz)),
     figure("code_sigma_chips", |_, outcome| kept(outcome, outcome.code_chips.sigma())),
-    figure("theory.code_sigma_chips", |case, _| sigma(expect::code_chips(case))),
+    figure("theory.code_sigma_chips", |case, _| sigma(case, expect::code_chips)),
     figure("code_sigma_m", |case, outcome| kept(outcome, outcome.code_chips.sigma().map(|x| x * chip_m(case)))),
-    figure("theory.code_sigma_m", |case, _| sigma(expect::code_chips(case)).map(|x| x * chip_m(case))),
+    figure("theory.code_sigma_m", |case, _| sigma(case, expect::code_chips).map(|x| x * chip_m(case))),
     figure("code_mean_chips", |_, outcome| kept(outcome, outcome.code_chips.mean())),
     figure("raw_phase_sigma_deg", |_, outcome| kept(outcome, outcome.raw_phase_cycles.sigma().map(|x| 360.0 * x))),
     figure("raw_code_sigma_chips", |_, outcome| kept(outcome, outcome.raw_code_chips.sigma())),

@@ -163,7 +163,7 @@ impl Results {
         table.into_inner().map_err(|e| StudyError::Bug(e.to_string()))
     }
 
-    /// Agreement of measurement and theory for each figure that theory predicts.
+    /// Agreement of measurement and theory for each figure that theory predicts in some cell.
     pub fn agreement(&self) -> Vec<Agreement> {
         let snr = self.figure(SNR);
         let pair = |(number, figure): (usize, &Column)| {
@@ -175,7 +175,7 @@ impl Results {
                 let snr = snr.and_then(|snr| (*cell.estimates.get(snr)?).map(|estimate| estimate.mean));
                 Some(Compared { cell: index, ratio, bar: BAR.max(half), snr })
             });
-            Some(Agreement { figure: number, cells: cells.collect() })
+            Some(Agreement { figure: number, cells: cells.collect() }).filter(|agreement| !agreement.cells.is_empty())
         };
         self.figures.iter().enumerate().filter_map(pair).collect()
     }
