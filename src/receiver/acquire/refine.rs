@@ -2,8 +2,8 @@
 //! hundredths of a chip, C/N0.
 //!
 //! Prompt sums over single code periods are squared, which removes data signs (Costas). The frequency of the
-//! squares is read from a padded FFT. Then an early-minus-late comparison of amplitudes, half a chip to
-//! either side, centres the code phase. The noise power comes from correlators at code phases where the
+//! squares is read from a padded FFT. Then an early-minus-late comparison of powers, half a chip to either
+//! side, centres the code phase. The noise power comes from correlators at code phases where the
 //! code's own autocorrelation is small.
 
 use fft::Planner;
@@ -69,20 +69,20 @@ pub(super) fn refine<C: Correlator>(
     let noises: Vec<f64> =
         of_fours.chain(rest.iter().map(|&offset| correlators.powers(phase, doppler_hz, &[offset])[0])).collect();
     let noise = mean(noises.into_iter());
-    // Early less late over their sum is the slope there times twice the error over twice the value.
+    // The difference of the early and the late power is four times value, slope and error, times the prompt
+    // power. Roots of powers near the noise would be zero as often as not, and no measure of the error.
     let steps = steps_of_chip(component);
     let reach = if steps > 1 { 0.25 / steps as f64 } else { 0.5 };
     let correlation = |chips: f64| shape.correlation(chips / component.chip_rate_hz);
     // Beside the peak it falls in a straight line.
     let slope = (correlation(0.5 * reach) - correlation(reach)) / (0.5 * reach);
-    let scale = correlation(reach) / slope;
+    let scale = 0.25 * correlation(0.0).powi(2) / (correlation(reach) * slope);
     let mut power = 0.0;
     for _ in 0..3 {
-        let taps = correlators.powers(phase, doppler_hz, &[reach, 0.0, -reach]);
-        let [early, _, late] = taps.map(|power| (power - noise).max(0.0).sqrt());
-        power = taps[1];
-        if early + late > 0.0 {
-            phase += scale * (early - late) / (early + late);
+        let [early, prompt, late] = correlators.powers(phase, doppler_hz, &[reach, 0.0, -reach]);
+        power = prompt;
+        if power > noise {
+            phase += (scale * (early - late) / (power - noise)).clamp(-0.5 * reach, 0.5 * reach);
         }
     }
     let measured = if noise > 0.0 { (power / noise - 1.0) / component.period_s() } else { 0.0 };
