@@ -267,6 +267,42 @@ fn detections_come_as_often_as_theory_says() {
 }
 
 #[test]
+fn the_code_phase_of_weak_signals_scatters_as_theory_says() {
+    let metadata = metadata(Format::Ci8, 5.0e6, 0.0, false);
+    let (sums, cn0_dbhz) = (16, 35.0);
+    let settings = AcquisitionSettings {
+        doppler_max_hz: 500.0,
+        coherent_periods: 1,
+        noncoherent_sums: sums,
+        false_alarm_probability: 1e-3,
+        ..Default::default()
+    };
+    let samples = samples_needed(&metadata, &settings).unwrap() as usize;
+    let mut searcher = Searcher::new(&metadata, &settings).unwrap();
+    let mut place = Noise(41);
+    let errors: Vec<f64> = (0..200)
+        .filter_map(|seed| {
+            let phase_chips = 1023.0 * place.uniform();
+            let sent = Sent { prn: 9, doppler_hz: 100.0, phase_chips, cn0_dbhz };
+            let recording = record(metadata.clone(), samples, &[sent], 3000 + seed);
+            let block = Block { first: 0, i: &recording.i, q: &recording.q };
+            let hit = searcher.search(&block, &[L1_CA.link(Sv::gps(9))]).unwrap()[0].1?;
+            Some(difference_chips(hit.code_phase_chips, phase_chips)).filter(|error| error.abs() < 1.0)
+        })
+        .collect();
+    assert!(errors.len() > 150, "{}", errors.len());
+    // Half a chip to either side the value is a half, and the slope one. There a period has a ratio s of signal to
+    // noise of a quarter of the prompt's; its power scatters by √(1 + 2s), and a chip parts the two by 8·s.
+    let s = 0.25 * libm::pow(10.0, cn0_dbhz / 10.0) * 1e-3;
+    let theory = ((1.0 + 2.0 * s) / f64::from(sums)).sqrt() * 2.0_f64.sqrt() / (8.0 * s);
+    let rms = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
+    // Three standard deviations of the rms of so many values.
+    let bar = 3.0 / (2.0 * errors.len() as f64).sqrt();
+    println!("{rms:.4} chips found, {theory:.4} by theory, {} values", errors.len());
+    assert!((rms / theory - 1.0).abs() < bar, "{rms} chips, {theory} by theory");
+}
+
+#[test]
 fn the_default_search_finds_38_dbhz_whatever_the_phase_and_doppler() {
     let metadata = metadata(Format::Ci8, 2.6e6, 0.0, false);
     let settings = AcquisitionSettings { doppler_max_hz: 1000.0, ..Default::default() };
