@@ -65,6 +65,7 @@ static FRAMES: Message = Message {
     symbol_s: 0.004,
     bit: |_| &[1],
     unit_s: 6,
+    decided_after: 0,
     set_s: 6,
     first_s: 0,
     sender: |_| Ok(Box::new(Frames)),

@@ -32,6 +32,9 @@ pub struct Message {
     pub bit: fn(Sv) -> &'static [i8],
     /// Duration of a unit, which is encoded as a whole, in seconds.
     pub unit_s: i64,
+    /// Number of symbols after a unit by which its last bits are decided: zero, except where a convolutional
+    /// code runs on into the next unit.
+    pub decided_after: usize,
     /// Interval in seconds, from one multiple of it to the next, in which all units belong to one ephemeris.
     /// Messages whose units each identify their ephemeris have the interval of one unit.
     pub set_s: i64,

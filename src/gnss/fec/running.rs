@@ -10,7 +10,7 @@ use super::convolutional::Convolutional;
 
 /// Symbols before and after a message by which its first and last bits are as sure as the others: some
 /// constraint lengths.
-const MARGIN: usize = 80;
+pub const MARGIN: usize = 80;
 /// Messages in a row that fail where they are expected before they are sought elsewhere.
 const FAILURES: u32 = 4;
 const CODE: Convolutional = Convolutional { second_inverted: false };

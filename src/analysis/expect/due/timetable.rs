@@ -67,7 +67,8 @@ impl Timetable {
         let begins = |unit: &i64| message.unit_start(*unit).since(from) >= 0.0;
         let mut units = (first..first + LARGEST_UNITS).filter(begins).map(|unit| message.unit_start(unit));
         let found = units.find(|start| wanted(message, *start));
-        found.map_or(f64::INFINITY, |start| start.since(self.start) + message.unit_s as f64 + LIGHT_S)
+        let decided_s = message.unit_s as f64 + message.decided_after as f64 * message.symbol_s;
+        found.map_or(f64::INFINITY, |start| start.since(self.start) + decided_s + LIGHT_S)
     }
 
     /// Time in seconds at which a channel locked since `locked_s` knows the beginnings of units, and their
@@ -120,6 +121,7 @@ mod tests {
     use gnss::galileo::e1::E1;
     use gnss::galileo::e6::E6;
     use gnss::gps::l1ca::L1_CA;
+    use gnss::gps::l2c::L2C;
     use gnss::signal::synthetic::LONG_BOC;
 
     fn at(text: &str) -> Timetable {
@@ -157,6 +159,13 @@ mod tests {
             assert!((18.0..=36.0 + LIGHT_S).contains(&orbit_s), "{second}: {orbit_s}");
             assert!((6.0..=756.0 + LIGHT_S).contains(&page_s), "{second}: {page_s}");
         }
+    }
+
+    #[test]
+    fn a_code_that_runs_on_decides_a_message_by_the_symbols_after_it() {
+        // Messages of L2C begin at 1, 13 and 25 s; the third has type 30. Eighty symbols of 20 ms follow.
+        let timetable = Timetable::new(&L2C, Epoch::parse("2025-08-21T06:26:23").unwrap());
+        assert!((timetable.ionosphere_by_s(0.0) - 37.0 - 1.6 - LIGHT_S).abs() < 1e-9);
     }
 
     #[test]

@@ -30,6 +30,7 @@ pub static B_CNAV2: Message = Message {
     symbol_s: 0.005,
     bit: |_| &[1],
     unit_s: MESSAGE_S,
+    decided_after: 0,
     set_s: MESSAGE_S * ORDER.len() as i64,
     first_s: 0,
     sender: |common| bcnav::check(common).map(|()| Box::new(Messages { layout: &LAYOUT, common: common.clone() }) as _),

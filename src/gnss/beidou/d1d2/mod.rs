@@ -34,6 +34,7 @@ pub static D1_D2: Message = Message {
     symbol_s: 0.001,
     bit: |sv| if sv.is_geostationary() { &[1; D2_SYMBOLS] } else { &NEUMAN_HOFMAN_SIGNS },
     unit_s: UNIT_S,
+    decided_after: 0,
     set_s: UNIT_S,
     first_s: 0,
     sender: |common| Ok(Box::new(Frames { klobuchar: common.klobuchar_beidou })),

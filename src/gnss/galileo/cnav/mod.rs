@@ -33,6 +33,7 @@ pub static CNAV: Message = Message {
     symbol_s: 0.001,
     bit: |_| &[1],
     unit_s: PAGE_S,
+    decided_after: 0,
     set_s: PAGE_S,
     first_s: 0,
     sender: |_| Ok(Box::new(Pages)),

@@ -34,6 +34,7 @@ pub static FNAV: Message = Message {
     symbol_s: 0.02,
     bit: |_| &[1],
     unit_s: PAGE_S,
+    decided_after: 0,
     set_s: PAGE_S,
     first_s: 0,
     sender: |common| Ok(Box::new(Pages { common: common.clone() })),

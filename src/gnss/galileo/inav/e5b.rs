@@ -19,6 +19,7 @@ pub static INAV_E5B: Message = Message {
     symbol_s: INAV.symbol_s,
     bit: |_| &[1],
     unit_s: PAGE_S,
+    decided_after: 0,
     set_s: PAGE_S,
     first_s: 0,
     sender: |common| Ok(Box::new(Pages { common: common.clone(), carrier: &ON_E5B })),

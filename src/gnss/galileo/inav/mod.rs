@@ -44,6 +44,7 @@ pub static INAV: Message = Message {
     symbol_s: 0.004,
     bit: |_| &[1],
     unit_s: PAGE_S,
+    decided_after: 0,
     set_s: PAGE_S,
     // The even part begins at an odd second on E1-B (4.3.2.2).
     first_s: 1,

@@ -36,6 +36,7 @@ pub static GNAV: Message = Message {
     symbol_s: 0.01,
     bit: |_| &[1],
     unit_s: STRING_S,
+    decided_after: 0,
     set_s: STRING_S,
     first_s: 0,
     sender: |_| Ok(Box::new(Strings)),

@@ -22,6 +22,7 @@ use crate::broadcast::{Ephemeris, GPS_CLOCK_CODE, SetForm};
 use crate::crc::crc24q;
 use crate::exchange::modern;
 use crate::fec::convolutional::Convolutional;
+use crate::fec::running::MARGIN;
 use crate::gps::lnav::LNAV;
 use crate::ionosphere::{Coefficients, Model};
 use crate::klobuchar::Klobuchar;
@@ -41,6 +42,7 @@ pub static CNAV: Message = Message {
     symbol_s: 0.01,
     bit: |_| &[1],
     unit_s: MESSAGE_S,
+    decided_after: MARGIN,
     set_s: MESSAGE_S,
     first_s: 0,
     sender: |common| Ok(sender(common, &CNAV)),

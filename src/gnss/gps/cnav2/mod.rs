@@ -45,6 +45,7 @@ pub static CNAV2: Message = Message {
     symbol_s: 0.01,
     bit: |_| &[1],
     unit_s: FRAME_S,
+    decided_after: 0,
     // A new ephemeris begins with page 1, after the frame of almanacs.
     set_s: ROUND * FRAME_S,
     first_s: 2 * FRAME_S,

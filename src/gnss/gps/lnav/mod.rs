@@ -44,6 +44,7 @@ pub static LNAV: Message = Message {
     symbol_s: 0.02,
     bit: |_| &[1],
     unit_s: SUBFRAME_S,
+    decided_after: 0,
     set_s: SUBFRAME_S,
     first_s: 0,
     sender: |common| Ok(Box::new(Broadcast::of(common)?)),

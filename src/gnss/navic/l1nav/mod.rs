@@ -46,6 +46,7 @@ pub static L1_NAV: Message = Message {
     symbol_s: 0.01,
     bit: |_| &[1],
     unit_s: FRAME_S,
+    decided_after: 0,
     set_s: FRAME_S,
     first_s: 0,
     sender: |common| Ok(Box::new(Frames(common.clone()))),

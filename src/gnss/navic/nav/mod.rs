@@ -35,6 +35,7 @@ pub static SPS_NAV: Message = Message {
     symbol_s: 0.02,
     bit: |_| &[1],
     unit_s: SUBFRAME_S,
+    decided_after: 0,
     // Subframes 1 and 2 have no issue in common: an ephemeris goes on the air with a frame.
     set_s: FRAME_S,
     first_s: 0,

@@ -24,6 +24,7 @@ use crate::bits::{FieldError, add_to, bits_of, integers, number, quantise_all, r
 use crate::broadcast::{Ephemeris, SetForm};
 use crate::crc::crc24q;
 use crate::fec::convolutional::Convolutional;
+use crate::fec::running::MARGIN;
 use crate::ionosphere::Model;
 use crate::message::{IonosphereForm, Message, Parameters, Raw, Records, Sender};
 use crate::satellite::Sv;
@@ -39,6 +40,7 @@ pub static SBAS: Message = Message {
     symbol_s: 0.002,
     bit: |_| &[1],
     unit_s: 1,
+    decided_after: MARGIN,
     first_s: 0,
     set_s: 1,
     sender: |common| Ok(Box::new(Blocks { network: common.network.clone() })),
