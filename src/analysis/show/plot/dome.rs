@@ -81,8 +81,6 @@ fn tracked(area: &Area<'_>, dome: Dome, tracks: &[Track], skyline_deg: &[[f64; 2
     if let Some(corner_px) = dome.scale_px {
         scale(area, corner_px, low, high)?;
     }
-    // Names keep clear of the dots, the tracks and each other.
-    let mut taken: Vec<(i32, i32)> = tracks.iter().flat_map(|track| track.places.iter().copied()).collect();
     let mut ends = Vec::new();
     for Track { sv, places, cn0_dbhz, observed } in tracks {
         let colour = cn0_dbhz.map_or(GREY, |cn0| shade(cn0, low, high));
@@ -92,8 +90,12 @@ fn tracked(area: &Area<'_>, dome: Dome, tracks: &[Track], skyline_deg: &[[f64; 2
         dot(area, end, systems.iter().position(|system| *system == sv.system).unwrap_or(0), (inside, colour))?;
         ends.push((*sv, end));
     }
-    for (sv, end) in ends {
-        label(area, sv, end, &mut taken)?;
+    for ((sv, end), spot) in ends.iter().zip(names(tracks)) {
+        if spot.is_far() {
+            area.draw(&PathElement::new([*end, spot.middle], GREY.stroke_width(FINE as u32)))?;
+            area.draw(&Rectangle::new(spot.corners(), WHITE.filled()))?;
+        }
+        area.draw(&Text::new(sv.to_string(), spot.middle, anchored(14, HPos::Center, VPos::Center)))?;
     }
     let note = anchored(12, HPos::Left, VPos::Center);
     let shaded = if skyline_deg.is_empty() { "" } else { "; shaded: obstructed at the start" };
@@ -146,18 +148,62 @@ fn obstructed(area: &Area<'_>, dome: Dome, skyline_deg: &[[f64; 2]]) -> Result<(
     Ok(())
 }
 
-/// Writes a satellite's name beside its dot, on the first side where nothing else is.
-fn label(area: &Area<'_>, sv: Sv, (x, y): (i32, i32), taken: &mut Vec<(i32, i32)>) -> Result<(), Failure> {
-    let sides = [(28, 0), (-28, 0), (0, -18), (0, 18), (24, -15), (-24, -15), (24, 15), (-24, 15)];
-    let spots = sides.map(|(dx, dy)| (x + dx * FINE, y + dy * FINE));
-    let free = |spot: &(i32, i32)| {
-        taken.iter().all(|other| (spot.0 - other.0).abs() > 24 * FINE || (spot.1 - other.1).abs() > 13 * FINE)
-    };
-    let spot = spots.iter().copied().find(free).unwrap_or(spots[0]);
-    // A name is wider than a dot: its two ends represent it.
-    taken.extend([(spot.0 - 12 * FINE, spot.1), (spot.0 + 12 * FINE, spot.1)]);
-    area.draw(&Text::new(sv.to_string(), spot, anchored(14, HPos::Center, VPos::Center)))?;
-    Ok(())
+/// Position of a name, in virtual pixels.
+#[derive(Clone, Copy, Debug)]
+struct Spot {
+    middle: (i32, i32),
+    dot: (i32, i32),
+}
+
+/// Half width and half height of a name, of a dot, and of a point of a track, in pixels.
+const NAME_PX: (i32, i32) = (14, 8);
+const DOT_PX: (i32, i32) = (9, 9);
+const POINT_PX: (i32, i32) = (2, 2);
+/// Positions of a name beside its dot, in the order in which they are tried, and how many times as far.
+const SIDES_PX: [(i32, i32); 8] = [(26, 0), (-26, 0), (0, -18), (0, 18), (24, -15), (-24, -15), (24, 15), (-24, 15)];
+const RINGS: [i32; 3] = [1, 2, 3];
+
+impl Spot {
+    /// True if a line has to lead to the dot.
+    fn is_far(self) -> bool {
+        let (dx, dy) = (self.middle.0 - self.dot.0, self.middle.1 - self.dot.1);
+        dx.abs() > 30 * FINE || dy.abs() > 20 * FINE
+    }
+
+    fn corners(self) -> [(i32, i32); 2] {
+        let (x, y) = self.middle;
+        let (dx, dy) = (NAME_PX.0 * FINE, NAME_PX.1 * FINE);
+        [(x - dx, y - dy), (x + dx, y + dy)]
+    }
+
+    /// Distance in virtual pixels to something of a half width and a half height; negative where they overlap.
+    fn clearance(self, (x, y): (i32, i32), half_px: (i32, i32)) -> i32 {
+        let across = (self.middle.0 - x).abs() - (NAME_PX.0 + half_px.0) * FINE;
+        let along = (self.middle.1 - y).abs() - (NAME_PX.1 + half_px.1) * FINE;
+        across.max(along)
+    }
+}
+
+/// Positions of the names of tracks that have one: clear of dots, tracks and each other, or as clear as can be.
+fn names(tracks: &[Track]) -> Vec<Spot> {
+    let dots: Vec<(i32, i32)> = tracks.iter().filter_map(|track| track.places.last().copied()).collect();
+    let points = || tracks.iter().flat_map(|track| track.places.iter().copied());
+    let mut spots: Vec<Spot> = Vec::with_capacity(dots.len());
+    for &dot in &dots {
+        let clearance = |spot: &Spot| {
+            let from_names = spots.iter().map(|other| spot.clearance(other.middle, NAME_PX));
+            let from_dots = dots.iter().map(|other| spot.clearance(*other, DOT_PX));
+            let from_points = points().map(|point| spot.clearance(point, POINT_PX));
+            from_names.chain(from_dots).chain(from_points).min().unwrap_or(0)
+        };
+        let at =
+            |far: i32, (dx, dy): (i32, i32)| Spot { middle: (dot.0 + far * dx * FINE, dot.1 + far * dy * FINE), dot };
+        let sides = || RINGS.iter().flat_map(|far| SIDES_PX.map(|side| at(*far, side)));
+        let free = sides().find(|spot| clearance(spot) >= 0);
+        let Some(spot) = free.or_else(|| sides().max_by_key(clearance)) else { continue };
+        spots.push(spot);
+    }
+    spots
 }
 
 impl Dome {
@@ -230,4 +276,37 @@ fn scale(area: &Area<'_>, (left_px, top_px): (i32, i32), low: f64, high: f64) ->
     let style = anchored(12, HPos::Center, VPos::Bottom);
     area.draw(&Text::new("C/N0 (dB-Hz)", (left + 14 * FINE, top - 10 * FINE), style))?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hand_made::Draw;
+
+    /// Skies of sixteen satellites with three pairs of neighbours whose dots overlap.
+    #[test]
+    fn names_of_neighbours_do_not_overlap() {
+        let mut draw = Draw(3);
+        for _ in 0..200 {
+            let mut place =
+                || ((100.0 + 60.0 * draw.normal()) as i32 * FINE, (100.0 + 60.0 * draw.normal()) as i32 * FINE);
+            let mut ends: Vec<(i32, i32)> = (0..10).map(|_| place()).collect();
+            ends.extend_from_within(..3);
+            ends.iter_mut().skip(10).for_each(|end| end.0 += 6 * FINE);
+            let track = |end: &(i32, i32)| Track {
+                sv: Sv::gps(1),
+                places: vec![(end.0 - 3 * FINE, end.1), *end],
+                cn0_dbhz: None,
+                observed: true,
+            };
+            let tracks: Vec<Track> = ends.iter().map(track).collect();
+            let spots = names(&tracks);
+            assert_eq!(spots.len(), ends.len());
+            for (at, spot) in spots.iter().enumerate() {
+                for other in &spots[..at] {
+                    assert!(spot.clearance(other.middle, NAME_PX) >= 0, "{spot:?} {other:?}");
+                }
+            }
+        }
+    }
 }
