@@ -4,6 +4,8 @@
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
 use std::path::PathBuf;
+use std::thread;
+use std::time::Duration;
 
 use crate::cli::error::CliError;
 use crate::cli::scenario;
@@ -58,6 +60,29 @@ pub fn listen(address: SocketAddr, what: &str) -> Result<(TcpListener, SocketAdd
     }
     scenario::note(&format!("{what}: listening on {own}"));
     Ok((listener, own))
+}
+
+/// Pause before a failed call on a socket is tried again.
+pub const RETRY: Duration = Duration::from_millis(100);
+
+/// Takes the next client. While none can be taken, as without free file descriptors, it says so once and
+/// tries again.
+pub fn accept(listener: &TcpListener, what: &str) -> (TcpStream, SocketAddr) {
+    let mut is_said = false;
+    loop {
+        match listener.accept() {
+            Ok(client) => return client,
+            // Gone before it was taken: the next one, then.
+            Err(error) if matches!(error.kind(), io::ErrorKind::ConnectionAborted | io::ErrorKind::Interrupted) => {}
+            Err(error) => {
+                if !is_said {
+                    scenario::warn(&format!("{what}: cannot take a client: {error}; trying again"));
+                    is_said = true;
+                }
+                thread::sleep(RETRY);
+            }
+        }
+    }
 }
 
 /// Text of a peer's address: `PORT` on this machine, or `HOST:PORT`.

@@ -254,6 +254,10 @@ pub struct Live {
     /// Source of the pace
     #[arg(long, value_enum, default_value_t = Clock::Sink)]
     pub clock: Clock,
+    /// Time in seconds for which the first sink waits for a receiver in place of one that left tcp:ADDR or
+    /// rtl-tcp:ADDR; 0 ends the run at once
+    #[arg(long, value_name = "S", default_value_t = 30)]
+    pub reconnect: u64,
     /// Lead of the samples over their due time, in milliseconds; a delay up to it causes no underrun
     #[arg(long, value_name = "MS", default_value_t = 8.0, value_parser = latency)]
     pub latency: f64,

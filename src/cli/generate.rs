@@ -204,7 +204,7 @@ fn to_stream(stream: &sink::Spec, arguments: &args::Generate, scene: &Scene, par
         None => truth::Several::default(),
     };
     let metadata = &scene.metadata;
-    let mut sink = stream.open(metadata)?;
+    let mut sink = stream.open(metadata, false)?;
     if arguments.printed.in_words() {
         scenario::note(&format!(
             "samples: {}, {} a second, {} Hz in the middle, {} of them to {stream}",

@@ -12,7 +12,7 @@ use std::str::FromStr;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
-use crate::cli::address::{listen, listen_address, path};
+use crate::cli::address::{accept, listen, listen_address, path};
 use crate::cli::error::{CliError, shown};
 use crate::cli::scenario;
 use crate::cli::staging::{InSight, Staging};
@@ -130,15 +130,15 @@ impl Clients {
         let thread = thread::Builder::new().name("clients".to_owned()).stack_size(STACK_BYTES);
         // It ends with the process.
         thread
-            .spawn(move || accept(&listener, &waiting))
+            .spawn(move || take_clients(&listener, &waiting))
             .map_err(|error| CliError::create(format!("a listener on {own}"), &error))?;
         Ok(Self { what: what.to_owned(), streams })
     }
 }
 
-fn accept(listener: &TcpListener, streams: &Mutex<Vec<TcpStream>>) {
-    for stream in listener.incoming() {
-        let Ok(stream) = stream else { continue };
+fn take_clients(listener: &TcpListener, streams: &Mutex<Vec<TcpStream>>) {
+    loop {
+        let (stream, _) = accept(listener, "lines");
         let ready = stream.set_nonblocking(true).and_then(|()| stream.set_nodelay(true));
         let mut streams = streams.lock().unwrap_or_else(PoisonError::into_inner);
         if ready.is_ok() && streams.len() < MOST_CLIENTS {
@@ -202,7 +202,7 @@ mod tests {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap();
         let streams = Arc::clone(&clients.streams);
-        thread::spawn(move || accept(&listener, &streams));
+        thread::spawn(move || take_clients(&listener, &streams));
         let [mut good, idle, gone] = [(); 3].map(|()| TcpStream::connect(address).unwrap());
         while clients.streams.lock().unwrap().len() < 3 {
             thread::yield_now();

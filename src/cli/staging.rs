@@ -88,11 +88,33 @@ impl InSight {
         refuse_others(&target)?;
         let error = |error: io::Error| CliError::create(path.display(), &error);
         // What an earlier one of these left has no marker yet.
-        if !path.join(ROWS).is_file() {
+        if !ROWS.iter().any(|rows| path.join(rows).is_file()) {
             refuse_others(&path)?;
         }
         remove(&path).and_then(|()| fs::create_dir(&path)).map_err(error)?;
         Ok(Self { path, target })
+    }
+
+    /// Starts a directory that will be `target`, and keeps what an earlier one left unfinished if it has a
+    /// file `proof`: that gets the first free name `<name>.unfinished-1` and on, which is returned.
+    pub fn beside(target: &Path, proof: &str) -> Result<(Self, Option<PathBuf>), CliError> {
+        let path = unfinished(target)?;
+        if !path.join(proof).is_file() {
+            return Ok((Self::directory(target)?, None));
+        }
+        let error = |error: io::Error| CliError::create(path.display(), &error);
+        let mut number = 0_u32;
+        let kept = loop {
+            number += 1;
+            let mut name = path.as_os_str().to_owned();
+            name.push(format!("-{number}"));
+            let name = PathBuf::from(name);
+            if !present(&name).map_err(error)? {
+                break name;
+            }
+        };
+        fs::rename(&path, &kept).map_err(error)?;
+        Ok((Self::directory(target)?, Some(kept)))
     }
 
     /// Starts a file that will be `target`.
@@ -117,8 +139,8 @@ impl InSight {
     }
 }
 
-/// A file that every reception has from its beginning.
-const ROWS: &str = "observations.csv";
+/// Files that every reception and every record of a live run have from their beginning.
+const ROWS: [&str; 2] = ["observations.csv", "inputs.csv"];
 
 fn unfinished(target: &Path) -> Result<PathBuf, CliError> {
     let mut name = name(target)?.to_owned();

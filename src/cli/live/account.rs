@@ -1,5 +1,6 @@
 //! Statistics of a live run: counts, ages and rates, once a second as a line of JSON and at the end.
 
+use std::mem::{Discriminant, discriminant};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
@@ -74,6 +75,9 @@ pub struct Handed {
     /// Writes that took longer than the sink's samples in the ring last.
     pub stalls: u64,
     pub longest_write: Duration,
+    /// Clients that left, and blocks that were lost until another one came.
+    pub clients_left: u64,
+    pub lost_blocks: u64,
     /// Ages from a push's arrival until its first sample was handed over.
     pub ages: Ages,
 }
@@ -86,7 +90,7 @@ pub struct Intake {
     pub malformed: u64,
     /// Description of the first malformed message.
     pub first_malformed: Option<String>,
-    /// Messages from another sender than the first.
+    /// Messages from another sender than the one that is heard.
     pub strangers: u64,
     /// Too many at once.
     pub dropped: u64,
@@ -119,9 +123,12 @@ pub struct Made {
     pub duplicates: u64,
     pub out_of_order: u64,
     pub before_start: u64,
+    pub ahead: u64,
     pub not_finite: u64,
     pub refused: u64,
     pub last_refusal: Option<String>,
+    /// Kinds of refusals so far.
+    kinds: Vec<Discriminant<Refusal>>,
     pub events: u64,
     pub events_refused: u64,
     /// Fewest blocks that waited for the first sink in the second.
@@ -151,15 +158,23 @@ impl Made {
         }
     }
 
-    pub fn refuse(&mut self, refusal: &Refusal) {
+    /// Counts a refusal; true for the first one of its kind.
+    pub fn refuse(&mut self, refusal: &Refusal) -> bool {
         match refusal {
             Refusal::Duplicate(_) => self.duplicates += 1,
             Refusal::OutOfOrder(..) => self.out_of_order += 1,
             Refusal::BeforeStart(_) => self.before_start += 1,
+            Refusal::Ahead(..) => self.ahead += 1,
             Refusal::NotFinite => self.not_finite += 1,
             _ => self.refused += 1,
         }
         self.last_refusal = Some(refusal.to_string());
+        let kind = discriminant(refusal);
+        let is_new = !self.kinds.contains(&kind);
+        if is_new {
+            self.kinds.push(kind);
+        }
+        is_new
     }
 
     /// One object with everything.
@@ -171,6 +186,8 @@ impl Made {
             "low_water": self.low_water,
             "underruns": handed.underruns,
             "stalls": handed.stalls,
+            "clients_left": handed.clients_left,
+            "lost_blocks": handed.lost_blocks,
             "longest_write_ms": handed.longest_write.as_secs_f64() * 1e3,
             "dropped_blocks": self.dropped_blocks,
             "slowest_tick_ms": self.slowest_tick.as_secs_f64() * 1e3,
@@ -192,6 +209,7 @@ impl Made {
                 "duplicates": self.duplicates,
                 "out_of_order": self.out_of_order,
                 "before_start": self.before_start,
+                "ahead": self.ahead,
                 "not_finite": self.not_finite,
                 "refused": self.refused,
                 "last_refusal": self.last_refusal,

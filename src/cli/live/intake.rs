@@ -1,7 +1,7 @@
 //! Motion and events on their way in: a UDP socket, a TCP listener or standard input, on a thread of its own.
 //!
 //! What arrives is data from outside: lengths are bounded before anything is read of them, and nothing is
-//! reserved by their word. Of UDP the first sender counts until it says goodbye; of TCP one client at a time.
+//! reserved by their word. One sender is heard at a time ([`Peers`]); others are ignored and named.
 
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, Read};
@@ -12,7 +12,8 @@ use std::thread;
 use std::time::Instant;
 
 use super::account::Intake;
-use crate::cli::address::{listen, listen_address};
+use super::peers::{Heard, Peers};
+use crate::cli::address::{RETRY, accept, listen, listen_address};
 use crate::cli::error::CliError;
 use crate::cli::scenario;
 use live::wire::{MOST_BYTES, MOST_DATAGRAM_BYTES, Message, Reader, WireError, pieces};
@@ -86,10 +87,37 @@ impl Inbox {
             Ok(message) => {
                 if inside.messages.len() >= MOST_WAITING {
                     inside.messages.pop_front();
+                    if inside.intake.dropped == 0 {
+                        scenario::warn(&format!(
+                            "motion: over {MOST_WAITING} messages within a tick: older ones are dropped, counted"
+                        ));
+                    }
                     inside.intake.dropped += 1;
                 }
                 inside.messages.push_back((Instant::now(), message));
             }
+        }
+    }
+
+    /// True if something counts, by the answer to it. The end of a sender that was silent is put in.
+    fn admits(&self, heard: Heard) -> bool {
+        match heard {
+            Heard::Same | Heard::First => {}
+            Heard::Instead => self.end(),
+            Heard::Ignored => {
+                let mut inside = self.inside();
+                inside.intake.messages += 1;
+                inside.intake.strangers += 1;
+            }
+        }
+        heard != Heard::Ignored
+    }
+
+    /// A sender ended without a word.
+    fn end(&self) {
+        let mut inside = self.inside();
+        if inside.messages.len() < MOST_WAITING {
+            inside.messages.push_back((Instant::now(), Message::Bye));
         }
     }
 }
@@ -102,7 +130,7 @@ pub fn begin(origin: Origin, reader: Reader) -> Result<Arc<Inbox>, CliError> {
     let inbox = Arc::new(Inbox::default());
     let own = Arc::clone(&inbox);
     let work: Box<dyn FnOnce() + Send> = match origin {
-        Origin::Stdin => Box::new(move || lines(io::stdin().lock(), &own, reader)),
+        Origin::Stdin => Box::new(move || lines(io::stdin().lock(), &own, &reader, || Heard::Same)),
         Origin::Tcp(address) => {
             let (listener, _) = listen(address, "motion")?;
             Box::new(move || clients(&listener, &own, &reader))
@@ -126,15 +154,18 @@ pub fn begin(origin: Origin, reader: Reader) -> Result<Arc<Inbox>, CliError> {
 fn datagrams(socket: &UdpSocket, inbox: &Inbox, fresh: &Reader) {
     let mut reader = fresh.clone();
     let mut buffer = [0; MOST_DATAGRAM_BYTES + 1];
-    let mut known: Option<SocketAddr> = None;
+    let mut peers = Peers::default();
     loop {
-        // A failed receive is one of an earlier answer on this socket; there are none.
-        let Ok((length, sender)) = socket.recv_from(&mut buffer) else { continue };
-        if *known.get_or_insert(sender) != sender {
-            let mut inside = inbox.inside();
-            inside.intake.messages += 1;
-            inside.intake.strangers += 1;
+        let Ok((length, sender)) = socket.recv_from(&mut buffer) else {
+            thread::sleep(RETRY);
             continue;
+        };
+        let heard = peers.hear(sender, Instant::now());
+        if !inbox.admits(heard) {
+            continue;
+        }
+        if heard != Heard::Same {
+            reader = fresh.clone();
         }
         let bytes = buffer.get(..length).unwrap_or_default();
         if length > MOST_DATAGRAM_BYTES {
@@ -146,7 +177,7 @@ fn datagrams(socket: &UdpSocket, inbox: &Inbox, fresh: &Reader) {
             let ends = came == Ok(Message::Bye);
             inbox.take(piece, came);
             if ends {
-                (known, reader) = (None, fresh.clone());
+                peers.leave(sender);
                 break;
             }
         }
@@ -160,16 +191,38 @@ fn shown(bytes: &[u8]) -> String {
     if line.len() > SHOWN_BYTES { begun + "…" } else { begun }
 }
 
-fn clients(listener: &TcpListener, inbox: &Inbox, fresh: &Reader) {
+/// Takes clients, each on a thread of its own, so that one that is silent holds up no other.
+fn clients(listener: &TcpListener, inbox: &Arc<Inbox>, fresh: &Reader) {
+    let peers = Arc::new(Mutex::new(Peers::default()));
     loop {
-        if let Ok((client, _)) = listener.accept() {
-            lines(BufReader::with_capacity(4096, client), inbox, fresh.clone());
+        let (client, peer) = accept(listener, "motion");
+        let client = Arc::new(client);
+        locked(&peers).enter(peer, Arc::clone(&client), Instant::now());
+        let (own, inbox, fresh) = (Arc::clone(&peers), Arc::clone(inbox), fresh.clone());
+        let work = move || {
+            let hear = || locked(&own).hear(peer, Instant::now());
+            lines(BufReader::with_capacity(4096, &*client), &inbox, &fresh, hear);
+            if locked(&own).leave(peer) {
+                inbox.end();
+            }
+        };
+        let thread = thread::Builder::new().name("motion client".to_owned()).stack_size(STACK_BYTES).spawn(work);
+        if let Err(error) = thread {
+            scenario::warn(&format!("motion: client {peer} is disconnected: cannot start a thread: {error}"));
+            locked(&peers).leave(peer);
+            thread::sleep(RETRY);
         }
     }
 }
 
-/// Takes lines to the end of the input; what is beyond the longest line is passed over to the next.
-fn lines(mut input: impl BufRead, inbox: &Inbox, mut reader: Reader) {
+fn locked(peers: &Mutex<Peers>) -> MutexGuard<'_, Peers> {
+    peers.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Takes lines to the end of the input, those that `hear` admits; what is beyond the longest line is passed
+/// over to the next.
+fn lines(mut input: impl BufRead, inbox: &Inbox, fresh: &Reader, mut hear: impl FnMut() -> Heard) {
+    let mut reader = fresh.clone();
     let mut line = Vec::with_capacity(MOST_BYTES + 1);
     loop {
         line.clear();
@@ -178,8 +231,18 @@ fn lines(mut input: impl BufRead, inbox: &Inbox, mut reader: Reader) {
             Ok(0) | Err(_) => return,
             Ok(_) => {}
         }
+        if line.trim_ascii().is_empty() {
+            continue;
+        }
+        let heard = hear();
+        let counts = inbox.admits(heard);
+        if matches!(heard, Heard::First | Heard::Instead) {
+            reader = fresh.clone();
+        }
         if line.len() > MOST_BYTES && !line.ends_with(b"\n") {
-            inbox.take(&line, Err(WireError::Long));
+            if counts {
+                inbox.take(&line, Err(WireError::Long));
+            }
             loop {
                 line.clear();
                 match input.by_ref().take(MOST_BYTES as u64).read_until(b'\n', &mut line) {
@@ -190,16 +253,19 @@ fn lines(mut input: impl BufRead, inbox: &Inbox, mut reader: Reader) {
             }
             continue;
         }
-        let text = std::str::from_utf8(&line).map(str::trim);
-        if text == Ok("") {
-            continue;
+        if counts {
+            let text = std::str::from_utf8(&line).map_err(|_| WireError::NotText);
+            inbox.take(&line, text.and_then(|text| reader.line(text.trim())));
         }
-        inbox.take(&line, text.map_err(|_| WireError::NotText).and_then(|text| reader.line(text)));
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::io::Write;
+    use std::net::TcpStream;
+
+    use super::super::peers::SILENCE;
     use super::*;
     use gnss::time::Epoch;
 
@@ -208,7 +274,7 @@ mod tests {
         let inbox = Inbox::default();
         let mut text = vec![b'x'; 5000];
         text.extend_from_slice(b"\n1 2 3 4\n\nhello\nnonsense 1\n\xff\xfe\n5 6 7 8");
-        lines(text.as_slice(), &inbox, Reader::new(Epoch::new(0, 0.0), 0.0));
+        lines(text.as_slice(), &inbox, &Reader::new(Epoch::new(0, 0.0), 0.0), || Heard::Same);
         let mut messages = Vec::new();
         let intake = inbox.drain(&mut messages);
         assert_eq!((intake.messages, intake.malformed), (6, 3));
@@ -246,11 +312,63 @@ mod tests {
         assert!(quoted.starts_with(r"'1 2\x07': ") && quoted.contains("expected"), "{quoted}");
     }
 
+    /// All messages, once there are so many.
+    fn at_least(inbox: &Inbox, count: usize) -> Vec<Message> {
+        let (mut all, mut messages) = (Vec::new(), Vec::new());
+        while all.len() < count {
+            inbox.drain(&mut messages);
+            all.extend(messages.iter().map(|(_, message)| *message));
+            thread::yield_now();
+        }
+        all
+    }
+
+    #[test]
+    fn a_rig_that_restarts_with_another_port_is_heard_after_the_silence_of_the_first() {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let (address, inbox) = (socket.local_addr().unwrap(), Arc::new(Inbox::default()));
+        let own = Arc::clone(&inbox);
+        thread::spawn(move || datagrams(&socket, &own, &Reader::new(Epoch::new(0, 0.0), 0.0)));
+        let [first, second] = [(); 2].map(|()| UdpSocket::bind("127.0.0.1:0").unwrap());
+        first.send_to(b"1 2 3 4", address).unwrap();
+        at_least(&inbox, 1);
+        second.send_to(b"2 2 3 4", address).unwrap();
+        // Longer than the silence by a tenth of a second, which it takes at most to be scheduled.
+        thread::sleep(SILENCE + RETRY);
+        second.send_to(b"3 2 3 4", address).unwrap();
+        let came = at_least(&inbox, 2);
+        assert!(matches!(came.as_slice(), [Message::Bye, Message::Push(push)] if push.t_s == 3.0), "{came:?}");
+        assert_eq!(inbox.drain(&mut Vec::new()).strangers, 1);
+    }
+
+    #[test]
+    fn clients_that_are_silent_hold_up_none_that_sends_however_many_they_are() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let (address, inbox) = (listener.local_addr().unwrap(), Arc::new(Inbox::default()));
+        let own = Arc::clone(&inbox);
+        thread::spawn(move || clients(&listener, &own, &Reader::new(Epoch::new(0, 0.0), 0.0)));
+        let silent: Vec<_> = (0..40).map(|_| TcpStream::connect(address).unwrap()).collect();
+        let mut rig = TcpStream::connect(address).unwrap();
+        rig.write_all(b"1 2 3 4\n").unwrap();
+        assert!(matches!(at_least(&inbox, 1).as_slice(), [Message::Push(push)] if push.t_s == 1.0));
+        // What another one sends is ignored and counted, until the rig leaves.
+        let mut other = TcpStream::connect(address).unwrap();
+        other.write_all(b"2 2 3 4\n").unwrap();
+        while inbox.drain(&mut Vec::new()).strangers == 0 {
+            thread::yield_now();
+        }
+        drop(rig);
+        assert_eq!(at_least(&inbox, 1), [Message::Bye]);
+        other.write_all(b"3 2 3 4\n").unwrap();
+        assert!(matches!(at_least(&inbox, 1).as_slice(), [Message::Push(push)] if push.t_s == 3.0));
+        drop(silent);
+    }
+
     #[test]
     fn a_flood_keeps_the_newest() {
         let inbox = Inbox::default();
         let text: String = (0..10_000).map(|k| format!("{k} 0 0 0\n")).collect();
-        lines(text.as_bytes(), &inbox, Reader::new(Epoch::new(0, 0.0), 0.0));
+        lines(text.as_bytes(), &inbox, &Reader::new(Epoch::new(0, 0.0), 0.0), || Heard::Same);
         let mut messages = Vec::new();
         assert_eq!(inbox.drain(&mut messages).dropped, 10_000 - MOST_WAITING as u64);
         assert!(matches!(messages.last(), Some((_, Message::Push(last))) if last.t_s == 9999.0));

@@ -7,18 +7,20 @@
 mod account;
 pub mod intake;
 mod output;
+mod peers;
 mod record;
 mod ring;
+mod times;
 
 use std::collections::VecDeque;
 use std::io::{IsTerminal, Write};
 use std::sync::Arc;
 use std::thread;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use crate::cli::args::{self, MotionTime, StartAt};
+use crate::cli::args::{self, MotionTime};
 use crate::cli::error::CliError;
 use crate::cli::interrupt;
 use crate::cli::run::generator_error;
@@ -31,16 +33,15 @@ use generator::truth;
 use generator::vehicle::joining::Push;
 use gnss::earth::Geodetic;
 use gnss::samples::Format;
-use gnss::time::{Epoch, Rate};
+use gnss::time::Rate;
 use intake::Inbox;
 use live::drive::{Driver, Made as Tick};
 use live::wire::{Message, Reader};
 use output::{Output, Pace};
 use record::{Recorder, Run};
 use ring::{Block, Put};
+use times::{Zero, instant};
 
-/// Seconds from the Unix epoch to that of GPS time, leap seconds left out.
-const GPS_UNIX_S: i64 = 315_964_800;
 /// Polling interval for signals during a wait.
 const LOOK: Duration = Duration::from_millis(20);
 /// Time limit of the sinks for the rest after a signal.
@@ -85,9 +86,10 @@ pub fn execute(arguments: &args::Live) -> Result<(), CliError> {
         Some(recorder) => Driver::new(scene, &mut recorder.truth),
         None => Driver::new(scene, &mut ()),
     };
-    let driver = driver.map_err(generator_error)?;
-    let sinks: Result<Vec<_>, CliError> = arguments.to.iter().map(|spec| spec.open(&scene.metadata)).collect();
-    let sinks = sinks?;
+    let discard = || recorder.iter().for_each(Recorder::discard);
+    let driver = driver.map_err(generator_error).inspect_err(|_| discard())?;
+    let sinks: Result<Vec<_>, CliError> = arguments.to.iter().map(|spec| spec.open(&scene.metadata, true)).collect();
+    let sinks = sinks.inspect_err(|_| discard())?;
     interrupt::ends_work();
     let pace = Pace::new(arguments, scene.clock.rate, start.map(|(_, at)| at));
     let tick_s = scene.clock.rate.elapsed_s(driver.tick_samples());
@@ -97,33 +99,9 @@ pub fn execute(arguments: &args::Live) -> Result<(), CliError> {
         .map(|((number, sink), spec)| Output::begin((number, spec), sink, pace, tick_s))
         .collect();
     scenario::note(&format!("the first sample is of {0}: gnss-twin receive --start {0}", scene.clock.start));
-    let first_is_now = arguments.motion_time == MotionTime::First;
-    let live = Live { driver, recorder, inbox, outputs: outputs?, pace, scene, made: Made::default(), first_is_now };
+    let zero = (arguments.motion_time == MotionTime::First).then(Zero::default);
+    let live = Live { driver, recorder, inbox, outputs: outputs?, pace, scene, made: Made::default(), zero };
     live.run(arguments, &Run { named: &named, scene, overrides: &overrides, restarted: start.is_some() })
-}
-
-/// The GPS time with which a run starts, and the machine's.
-fn instant(at: StartAt) -> Result<(Epoch, SystemTime), CliError> {
-    let now = SystemTime::now().duration_since(UNIX_EPOCH).map_err(|_| CliError::usage("--start-at: no clock"))?;
-    let unix = |gps: i64| gps - Epoch::new(gps, 0.0).leap_seconds() + GPS_UNIX_S;
-    let (epoch, unix_s) = match at {
-        StartAt::Utc(epoch) => (epoch, unix(epoch.seconds())),
-        StartAt::After(seconds) => {
-            let unix_s = (now.as_secs_f64() + seconds).ceil() as i64;
-            let gps = unix_s - GPS_UNIX_S;
-            // Leap seconds are those of the time itself, a second look for one just inserted.
-            let gps = gps + Epoch::new(gps, 0.0).leap_seconds();
-            (Epoch::new(gps, 0.0), unix_s)
-        }
-    };
-    let at = UNIX_EPOCH + Duration::from_secs(unix_s.max(0) as u64);
-    if at < SystemTime::now() {
-        return Err(CliError::usage(format!(
-            "--start-at: {} is over: expected a second to come, or +S",
-            epoch.to_utc_text()
-        )));
-    }
-    Ok((epoch, at))
 }
 
 /// A live run at work.
@@ -135,8 +113,8 @@ struct Live<'a> {
     pace: Pace,
     scene: &'a Scene,
     made: Made,
-    /// True if the first state defines the time.
-    first_is_now: bool,
+    /// Zero of the times of states, if the first state defines it.
+    zero: Option<Zero>,
 }
 
 /// Reason why a run ended.
@@ -149,7 +127,7 @@ enum End {
 
 impl Live<'_> {
     fn run(mut self, arguments: &args::Live, run: &Run<'_>) -> Result<(), CliError> {
-        let ended = self.ticks();
+        let ended = self.ticks(run);
         // Sinks have what was made, whatever ended it.
         self.outputs.iter().for_each(|output| output.ring.end());
         let patience = |output: &Output| {
@@ -214,7 +192,7 @@ impl Live<'_> {
     }
 
     /// Makes ticks to the scene's end, a signal, or the first sink's end.
-    fn ticks(&mut self) -> Result<End, CliError> {
+    fn ticks(&mut self, run: &Run<'_>) -> Result<End, CliError> {
         let (mut messages, mut arrivals) = (Vec::new(), VecDeque::new());
         let mut used: VecDeque<Arc<Block>> = VecDeque::new();
         let mut status = Instant::now() + Duration::from_secs(1);
@@ -246,6 +224,7 @@ impl Live<'_> {
             self.made.tick(tick.samples.0, tick.samples.1.min(self.scene.samples), tick.tick.as_ref());
             if let Some(recorder) = &mut self.recorder {
                 recorder.tick(&tick, &bytes, self.scene.metadata.format.bytes())?;
+                recorder.keep(run)?;
             }
             let block = Arc::new(Block { bytes, first: tick.samples.0, shows: shown(&tick, &mut arrivals) });
             self.hand(&block);
@@ -293,9 +272,16 @@ impl Live<'_> {
         for (at, message) in messages {
             match message {
                 Message::Push(push) => {
-                    let push = &self.timed(push, now_s);
+                    let push = match &mut self.zero {
+                        Some(zero) => &zero.timed(push, now_s),
+                        None => push,
+                    };
+                    self.made.offset_s = self.zero.as_ref().and_then(Zero::offset_s);
                     self.count_turn(push);
                     let taken = self.driver.offer(push);
+                    if let Some(zero) = &mut self.zero {
+                        zero.judge(&taken);
+                    }
                     match &taken {
                         Ok(number) => {
                             self.made.taken += 1;
@@ -306,10 +292,9 @@ impl Live<'_> {
                             }
                         }
                         Err(refusal) => {
-                            if self.made.last_refusal.is_none() {
+                            if self.made.refuse(refusal) {
                                 scenario::warn(&format!("motion: {refusal}; further ones are counted"));
                             }
-                            self.made.refuse(refusal);
                         }
                     }
                     if let Some(recorder) = &mut self.recorder {
@@ -330,20 +315,11 @@ impl Live<'_> {
                         self.made.events_refused += 1;
                     }
                 },
-                Message::Half | Message::Hello | Message::Bye => {}
+                Message::Bye => self.zero.iter_mut().for_each(|zero| *zero = Zero::default()),
+                Message::Half | Message::Hello => {}
             }
         }
         Ok(())
-    }
-
-    /// A state by the scene's time: where the first one sets it, that one is of the instant at which it is
-    /// used.
-    fn timed(&mut self, push: &Push, now_s: f64) -> Push {
-        if !self.first_is_now {
-            return *push;
-        }
-        let offset_s = *self.made.offset_s.get_or_insert(now_s - push.t_s);
-        Push { t_s: push.t_s + offset_s, ..*push }
     }
 
     /// Counts an attitude, and says once where the scene does not turn by it.

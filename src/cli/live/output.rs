@@ -9,6 +9,7 @@ use super::account::Handed;
 use super::ring::{Block, Ring};
 use crate::cli::args::{self, Clock};
 use crate::cli::error::CliError;
+use crate::cli::scenario;
 use crate::cli::sink::{Sink, Spec};
 use gnss::time::Rate;
 
@@ -29,6 +30,8 @@ pub struct Pace {
     /// Earliest time at which sample 0 is handed over.
     start: Instant,
     ahead: Duration,
+    /// Time for which the first sink waits for a client in place of one that left.
+    reconnect: Duration,
 }
 
 impl Pace {
@@ -39,7 +42,8 @@ impl Pace {
         let wait = at.and_then(|at| at.duration_since(SystemTime::now()).ok());
         let least = ahead + WARM_UP;
         let start = now + wait.unwrap_or(least).max(least);
-        Self { clock: arguments.clock, rate, start, ahead }
+        let reconnect = Duration::from_secs(arguments.reconnect);
+        Self { clock: arguments.clock, rate, start, ahead, reconnect }
     }
 
     /// Time at which a sample is due by the machine's clock.
@@ -82,11 +86,13 @@ impl Output {
     ) -> Result<Self, CliError> {
         let ring = Arc::new(Ring::new(pace.blocks(tick_s)));
         let handed = Arc::new(Mutex::default());
-        let work = Work { ring: Arc::clone(&ring), handed: Arc::clone(&handed), pace, tick_s, first: number == 0 };
+        let (name, first) = (spec.to_string(), number == 0);
+        let work =
+            Work { ring: Arc::clone(&ring), handed: Arc::clone(&handed), pace, tick_s, first, name: name.clone() };
         let thread = thread::Builder::new().name(format!("sink {number}")).stack_size(STACK_BYTES);
         let thread = thread.spawn(move || work.run(sink));
         let thread = thread.map_err(|error| CliError::passing(format!("cannot start a thread: {error}")))?;
-        Ok(Self { ring, name: spec.to_string(), handed, thread })
+        Ok(Self { ring, name, handed, thread })
     }
 
     /// True if the output is complete or failed, and takes nothing any more.
@@ -118,18 +124,57 @@ struct Work {
     pace: Pace,
     tick_s: f64,
     first: bool,
+    name: String,
 }
+
+/// Polling interval for another client.
+const LOOK: Duration = Duration::from_millis(50);
 
 impl Work {
     fn run(self, mut sink: Box<dyn Sink>) -> io::Result<()> {
         while let Some((block, dry)) = self.ring.take() {
             let written = self.write(sink.as_mut(), &block, dry);
+            let written = written.or_else(|left| self.reconnect(sink.as_mut(), left));
             if written.is_err() {
                 self.ring.leave();
                 return written;
             }
         }
         sink.finish()
+    }
+
+    /// Waits for another client after one that `left`, with an error, and drops what is made meanwhile. Only
+    /// where the first sink sets the pace, the scene waits too.
+    fn reconnect(&self, sink: &mut dyn Sink, left: io::Error) -> io::Result<()> {
+        if !sink.is_returning() || self.pace.reconnect.is_zero() {
+            return Err(left);
+        }
+        let (since, waits) = (Instant::now(), self.first && self.pace.clock != Clock::Host);
+        let meanwhile = if waits { "the scene waits" } else { "samples are lost" };
+        scenario::warn(&format!("{}: {left}: {meanwhile} until another one comes", self.name));
+        // The block that was under way is lost with its client.
+        self.lose(1, 1);
+        // One that left before it was greeted is none.
+        while !sink.again(LOOK).unwrap_or(false) {
+            let is_over = self.first && since.elapsed() > self.pace.reconnect;
+            if is_over || self.ring.has_ended() {
+                return Err(left);
+            }
+            if !waits {
+                self.lose(0, self.ring.clear());
+            }
+        }
+        let mut handed = self.handed.lock().unwrap_or_else(PoisonError::into_inner);
+        // Rate and shortage are those of the new client.
+        handed.since = Instant::now().checked_sub(Duration::from_secs_f64(self.pace.rate.elapsed_s(handed.samples)));
+        Ok(())
+    }
+
+    /// Counts clients that left and blocks that were lost by that.
+    fn lose(&self, clients: u64, blocks: u64) {
+        let mut handed = self.handed.lock().unwrap_or_else(PoisonError::into_inner);
+        handed.clients_left += clients;
+        handed.lost_blocks += blocks;
     }
 
     fn write(&self, sink: &mut dyn Sink, block: &Block, dry: bool) -> io::Result<()> {

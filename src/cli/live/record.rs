@@ -1,16 +1,20 @@
 //! The record of a live run: what came in, what each tick became, what was switched, the truth, and the
 //! scenario that sends it all again.
+//!
+//! A record grows in `DIR.unfinished`. Its scenario is brought up to what is written every second, so that a
+//! killed run leaves a record that replays; the next run gives it another name.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use sha2::{Digest, Sha256};
 
 use crate::cli::error::CliError;
 use crate::cli::run::truth_error;
-use crate::cli::scenario::Named;
-use crate::cli::staging::Staging;
+use crate::cli::scenario::{self, Named};
+use crate::cli::staging::InSight;
 use generator::event::{self, Event};
 use generator::scenario::Overrides;
 use generator::scene::Scene;
@@ -25,6 +29,13 @@ fn failed(error: &std::io::Error) -> CliError {
     CliError::output("the record", error)
 }
 
+/// Time between two states of a record that replay.
+const KEPT: Duration = Duration::from_secs(1);
+/// Bytes of rows that wait to be written: more than come within that time at 1000 ticks a second.
+const ROWS_BYTES: usize = 1 << 20;
+/// Scenario that replays a record.
+const REPLAY: &str = "replay.toml";
+
 /// Scene of a run, with the changes of the command line.
 #[derive(Clone, Copy)]
 pub struct Run<'a> {
@@ -37,7 +48,7 @@ pub struct Run<'a> {
 
 /// A record in the making.
 pub struct Recorder {
-    staging: Staging,
+    making: InSight,
     target: PathBuf,
     ticks: BufWriter<File>,
     inputs: BufWriter<File>,
@@ -45,18 +56,27 @@ pub struct Recorder {
     pub truth: truth::Writer,
     sent: Sha256,
     samples: u64,
+    /// Time of the last state that replays.
+    kept: Instant,
+    /// True if a failure of that was reported.
+    is_warned: bool,
 }
 
 impl Recorder {
     /// Starts a record of `scene` that will be `target`.
     pub fn create(target: &Path, scene: &Scene) -> Result<Self, CliError> {
-        let staging = Staging::directory(target)?;
+        let (making, kept) = InSight::beside(target, REPLAY)?;
+        if let Some(kept) = kept {
+            scenario::note(&format!("record of an earlier run that was cut off: {}", kept.display()));
+        }
         let create = |name: &str| {
-            let path = staging.path().join(name);
-            File::create(&path).map(BufWriter::new).map_err(|error| CliError::create(path.display(), &error))
+            let path = making.path().join(name);
+            File::create(&path)
+                .map(|file| BufWriter::with_capacity(ROWS_BYTES, file))
+                .map_err(|error| CliError::create(path.display(), &error))
         };
         let (mut ticks, mut inputs, mut events) = (create("ticks.csv")?, create("inputs.csv")?, create("events.csv")?);
-        let below = staging.path().join("truth");
+        let below = making.path().join("truth");
         fs::create_dir(&below).map_err(|error| CliError::create(below.display(), &error))?;
         let truth = truth::Writer::create(&below).map_err(truth_error)?;
         if let Some(first) = scene.trajectory.grown().and_then(|grown| grown.last()) {
@@ -71,7 +91,57 @@ impl Recorder {
         .and_then(|()| writeln!(events, "{}", event::HEADER))
         .map_err(|error| failed(&error))?;
         let target = target.to_owned();
-        Ok(Self { staging, target, ticks, inputs, events, truth, sent: Sha256::new(), samples: 0 })
+        let kept = Instant::now();
+        Ok(Self {
+            making,
+            target,
+            ticks,
+            inputs,
+            events,
+            truth,
+            sent: Sha256::new(),
+            samples: 0,
+            kept,
+            is_warned: false,
+        })
+    }
+
+    /// Removes a record of a run that did not begin.
+    pub fn discard(&self) {
+        // What cannot be removed is replaced by the next record of that name.
+        let _ = fs::remove_dir_all(self.making.path());
+    }
+
+    /// Writes out what came so far, and the scenario that replays it, if the last time was long enough ago.
+    pub fn keep(&mut self, run: &Run<'_>) -> Result<(), CliError> {
+        if self.samples == 0 || self.kept.elapsed() < KEPT {
+            return Ok(());
+        }
+        self.kept = Instant::now();
+        self.flush()?;
+        let text = replay(run, self.samples)?;
+        let kept = self.write("scenario.toml", &run.named.text).and_then(|()| self.write(REPLAY, &text));
+        // The run goes on, and the next second tries again; at the end it is an error.
+        if let Err(error) = kept
+            && !std::mem::replace(&mut self.is_warned, true)
+        {
+            scenario::warn("the record would not replay if the run were killed now");
+            error.print();
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<(), CliError> {
+        let mut outputs = [&mut self.ticks, &mut self.inputs, &mut self.events].into_iter();
+        outputs.try_for_each(Write::flush).map_err(|error| failed(&error))
+    }
+
+    /// Writes a file in one step, so that it is whole at any moment.
+    fn write(&self, name: &str, text: &str) -> Result<(), CliError> {
+        let path = self.making.path().join(name);
+        let part = path.with_extension("part");
+        let written = fs::write(&part, text).and_then(|()| fs::rename(&part, &path));
+        written.map_err(|error| CliError::output(path.display(), &error))
     }
 
     /// A push that came before the tick that begins at `sample`, and whether it was taken.
@@ -97,7 +167,7 @@ impl Recorder {
 
     /// An event that was applied at `sample`.
     pub fn event(&mut self, sample: u64, event: &Event) -> Result<(), CliError> {
-        writeln!(self.events, "{sample},{event}").map_err(|error| failed(&error))
+        writeln!(self.events, "{sample},{event}").and_then(|()| self.events.flush()).map_err(|error| failed(&error))
     }
 
     /// A tick and the bytes of its samples.
@@ -112,12 +182,9 @@ impl Recorder {
 
     /// Ends the record with a summary, the scenario as it was run and the one that replays it.
     pub fn finish(mut self, run: &Run<'_>, summary: serde_json::Value) -> Result<(), CliError> {
-        let digest = self.sent.finalize();
+        let digest = std::mem::take(&mut self.sent).finalize();
         let sha256: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
-        for output in [&mut self.ticks, &mut self.inputs, &mut self.events] {
-            output.flush().map_err(|error| failed(&error))?;
-        }
-        drop(self.truth);
+        self.flush()?;
         let mut summary = summary;
         if let Some(object) = summary.as_object_mut() {
             object.insert("start".to_owned(), run.scene.clock.start.to_string().into());
@@ -126,17 +193,14 @@ impl Recorder {
         }
         let mut text = serde_json::to_string_pretty(&summary).map_err(CliError::bug)?;
         text.push('\n');
-        let write = |name: &str, text: &str| {
-            let path = self.staging.path().join(name);
-            fs::write(&path, text).map_err(|error| CliError::output(path.display(), &error))
-        };
         // Not summary.json, which the judge of a record with rx/ writes.
-        write("live.json", &text)?;
-        write("scenario.toml", &run.named.text)?;
-        write("replay.toml", &replay(run, self.samples)?)?;
+        self.write("live.json", &text)?;
+        self.write("scenario.toml", &run.named.text)?;
+        self.write(REPLAY, &replay(run, self.samples)?)?;
+        drop(self.truth);
         let target = self.target;
-        self.staging.commit()?;
-        crate::cli::scenario::note(&format!("record in {}", target.display()));
+        self.making.commit()?;
+        scenario::note(&format!("record in {}", target.display()));
         Ok(())
     }
 }

@@ -86,6 +86,18 @@ impl Ring {
         self.changed.notify_all();
     }
 
+    /// True once no more blocks will come.
+    pub fn has_ended(&self) -> bool {
+        self.inside().ended
+    }
+
+    /// Drops what waits; the number of blocks.
+    pub fn clear(&self) -> u64 {
+        let dropped = std::mem::take(&mut self.inside().blocks).len() as u64;
+        self.changed.notify_all();
+        dropped
+    }
+
     /// No more blocks will be taken.
     pub fn leave(&self) {
         self.inside().gone = true;

@@ -1,9 +1,11 @@
 //! Sinks of samples while they are made: standard output, a FIFO, a TCP client, a client of rtl_tcp, a file.
 //!
 //! A write blocks until the reader has taken the block, so that the reader sets the pace. A listener takes
-//! the first client and disconnects later ones by name. It is on loopback unless another address is named.
-//! Limits: a FIFO is not made here, and a client that leaves cannot come back.
+//! one client and disconnects later ones by name; a live run takes another one in place of one that left. It
+//! is on loopback unless another address is named. Limits: a FIFO is not made here, and its reader cannot
+//! come back.
 
+mod door;
 mod plain;
 mod rtl_tcp;
 
@@ -12,6 +14,7 @@ use std::io;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::time::Duration;
 
 use crate::cli::address::{listen_address, path};
 use crate::cli::error::{CliError, shown};
@@ -46,16 +49,17 @@ impl Spec {
         text.parse().map(Some).map_err(|error: String| CliError::usage(format!("--out {}: {error}", shown(out))))
     }
 
-    /// Opens the sink for samples as `stream` describes them: waits until there is a reader.
+    /// Opens the sink for samples as `stream` describes them: waits until there is a reader. With `returning`
+    /// a listener takes another client after one that left.
     ///
     /// # Errors
     /// An output that cannot be made or listened on, a format that it cannot carry.
-    pub fn open(&self, stream: &IfMetadata) -> Result<Box<dyn Sink>, CliError> {
+    pub fn open(&self, stream: &IfMetadata, returning: bool) -> Result<Box<dyn Sink>, CliError> {
         Ok(match self {
             Self::Stdout => Box::new(plain::Pipe::stdout()?),
             Self::Fifo(path) => Box::new(plain::Pipe::fifo(path)?),
-            Self::Tcp(address) => Box::new(plain::Tcp::open(*address)?),
-            Self::RtlTcp(address) => Box::new(rtl_tcp::RtlTcp::open(*address, stream)?),
+            Self::Tcp(address) => Box::new(plain::Tcp::open(*address, returning)?),
+            Self::RtlTcp(address) => Box::new(rtl_tcp::RtlTcp::open(*address, stream, returning)?),
             Self::File(path) => Box::new(plain::StagedFile::open(path)?),
         })
     }
@@ -97,6 +101,19 @@ pub trait Sink: Send {
     /// [`io::ErrorKind::BrokenPipe`] of a pipe whose reader is gone, which ends the program quietly; what the
     /// system says otherwise.
     fn write(&mut self, block: &[u8]) -> io::Result<()>;
+
+    /// True if another client may take the slot of one that left.
+    fn is_returning(&self) -> bool {
+        false
+    }
+
+    /// Takes a client in place of one that left, within `patience`; true once there is one.
+    ///
+    /// # Errors
+    /// A client that left already.
+    fn again(&mut self, _patience: Duration) -> io::Result<bool> {
+        Ok(false)
+    }
 
     /// Ends the stream: what is buffered goes out, a reader sees the end, a file gets its name.
     ///

@@ -2,14 +2,16 @@
 
 use std::fs::{self, File};
 use std::io::{self, IsTerminal, Read, Write};
-use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::net::{Shutdown, SocketAddr, TcpStream};
 use std::os::fd::AsFd;
 use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
+use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
 use super::Sink;
+use super::door::Door;
 use crate::cli::address;
 use crate::cli::error::{CliError, shown};
 use crate::cli::scenario;
@@ -18,8 +20,6 @@ use crate::cli::staging::Staging;
 /// Time limit for a client to close its side when the stream has ended. Closing a connection with unread data
 /// would discard the last samples.
 pub(super) const PARTING: Duration = Duration::from_secs(2);
-/// Clients sent away that are named.
-const MOST_SAID: u32 = 5;
 /// Stack of the thread that sends them away.
 const STACK_BYTES: usize = 1 << 17;
 /// Polling interval for that.
@@ -72,42 +72,61 @@ impl Sink for Pipe {
 
 /// A client of a listener.
 pub(super) struct Client {
-    pub stream: TcpStream,
+    pub stream: Arc<TcpStream>,
     pub peer: SocketAddr,
+    what: String,
     sent: u64,
+    door: Arc<Door>,
 }
 
 impl Client {
-    /// The first that comes; later ones are sent away by name, as one stream has one pace.
-    pub fn wait(address: SocketAddr, what: &str) -> Result<Self, CliError> {
+    /// The first that comes. Later ones are sent away by name, as one stream has one pace; with `returning`
+    /// the first of them takes the slot of a client that left or takes nothing.
+    pub fn wait(address: SocketAddr, what: &str, returning: bool) -> Result<Self, CliError> {
         let (listener, own) = address::listen(address, what)?;
         let fail = |error: io::Error| CliError::create(format!("a connection on {own}"), &error);
-        let (stream, peer) = loop {
-            match listener.accept() {
-                // Gone before it was taken: the next one, then.
-                Err(error) if matches!(error.kind(), io::ErrorKind::ConnectionAborted | io::ErrorKind::Interrupted) => {
-                }
-                other => break other.map_err(fail)?,
-            }
-        };
-        stream.set_nodelay(true).and_then(|()| stream.set_read_timeout(Some(LOOK))).map_err(fail)?;
+        let (stream, peer) = address::accept(&listener, what);
+        let stream = Arc::new(stream);
+        ready(&stream).map_err(fail)?;
         scenario::note(&format!("{what}: client {peer}"));
-        let turned_away = thread::Builder::new().name("listener".to_owned()).stack_size(STACK_BYTES);
-        let turned_away = turned_away.spawn(move || send_away(&listener, peer));
-        turned_away.map_err(|error| CliError::passing(format!("cannot start a thread: {error}")))?;
-        Ok(Self { stream, peer, sent: 0 })
+        let door = Arc::new(Door::new(returning, Arc::clone(&stream), peer));
+        let (own, name) = (Arc::clone(&door), what.to_owned());
+        let thread = thread::Builder::new().name("listener".to_owned()).stack_size(STACK_BYTES);
+        let thread = thread.spawn(move || own.keep(&listener, &name));
+        thread.map_err(|error| CliError::passing(format!("cannot start a thread: {error}")))?;
+        Ok(Self { stream, peer, what: what.to_owned(), sent: 0, door })
     }
 
     /// Sends all of it; a client that left is no broken pipe but an error with its name.
     pub fn send(&mut self, block: &[u8]) -> io::Result<()> {
-        self.stream.write_all(block).map_err(|error| match error.kind() {
-            io::ErrorKind::BrokenPipe | io::ErrorKind::ConnectionReset | io::ErrorKind::ConnectionAborted => {
-                io::Error::other(format!("the client {} left after {} bytes", self.peer, self.sent))
+        self.door.write_begins(Some(Instant::now()));
+        let written = (&*self.stream).write_all(block);
+        self.door.write_begins(None);
+        written.map_err(|error| {
+            self.door.lost();
+            match error.kind() {
+                io::ErrorKind::BrokenPipe | io::ErrorKind::ConnectionReset | io::ErrorKind::ConnectionAborted => {
+                    io::Error::other(format!("the client {} left after {} bytes", self.peer, self.sent))
+                }
+                _ => error,
             }
-            _ => error,
         })?;
         self.sent += block.len() as u64;
         Ok(())
+    }
+
+    /// True if another client may take the slot of one that left.
+    pub fn is_returning(&self) -> bool {
+        self.door.returning
+    }
+
+    /// Takes the client that came after this one left, within `patience`; true once there is one.
+    pub fn again(&mut self, patience: Duration) -> io::Result<bool> {
+        let Some((stream, peer)) = self.door.next(patience) else { return Ok(false) };
+        ready(&stream).inspect_err(|_| self.door.lost())?;
+        scenario::note(&format!("{}: client {peer}", self.what));
+        (self.stream, self.peer, self.sent) = (stream, peer, 0);
+        Ok(true)
     }
 
     /// No more comes from here.
@@ -120,31 +139,17 @@ impl Client {
     }
 }
 
-/// Closes the connections of further clients, and says why of the first ones.
-fn send_away(listener: &TcpListener, first: SocketAddr) {
-    let mut said = 0;
-    loop {
-        match listener.accept() {
-            Ok((_, peer)) if said < MOST_SAID => {
-                said += 1;
-                scenario::warn(&format!(
-                    "client {peer} is sent away: {first} has these samples; a sink takes one client, another needs \
-                     a sink of its own (live takes several --to)"
-                ));
-            }
-            Ok(_) => {}
-            // No more descriptors, or the like: not in a hurry.
-            Err(_) => thread::sleep(LOOK),
-        }
-    }
+/// Sets what every client needs: no delay, and reads that end.
+fn ready(stream: &TcpStream) -> io::Result<()> {
+    stream.set_nodelay(true).and_then(|()| stream.set_read_timeout(Some(LOOK)))
 }
 
 /// A TCP client that is given the bytes and nothing else.
 pub(super) struct Tcp(Client);
 
 impl Tcp {
-    pub fn open(address: SocketAddr) -> Result<Self, CliError> {
-        Client::wait(address, "samples").map(Self)
+    pub fn open(address: SocketAddr, returning: bool) -> Result<Self, CliError> {
+        Client::wait(address, "samples", returning).map(Self)
     }
 }
 
@@ -153,12 +158,20 @@ impl Sink for Tcp {
         self.0.send(block)
     }
 
+    fn is_returning(&self) -> bool {
+        self.0.is_returning()
+    }
+
+    fn again(&mut self, patience: Duration) -> io::Result<bool> {
+        self.0.again(patience)
+    }
+
     fn finish(self: Box<Self>) -> io::Result<()> {
-        let mut client = self.0;
+        let client = self.0;
         client.end()?;
         let (begun, mut words) = (Instant::now(), [0; 512]);
         while begun.elapsed() < PARTING {
-            match client.stream.read(&mut words) {
+            match (&*client.stream).read(&mut words) {
                 Ok(0) => break,
                 Ok(_) => {}
                 Err(error) if is_silence(&error) => {}

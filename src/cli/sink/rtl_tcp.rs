@@ -12,7 +12,7 @@ use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::Sink;
 use super::plain::{Client, PARTING, is_silence};
@@ -33,43 +33,63 @@ const STACK_BYTES: usize = 1 << 18;
 /// The client, and the thread that reads its commands.
 pub(super) struct RtlTcp {
     client: Client,
-    format: Format,
+    stream: IfMetadata,
     packed: Vec<u8>,
-    done: Arc<AtomicBool>,
-    commands: JoinHandle<()>,
+    commands: Option<(JoinHandle<()>, Arc<AtomicBool>)>,
 }
 
 impl RtlTcp {
-    pub fn open(address: SocketAddr, stream: &IfMetadata) -> Result<Self, CliError> {
+    pub fn open(address: SocketAddr, stream: &IfMetadata, returning: bool) -> Result<Self, CliError> {
         if !matches!(stream.format, Format::Ci8 | Format::Cu8) {
             return Err(CliError::usage(format!(
                 "rtl-tcp carries complex samples of 8 bits, not {}: use --format cu8",
                 stream.format
             )));
         }
-        let mut client = Client::wait(address, "rtl_tcp")?;
-        let passing = |error: io::Error| CliError::output(format!("rtl_tcp client {}", client.peer), &error);
-        let reader = client.stream.try_clone().map_err(passing)?;
-        let done = Arc::new(AtomicBool::new(false));
-        let ear = Commands { peer: client.peer, fixed: Fixed::new(stream), done: Arc::clone(&done) };
-        let commands = thread::Builder::new().name("rtl_tcp".to_owned()).stack_size(STACK_BYTES);
-        let commands = commands.spawn(move || ear.read(reader)).map_err(passing)?;
-        client.send(&GREETING).map_err(|error| CliError::output("rtl_tcp", &error))?;
-        Ok(Self { client, format: stream.format, packed: Vec::new(), done, commands })
+        let client = Client::wait(address, "rtl_tcp", returning)?;
+        let mut own = Self { client, stream: stream.clone(), packed: Vec::new(), commands: None };
+        own.greet().map_err(|error| CliError::output(format!("rtl_tcp client {}", own.client.peer), &error))?;
+        Ok(own)
+    }
+
+    /// Greets a client and begins to read its commands.
+    fn greet(&mut self) -> io::Result<()> {
+        let (reader, done) = (Arc::clone(&self.client.stream), Arc::new(AtomicBool::new(false)));
+        let ear = Commands { peer: self.client.peer, fixed: Fixed::new(&self.stream), done: Arc::clone(&done) };
+        let thread = thread::Builder::new().name("rtl_tcp".to_owned()).stack_size(STACK_BYTES);
+        self.commands = Some((thread.spawn(move || ear.read(&reader))?, done));
+        self.client.send(&GREETING)
+    }
+
+    /// Lets the thread that reads commands end, with the client or soon after that.
+    fn hear_no_more(&mut self) -> Option<JoinHandle<()>> {
+        let (thread, done) = self.commands.take()?;
+        done.store(true, Ordering::Relaxed);
+        Some(thread)
     }
 }
 
 impl Sink for RtlTcp {
     fn write(&mut self, block: &[u8]) -> io::Result<()> {
-        offset_binary(self.format, block, &mut self.packed);
+        offset_binary(self.stream.format, block, &mut self.packed);
         self.client.send(&self.packed)
     }
 
-    fn finish(self: Box<Self>) -> io::Result<()> {
+    fn is_returning(&self) -> bool {
+        self.client.is_returning()
+    }
+
+    fn again(&mut self, patience: Duration) -> io::Result<bool> {
+        if !self.client.again(patience)? {
+            return Ok(false);
+        }
+        drop(self.hear_no_more());
+        self.greet().map(|()| true)
+    }
+
+    fn finish(mut self: Box<Self>) -> io::Result<()> {
         self.client.end()?;
-        self.done.store(true, Ordering::Relaxed);
-        // It ends by itself, with the client or after the time of parting.
-        let _ = self.commands.join();
+        let _ = self.hear_no_more().map(JoinHandle::join);
         Ok(())
     }
 }
@@ -125,7 +145,7 @@ struct Commands {
 
 impl Commands {
     /// Reads commands until the client closes its side, or for a while after the stream has ended.
-    fn read(mut self, mut stream: TcpStream) {
+    fn read(mut self, mut stream: &TcpStream) {
         let (mut words, mut have) = ([0_u8; 5], 0);
         let mut parting: Option<Instant> = None;
         loop {

@@ -118,7 +118,9 @@ impl Scenario {
         else {
             return Ok(());
         };
-        let states = self.states(path, tick_samples, log::MAX_ROWS, (files.directory, files.overrides))?;
+        // The last row of a record that was cut off may be half of one: those beyond the scene are not read.
+        let most = usize::try_from(scene.samples.div_ceil(tick_samples)).unwrap_or(log::MAX_ROWS).saturating_add(1);
+        let states = self.states(path, tick_samples, most, (files.directory, files.overrides))?;
         let known = tick_samples.saturating_mul(states.len() as u64 - 1);
         if known < scene.samples {
             let reason = format!(

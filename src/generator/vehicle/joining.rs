@@ -19,6 +19,8 @@ use gnss::earth::SPEED_OF_LIGHT_MPS;
 
 /// Pushes that wait for their time at most.
 const MOST_WAITING: usize = 1024;
+/// Time by which a push may lie ahead of the tick that is made next.
+const MOST_AHEAD_S: f64 = 3600.0;
 /// Distances from the Earth's centre that a push may have: inside the Earth, and beyond the Moon.
 const LEAST_RADIUS_M: f64 = 6.0e6;
 const MOST_RADIUS_M: f64 = 1e9;
@@ -88,10 +90,13 @@ pub enum Refusal {
     /// A time before the scene's start.
     #[error("{0} s: expected a time after the scene's start")]
     BeforeStart(f64),
-    /// A time that the push before had already.
+    /// A time beyond any that can be waited for.
+    #[error("{0:e} s while the scene is at {1} s: expected at most {MOST_AHEAD_S} s ahead")]
+    Ahead(f64, f64),
+    /// A time that a push which waits or steers has already.
     #[error("{0} s again")]
     Duplicate(f64),
-    /// A time before that of the push before.
+    /// A time before that of the push which steers.
     #[error("{0} s after {1} s: out of order")]
     OutOfOrder(f64, f64),
     /// More pushes ahead of their time than are kept.
@@ -167,9 +172,10 @@ pub struct Joiner {
     joining: Joining,
     /// Length of a tick, in seconds.
     tick_s: f64,
-    /// Motion that is transmitted now.
+    /// Motion that is transmitted now, and its time.
     now: Motion,
-    /// The push in use, and those that wait for their time.
+    now_s: f64,
+    /// The push in use, and those that wait for their time, by time.
     used: Option<State>,
     waiting: VecDeque<State>,
     /// Number of pushes taken so far.
@@ -181,7 +187,7 @@ pub struct Joiner {
 impl Joiner {
     /// Begins with `now`; a tick lasts `tick_s`.
     pub fn new(joining: Joining, tick_s: f64, now: Motion) -> Self {
-        Self { joining, tick_s, now, used: None, waiting: VecDeque::new(), taken: 0, turning: None }
+        Self { joining, tick_s, now, now_s: 0.0, used: None, waiting: VecDeque::new(), taken: 0, turning: None }
     }
 
     /// Adds a pushed attitude, which is `first` before the first push.
@@ -189,23 +195,23 @@ impl Joiner {
         Self { turning: first.map(Turning::new), ..self }
     }
 
-    /// Takes a push, and returns its number.
+    /// Takes a push, and returns its number. Pushes that wait are used by their times, in whatever order they
+    /// came; of too many, the one that lies furthest ahead is dropped.
     ///
     /// # Errors
     /// Reason for which it is not taken; nothing changes then.
     pub fn offer(&mut self, push: &Push) -> Result<u64, Refusal> {
         self.check(push)?;
-        let before = self.waiting.back().or(self.used.as_ref());
-        if let Some(before) = before {
-            if push.t_s == before.t_s {
+        let place = self.waiting.partition_point(|waiting| waiting.t_s < push.t_s);
+        let before = place.checked_sub(1).map_or(self.used.as_ref(), |last| self.waiting.get(last));
+        match before {
+            Some(before) if push.t_s < before.t_s => return Err(Refusal::OutOfOrder(push.t_s, before.t_s)),
+            Some(before) if push.t_s == before.t_s => return Err(Refusal::Duplicate(push.t_s)),
+            _ if self.waiting.get(place).is_some_and(|after| after.t_s == push.t_s) => {
                 return Err(Refusal::Duplicate(push.t_s));
             }
-            if push.t_s < before.t_s {
-                return Err(Refusal::OutOfOrder(push.t_s, before.t_s));
-            }
-        }
-        if self.waiting.len() >= MOST_WAITING {
-            return Err(Refusal::TooMany);
+            _ if place >= MOST_WAITING => return Err(Refusal::TooMany),
+            _ => {}
         }
         let near = before.filter(|before| push.t_s - before.t_s <= self.joining.hold_s.max(self.joining.join_s));
         let zero = Vector3::zeros();
@@ -225,7 +231,8 @@ impl Joiner {
             own_velocity: push.velocity_mps.is_some(),
             turn: push.turn,
         };
-        self.waiting.push_back(state);
+        self.waiting.truncate(MOST_WAITING - 1);
+        self.waiting.insert(place, state);
         self.taken += 1;
         Ok(state.number)
     }
@@ -259,12 +266,16 @@ impl Joiner {
         if push.t_s < 0.0 {
             return Err(Refusal::BeforeStart(push.t_s));
         }
+        if push.t_s > self.now_s + MOST_AHEAD_S {
+            return Err(Refusal::Ahead(push.t_s, self.now_s));
+        }
         let (away_m, most_m) = ((push.position_m - self.now.position_m).norm(), SNAP_SPEED_MPS * self.tick_s);
         if away_m > most_m { Err(Refusal::Far(away_m, most_m)) } else { Ok(()) }
     }
 
     /// Makes the tick from `from_s` to `to_s`, which follows the one before.
     pub fn tick(&mut self, from_s: f64, to_s: f64) -> Tick {
+        self.now_s = to_s;
         let horizon_s = from_s + self.joining.join_s.max(to_s - from_s);
         let known = self.used.as_ref().map(|state| state.number);
         while let Some(next) = self.waiting.front() {
@@ -470,7 +481,8 @@ mod tests {
             (with(&|p| p.jerk_mps3 = Some(Vector3::repeat(1e12))), "Rate"),
             (with(&|p| p.t_s = -0.5), "BeforeStart"),
             (good, "Duplicate"),
-            (with(&|p| p.t_s = 0.9), "OutOfOrder"),
+            (with(&|p| p.t_s = 1e12), "Ahead"),
+            (with(&|p| p.t_s = MOST_AHEAD_S + 1.0), "Ahead"),
         ];
         for (push, name) in refused {
             let refusal = joiner.offer(&push).unwrap_err();
@@ -479,6 +491,29 @@ mod tests {
         for k in 0..MOST_WAITING as u64 - 1 {
             assert_eq!(joiner.offer(&Push::of(2.0 + k as f64, &start)), Ok(k + 1));
         }
-        assert_eq!(joiner.offer(&Push::of(1e6, &start)), Err(Refusal::TooMany));
+        assert_eq!(joiner.offer(&Push::of(3000.0, &start)), Err(Refusal::TooMany));
+        // One that comes sooner is taken in the place of the furthest.
+        assert_eq!(joiner.offer(&Push::of(0.9, &start)), Ok(MOST_WAITING as u64));
+        assert_eq!(joiner.waiting.len(), MOST_WAITING);
+        joiner.tick(0.9, 0.91);
+        assert_eq!(joiner.offer(&Push::of(0.9, &start)), Err(Refusal::OutOfOrder(0.9, 1.0)));
+    }
+
+    #[test]
+    fn a_push_far_ahead_waits_and_later_ones_steer_as_if_it_had_not_come() {
+        let ticks = |far: bool| {
+            let mut joiner = Joiner::new(joining(), TICK_S, circle(0.0));
+            run(&mut joiner, 100, |tick, joiner| {
+                if far && tick % 10 == 5 {
+                    // Refused by its value, and not refused: an hour ahead and a minute.
+                    assert!(matches!(joiner.offer(&Push::of(7200.0, &circle(0.0))), Err(Refusal::Ahead(..))));
+                    joiner.offer(&Push::of(60.0 + tick as f64, &circle(0.0))).unwrap();
+                }
+                let t_s = tick as f64 * TICK_S;
+                joiner.offer(&Push::of(t_s, &circle(t_s))).unwrap();
+            })
+        };
+        let ends = |far: bool| ticks(far).into_iter().map(|tick| (tick.kind, tick.end)).collect::<Vec<_>>();
+        assert!(ends(true) == ends(false));
     }
 }

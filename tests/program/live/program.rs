@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::Write;
-use std::net::UdpSocket;
+use std::net::{TcpStream, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
@@ -143,16 +143,7 @@ fn a_rig_with_a_zero_of_its_own_turns_the_body_and_the_record_replays() {
 fn datagrams_are_followed_in_real_time_strangers_are_not_and_ages_are_measured() {
     let bench = Bench::new();
     let mut child = bench.start(&["--clock", "host", "--motion", "udp:0", "--record", "flight", "--latency", "20"]);
-    let mut stderr = std::io::BufReader::new(child.stderr.take().unwrap());
-    let mut line = String::new();
-    let port = loop {
-        line.clear();
-        assert!(std::io::BufRead::read_line(&mut stderr, &mut line).unwrap() > 0);
-        if let Some((_, address)) = line.trim().split_once("udp:") {
-            break address.to_owned();
-        }
-    };
-    let reader = std::thread::spawn(move || std::io::read_to_string(&mut stderr).unwrap());
+    let (port, reader) = listener(&mut child, "udp:");
     let mut stdout = child.stdout.take().unwrap();
     let samples = std::thread::spawn(move || {
         let mut bytes = Vec::new();
@@ -208,6 +199,150 @@ fn a_signal_in_the_middle_ends_with_whole_ticks_a_record_and_its_own_code() {
         assert!(sent.len().is_multiple_of(52_000), "{}", sent.len());
         assert!(bench.replayed("cut") == sent, "the replay differs");
     }
+}
+
+#[test]
+fn a_killed_run_leaves_a_record_that_replays_and_the_next_run_keeps_it() {
+    let bench = Bench::new();
+    fs::write(bench.path("scene.toml"), SCENE.replace("1.2", "3600")).unwrap();
+    let unfinished = bench.path("cut.unfinished");
+    for kept in ["cut.unfinished-1", "cut.unfinished-2"] {
+        let mut child = bench.start(&["--clock", "host", "--motion", "-", "--record", "cut"]);
+        child.stdin.as_mut().unwrap().write_all(b"power G13 -3\n").unwrap();
+        let mut sent = child.stdout.take().unwrap();
+        let reading = std::thread::spawn(move || {
+            let mut bytes = Vec::new();
+            // A killed sender ends the stream.
+            let _ = std::io::Read::read_to_end(&mut sent, &mut bytes);
+            bytes
+        });
+        while !unfinished.join("replay.toml").is_file() {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let sent = reading.join().unwrap();
+        let replayed = bench.replayed("cut.unfinished");
+        // Every second it is brought up to date, before the samples of the last ticks leave.
+        let both = replayed.len().min(sent.len());
+        assert!(both >= 52_000 && replayed[..both] == sent[..both], "{} and {}", replayed.len(), sent.len());
+
+        let next = bench.start(&["--clock", "free", "--record", "cut"]);
+        let id = next.id().to_string();
+        std::thread::sleep(Duration::from_millis(300));
+        assert!(Command::new("kill").args(["-s", "INT", &id]).status().unwrap().success());
+        let done = next.wait_with_output().unwrap();
+        assert!(errors(&done).contains(kept), "{}", errors(&done));
+        assert!(bench.replayed(kept) == replayed && !unfinished.exists(), "{kept}");
+    }
+}
+
+/// A listener of a child: its address, and what it says after that.
+fn listener(child: &mut Child, what: &str) -> (String, std::thread::JoinHandle<String>) {
+    let mut stderr = std::io::BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    let address = loop {
+        line.clear();
+        assert!(std::io::BufRead::read_line(&mut stderr, &mut line).unwrap() > 0, "ended before it listened");
+        if let Some((_, address)) = line.trim().split_once(what) {
+            break address.to_owned();
+        }
+    };
+    (address, std::thread::spawn(move || std::io::read_to_string(&mut stderr).unwrap()))
+}
+
+#[test]
+fn a_receiver_that_reconnects_goes_on_with_the_same_run() {
+    let bench = Bench::new();
+    fs::write(bench.path("scene.toml"), SCENE.replace("1.2", "3")).unwrap();
+    for clock in ["sink", "host"] {
+        let mut child = bench.start(&["--clock", clock, "--to", "tcp:0", "--record", clock]);
+        let (address, said) = listener(&mut child, "listening on ");
+        let take = |count: usize| {
+            let mut client = TcpStream::connect(&address).unwrap();
+            let mut bytes = vec![0; count];
+            std::io::Read::read_exact(&mut client, &mut bytes).unwrap();
+            (client, bytes)
+        };
+        let (client, first) = take(520_000);
+        drop(client);
+        let (mut client, mut rest) = take(52_000);
+        std::io::Read::read_to_end(&mut client, &mut rest).unwrap();
+        drop(client);
+        let said = said.join().unwrap();
+        assert!(child.wait().unwrap().success(), "{said}");
+        let made = summary(&bench.path(clock));
+        assert_eq!((&made["ended_by"], &made["clients_left"]), (&"scene".into(), &1.into()), "{made}");
+        // The record has all of it; each client has a part without gaps, the second to the end.
+        let all = bench.replayed(clock);
+        assert_eq!(all.len(), 2 * 7_800_000);
+        assert!(all.starts_with(&first) && all.ends_with(&rest), "{clock}");
+        assert!(said.contains("left after"), "{said}");
+        let lost = made["lost_blocks"].as_u64().unwrap();
+        assert!(if clock == "sink" { lost == 1 } else { lost < 300 }, "{made}");
+    }
+    // Where nobody is to come back, the run ends with the client.
+    let mut child = bench.start(&["--to", "tcp:0", "--reconnect", "0"]);
+    let (address, said) = listener(&mut child, "listening on ");
+    drop(TcpStream::connect(address).unwrap());
+    assert_eq!(child.wait().unwrap().code(), Some(74), "{}", said.join().unwrap());
+}
+
+#[test]
+fn without_free_descriptors_a_listener_rests_and_then_takes_the_rig() {
+    let bench = Bench::new();
+    fs::write(bench.path("scene.toml"), SCENE.replace("1.2", "3600")).unwrap();
+    // 16 clients are kept at one time, and the program has some 10 files of its own.
+    let run = format!(
+        "ulimit -n 24; exec {} live scene.toml --clock host --motion tcp:0 --record run",
+        env!("CARGO_BIN_EXE_gnss-twin")
+    );
+    let mut command = Command::new("bash");
+    command.current_dir(bench.directory.path()).args(["-c", &run]);
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let (address, said) = listener(&mut child, "listening on ");
+    // By then all its files are open.
+    while !bench.path("run.unfinished/replay.toml").is_file() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let silent: Vec<TcpStream> = (0..20).map(|_| TcpStream::connect(&address).unwrap()).collect();
+    std::thread::sleep(Duration::from_secs(1));
+    // The thread that listens: a try each 0.1 s, where one without a pause would have used all of a second.
+    let tasks = fs::read_dir(format!("/proc/{}/task", child.id())).unwrap().map(|task| task.unwrap().path());
+    let listens = |task: &PathBuf| fs::read_to_string(task.join("comm")).is_ok_and(|name| name.trim() == "motion");
+    let task = tasks.into_iter().find(listens).unwrap();
+    let about = fs::read_to_string(task.join("stat")).unwrap();
+    // User and system time are words 14 and 15, and the name is the second; 100 a second.
+    let times = about.rsplit(')').next().unwrap().split_whitespace().skip(11).take(2);
+    assert!(times.map(|time| time.parse::<u64>().unwrap()).sum::<u64>() < 30, "{about}");
+    drop(silent);
+    let mut rig = TcpStream::connect(&address).unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    rig.write_all(b"jammer 1 off\n").unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    let id = child.id().to_string();
+    assert!(Command::new("kill").args(["-s", "INT", &id]).status().unwrap().success());
+    let said = (child.wait().unwrap(), said.join().unwrap()).1;
+    assert!(said.contains("cannot take a client"), "{said}");
+    assert_eq!(summary(&bench.path("run"))["events"]["applied"], 1, "{said}");
+}
+
+#[test]
+fn a_state_far_ahead_is_refused_by_its_value_and_costs_no_other() {
+    let bench = Bench::new();
+    let mut child = bench.start(&["--clock", "host", "--motion", "-", "--record", "flight"]);
+    let [x, y, z] = PLACE_M;
+    let mut text = format!("1e9 {x} {y} {z}\n1000 {x} {y} {z}\n");
+    (0..130).for_each(|k| text += &(state(f64::from(k) * 0.01) + "\n"));
+    child.stdin.take().unwrap().write_all(text.as_bytes()).unwrap();
+    let done = child.wait_with_output().unwrap();
+    let made = summary(&bench.path("flight"));
+    assert_eq!(made["motion"]["ahead"], 1, "{made}");
+    assert!(
+        made["motion"]["taken"].as_u64().unwrap() >= 100 && made["ticks"]["fresh"].as_u64().unwrap() > 50,
+        "{made}"
+    );
+    assert!(errors(&done).contains("1e9 s while the scene is at"), "{}", errors(&done));
 }
 
 #[test]
