@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Reports as pages in Chromium: of a run whose scene has the name of a script, and of a foreign receiver.
+# Pages in Chromium: the report of a run whose scene has the name of a script, that of a foreign receiver, and a live run.
 #
 # usage: tests/page.sh [GNSS_TWIN_BINARY]     (default: target/release/gnss-twin)
 # needs: Node.js with npm; chromium, which is installed on Debian where it is missing
-# exit:  0 every law of page.mjs holds on each page
+# exit:  0 every law of page.mjs and live.mjs holds on each page
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 twin=$(realpath "${1:-$root/target/release/gnss-twin}")
@@ -12,7 +12,7 @@ trap 'rm -rf "$work"' EXIT
 
 command -v chromium >/dev/null || { apt-get update -qq && apt-get install -y -qq chromium >/dev/null; }
 # The lock file names each package with its hash.
-cp "$root"/tests/page/{package.json,package-lock.json,page.mjs} "$work/"
+cp "$root"/tests/page/{package.json,package-lock.json,page.mjs,live.mjs} "$work/"
 cd "$work"
 npm ci --silent --no-audit --no-fund
 
@@ -34,3 +34,30 @@ size=$(stat -c %s run/report.html)
 # The run's own records, judged as another receiver's.
 "$twin" analyze --truth run/truth --rinex-obs run/rx/observations.rnx --nmea run/rx/fixes.nmea --out foreign --quiet
 node page.mjs foreign/foreign_report.html ${SHOTS:+--shots "$SHOTS/foreign"}
+
+# A live run under the same name, and its receiver on the same page.
+cat >live.toml <<END
+name = "$name"
+start = 2010-07-01T08:06:00
+duration_s = 90
+motion = { kind = "pushed", latitude_deg = 48.1, longitude_deg = 11.6, height_m = 520 }
+[[interference]]
+kind = "cw"
+offset_hz = 500e3
+js_db = 10
+END
+lines=$((20000 + RANDOM % 10000))
+samples=$((lines + 1))
+"$twin" live live.toml --clock host --latency 500 --to "tcp:$samples" --web 0 --web-receiver "tcp:$lines" 2>live.log &
+run=$!
+trap 'kill "$run" 2>/dev/null || true; rm -rf "$work"' EXIT
+for _ in $(seq 100); do
+  url=$(sed -n 's|.*page: \(http://.*\)|\1|p' live.log)
+  [ -z "$url" ] || break
+  sleep 0.1
+done
+"$twin" receive "tcp:$samples" --format ci8 --rate-hz 2600000 --start 2010-07-01T08:06:00 --json "tcp:$lines" --live --out live_rx \
+  >receive.log 2>&1 &
+node live.mjs "$url" --title "$name" --receiver ${SHOTS:+--shots "$SHOTS"}
+kill "$run"
+wait

@@ -1,15 +1,18 @@
 //! Arguments as written.
 
+use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::cli::address::listen_address;
 use crate::cli::lines;
 use crate::cli::live::intake::Origin;
 use crate::cli::packed::{Bits, Packed};
 use crate::cli::printed::Printed;
 use crate::cli::sink::Spec;
 use crate::cli::study::args::Study;
+use crate::cli::watch::{Watched, tcp_peer};
 use analysis::show::document::Forms;
 use gnss::exchange::Version;
 use gnss::samples::Format;
@@ -33,6 +36,8 @@ pub enum Command {
     Generate(Generate),
     /// Send a scene in real time, while motion and events come in
     Live(Live),
+    /// Show a receiver or a run's directory in a browser, while it goes on
+    Watch(Watch),
     /// Find position and time in a recording, from a cold start
     Receive(Receive),
     /// Judge an existing run again
@@ -239,9 +244,9 @@ pub struct Generate {
 #[command(
     after_help = "Examples:\n  gnss-twin live scene.toml --motion udp:4567 --to - | hackrf_transfer -t - -f 1575420000 \
                   -s 2600000\n  gnss-twin live scene.toml --clock host --motion udp:4567 --to tcp:5000 --record \
-                  reports/flight\n  gnss-twin generate reports/flight/replay.toml --out again.sigmf-data\n\nStatus: \
-                  one line of JSON per second on standard error. Exit code: 3 beyond --max-underruns or \
-                  --max-late, 130 or 143 after a signal"
+                  reports/flight\n  gnss-twin live scene.toml --clock host --to tcp:5000 --web 8080\n  gnss-twin \
+                  generate reports/flight/replay.toml --out again.sigmf-data\n\nStatus: one line of JSON per second \
+                  on standard error. Exit code: 3 beyond --max-underruns or --max-late, 130 or 143 after a signal"
 )]
 pub struct Live {
     /// Scene to send. With motion kind = "pushed" it takes motion and events from --motion
@@ -275,6 +280,13 @@ pub struct Live {
     /// Directory for a record of the run: the received motion and events, the truth, and replay.toml
     #[arg(long, value_name = "DIR")]
     pub record: Option<PathBuf>,
+    /// Serve a page for browsers: PORT on this machine alone (0 for a free one), or IP:PORT. Its address with
+    /// the token that admits is printed
+    #[arg(long, value_name = "ADDR", value_parser = listen_address)]
+    pub web: Option<SocketAddr>,
+    /// Receiver that the page shows: the address of receive --json, as tcp:PORT or tcp:HOST:PORT
+    #[arg(long, value_name = "PEER", value_parser = tcp_peer, requires = "web")]
+    pub web_receiver: Option<String>,
     /// Exit with code 3 after more than N underruns
     #[arg(long, value_name = "N")]
     pub max_underruns: Option<u64>,
@@ -296,6 +308,20 @@ pub struct Live {
     /// Allow the scene to read files outside its own directory
     #[arg(long)]
     pub allow_outside: bool,
+}
+
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Examples:\n  gnss-twin watch reports/flight\n  gnss-twin watch tcp:5001 --web 8080\n\nThe page's \
+                  address with the token that admits is printed. Ctrl-C ends the program"
+)]
+pub struct Watch {
+    /// Source of the rows: the directory of a run, a record or a reception, finished or not, or tcp:ADDR for
+    /// a receiver with --json tcp:ADDR
+    pub source: Watched,
+    /// Address of the page: PORT on this machine alone (0 for a free one), or IP:PORT
+    #[arg(long, value_name = "ADDR", value_parser = listen_address, default_value = "0")]
+    pub web: SocketAddr,
 }
 
 /// Forms of a report.

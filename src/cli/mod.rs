@@ -34,6 +34,8 @@ mod source;
 mod speed;
 mod staging;
 mod study;
+mod watch;
+mod web;
 
 use std::ffi::OsString;
 use std::panic::catch_unwind;
@@ -80,6 +82,7 @@ fn execute(arguments: Arguments) -> Result<(), CliError> {
         Command::Run(arguments) => run::execute(&arguments),
         Command::Generate(arguments) => generate::execute(&arguments),
         Command::Live(arguments) => live::execute(&arguments),
+        Command::Watch(arguments) => watch::execute(&arguments),
         Command::Receive(arguments) => receive::execute(&arguments),
         Command::Analyze(arguments) => analyze::execute(&arguments),
         Command::Plan(arguments) => plan::execute(&arguments),

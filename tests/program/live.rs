@@ -1,5 +1,6 @@
 //! Motion that is pushed while samples go out: ticks, their record and its replay, in virtual time and
-//! through the program.
+//! through the program; and the page that browsers see of it.
 
 mod program;
 mod replay;
+mod web;

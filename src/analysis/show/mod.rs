@@ -8,7 +8,7 @@
 
 pub mod document;
 pub mod foreign;
-mod page;
+pub mod page;
 #[cfg(feature = "pdf")]
 pub mod pdf;
 pub mod plot;

@@ -11,6 +11,7 @@ mod peers;
 mod record;
 mod ring;
 mod times;
+mod web;
 
 use std::collections::VecDeque;
 use std::io::{IsTerminal, Write};
@@ -41,6 +42,7 @@ use output::{Output, Pace};
 use record::{Recorder, Run};
 use ring::{Block, Put};
 use times::{Zero, instant};
+use web::Page;
 
 /// Polling interval for signals during a wait.
 const LOOK: Duration = Duration::from_millis(20);
@@ -81,6 +83,7 @@ pub fn execute(arguments: &args::Live) -> Result<(), CliError> {
             intake::begin(origin, Reader::new(scene.clock.start, Geodetic::from_ecef(&first_m).height_m))
         })
         .transpose()?;
+    let page = Page::begin(arguments, scene)?;
     let mut recorder = arguments.record.as_ref().map(|target| Recorder::create(target, scene)).transpose()?;
     let driver = match &mut recorder {
         Some(recorder) => Driver::new(scene, &mut recorder.truth),
@@ -100,7 +103,7 @@ pub fn execute(arguments: &args::Live) -> Result<(), CliError> {
         .collect();
     scenario::note(&format!("the first sample is of {0}: gnss-twin receive --start {0}", scene.clock.start));
     let zero = (arguments.motion_time == MotionTime::First).then(Zero::default);
-    let live = Live { driver, recorder, inbox, outputs: outputs?, pace, scene, made: Made::default(), zero };
+    let live = Live { driver, recorder, page, inbox, outputs: outputs?, pace, scene, made: Made::default(), zero };
     live.run(arguments, &Run { named: &named, scene, overrides: &overrides, restarted: start.is_some() })
 }
 
@@ -108,6 +111,7 @@ pub fn execute(arguments: &args::Live) -> Result<(), CliError> {
 struct Live<'a> {
     driver: Driver<'a>,
     recorder: Option<Recorder>,
+    page: Option<Page>,
     inbox: Option<Arc<Inbox>>,
     outputs: Vec<Output>,
     pace: Pace,
@@ -153,6 +157,9 @@ impl Live<'_> {
             object.insert("stated_latency_ms".to_owned(), self.stated(arguments));
         }
         print(&json!({ "summary": &summary }));
+        if let Some(page) = self.page.take() {
+            page.end(&summary);
+        }
         let rate = self.scene.clock.rate;
         match self.recorder {
             Some(mut recorder) => {
@@ -203,8 +210,12 @@ impl Live<'_> {
             }
             if let Some(inbox) = &self.inbox {
                 intake = inbox.drain(&mut messages);
-                self.take(&messages, &mut arrivals)?;
             }
+            if let Some(page) = &self.page {
+                page.add_events(&mut messages);
+            }
+            self.take(&messages, &mut arrivals)?;
+            messages.clear();
             let reused = used.pop_front().and_then(|block| match Arc::try_unwrap(block) {
                 Ok(block) => Some(block.bytes),
                 Err(block) => {
@@ -214,24 +225,35 @@ impl Live<'_> {
             });
             let mut bytes = reused.unwrap_or_default();
             let begun = Instant::now();
-            let mut none = ();
+            let (mut unrecorded, mut unseen) = ((), ());
             let truth: &mut dyn truth::Sink = match &mut self.recorder {
                 Some(recorder) => &mut recorder.truth,
-                None => &mut none,
+                None => &mut unrecorded,
             };
-            let Some(tick) = self.driver.tick(truth, &mut bytes).map_err(generator_error)? else { break };
+            let seen: &mut dyn truth::Sink = match &mut self.page {
+                Some(page) => page,
+                None => &mut unseen,
+            };
+            let Some(tick) = self.driver.tick(&mut (truth, seen), &mut bytes).map_err(generator_error)? else { break };
             self.made.slowest_tick = self.made.slowest_tick.max(begun.elapsed());
             self.made.tick(tick.samples.0, tick.samples.1.min(self.scene.samples), tick.tick.as_ref());
             if let Some(recorder) = &mut self.recorder {
                 recorder.tick(&tick, &bytes, self.scene.metadata.format.bytes())?;
                 recorder.keep(run)?;
             }
+            if let Some(page) = &mut self.page {
+                page.tick(self.scene.clock.rate.elapsed_s(tick.samples.1), &bytes);
+            }
             let block = Arc::new(Block { bytes, first: tick.samples.0, shows: shown(&tick, &mut arrivals) });
             self.hand(&block);
             used.push_back(block);
             if Instant::now() >= status {
                 status += Duration::from_secs(1);
-                print(&self.status(&intake).1);
+                let status = self.status(&intake).1;
+                print(&status);
+                if let Some(page) = &mut self.page {
+                    page.status(&status);
+                }
                 self.made.low_water = None;
             }
         }
@@ -304,11 +326,17 @@ impl Live<'_> {
                 Message::Event(event) => match self.driver.switch(event) {
                     Ok(sample) => {
                         self.made.events += 1;
+                        if let Some(page) = &mut self.page {
+                            page.event(now_s, event, None);
+                        }
                         if let Some(recorder) = &mut self.recorder {
                             recorder.event(sample, event)?;
                         }
                     }
                     Err(error) => {
+                        if let Some(page) = &mut self.page {
+                            page.event(now_s, event, Some(&error));
+                        }
                         if self.made.events_refused == 0 {
                             scenario::warn(&format!("event: {error}; further ones are counted"));
                         }

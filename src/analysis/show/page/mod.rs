@@ -8,6 +8,7 @@
 mod data;
 mod encode;
 mod items;
+pub mod live;
 #[cfg(test)]
 mod tests;
 
@@ -21,6 +22,7 @@ use crate::show::plot::sketch::{Figure, Sketch};
 use data::Data;
 use encode::{escaped, inert};
 use items::Writer;
+use live::LivePage;
 
 /// Draws the plots and filters the tables.
 const SCRIPT: &str = include_str!("../../assets/page.js");
@@ -48,6 +50,17 @@ struct Chapter<'r> {
 impl Report {
     /// The report as an HTML file.
     pub fn html(&self) -> String {
+        self.page(&[SCRIPT], "").0
+    }
+
+    /// The report as a page that its server fills by the script of a live page.
+    pub(crate) fn live(&self) -> LivePage {
+        let (html, policy) = self.page(&[SCRIPT, live::SCRIPT], " connect-src 'self';");
+        LivePage { html, policy }
+    }
+
+    /// The page with these scripts, and its content security policy with one more rule.
+    fn page(&self, scripts: &[&str], rule: &str) -> (String, String) {
         let mut data = Data::default();
         let (overview, chapters) = self.chapters();
         let (plots, words): (Vec<&Chapter<'_>>, Vec<&Chapter<'_>>) =
@@ -62,7 +75,13 @@ impl Report {
         words.iter().for_each(|chapter| body.section(chapter.title, &chapter.items));
         let body = body.finish();
         let titles = ["Overview"].into_iter().chain(plots.iter().chain(&words).map(|chapter| chapter.title));
-        self.file(titles, &body, &data.json())
+        let hashes: String = scripts.iter().map(|script| format!(" 'sha256-{}'", hash(script))).collect();
+        let policy = format!(
+            "default-src 'none'; script-src{hashes}; style-src 'sha256-{}';{rule} base-uri 'none'; form-action 'none'",
+            hash(STYLE)
+        );
+        let scripts: String = scripts.iter().map(|script| format!("<script>{script}</script>\n")).collect();
+        (self.file(titles, &body, &data.json(), (&policy, &scripts)), policy)
     }
 
     /// Items before the first heading, and chapters. Pictures over time get a chapter of their own.
@@ -88,12 +107,13 @@ impl Report {
         (overview, chapters)
     }
 
-    fn file<'t>(&self, titles: impl Iterator<Item = &'t str>, body: &str, data: &str) -> String {
-        let policy = format!(
-            "default-src 'none'; script-src 'sha256-{}'; style-src 'sha256-{}'; base-uri 'none'; form-action 'none'",
-            hash(SCRIPT),
-            hash(STYLE)
-        );
+    fn file<'t>(
+        &self,
+        titles: impl Iterator<Item = &'t str>,
+        body: &str,
+        data: &str,
+        (policy, scripts): (&str, &str),
+    ) -> String {
         let link = |title: &str| format!("<a href=\"#{}\">{}</a>\n", items::anchor(title), escaped(title));
         let links: String = titles.map(link).collect();
         let (title, subtitle, head) = (escaped(&self.title), escaped(&self.subtitle), escaped(&self.head));
@@ -108,7 +128,7 @@ impl Report {
              filters need JavaScript.</p></noscript>\n{body}</main>\n<p id=\"help\" hidden>{HELP}</p>\n\
              <p id=\"readout\" \
              class=\"unseen\" aria-live=\"polite\"></p>\n<script type=\"application/json\" \
-             id=\"data\">{}</script>\n<script>{SCRIPT}</script>\n</body>\n</html>\n",
+             id=\"data\">{}</script>\n{scripts}</body>\n</html>\n",
             inert(data)
         )
     }
