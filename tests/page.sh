@@ -35,9 +35,9 @@ size=$(stat -c %s run/report.html)
 "$twin" analyze --truth run/truth --rinex-obs run/rx/observations.rnx --nmea run/rx/fixes.nmea --out foreign --quiet
 node page.mjs foreign/foreign_report.html ${SHOTS:+--shots "$SHOTS/foreign"}
 
-# A live run under the same name, and its receiver on the same page.
+# A live run, and its receiver on the same page.
 cat >live.toml <<END
-name = "$name"
+name = "live_page"
 start = 2010-07-01T08:06:00
 duration_s = 90
 motion = { kind = "pushed", latitude_deg = 48.1, longitude_deg = 11.6, height_m = 520 }
@@ -58,6 +58,6 @@ for _ in $(seq 100); do
 done
 "$twin" receive "tcp:$samples" --format ci8 --rate-hz 2600000 --start 2010-07-01T08:06:00 --json "tcp:$lines" --live --out live_rx \
   >receive.log 2>&1 &
-node live.mjs "$url" --title "$name" --receiver ${SHOTS:+--shots "$SHOTS"}
+node live.mjs "$url" --title live_page --receiver ${SHOTS:+--shots "$SHOTS"}
 kill "$run"
 wait

@@ -102,6 +102,7 @@
     };
     point(map.series[0], next.truth);
     point(map.series[1], next.fix?.place);
+    [map.series[2].x, map.series[2].y] = next.truth ? [[next.truth[0]], [next.truth[1]]] : [[], []];
     const { status } = next;
     if (status) {
       for (const [series, value] of [[ages.series[0], status.age_ms.p50], [ages.series[1], status.age_ms.p99],
@@ -179,7 +180,7 @@
   }
 
   function drawSky() {
-    const scale = sky.sky.scale, { low, high } = sky.sky;
+    const scale = sky.sky.scale, { low, high } = sky.sky, channels = Object.keys(frame.channels);
     const strongest = (sv) => Math.max(...[frame.cn0, Object.fromEntries(Object.entries(frame.channels)
       .map(([name, values]) => [name, values[0]]))].flatMap((table) => Object.entries(table)
       .filter(([name]) => name.split(" ")[0] === sv).map(([, value]) => value ?? -Infinity)));
@@ -188,7 +189,7 @@
       const share = Math.min(Math.max((cn0 - low) / (high - low), 0), 1);
       const isKnown = Number.isFinite(cn0);
       return { sv, system: sv.slice(0, 1), cn0: isKnown ? cn0 : null,
-        observed: Object.keys(frame.channels).some((name) => name.split(" ")[0] === sv),
+        observed: channels.length === 0 || channels.some((name) => name.split(" ")[0] === sv),
         colour: isKnown ? scale[Math.round(share * (scale.length - 1))] : null,
         x: [distance * Math.sin(angle)], y: [distance * Math.cos(angle)] };
     });

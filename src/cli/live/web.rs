@@ -2,14 +2,14 @@
 //!
 //! The stream never waits for the page: what is collected here is handed over when nobody else has the state.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use serde_json::Value;
 
 use crate::cli::args;
 use crate::cli::error::CliError;
-use crate::cli::web::{Events, FRAME, Table, Web, source, spawn};
+use crate::cli::web::{Events, FRAME, State, Table, Web, source, spawn};
 use analysis::show::page::live::Words;
 use generator::event::{Event, EventError};
 use generator::scene::Scene;
@@ -101,7 +101,13 @@ impl Page {
         }
         self.next = now + FRAME;
         self.web.sample(bytes);
-        let Some(mut state) = self.web.try_state() else { return };
+        let web = Arc::clone(&self.web);
+        if let Some(state) = web.try_state() {
+            self.hand_over(state, t_s);
+        }
+    }
+
+    fn hand_over(&mut self, mut state: MutexGuard<'_, State>, t_s: f64) {
         self.rows.drain(..).for_each(|(table, row)| state.take(table, &row));
         self.log.drain(..).for_each(|text| state.event(text));
         if let Some(status) = self.status.take() {
@@ -113,9 +119,9 @@ impl Page {
     /// Shows the summary and lets browsers take it.
     pub fn end(mut self, summary: &Value) {
         self.status(summary);
-        self.next = Instant::now();
-        self.tick(summary.get("t_s").and_then(Value::as_f64).unwrap_or(0.0), &[]);
-        self.web.end();
+        let web = Arc::clone(&self.web);
+        self.hand_over(web.state(), summary.get("t_s").and_then(Value::as_f64).unwrap_or(0.0));
+        web.end();
     }
 }
 

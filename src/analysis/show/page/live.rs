@@ -42,7 +42,6 @@ pub struct LivePage {
 pub fn compose(words: &Words) -> Result<LivePage, Failure> {
     let mut report = Report::new(&words.title, &words.subtitle, "live");
     let sky = Sky { dome: NARROW, tracks: Vec::new(), skyline_deg: Vec::new() };
-    report.heading("Sky and map");
     report.add(Item::Pair(Box::new([Figure::new("sky", Sketch::Sky(sky), "")?, map()?])));
     report.heading("Strengths").figure(strengths()?);
     report.heading("Spectrum").figure(spectrum()?);
@@ -70,7 +69,11 @@ fn empty(name: &str, colour: RGBColor, mark: Mark) -> Series {
 }
 
 fn map() -> Result<Figure, Failure> {
-    let series = vec![empty("true position", BLUE, Mark::Line), empty("fixes", ORANGE, Mark::Balls)];
+    let series = vec![
+        empty("true track", BLUE, Mark::Line),
+        empty("fixes", ORANGE, Mark::Balls),
+        empty("true position", GREEN, Mark::Cross),
+    ];
     let (x, y) = (Axis::new("east (m)", (-10.0, 10.0)), Axis::new("north (m)", (-10.0, 10.0)));
     let mut chart = Chart::new("Map: fixes and true position", x, y, series.clone());
     chart.equal = true;
