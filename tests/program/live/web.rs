@@ -150,7 +150,7 @@ fn a_browser_with_the_token_sees_the_run_and_switches_its_sources() {
 #[test]
 fn crowds_half_open_sockets_and_browsers_that_do_not_read_cost_the_stream_nothing() {
     let directory = bench();
-    let served = Served::start(directory.path(), &LIVE);
+    let (started, served) = (Instant::now(), Served::start(directory.path(), &LIVE));
     // Browsers that take nothing more, and sockets on which half a request is sent.
     let ask = format!("GET /stream?token={} HTTP/1.1\r\nHost: {}\r\n\r\n", served.token, served.host);
     let mut slow: Vec<TcpStream> = (0..20).map(|_| served.connect()).collect();
@@ -193,10 +193,10 @@ fn crowds_half_open_sockets_and_browsers_that_do_not_read_cost_the_stream_nothin
     assert!(refused["unfinished"].as_u64().unwrap() >= 20, "{refused}");
     drop((half_open, slow));
     let summary = served.summary();
-    // A busy machine wakes the sink's thread a tick too late now and then. A run that waited for one browser
-    // alone, which takes nothing for 10 s, would send each of its later ticks too late: hundreds of 600.
+    // A busy machine has underruns of its own. A run that waited for one browser alone, which takes nothing
+    // for 10 s, would last so much longer: 6 s of samples after 1.25 s.
     assert_eq!(summary["stalls"], 0, "{summary}");
-    assert!(summary["underruns"].as_u64().unwrap() < 20, "{summary}");
+    assert!(started.elapsed() < Duration::from_secs(16), "{:?}: {summary}", started.elapsed());
     assert_eq!(summary["samples"].as_u64().or(summary["made"].as_u64()), Some(6 * 2_600_000));
 }
 
