@@ -291,8 +291,9 @@ fn the_code_phase_of_weak_signals_scatters_as_theory_says() {
         })
         .collect();
     assert!(errors.len() > 150, "{}", errors.len());
-    // Half a chip to either side the value is a half, and the slope one. There a period has a ratio s of signal to
-    // noise of a quarter of the prompt's; its power scatters by √(1 + 2s), and a chip parts the two by 8·s.
+    // Half a chip to either side the value is a half, and the slope one. There a period has a ratio s of
+    // signal to noise of a quarter of the prompt's; its power scatters by √(1 + 2s), and a chip parts the two
+    // by 8·s.
     let s = 0.25 * libm::pow(10.0, cn0_dbhz / 10.0) * 1e-3;
     let theory = ((1.0 + 2.0 * s) / f64::from(sums)).sqrt() * 2.0_f64.sqrt() / (8.0 * s);
     let rms = (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();

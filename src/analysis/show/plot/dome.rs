@@ -176,7 +176,8 @@ impl Spot {
         [(x - dx, y - dy), (x + dx, y + dy)]
     }
 
-    /// Distance in virtual pixels to something of a half width and a half height; negative where they overlap.
+    /// Distance in virtual pixels to something of a half width and a half height; negative where they
+    /// overlap.
     fn clearance(self, (x, y): (i32, i32), half_px: (i32, i32)) -> i32 {
         let across = (self.middle.0 - x).abs() - (NAME_PX.0 + half_px.0) * FINE;
         let along = (self.middle.1 - y).abs() - (NAME_PX.1 + half_px.1) * FINE;
@@ -184,7 +185,8 @@ impl Spot {
     }
 }
 
-/// Positions of the names of tracks that have one: clear of dots, tracks and each other, or as clear as can be.
+/// Positions of the names of tracks that have one: clear of dots, tracks and each other, or as clear as can
+/// be.
 fn names(tracks: &[Track]) -> Vec<Spot> {
     let dots: Vec<(i32, i32)> = tracks.iter().filter_map(|track| track.places.last().copied()).collect();
     let points = || tracks.iter().flat_map(|track| track.places.iter().copied());
