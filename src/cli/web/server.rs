@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 
 use super::http::{self, Method, Refusal, Request};
 use super::hub::{Hub, Next};
+use crate::cli::address::accept;
 
 /// Connections at one time, requests that are not whole yet included.
 const MOST_CONNECTIONS: usize = 64;
@@ -23,7 +24,7 @@ const DEADLINE: Duration = Duration::from_secs(3);
 const STUCK: Duration = Duration::from_secs(10);
 /// Time after which a sign of life is sent.
 const SILENCE: Duration = Duration::from_secs(5);
-/// Wait after a connection that cannot be accepted, of files that are all in use for one.
+/// Time for one read of what a refused client still sends.
 const PAUSE: Duration = Duration::from_millis(100);
 /// Reads of what a refused client still sends.
 const MOST_UNREAD: usize = 16;
@@ -89,10 +90,7 @@ impl Server {
     /// Serves to the end of the process.
     pub fn run(self: Arc<Self>, listener: &TcpListener) {
         loop {
-            let Ok((stream, _)) = listener.accept() else {
-                thread::sleep(PAUSE);
-                continue;
-            };
+            let (stream, _) = accept(listener, "page");
             if self.connections.fetch_add(1, Ordering::AcqRel) >= MOST_CONNECTIONS {
                 self.turn_away(stream);
                 continue;
