@@ -251,7 +251,7 @@ pub enum NoFix {
         condition: f64,
     },
     /// Iterations that do not end.
-    #[error("the solution does not converge: the step is {step_m} m after {iterations} iterations")]
+    #[error("the solution does not converge: the step is {step_m:.0} m after {iterations} iterations")]
     Diverged {
         /// Iterations made.
         iterations: u32,
