@@ -9,6 +9,7 @@ use std::collections::{BTreeMap, VecDeque};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::{Value, json};
 
+use analysis::statistics::percentile;
 use gnss::earth::Geodetic;
 
 /// Satellites and channels at most.
@@ -235,6 +236,7 @@ impl State {
         let errors = &self.errors;
         let count = errors.reported_m2.len();
         let [flat, up] = errors.reported_m2.iter().fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y]);
+        let p95 = |values: &VecDeque<f64>| percentile(&Vec::from_iter(values.iter().copied()), 0.95);
         let limit = |ratio: f64, sum: f64| (count > 0).then(|| ratio * (sum / count as f64).sqrt());
         json!({
             "fixes": self.fixes,
@@ -268,14 +270,6 @@ impl State {
             "page": page,
         })
     }
-}
-
-/// The value that 95 % do not exceed.
-fn p95(values: &VecDeque<f64>) -> Option<f64> {
-    let mut sorted: Vec<f64> = values.iter().copied().collect();
-    let wanted = (0.95 * sorted.len() as f64).ceil() as usize;
-    let index = wanted.checked_sub(1)?;
-    Some(*sorted.select_nth_unstable_by(index, f64::total_cmp).1)
 }
 
 #[cfg(test)]
