@@ -12,7 +12,7 @@ trap 'rm -rf "$work"' EXIT
 
 command -v chromium >/dev/null || { apt-get update -qq && apt-get install -y -qq chromium >/dev/null; }
 # The lock file names each package with its hash.
-cp "$root"/tests/page/{package.json,package-lock.json,page.mjs,live.mjs} "$work/"
+cp "$root"/tests/page/{package.json,package-lock.json,browser.mjs,page.mjs,live.mjs} "$work/"
 cd "$work"
 npm ci --silent --no-audit --no-fund
 

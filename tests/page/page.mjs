@@ -4,45 +4,20 @@
 // exit:  0 if every law holds; 1 with the first that does not
 
 import assert from "node:assert/strict";
-import { mkdtempSync, rmSync, statSync } from "node:fs";
-import { tmpdir } from "node:os";
+import { statSync } from "node:fs";
 import { join, resolve } from "node:path";
 import { pathToFileURL } from "node:url";
-import { chromium } from "playwright-core";
+import { inked, open } from "./browser.mjs";
 
 const [file, ...options] = process.argv.slice(2);
 const option = (name) => (options.includes(name) ? options[options.indexOf(name) + 1] : undefined);
-const shots = option("--shots"), title = option("--title");
-const url = pathToFileURL(resolve(file)).href;
-const profile = mkdtempSync(join(tmpdir(), "page-"));
-const context = await chromium.launchPersistentContext(profile, {
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--no-first-run"],
-  viewport: { width: 1280, height: 900 },
-});
-const page = await context.newPage();
-const faults = [], requests = [];
-page.on("console", (message) => { if (message.type() === "error") faults.push(message.text()); });
-page.on("pageerror", (error) => faults.push(String(error)));
-page.on("dialog", (dialog) => { faults.push(`a dialog: ${dialog.message()}`); dialog.dismiss(); });
-page.on("request", (request) => requests.push(request.url()));
-const shot = async (name, whole = false) => { if (shots) await page.screenshot({ path: join(shots, `${name}.png`), fullPage: whole }); };
+const title = option("--title"), shots = option("--shots"), url = pathToFileURL(resolve(file)).href;
+const { page, faults, requests, shot, close } = await open(shots);
 
 // Views of all plots; `linked` ones share the axis of time.
 const views = () => page.evaluate(() => [...document.querySelectorAll(".plot")].filter((root) => root.plot.view)
   .map(({ plot }) => ({ title: plot.chart.title, linked: plot.linked, x: [...plot.view.x], y: [...plot.view.y] })));
 const settled = () => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
-// Pixels of a plot that are neither its ground nor grey.
-const inked = (index) => page.evaluate((at) => {
-  const { base } = document.querySelectorAll(".plot")[at].plot, { width, height } = base;
-  const pixels = base.getContext("2d").getImageData(0, 0, width, height).data;
-  let coloured = 0, other = 0;
-  for (let n = 0; n < pixels.length; n += 4) {
-    if (pixels[n] !== pixels[0] || pixels[n + 1] !== pixels[1] || pixels[n + 2] !== pixels[2]) other += 1;
-    if (Math.max(pixels[n], pixels[n + 1], pixels[n + 2]) - Math.min(pixels[n], pixels[n + 1], pixels[n + 2]) > 60) coloured += 1;
-  }
-  return { coloured, other, all: width * height };
-}, index);
 const same = (a, b) => a.every((value, n) => Math.abs(value - b[n]) < 1e-9);
 
 // ---- It opens, alone ----
@@ -68,7 +43,7 @@ assert.ok(count >= 5 && plots.length >= 4, `${count} plots`);
 for (let at = 0; at < count; at += 1) {
   await page.locator(".plot").nth(at).scrollIntoViewIfNeeded();
   await settled();
-  const { coloured, other, all } = await inked(at);
+  const { coloured, other, all } = await page.locator(".plot canvas.base").nth(at).evaluate(inked);
   const name = await page.locator(".plot .plot-title").nth(at).textContent();
   assert.ok(other > 0.005 * all && coloured > 30, `${name}: ${other} of ${all} pixels drawn, ${coloured} coloured`);
 }
@@ -276,7 +251,6 @@ await shot("phone");
 
 assert.equal(faults.join("\n"), "", "errors on the console");
 assert.deepEqual([...new Set(requests)].filter((one) => one !== url), [], "no request but for the file");
-await context.close();
-rmSync(profile, { recursive: true, force: true });
+await close();
 const kilobytes = Math.round(statSync(file).size / 1000);
 console.log(`${file}: ${kilobytes} kB, open and drawn after ${Math.round(opened)} ms, ${count} plots, ${linked.length} linked, ${full} rows judged`);
