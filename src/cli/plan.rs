@@ -43,7 +43,12 @@ pub fn execute(arguments: &args::Plan) -> Result<(), CliError> {
         scenario::note(&format!("{of_it}{}", plan.speed()));
         plans.push(plan);
     }
-    let together = if plans.len() > 1 { format!("{}\n", Together(&plans)) } else { String::new() };
+    let mut together = String::new();
+    if plans.len() > 1 {
+        let all = Together(&plans);
+        scenario::note(&all.speed());
+        together = format!("{all}\n");
+    }
     arguments.printed.results(&(together + &texts.join("\n")), || json!({ "front_ends": objects }))
 }
 

@@ -104,7 +104,7 @@ pub struct Levels {
     /// Shares of the signals' powers that chip edges keep.
     #[serde(skip)]
     pub(crate) kept: Kept,
-    /// Time of this machine for a sample of all that the scene sends, on one core: the median of the
+    /// Time of this machine for a sample of all that the scene sends, on one core: the mean of the
     /// segments.
     #[serde(skip)]
     pub sample_s: f64,
@@ -139,7 +139,7 @@ impl Levels {
             clipped_share: sum(|stretch| stretch.clipped as f64) / components,
             worst: worst.fold((0.0, 0.0), |worst, (share, t_s)| if share > worst.0 { (share, t_s) } else { worst }),
             stretches: (met.len() + extra.len()) as u64,
-            sample_s: middle(met.iter().map(|stretch| stretch.sample_s)),
+            sample_s: sum(|stretch| stretch.sample_s) / met.len().max(1) as f64,
             full_scale_lsb,
             scale,
             kept,
@@ -156,13 +156,6 @@ impl Levels {
     pub fn satellite_dbfs(&self, sampled_dbhz: f64) -> f64 {
         self.dbfs(sampled_dbhz) - self.attenuation_db
     }
-}
-
-/// The median; zero of none.
-fn middle(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// The strongest satellite in view at the scene's start, and the C/N0 in dB-Hz of the direct ray of its

@@ -178,6 +178,14 @@ impl Plan {
     }
 }
 
+impl Together<'_> {
+    /// Describes the time that this machine needs for all of them.
+    pub fn speed(&self) -> String {
+        let time_s: f64 = self.0.iter().map(|plan| plan.time_s).sum();
+        format!("this machine needs about {time_s:.1} s of one core for the samples of all front ends")
+    }
+}
+
 /// The satellites above the mask at any instant looked at, highest first.
 fn in_view(scene: &Scene, kept: &Kept, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
     let mut rows = Vec::new();

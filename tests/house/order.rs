@@ -48,7 +48,7 @@ pub const ORDER: Order<'static> = &[
             &["spoof"],
             &["synth"],
             &["knots"],
-            &["switches"],
+            &["stopwatch", "switches"],
             &["stage"],
             &["scene"],
             &["event"],

@@ -1,12 +1,11 @@
 //! Work of the synthesiser for a scene: knots, memory and speed.
 
-use std::time::Instant;
-
 use serde::Serialize;
 
 use crate::arrival;
 use crate::error::GenerateError;
 use crate::scene::Scene;
+use crate::stopwatch::Stopwatch;
 use crate::stream::{Options, transmitters};
 use crate::synth::{Edge, RUN_SAMPLES};
 
@@ -43,7 +42,7 @@ pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
         }
         let size = transmitter.root_samples();
         let roots = scene.samples.div_ceil(size);
-        let (begin, each) = (Instant::now(), roots.div_ceil(PLANNED_ROOTS).max(1));
+        let (watch, each) = (Stopwatch::start(), roots.div_ceil(PLANNED_ROOTS).max(1));
         for root in (0..roots).step_by(each as usize) {
             for part in transmitter.root(scene, root)? {
                 shortest = shortest.min(part.end - part.start);
@@ -51,7 +50,7 @@ pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
                 worst_cycles = worst_cycles.max(part.error_cycles);
             }
         }
-        knots_s += begin.elapsed().as_secs_f64() * roots as f64 / roots.div_ceil(each).max(1) as f64;
+        knots_s += watch.elapsed_s() * roots as f64 / roots.div_ceil(each).max(1) as f64;
     }
     let shortest = shortest.min(longest);
     let options = Options::default();

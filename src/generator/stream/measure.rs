@@ -1,13 +1,13 @@
 //! Segments of samples that are made to be measured.
 
 use std::ops::Range;
-use std::time::Instant;
 
 use super::GenerateError;
 use super::block::{Worker, edge, first_run, pack, run_begin, satellites};
 use super::front::transmitters;
 use crate::scene::{CodeEdge, Scene};
 use crate::stage::Block;
+use crate::stopwatch::Stopwatch;
 use crate::synth::band::Filter;
 use crate::synth::isa::Level;
 use crate::synth::waveform::Waveform;
@@ -24,8 +24,8 @@ pub(crate) struct Stretch {
     pub square_lsb2: f64,
     /// Number of components that were clipped.
     pub clipped: u64,
-    /// Time in seconds per sample for everything that is made, including the samples that stages look back
-    /// at.
+    /// Processor time in seconds per sample for everything that is made, including the samples that stages
+    /// look back at.
     pub sample_s: f64,
 }
 
@@ -87,7 +87,7 @@ pub(crate) fn measured(scene: &Scene, stretches: &[Range<u64>]) -> Result<Vec<St
         // On this thread alone: a plan has to work where no other can be started.
         transmitters.iter_mut().try_for_each(|t| t.prepare_alone(scene, needed, made))?;
         let samples = (stretch.end - stretch.start) as usize;
-        let begin = Instant::now();
+        let watch = Stopwatch::start();
         let mut block = satellites(scene, &transmitters, kernel, (stretch.start, samples, memory), &mut worker);
         let sent = block.lead..block.lead + samples;
         let square = |block: &Block<'_>| {
@@ -110,7 +110,7 @@ pub(crate) fn measured(scene: &Scene, stretches: &[Range<u64>]) -> Result<Vec<St
             components: if format.is_complex() { 2 } else { 1 } * samples as u64,
             square_lsb2,
             clipped,
-            sample_s: begin.elapsed().as_secs_f64() / block.i.len().max(1) as f64,
+            sample_s: watch.elapsed_s() / block.i.len().max(1) as f64,
         });
     }
     Ok(found)
