@@ -396,7 +396,8 @@ impl<'a> One<'a> {
         let ray_rad = self.ray_cycles * std::f64::consts::TAU;
         let phase2 = THEORY * THEORY * sigma_rad * sigma_rad + stress_rad * stress_rad + ray_rad * ray_rad;
         let (_, high) = mean_square(0.5 * count);
-        let limit = high * (1.0 + 2.0 * snr * phase2) / (2.0 + 2.0 * snr) * THEORY * THEORY;
+        let noise = THEORY * self.pair * THEORY * self.pair;
+        let limit = high * noise * (1.0 + 2.0 * snr * phase2) / (2.0 + 2.0 * snr);
         let quadrature = sums.quadrature / count / power;
         links.put(Figure::PromptQuadrature, &self.name, quadrature, limit.min(1.0));
     }

@@ -15,6 +15,8 @@ use gnss::record::{Event, Fix, Observation, TrackingRow};
 
 /// Steps beyond this many usual ones are gaps.
 const GAP: f64 = 1.5;
+/// Length of an update as received over the one that is stated: codes and clocks are off by 1e-4 at most.
+const LONGEST_UPDATE: f64 = 1.0001;
 
 /// Time in which every loop has been updated, and every value of it with noise.
 const RENEWED_S: f64 = 0.095;
@@ -132,6 +134,7 @@ fn tracking(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError> {
         .collect();
     // A channel that ended and began again has nothing between.
     let goes_on = |old: u64, sample: u64| !lost.iter().any(|at| (old..=sample).contains(at));
+    let mut stood = false;
     for row in run.tracking.cursor(link) {
         let row = row?;
         if let Some(old) = &before {
@@ -140,9 +143,13 @@ fn tracking(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError> {
                 [row.prompt_i, row.prompt_q, row.dll_discriminator_chips, row.pll_discriminator_cycles]
                     .map(f64::to_bits)
             };
-            if row.prompt_i != 0.0 && values(old) == values(&row) {
+            // Updates that last as long as rows are apart pass over an interval now and then, as codes drift.
+            let update = LONGEST_UPDATE * row.integration_s * run.scene.sample_rate_hz;
+            let stands = row.prompt_i != 0.0 && values(old) == values(&row);
+            if stands && (stood || (row.sample - old.sample.min(row.sample)) as f64 > update) {
                 rows.repeated.add(|| format!("loop update of {key} at sample {}", row.sample));
             }
+            stood = stands;
             if goes_on(old.sample, row.sample) {
                 steps.push(row.sample as f64 - old.sample as f64)?;
             }
