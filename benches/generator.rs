@@ -81,7 +81,7 @@ impl Case {
         let text = format!("duration_s = {seconds}\n{bare}{tables}[front_end]\nsample_rate_hz = {rate_hz}\n");
         let scenario = Scenario::parse(&text, "bench").unwrap();
         let (mut scene, _) = scenario.compose(Path::new("scenarios"), &Overrides::default()).unwrap();
-        scene.fidelity = Fidelity::suited(grade, rate_hz, scene.fidelity.allowed_m, &scene.signals);
+        scene.fidelity = Fidelity::suited(grade, rate_hz, scene.fidelity.allowed_m, &scene.signals).unwrap();
         let up: Vec<Sv> = scene
             .catalogue
             .satellites()
@@ -169,7 +169,7 @@ fn galileo(lines: &mut Vec<Line>) {
             [front_end]\nsample_rate_hz = 10e6\n";
         let scenario = Scenario::parse(text, "bench").unwrap();
         let (mut scene, _) = scenario.compose(Path::new("scenarios"), &Overrides::default()).unwrap();
-        scene.fidelity = Fidelity::suited(grade, 10e6, scene.fidelity.allowed_m, &scene.signals);
+        scene.fidelity = Fidelity::suited(grade, 10e6, scene.fidelity.allowed_m, &scene.signals).unwrap();
         let start = scene.clock.start;
         let up = scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv));
         let up: Vec<Sv> = up.filter(|sv| truth::in_view(&scene, *sv, start).unwrap()).collect();

@@ -268,7 +268,7 @@ fn settings(rate_msps: f64) -> Vec<(String, Fidelity)> {
     let mut found: Vec<(String, Fidelity)> = Grade::NAMES
         .iter()
         .map(|(name, grade)| {
-            ((*name).to_owned(), Fidelity::suited(*grade, rate_msps * 1e6, allowed_m(None), &[&L1_CA]))
+            ((*name).to_owned(), Fidelity::suited(*grade, rate_msps * 1e6, allowed_m(None), &[&L1_CA]).unwrap())
         })
         .collect();
     for (carrier_name, carrier) in Arithmetic::NAMES {

@@ -21,7 +21,7 @@ struct Rung<'r> {
 /// The levels of a signal at a rate, from the rows of its edges.
 fn ladder<'r>(rows: &'r [SignalRow], signal: &Signal, rate_msps: f64) -> Vec<Rung<'r>> {
     let of = |&(name, grade): &(&'static str, Grade)| {
-        let fidelity = Fidelity::suited(grade, 1e6 * rate_msps, allowed_m(None), &[signal]);
+        let fidelity = Fidelity::suited(grade, 1e6 * rate_msps, allowed_m(None), &[signal]).unwrap();
         let edge = fidelity.code_edge.name();
         let mut own = rows.iter().filter(|row| row.signal == signal.name && row.sample_rate_msps == rate_msps);
         let row = own.find(|row| row.code_edge == edge)?;

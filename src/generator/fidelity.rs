@@ -6,6 +6,7 @@
 //! its best.
 
 mod bias;
+mod budget;
 mod costs;
 
 use serde::Serialize;
@@ -15,10 +16,11 @@ use gnss::signal::{Component, Layers, Signal};
 
 use bias::{LARGEST_BIAS_M, standing_bias_m};
 pub use bias::{LOOP_HZ, allowed_m, code_bias_m, moving_bias_m};
+pub use budget::{Budget, LARGEST_OVER_RMS, Unmet};
 pub use costs::kernel_ns;
 
-/// Level of fidelity: a name for a value of every knob.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Level of fidelity: a name for a value of every knob, or the errors below which the cheapest are taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Grade {
     /// Nearest chips, carrier within 1e-3 cycle and spurs below −70 dBc.
     Fast,
@@ -26,6 +28,8 @@ pub enum Grade {
     Balanced,
     /// Reference level with `f64` for every sample, to which the other levels are compared.
     Reference,
+    /// The cheapest value of each knob whose errors stay within a budget.
+    Budget(Budget),
 }
 
 /// Model of a chip edge between samples. C/N0 is at the antenna, before the front end: samples have the share
@@ -76,9 +80,9 @@ impl Grade {
     pub const NAMES: [(&'static str, Self); 3] =
         [("fast", Self::Fast), ("balanced", Self::Balanced), ("reference", Self::Reference)];
 
-    /// Name of the level in a scenario.
+    /// Name of the level in a scenario; of a budget, the name of its key.
     pub fn name(self) -> &'static str {
-        name_of(&Self::NAMES, self)
+        if matches!(self, Self::Budget(_)) { "budget" } else { name_of(&Self::NAMES, self) }
     }
 }
 
@@ -110,6 +114,14 @@ impl Arithmetic {
     pub fn name(self) -> &'static str {
         name_of(&Self::NAMES, self)
     }
+
+    /// Error of the carrier in cycles that this arithmetic makes.
+    pub fn error_cycles(self) -> f64 {
+        match self {
+            Self::F32 => 1e-6,
+            Self::F64 => 1e-10,
+        }
+    }
 }
 
 fn name_of<T: PartialEq>(names: &[(&'static str, T)], value: T) -> &'static str {
@@ -131,8 +143,9 @@ impl Fidelity {
                 knot_tolerance_cycles: 4e-4,
                 allowed_m: LARGEST_BIAS_M,
             },
-            // 1e-4 cycle is 19 µm: a carrier loop at 50 dB-Hz has forty times that.
-            Grade::Balanced => Self {
+            // 1e-4 cycle is 19 µm: a carrier loop at 50 dB-Hz has forty times that. A budget sets what it
+            // needs.
+            Grade::Balanced | Grade::Budget(_) => Self {
                 grade,
                 code_edge: CodeEdge::Area,
                 waveform: Layers::Whole,
@@ -157,13 +170,19 @@ impl Fidelity {
     /// Returns the knobs of a level for `signals` at `rate_hz`. `balanced` takes area edges if the code error
     /// of every signal is below `allowed_m` (see [`allowed_m`]), because they cost less than band-limited
     /// ones at every rate. It never takes nearest edges, whose spurs are those of `fast`.
-    pub fn suited(grade: Grade, rate_hz: f64, allowed_m: f64, signals: &[&Signal]) -> Self {
+    ///
+    /// # Errors
+    /// A budget that no knobs keep.
+    pub fn suited(grade: Grade, rate_hz: f64, allowed_m: f64, signals: &[&Signal]) -> Result<Self, Unmet> {
+        if let Grade::Budget(budget) = grade {
+            return budget.cheapest(rate_hz, signals);
+        }
         let level = Self { allowed_m, ..Self::of(grade) };
         let too_much = |signal: &&Signal| code_bias_m(level.code_edge, signal, rate_hz) >= allowed_m;
         if grade == Grade::Balanced && signals.iter().any(too_much) {
-            return Self { code_edge: CodeEdge::BandLimited, ..level };
+            return Ok(Self { code_edge: CodeEdge::BandLimited, ..level });
         }
-        level
+        Ok(level)
     }
 
     /// Warning text for edges that bias the code of one of the `signals` by metres. It occurs at rates that
@@ -221,16 +240,19 @@ impl Wishes {
     }
 
     /// Returns the knobs for `signals` at `rate_hz`.
-    pub fn suited(&self, rate_hz: f64, signals: &[&Signal]) -> Fidelity {
-        let level = Fidelity::suited(self.grade, rate_hz, self.allowed_m, signals);
-        Fidelity {
+    ///
+    /// # Errors
+    /// A budget that no knobs keep.
+    pub fn suited(&self, rate_hz: f64, signals: &[&Signal]) -> Result<Fidelity, Unmet> {
+        let level = Fidelity::suited(self.grade, rate_hz, self.allowed_m, signals)?;
+        Ok(Fidelity {
             code_edge: self.code_edge.unwrap_or(level.code_edge),
             waveform: self.waveform.unwrap_or(level.waveform),
             carrier: self.carrier.unwrap_or(level.carrier),
             noise: self.noise.unwrap_or(level.noise),
             knot_tolerance_cycles: self.knot_tolerance_cycles.unwrap_or(level.knot_tolerance_cycles),
             ..level
-        }
+        })
     }
 }
 
@@ -252,7 +274,7 @@ pub struct Choice {
 /// Lists the value of each knob at a sample rate, with its expected error and its cost. The noise arithmetic
 /// is listed if there is `noise`. The waveform is listed if one of the `signals` has several layers.
 pub fn choices(chosen: Fidelity, rate_hz: f64, noise: bool, signals: &[&Signal]) -> Vec<Choice> {
-    let level = Fidelity::suited(chosen.grade, rate_hz, chosen.allowed_m, signals);
+    let level = Fidelity::suited(chosen.grade, rate_hz, chosen.allowed_m, signals).unwrap_or(chosen);
     let edge = chosen.code_edge;
     let bias = worst(signals, |signal| code_bias_m(edge, signal, rate_hz));
     let mut found = vec![
@@ -263,9 +285,10 @@ pub fn choices(chosen: Fidelity, rate_hz: f64, noise: bool, signals: &[&Signal])
             error: bias.map_or_else(String::new, |(signal, bias_m)| {
                 format!(
                     "pseudorange of {signal} {bias_m:.1e} m rms at {:.3} Msps where the code is at rest, {:.1e} m at 1 \
-                     kHz of Doppler behind a loop of {LOOP_HZ} Hz (balanced: below {:.1e} m)",
+                     kHz of Doppler behind a loop of {LOOP_HZ} Hz ({}: below {:.1e} m)",
                     1e-6 * rate_hz,
                     moving_bias_m(edge, signal, rate_hz, 1000.0),
+                    if matches!(chosen.grade, Grade::Budget(_)) { "budget" } else { "balanced" },
                     chosen.allowed_m
                 )
             }),
@@ -278,10 +301,7 @@ pub fn choices(chosen: Fidelity, rate_hz: f64, noise: bool, signals: &[&Signal])
             knob: "carrier",
             value: chosen.carrier.name().to_owned(),
             own: chosen.carrier != level.carrier,
-            error: match chosen.carrier {
-                Arithmetic::F32 => "carrier 1e-6 cycle".to_owned(),
-                Arithmetic::F64 => "carrier 1e-10 cycle".to_owned(),
-            },
+            error: format!("carrier {:e} cycle", chosen.carrier.error_cycles()),
             cost: match chosen.carrier {
                 Arithmetic::F32 => "the least".to_owned(),
                 double => multiple([edge; 2], [double, Arithmetic::F32], "f32", rate_hz, signals),
@@ -362,7 +382,7 @@ mod tests {
     #[test]
     fn balanced_keeps_its_promise_where_the_rate_meets_the_chips() {
         let largest_m = allowed_m(None);
-        let suited = |grade, rate_hz, signal| Fidelity::suited(grade, rate_hz, largest_m, &[signal]).code_edge;
+        let suited = |grade, rate_hz, signal| Fidelity::suited(grade, rate_hz, largest_m, &[signal]).unwrap().code_edge;
         for rate_hz in [2.046e6, 4.092e6, 5.115e6, 2.5575e6] {
             assert_eq!(suited(Grade::Balanced, rate_hz, &L1_CA), CodeEdge::BandLimited, "{rate_hz}");
         }
@@ -383,14 +403,14 @@ mod tests {
         assert_eq!(suited(Grade::Balanced, 20.46e6, &L5), CodeEdge::BandLimited);
         assert_eq!(suited(Grade::Balanced, 25e6, &L5), CodeEdge::Area);
         // Of several signals the worst counts.
-        let both = Fidelity::suited(Grade::Balanced, 20.46e6, largest_m, &[&L1_CA, &L5]);
+        let both = Fidelity::suited(Grade::Balanced, 20.46e6, largest_m, &[&L1_CA, &L5]).unwrap();
         assert_eq!(both.code_edge, CodeEdge::BandLimited);
     }
 
     #[test]
     fn signals_stronger_than_nature_s_ask_for_better_edges() {
         let edge = |rate_hz: f64, cn0_dbhz: f64| {
-            Fidelity::suited(Grade::Balanced, rate_hz, allowed_m(Some(cn0_dbhz)), &[&L1_CA]).code_edge
+            Fidelity::suited(Grade::Balanced, rate_hz, allowed_m(Some(cn0_dbhz)), &[&L1_CA]).unwrap().code_edge
         };
         // 0.164 m and 0.103 m against the 0.14 m of area edges.
         assert_eq!((edge(2.6e6, 59.0), edge(2.6e6, 63.0)), (CodeEdge::Area, CodeEdge::BandLimited));

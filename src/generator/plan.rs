@@ -16,7 +16,7 @@ use serde::Serialize;
 
 use crate::catalogue::Silence;
 use crate::error::GenerateError;
-use crate::fidelity::{self, Choice};
+use crate::fidelity::{self, Choice, Grade};
 use crate::levels::{Levels, Span};
 use crate::presence::{Presence, presence};
 use crate::ray::{Ray, Sight};
@@ -102,6 +102,8 @@ pub struct Plan {
     pub signal_sample_ns: f64,
     /// Chosen value of each fidelity knob.
     pub knobs: Vec<Choice>,
+    /// Cheaper knobs than a budget's, each with what it would break.
+    pub cheaper: Vec<String>,
     /// Rate, format and tuning of the samples, in words.
     pub sampling: String,
     /// Samples of the scene.
@@ -154,6 +156,10 @@ impl Plan {
             sample_ns: 1e9 * levels.sample_s,
             signal_sample_ns: 1e9 * levels.sample_s / (links as f64 * sources).max(1.0),
             knobs: fidelity::choices(scene.fidelity, scene.clock.rate.hz(), scene.noise, &scene.signals),
+            cheaper: match scene.fidelity.grade {
+                Grade::Budget(budget) => budget.cheaper(&scene.fidelity, scene.clock.rate.hz(), &scene.signals),
+                _ => Vec::new(),
+            },
             sampling: sampling(scene),
             samples: scene.samples,
             bytes,
@@ -333,6 +339,9 @@ impl fmt::Display for Plan {
         for Choice { knob, value, own, error, cost } in &self.knobs {
             let value = if *own { format!("{value} (own)") } else { value.clone() };
             writeln!(f, "  {knob:21}  {value:12}  {cost:24}  {error}")?;
+        }
+        for cheaper in &self.cheaper {
+            writeln!(f, "  cheaper, not within the budget: {cheaper}")?;
         }
         for (title, present) in [("computed", true), ("not computed", false)] {
             writeln!(f, "\n{title}")?;

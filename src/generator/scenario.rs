@@ -11,6 +11,7 @@ mod band;
 mod builder;
 mod compose;
 mod expect;
+mod fidelity;
 mod files;
 mod front_end;
 mod hardware;
@@ -56,12 +57,11 @@ use stages::PlaybackSpec;
 use crate::effect::multipath::Echo;
 use crate::effect::obstruction::Obstacle;
 use crate::fast_phase::scintillation::Strength;
-use crate::fidelity::{Wishes, allowed_m};
-use crate::scene::{Arithmetic, CodeEdge, Grade};
+use crate::fidelity::allowed_m;
 use crate::vehicle::attitude::Attitude;
 use gnss::facts::Expect;
 use gnss::satellite::Sv;
-use gnss::signal::{Layers, Signal};
+use gnss::signal::Signal;
 use gnss::time::Epoch;
 
 /// Elevation mask in degrees if `[satellites]` is absent. A test compares the constants with the declared
@@ -492,21 +492,6 @@ fn satellite_list(table: &Table<'_>, key: &str) -> Result<Option<Vec<Sv>>, Scena
     let Some(words) = table.words(key, expected)? else { return Ok(None) };
     let satellites: Result<Vec<Sv>, _> = words.iter().map(|word| word.parse::<Sv>()).collect();
     satellites.map(Some).map_err(|_| table.bad(key, expected))
-}
-
-/// A level, and the knobs that the table names.
-fn fidelity_of(table: Option<&Table<'_>>, allowed_m: f64) -> Result<Wishes, ScenarioError> {
-    let wishes = Wishes::of(Grade::Balanced, allowed_m);
-    let Some(table) = table else { return Ok(wishes) };
-    Ok(Wishes {
-        grade: table.choice("level", &Grade::NAMES)?.unwrap_or(wishes.grade),
-        code_edge: table.choice("code_edge", &CodeEdge::NAMES)?,
-        waveform: table.choice("waveform", &Layers::NAMES)?,
-        carrier: table.choice("carrier", &Arithmetic::NAMES)?,
-        noise: table.choice("noise", &Arithmetic::NAMES)?,
-        knot_tolerance_cycles: table.number("knot_tolerance_cycles")?,
-        ..wishes
-    })
 }
 
 /// The receiver's table as written, through the ordinary parser.

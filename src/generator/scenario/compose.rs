@@ -232,6 +232,9 @@ impl Scenario {
         let if_hz = signals.first().map_or(0.0, |signal| metadata.if_hz(signal.centre_hz()));
         let stages = front_end.stages.in_order(front_end, (metadata.format, if_hz), world.seed, noise_lsb);
         let refuse = |reason: &str| self.conflict("filter.bandwidth_hz", front_end.of_it() + reason);
+        let fidelity = front_end.fidelity.suited(metadata.rate.hz(), &signals);
+        let fidelity =
+            fidelity.map_err(|unmet| self.conflict("fidelity.budget", front_end.of_it() + &unmet.to_string()));
         let shared = |effect: &Arc<dyn Effect>| Box::new(Arc::clone(effect)) as Box<dyn Effect>;
         let mut scene = Scene {
             name: self.name.clone(),
@@ -246,7 +249,7 @@ impl Scenario {
             messages: Arc::clone(&world.messages),
             message_faults: world.message_faults.clone(),
             satellite_clocks: Arc::clone(&world.satellite_clocks),
-            fidelity: front_end.fidelity.suited(metadata.rate.hz(), &signals),
+            fidelity: fidelity?,
             signals,
             excluded: world.excluded.clone(),
             mask_rad: self.mask_rad,

@@ -3,9 +3,10 @@
 //! In a list each has its `name`, and its own centre, rate, format, gain and stages. What is random about it
 //! is keyed by its name alone, never by its position in the list.
 
+use super::fidelity::fidelity_of;
 use super::read::{Refusals, Table};
 use super::stages::{self, Stages};
-use super::{Scenario, ScenarioError, fidelity_of, signal_list};
+use super::{Scenario, ScenarioError, signal_list};
 use crate::fidelity::Wishes;
 use gnss::samples::Format;
 use gnss::signal::Signal;

@@ -17,10 +17,11 @@ use super::*;
 use crate::clock::oscillator::PowerLaw;
 use crate::effect::multipath::Detour;
 use crate::effect::transmit::Block;
-use crate::scene::Fidelity;
+use crate::scene::{CodeEdge, Fidelity, Grade};
 use crate::vehicle::attitude::Nose;
 use gnss::gps::l1ca::L1_CA;
 use gnss::samples::Format;
+use gnss::signal::Layers;
 
 const MINIMAL: &str = "name = \"test\"\nstart = 2010-07-01T10:00:00\nduration_s = 10\n";
 const STATIC: &str = "[motion]\nkind = \"static\"\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\n";
@@ -254,7 +255,7 @@ fn what_cannot_be_turned_or_reflected_is_refused_with_the_remedy() {
 
 #[test]
 fn a_level_sets_every_knob_and_a_knob_overrides_its_level() {
-    let of = |text: &str| parse(text).unwrap().front_ends[0].fidelity.suited(2.6e6, &[&L1_CA]);
+    let of = |text: &str| parse(text).unwrap().front_ends[0].fidelity.suited(2.6e6, &[&L1_CA]).unwrap();
     let fidelity = |lines: &str| of(&with("fidelity", lines));
     assert_eq!(of(&format!("{MINIMAL}{STATIC}")), Fidelity::of(Grade::Balanced));
     for (name, grade) in Grade::NAMES {
@@ -276,6 +277,16 @@ fn a_level_sets_every_knob_and_a_knob_overrides_its_level() {
     ] {
         let error = parse(&with("fidelity", &format!("{key} = {value}"))).unwrap_err().to_string();
         assert!(error.starts_with("scene.toml:") && error.contains(&format!("fidelity.{key} = ")), "{error}");
+        assert!(error.contains(hint), "{error}");
+    }
+    let budget = fidelity("budget = { code_m = 3.0, carrier_cycles = 1e-5 }");
+    assert_eq!((budget.grade.name(), budget.code_edge), ("budget", CodeEdge::Area));
+    for (lines, hint) in [
+        ("budget = {}", "at least one of code_m, carrier_cycles and cn0_db"),
+        ("budget = { code_m = 3.0 }\ncarrier = \"f64\"", "nothing beside fidelity.budget"),
+        ("budget = { code_m = 0.0 }", "fidelity.budget.code_m = 0"),
+    ] {
+        let error = parse(&with("fidelity", lines)).unwrap_err().to_string();
         assert!(error.contains(hint), "{error}");
     }
     let error = parse(&with("fidelity", "sample_width = 8")).unwrap_err().to_string();

@@ -152,6 +152,19 @@ const FIDELITY: &[Key] = &[
         "largest error of the carrier between knots of its polynomials",
     )
     .or_else("the level's"),
+    table(
+        "budget",
+        BUDGET,
+        "Largest errors of the samples, in place of a level and knobs: the cheapest knobs are taken whose errors stay \
+         below them; at least one of the three. `gnss-twin plan` prints them, and what cheaper ones would break.",
+    ),
+];
+
+const BUDGET: &[Key] = &[
+    number("code_m", 1e-6, 1e3, "m", "largest error of a code at rest on the sampling grid").or_else("unbounded"),
+    number("carrier_cycles", 1e-7, 0.1, "cycles", "largest error of a carrier").or_else("unbounded"),
+    number("cn0_db", 1e-4, 20.0, "dB", "largest error of a C/N0, against an ideal filter of the samples' band")
+        .or_else("unbounded"),
 ];
 
 const TRUTH: &[Key] = &[number("interval_s", 0.001, 3600.0, "s", "interval of the rows").or(0.1)];

@@ -161,6 +161,11 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
                     cases.push((with("front_end", &format!("{key} = 1")), table, key))
                 }
                 ("satellites", "only") => cases.push((with("satellites", "only = 1"), table, key)),
+                ("fidelity", "budget") => cases.push((with("fidelity", "budget = 1"), table, key)),
+                ("fidelity.budget", _) => {
+                    let errors = "[fidelity.budget]\ncode_m = 1\ncarrier_cycles = 1e-3\ncn0_db = 1\n";
+                    cases.push((format!("{MINIMAL}{STATIC}{errors}"), table, key));
+                }
                 ("navigation", "moved_to") => cases.push((with("navigation", &format!("{key} = 1")), table, key)),
                 ("expect", "interval" | "position_within_m") => {
                     cases.push((with("expect", &format!("{key} = 1")), table, key));

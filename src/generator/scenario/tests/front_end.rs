@@ -146,12 +146,20 @@ fn a_signal_outside_the_band_is_refused_where_it_is_the_only_one() {
 fn noise_and_strong_signals_decide_how_good_balanced_edges_are() {
     let edge = |tables: &str| {
         let scenario = parse(&format!("{MINIMAL}{STATIC}{tables}")).unwrap();
-        scenario.front_ends[0].fidelity.suited(2.6e6, &[&L1_CA]).code_edge
+        scenario.front_ends[0].fidelity.suited(2.6e6, &[&L1_CA]).unwrap().code_edge
     };
     assert_eq!(edge("[noise]\n"), CodeEdge::Area);
     assert_eq!(edge("[power]\ncn0_dbhz = 80\n"), CodeEdge::Area);
     assert_eq!(edge("[noise]\n[power]\ncn0_dbhz = 80\n"), CodeEdge::BandLimited);
     assert_eq!(edge("[noise]\n[power]\ncn0_dbhz = 45\n[power.satellites]\nG13 = 80\n"), CodeEdge::BandLimited);
+}
+
+#[test]
+fn a_budget_that_a_front_end_cannot_keep_is_refused_with_the_least() {
+    let refused = composed(&format!("{WIDE}{NARROW}[noise]\n[fidelity]\nbudget = {{ code_m = 1e-3 }}\n"));
+    let error = refused.map(|_| ()).unwrap_err();
+    assert!(error.contains("fidelity.budget") && error.contains("front end wide"), "{error}");
+    assert!(error.contains("code_m = 0.001 cannot be promised: at least") && error.contains("10.000 Msps"), "{error}");
 }
 
 #[test]
