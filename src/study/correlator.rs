@@ -15,7 +15,7 @@ use super::motion::{Motion, Truth};
 use super::normal::{Normals, Purpose, symbol};
 use super::watch::Watch;
 use analysis::expect::theory::clock::PowerLaw;
-use gnss::signal::{self, Carrier, Component, Signal};
+use gnss::signal::{self, Component, Signal};
 use receiver::correlate::units_to_chips;
 use receiver::lead::{lead, other_side};
 use receiver::track::closed::{Loops, Mode, Update};
@@ -55,12 +55,11 @@ pub struct Case {
     pub seed: u64,
 }
 
-/// The signals that a channel of this kind can follow: those whose carrier is the same for all satellites,
-/// and of which one component is followed.
+/// The signals that a channel of this kind can follow: those of which one component is followed. The carrier
+/// of one with channels is that of channel 0.
 pub fn signals() -> Vec<&'static Signal> {
-    let common = |signal: &&'static Signal| matches!(signal.carrier, Carrier::Common(_));
     let alone = |signal: &&'static Signal| lead(signal).is_some_and(|lead| other_side(lead, signal).is_none());
-    signal::all().into_iter().filter(|signal| common(signal) && alone(signal)).collect()
+    signal::all().into_iter().filter(alone).collect()
 }
 
 impl Case {
