@@ -399,10 +399,10 @@ fn latency(text: &str) -> Result<f64, String> {
 )]
 pub struct Receive {
     /// Recording or stream. A recording is a SigMF pair (either file), a SigMF archive (.sigmf), a SigMF
-    /// collection of front ends that share a clock, ION metadata (.xml, .sdrx), or a raw file with --format
-    /// or
-    /// --bits and --rate-hz. A stream is - (standard input), fifo:PATH, tcp:ADDR of a server of plain
-    /// samples, or rtl-tcp:ADDR of an rtl_tcp server. ADDR is HOST:PORT, or PORT on this machine
+    /// collection of front ends that share a clock, ION metadata (.xml, .sdrx, .usbx, .tgx, .smfx), or a raw
+    /// file with --format or --bits and --rate-hz. A stream is - (standard input), fifo:PATH, tcp:ADDR of a
+    /// server of plain samples, or rtl-tcp:ADDR of an rtl_tcp server. ADDR is HOST:PORT, or PORT on this
+    /// machine
     pub file: PathBuf,
     /// Directory for the results
     #[arg(long, value_name = "DIR")]

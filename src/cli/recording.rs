@@ -88,7 +88,7 @@ fn open_one(arguments: &args::Receive) -> Result<Recording, CliError> {
     }
     let found = match extension {
         Some("sigmf") => of_archive(&arguments.file)?,
-        Some("xml" | "sdrx") => of_ion(&arguments.file, arguments)?,
+        Some(extension) if ION.contains(&extension) => of_ion(&arguments.file, arguments)?,
         _ => match ion_beside(&arguments.file)? {
             Some(path) => of_ion(&path, arguments)?,
             None => of_pair(arguments)?,
@@ -204,13 +204,16 @@ fn text_of(file: &mut File, member: &archive::Member) -> io::Result<String> {
     Ok(text)
 }
 
+/// Endings of ION's metadata: the standard's, and those of front ends that add an x to that of their samples.
+const ION: [&str; 5] = ["sdrx", "xml", "usbx", "tgx", "smfx"];
+
 /// ION's metadata of a file of samples that has no others: of the same name beside it.
 fn ion_beside(file: &Path) -> Result<Option<PathBuf>, CliError> {
     let is_there = |path: &Path| present(path).map_err(|error| CliError::read(shown(path), &error));
     if is_there(&pair(file).1)? {
         return Ok(None);
     }
-    for extension in ["sdrx", "xml"] {
+    for extension in ION {
         let path = file.with_extension(extension);
         if is_there(&path)? {
             return Ok(Some(path));

@@ -2,11 +2,16 @@
 //! samples.
 //!
 //! Source: ION GNSS SDR Metadata Standard, revision 1.0 (2020): lanes of blocks of chunks of lumps of
-//! streams, a system's base rate, bands. A stream's 0 Hz is its band's centre less what that was
-//! translated to. A format whose quadrature or in-phase part is negated (`IQn`, `InQ`, …) mirrors the
-//! spectrum. Limits: one kind of block of one kind of chunk, in which every lump has the same streams;
-//! encodings of 1 to 16 bits but for Gray codes, magnitude before sign and floating point. Times are
-//! passed over: of the files that there are some have the start as the session's, some as the file's.
+//! streams, a system's base rate, bands. Bits of a chunk count from the highest of its first word, and with a
+//! word shift to the right from the highest of its last word. A lump fills its chunk as often as it fits in,
+//! as the standard's own converter has it. A shift to the right of a lump or a stream reverses the order in
+//! time, and moves no bits. A stream's 0 Hz is its band's centre less what that was translated to. Of the
+//! standard's own samples two name what is at 0 Hz as the centre (JRC, FITWDP): there the centre is no
+//! carrier of a signal, and with the translation it is one. A format whose quadrature or in-phase part is
+//! negated (`IQn`, `InQ`, …) mirrors the spectrum. Limits: one kind of block of one kind of chunk, in which
+//! every lump has the same streams; encodings of 1 to 16 bits but for Gray codes, magnitude before sign and
+//! floating point. Times are passed over: of the files that there are some have the start as the session's,
+//! some as the file's.
 
 use std::collections::BTreeMap;
 
@@ -15,6 +20,7 @@ use thiserror::Error;
 
 use crate::packed::{Components, Encoding, Group, Layout};
 use crate::recording::{Blocks, Description, Samples};
+use crate::signal;
 use crate::time::Rate;
 
 /// Reason for which a text does not describe readable samples.
@@ -38,6 +44,18 @@ pub enum IonError {
         /// Enclosing element in which it is expected.
         within: String,
     },
+    /// Elements of which one is read.
+    #[error("{name}: {count} kinds of <{element}> in <{within}>: only files with one are supported")]
+    Several {
+        /// Name of the file.
+        name: String,
+        /// The element.
+        element: &'static str,
+        /// Enclosing element.
+        within: String,
+        /// Number of them.
+        count: usize,
+    },
     /// An element whose value cannot be used.
     #[error("{name}: <{element}> is {value:?}: expected {expected}")]
     Value {
@@ -60,20 +78,39 @@ pub type Stream = (String, Description);
 /// # Errors
 /// [`IonError`] with the file, the element, its value and what was expected.
 pub fn parse(text: &str, name: &str) -> Result<Vec<Stream>, IonError> {
-    let document = Document::parse(text).map_err(|error| IonError::Syntax { name: name.to_owned(), error })?;
+    // A declaration has to come first, and not every program writes it so.
+    let document =
+        Document::parse(text.trim_start()).map_err(|error| IonError::Syntax { name: name.to_owned(), error })?;
     let of = Of { name, ids: ids(document.root_element()) };
     let root = document.root_element();
-    let lane = of.only(root, "lane")?;
-    let chunk = of.chunk(lane)?;
-    let system = of.child(lane, "system")?;
-    let base_hz = of.frequency_hz(of.child(system, "freqbase")?)?;
-    let file = root.children().find(|node| node.tag_name().name() == "file");
-    let dataset = file.and_then(|file| inner(file, "url")).map(|url| url.trim().to_owned());
-    let mut streams = of.streams(chunk, base_hz)?;
-    for (_, description) in &mut streams {
-        description.dataset.clone_from(&dataset);
+    let lanes: Vec<Node<'_, '_>> = of.children(root, "lane").collect();
+    if lanes.is_empty() {
+        return Err(of.missing("lane", root));
+    }
+    let mut streams = Vec::new();
+    for lane in &lanes {
+        let chunk = of.chunk(*lane)?;
+        let system = of.child(*lane, "system")?;
+        let base_hz = of.frequency_hz(of.child(system, "freqbase")?)?;
+        let own = |file: &Node<'_, '_>| lanes.len() == 1 || of.is_of_lane(*file, *lane);
+        let file = root.children().filter(|node| node.tag_name().name() == "file").find(own);
+        let dataset = file.and_then(|file| inner(file, "url")).map(|url| url.trim().to_owned());
+        for (name, description) in of.streams(chunk, base_hz)? {
+            streams.push((name, Description { dataset: dataset.clone(), ..description }));
+        }
     }
     Ok(streams)
+}
+
+/// True if a signal has its carrier there, to the hertz.
+fn is_carrier(hz: f64) -> bool {
+    signal::all().iter().any(|signal| (signal.centre_hz() - hz).abs() < 1.0)
+}
+
+/// Bit of a group of words that is number `at` if the last word comes first; one beyond the group stays
+/// there.
+fn mirrored(at: u32, word_bits: u32, room: u32) -> u32 {
+    if at < room { room - (at / word_bits + 1) * word_bits + at % word_bits } else { at }
 }
 
 /// The text of a child element.
@@ -96,6 +133,8 @@ fn ids<'a, 'i>(root: Node<'a, 'i>) -> BTreeMap<(&'a str, &'a str), Node<'a, 'i>>
 struct Chunk<'a, 'i> {
     node: Node<'a, 'i>,
     group: Group,
+    /// True if its last word comes first.
+    reversed: bool,
     framing: Framing,
 }
 
@@ -141,12 +180,25 @@ impl<'a, 'i> Of<'a, 'i> {
         self.children(within, name).next().ok_or_else(|| self.missing(name, within))
     }
 
+    /// True if a file holds a lane.
+    fn is_of_lane(&self, file: Node<'_, '_>, lane: Node<'_, '_>) -> bool {
+        let mut lanes = file.children().filter(|child| child.tag_name().name() == "lane");
+        lanes.any(|child| child.attribute("id") == lane.attribute("id"))
+    }
+
     /// The one child of that name.
     fn only(&self, within: Node<'a, 'i>, name: &'static str) -> Result<Node<'a, 'i>, IonError> {
         let mut all = self.children(within, name);
         let first = all.next().ok_or_else(|| self.missing(name, within))?;
-        let more = all.count();
-        if more == 0 { Ok(first) } else { Err(self.bad(first, format!("one <{name}>, there are {}", more + 1))) }
+        match all.count() {
+            0 => Ok(first),
+            more => Err(IonError::Several {
+                name: self.name.to_owned(),
+                element: name,
+                within: within.tag_name().name().to_owned(),
+                count: more + 1,
+            }),
+        }
     }
 
     /// A number; `usual` where the element is not there.
@@ -183,25 +235,24 @@ impl<'a, 'i> Of<'a, 'i> {
         Ok((hz * 1e3).round() * 1e-3)
     }
 
+    /// True if a shift is to the right.
+    fn is_right(&self, within: Node<'a, 'i>, name: &str) -> bool {
+        matches!(self.word(within, name).as_str(), "right" | "r")
+    }
+
     /// The lane's one chunk.
     fn chunk(&self, lane: Node<'a, 'i>) -> Result<Chunk<'a, 'i>, IonError> {
         let block = self.only(lane, "block")?;
         let node = self.only(block, "chunk")?;
         let endian = self.word(node, "endian");
-        let shift = self
-            .children(node, "lump")
-            .next()
-            .and_then(|lump| self.children(lump, "stream").next().map(|stream| self.word(stream, "shift")));
-        let shift = [shift.unwrap_or_default(), self.word(node, "wordshift"), self.word(node, "shift")];
-        let right = shift.iter().find(|word| matches!(word.as_str(), "left" | "right" | "l" | "r"));
         let group = Group {
             word_bytes: self.number(node, "sizeword", None)? as usize,
             words: self.number(node, "countwords", None)? as usize,
             big_endian: matches!(endian.as_str(), "big" | "b"),
-            lowest_first: right.is_some_and(|word| word.starts_with('r')),
+            lowest_first: false,
         };
         let framing = self.framing(block, &group)?;
-        Ok(Chunk { node, group, framing })
+        Ok(Chunk { node, group, reversed: self.is_right(node, "wordshift"), framing })
     }
 
     /// Headers and footers of a block of so many cycles of its chunk. One of no cycles is the whole file.
@@ -218,7 +269,7 @@ impl<'a, 'i> Of<'a, 'i> {
 
     /// The streams of a chunk whose words are sampled at a multiple of a base rate.
     fn streams(&self, chunk: Chunk<'a, 'i>, base_hz: f64) -> Result<Vec<Stream>, IonError> {
-        let Chunk { node, group, framing } = chunk;
+        let Chunk { node, group, reversed, framing } = chunk;
         let lumps: Vec<Node<'a, 'i>> = self.children(node, "lump").collect();
         let first = *lumps.first().ok_or_else(|| self.missing("lump", node))?;
         let names = |lump| self.children(lump, "stream").map(|node| node.attribute("id")).collect::<Vec<_>>();
@@ -227,16 +278,19 @@ impl<'a, 'i> Of<'a, 'i> {
         }
         let width = |stream| self.number(stream, "packedbits", None);
         let lump_bits = self.children(first, "stream").map(width).sum::<Result<u32, _>>()?;
-        let padded = self.word(node, "padding");
-        let used = lump_bits * lumps.len() as u32;
         let room = (8 * group.word_bytes * group.words) as u32;
-        let begin = if padded == "head" { room.saturating_sub(used) } else { 0 };
+        // One lump is repeated as often as there is room.
+        let count = if lumps.len() == 1 { room.checked_div(lump_bits).unwrap_or(0) } else { lumps.len() as u32 };
+        let padded = matches!(self.word(node, "padding").as_str(), "head" | "h");
+        let begin = if padded { room.saturating_sub(lump_bits * count) } else { 0 };
+        let reversed_lumps = self.is_right(first, "shift");
         let (mut streams, mut within) = (Vec::new(), begin);
         for (number, stream) in (1..).zip(self.children(first, "stream")) {
             let packed = width(stream)?;
             let factor = self.number(stream, "ratefactor", None)?;
-            let starts = (0..lumps.len() as u32).map(|lump| within + lump * lump_bits);
-            let samples = self.samples(stream, group, (factor, packed), starts)?;
+            let lump = |lump| if reversed_lumps { count - 1 - lump } else { lump };
+            let starts = (0..count).map(|number| within + lump(number) * lump_bits);
+            let samples = self.samples(stream, (group, reversed), (factor, packed), starts)?;
             within += packed;
             let rate = Rate::from_hz(base_hz * f64::from(factor));
             let (center_hz, inverted) = self.tuning(stream)?;
@@ -257,11 +311,12 @@ impl<'a, 'i> Of<'a, 'i> {
         Ok(streams)
     }
 
-    /// The samples of a stream: so many in so many bits, from each of `starts` on.
+    /// The samples of a stream: so many in so many bits, from each of `starts` on, in a group of words or in
+    /// the reverse of one.
     fn samples(
         &self,
         stream: Node<'a, 'i>,
-        group: Group,
+        (group, reversed): (Group, bool),
         (factor, packed): (u32, u32),
         starts: impl Iterator<Item = u32>,
     ) -> Result<Samples, IonError> {
@@ -288,16 +343,27 @@ impl<'a, 'i> Of<'a, 'i> {
         };
         let left = packed - filled;
         let begin = if self.word(stream, "alignment") == "right" { left } else { 0 };
-        let starts = starts.flat_map(|start| (0..factor).map(move |k| start + begin + k * sample_bits));
-        let layout = Layout::of_fields(group, (bits, encoding, components), starts);
+        let right = self.is_right(stream, "shift");
+        let place = move |k| if right { factor - 1 - k } else { k };
+        let starts = starts.flat_map(|start| (0..factor).map(move |k| start + begin + place(k) * sample_bits));
+        let word_bits = 8 * group.word_bytes as u32;
+        let room = word_bits * group.words as u32;
+        let starts: Vec<u32> =
+            if reversed { starts.map(|at| mirrored(at, word_bits, room)).collect() } else { starts.collect() };
+        // In words that are reversed the rest of a sample would not be in the next one of the file.
+        if reversed && starts.iter().any(|at| at % word_bits + sample_bits > word_bits) {
+            return Err(self.bad(stream, "every sample within one word, as <wordshift> reverses the words"));
+        }
+        let layout = Layout::of_fields(group, (bits, encoding, components), starts.into_iter());
         layout.map(Samples::Laid).map_err(|error| self.bad(stream, error.to_string()))
     }
 
     /// The radio frequency at 0 Hz of a stream, and whether its spectrum is mirrored.
     fn tuning(&self, stream: Node<'a, 'i>) -> Result<(f64, bool), IonError> {
         let band = self.child(stream, "band")?;
-        let centre_hz = self.frequency_hz(self.child(band, "centerfreq")?)?;
+        let named_hz = self.frequency_hz(self.child(band, "centerfreq")?)?;
         let at_hz = self.frequency_hz(self.child(band, "translatedfreq")?)?;
+        let centre_hz = if !is_carrier(named_hz) && is_carrier(named_hz + at_hz) { named_hz + at_hz } else { named_hz };
         let format = self.word(stream, "format");
         let negated = planted!("gnss.ion.negated", format != "ifn" && format.matches('n').count() == 1, false);
         // Frequencies are those of the stream as it is meant; what is read has the opposite part's sign.
@@ -309,100 +375,4 @@ impl<'a, 'i> Of<'a, 'i> {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::io::Read;
-
-    use super::*;
-    use crate::recording::Unblocked;
-    use crate::samples::Format;
-
-    /// Two streams of 1-bit I and Q in the higher half of a little-endian word, and six samples of a third.
-    const TRIPLE: &str = r#"<?xml version="1.0"?>
-        <metadata xmlns="http://www.ion.org/standards/sdrwg/schema/metadata.xsd">
-          <lane id="three"><system id="S"/><block><cycles>0</cycles><sizeheader>0</sizeheader>
-            <chunk><sizeword>2</sizeword><countwords>1</countwords><endian>Little</endian><padding>Tail</padding><lump>
-              <stream id="L1"><ratefactor>1</ratefactor><quantization>1</quantization><packedbits>2</packedbits>
-                <alignment>Left</alignment><shift>Left</shift><format>IQn</format><encoding>SIGN</encoding>
-                <band id="L1"/></stream>
-              <stream id="L2"><ratefactor>1</ratefactor><quantization>1</quantization><packedbits>2</packedbits>
-                <shift>Left</shift><format>IQ</format><encoding>SIGN</encoding><band id="L2"/></stream>
-              <stream id="L5"><ratefactor>6</ratefactor><quantization>1</quantization><packedbits>12</packedbits>
-                <shift>Left</shift><format>QI</format><encoding>SIGN</encoding><band id="L5"/></stream>
-            </lump></chunk></block></lane>
-          <system id="S"><freqbase format="MHz">5.0</freqbase></system>
-          <band id="L1"><centerfreq format="GHz">1.57542</centerfreq>
-            <translatedfreq format="kHz">-48.75</translatedfreq></band>
-          <band id="L2"><centerfreq format="MHz">1227.6</centerfreq><translatedfreq format="kHz">-56.25</translatedfreq>
-            <inverted>true</inverted></band>
-          <band id="L5"><centerfreq format="MHz">1176.45</centerfreq>
-            <translatedfreq format="Hz">121875</translatedfreq></band>
-          <file><url>three.dat</url><lane id="three"/></file>
-        </metadata>"#;
-
-    fn unpacked(description: &Description, bytes: &[u8]) -> Vec<i8> {
-        let (format, layout) = description.samples.clone().unwrap().unpacked().unwrap();
-        assert_eq!(format, Format::Ci8);
-        let mut out = Vec::new();
-        layout.unwrap().unpack(bytes, &mut out);
-        out.into_iter().map(|byte| byte as i8).collect()
-    }
-
-    #[test]
-    fn streams_lie_in_their_bits_and_at_their_frequencies() {
-        let streams = parse(TRIPLE, "three.xml").unwrap();
-        let names: Vec<&str> = streams.iter().map(|(name, _)| name.as_str()).collect();
-        assert_eq!(names, ["L1", "L2", "L5"]);
-        let rates: Vec<f64> = streams.iter().map(|(_, one)| one.rate.unwrap().hz()).collect();
-        assert_eq!(rates, [5e6, 5e6, 30e6]);
-        assert!(streams.iter().all(|(_, one)| one.dataset.as_deref() == Some("three.dat")));
-        // 0b10_01_110000000001, its lower byte first.
-        let word = [0b0000_0001, 0b1001_1100];
-        assert_eq!(unpacked(&streams[0].1, &word), [1, -1]);
-        assert_eq!(unpacked(&streams[1].1, &word), [-1, 1]);
-        assert_eq!(unpacked(&streams[2].1, &word), [1, 1, -1, -1, -1, -1, -1, -1, -1, -1, 1, -1]);
-        let tuned = |k: usize| (streams[k].1.center_hz.unwrap(), streams[k].1.inverted);
-        assert_eq!(tuned(0), (1_575.468_75e6, true));
-        // Mirrored as it is meant: what is 56.25 kHz below the centre is above 0 Hz by as much.
-        assert_eq!(tuned(1), (1_227.543_75e6, true));
-        assert_eq!(tuned(2), (1_176.328_125e6, false));
-    }
-
-    #[test]
-    fn headers_and_footers_of_blocks_are_no_samples() {
-        let framed = |cycles: u32| {
-            let block = format!("<cycles>{cycles}</cycles><sizeheader>3</sizeheader><sizefooter>1</sizefooter>");
-            let text = TRIPLE.replacen("<cycles>0</cycles><sizeheader>0</sizeheader>", &block, 1);
-            parse(&text, "three.xml").unwrap().remove(0).1
-        };
-        // Two words of two bytes a block.
-        let blocks = framed(2).blocks.unwrap();
-        assert_eq!(blocks, Blocks { header_bytes: 3, sample_bytes: 4, footer_bytes: 1 });
-        let file: Vec<u8> = (0..22).collect();
-        let mut samples = Vec::new();
-        Unblocked::new(blocks, &file[..]).read_to_end(&mut samples).unwrap();
-        assert_eq!(samples, [3, 4, 5, 6, 11, 12, 13, 14, 19, 20, 21]);
-        let counts = [0, 3, 5, 7, 8, 11, 12, 22].map(|bytes| blocks.samples_among(bytes));
-        assert_eq!(counts, [0, 0, 2, 4, 4, 4, 5, 11]);
-        // A block without cycles is the whole file.
-        let whole = framed(0);
-        assert_eq!((whole.header_bytes, whole.trailing_bytes, whole.blocks), (3, 1, None));
-    }
-
-    #[test]
-    fn what_cannot_be_read_is_refused_by_element() {
-        let refused = |from: &str, to: &str| parse(&TRIPLE.replacen(from, to, 1), "three.xml").unwrap_err().to_string();
-        for (from, to, words) in [
-            ("</metadata>", "", ["not XML", "never closed"]),
-            ("<system id=\"S\"><freq", "<system id=\"T\"><freq", ["no <freqbase>", "<system>"]),
-            ("SIGN", "OG", ["<encoding> is \"OG\"", "SIGN, SM"]),
-            (">IQn<", ">IFQ<", ["<format> is \"IFQ\"", "IF, IQ or QI"]),
-            ("<sizeheader>0", "<sizeheader>-2", ["<sizeheader> is \"-2\"", "a whole number"]),
-            ("<quantization>1", "<quantization>2", ["<packedbits> is \"2\"", "1 samples of 4"]),
-            ("<countwords>1", "<countwords>0", ["<stream>", "no room"]),
-            ("format=\"GHz\"", "format=\"lines\"", ["<centerfreq>", "not \"lines\""]),
-        ] {
-            let text = refused(from, to);
-            assert!(text.starts_with("three.xml: ") && words.iter().all(|word| text.contains(word)), "{text}");
-        }
-    }
-}
+mod tests;

@@ -137,12 +137,12 @@ fn blocks_of_a_file_beside_ions_metadata_are_read_without_their_headers() {
         </stream></lump></chunk></block></lane><system id=\"s\"><freqbase format=\"MHz\">4</freqbase></system>
         <band id=\"b\"><centerfreq format=\"MHz\">1575.42</centerfreq>
         <translatedfreq format=\"Hz\">0</translatedfreq></band>
-        <file><url>flight.usbx</url><lane id=\"l\"/></file></metadata>";
-    fs::write(here.path().join("flight.sdrx"), metadata).unwrap();
+        <file><url>flight.usb</url><lane id=\"l\"/></file></metadata>";
+    fs::write(here.path().join("flight.usbx"), metadata).unwrap();
     // Forty blocks, and 100 samples of one more.
     let block = [vec![0x7f; 64], vec![1; 2000], vec![0x7f; 8]].concat();
-    fs::write(here.path().join("flight.usbx"), [block.repeat(40), block[..64 + 200].to_vec()].concat()).unwrap();
-    for file in ["flight.usbx", "flight.sdrx"] {
+    fs::write(here.path().join("flight.usb"), [block.repeat(40), block[..64 + 200].to_vec()].concat()).unwrap();
+    for file in ["flight.usb", "flight.usbx"] {
         let output = twin(&["receive", file, "--out", "out"], here.path());
         assert_eq!(code(&output), 3, "{}", stderr(&output));
         let summary: serde_json::Value =
