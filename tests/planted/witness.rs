@@ -23,6 +23,8 @@ mod cnav;
 mod cnav2;
 #[path = "../witness/codes.rs"]
 mod codes;
+#[path = "../witness/constants.rs"]
+mod constants;
 #[path = "../witness/data.rs"]
 mod data;
 #[path = "../witness/fnav.rs"]

@@ -7,7 +7,7 @@ use gnss::gps::l1ca::L1_CA;
 use gnss::qzss;
 use gnss::samples::{Format, IfMetadata};
 use gnss::satellite::{Sv, System};
-use gnss::signal::{Link, Signal};
+use gnss::signal::{Component, Link, Signal};
 use gnss::time::Rate;
 use receiver::acquire::{Acquired, AcquisitionSettings, Searcher};
 use receiver::source::Block;
@@ -252,53 +252,84 @@ pub fn secondary_code_begins_s(
     ((-begun_s).rem_euclid(18.0), places[0].0 / places[1].0)
 }
 
-/// Phase of a pilot of L1C against L1 C/A of the satellite in a recording of inverted spectrum, in cycles
-/// modulo half a cycle: neither bits nor secondary code have to be known. Codes begin together, every tenth
-/// period of C/A.
-fn l1c_ahead_of_ca_cycles(hit: &Acquired, [i, q]: [&[f32]; 2], rate_hz: f64, [pilot, civil]: [&[i8]; 2]) -> f64 {
+/// Phase of one component of 1.023 Mchip/s against another in a recording of inverted spectrum, in cycles
+/// modulo half a cycle, and the ratio of their powers behind replicas of their first layers. Neither bits nor
+/// secondary codes have to be known. The codes begin together.
+fn apart(hit: &Acquired, [i, q]: [&[f32]; 2], rate_hz: f64, two: [&Component; 2]) -> (f64, f64) {
+    let codes = two.map(|component| (component.code)(hit.sv.number).unwrap());
+    let length = codes[0].len().max(codes[1].len());
     let chips_a_sample = 1.023e6 * (1.0 + hit.doppler_hz / 1_575.42e6) / rate_hz;
-    let mut prompts = vec![[Complex64::default(); 2]; (i.len() as f64 / (0.01 * rate_hz)) as usize];
+    let periods = i.len() as f64 * 1.023e6 / (length as f64 * rate_hz);
+    let mut prompts = vec![([Complex64::default(); 2], 0.0); periods as usize];
     for (n, (&i, &q)) in i.iter().zip(q).enumerate() {
         let half_chips = (2.0 * (hit.code_phase_chips + n as f64 * chips_a_sample)) as usize;
-        let (period, chip) = (half_chips / (2 * pilot.len()), half_chips / 2 % pilot.len());
-        let half = if half_chips % 2 == 1 { -1.0 } else { 1.0 };
         let (sin, cos) = libm::sincos(-std::f64::consts::TAU * (hit.doppler_hz * n as f64 / rate_hz).fract());
         let taken = Complex64::new(f64::from(i), -f64::from(q)) * Complex64::new(cos, sin);
-        for [of_pilot, of_civil] in prompts.iter_mut().skip(period).take(1) {
-            *of_pilot += taken * half * f64::from(pilot[chip]);
-            *of_civil += taken * f64::from(civil[chip % civil.len()]);
+        for (sums, energy) in prompts.iter_mut().skip(half_chips / 2 / length).take(1) {
+            for ((sum, component), code) in sums.iter_mut().zip(two).zip(&codes) {
+                let pulse = component.layers[0].pulse;
+                let sign = code[half_chips / 2 % code.len()] * pulse[half_chips % 2 * pulse.len() / 2];
+                *sum += taken * f64::from(sign);
+            }
+            *energy += taken.norm_sqr();
         }
     }
     // Both turn alike with what the search does not know of the Doppler, and a bit's end takes length alone.
-    let product: Complex64 = prompts.iter().map(|[of_pilot, of_civil]| (of_pilot * of_civil.conj()).powi(2)).sum();
-    (product.arg() / (2.0 * std::f64::consts::TAU)).rem_euclid(0.5)
+    let product: Complex64 = prompts.iter().map(|([one, other], _)| (one * other.conj()).powi(2)).sum();
+    let power = |at: usize| prompts.iter().map(|(sums, noise)| sums[at].norm_sqr() - noise).sum::<f64>();
+    ((product.arg() / (2.0 * std::f64::consts::TAU)).rem_euclid(0.5), power(0) / power(1))
+}
+
+/// Searches half a second of an antenna's recording for satellites of signals about L1, and holds the phase
+/// between two components of each against the program's.
+fn held(
+    signals: &[(&'static Signal, &[u8])],
+    other: impl Fn(&'static Signal) -> &'static Component,
+) -> Vec<(Sv, f64, f64)> {
+    let Some((i, q)) = read("if/pocket_l1_2021-12-02_4msps_ci8.bin", Format::Ci8) else { return Vec::new() };
+    let metadata = IfMetadata { inverted: true, ..metadata(Format::Ci8, 4e6, 0.0) };
+    let settings = AcquisitionSettings { doppler_max_hz: 4000.0, ..AcquisitionSettings::default() };
+    let mut searcher = Searcher::new(&metadata, &settings).unwrap();
+    let mut found = Vec::new();
+    for (signal, numbers) in signals {
+        let links: Vec<Link> =
+            numbers.iter().map(|&number| signal.link(Sv { system: signal.system, number })).collect();
+        let rows = searcher.search(&Block { first: 0, i: &i, q: &q }, &links).unwrap();
+        let hits: Vec<Acquired> = rows.into_iter().filter_map(|(_, hit)| hit).collect();
+        assert!(hits.len() + 1 >= numbers.len(), "{}: {hits:?}", signal.name);
+        for hit in hits {
+            let two = [&signal.components[0], other(signal)];
+            let (cycles, ratio) = apart(&hit, [&i, &q], 4e6, two);
+            let off = cycles - (two[0].phase_cycles - two[1].phase_cycles);
+            let power = |component: &Component| {
+                let layer = component.layers[0];
+                let on = layer.chips.iter().filter(|on| **on).count() as f64 / layer.chips.len() as f64;
+                component.power_share * (layer.weight * if layer.chips.is_empty() { 1.0 } else { on }).powi(2)
+            };
+            let expected = power(two[0]) / power(two[1]);
+            println!("{} {}: {cycles:.3} cycles, power {ratio:.3} of {expected:.3}", signal.name, hit.sv);
+            assert!((off - 0.5 * (2.0 * off).round()).abs() < 0.025, "{} {}: {cycles}", signal.name, hit.sv);
+            found.push((hit.sv, ratio, expected));
+        }
+    }
+    found
 }
 
 /// IS-GPS-200N, 3.3.1.5.1, allows 100 mrad, 0.016 cycles, of quadrature; half a second of the weakest, 40
 /// dB-Hz in both signals, has 0.003 cycles of noise.
 #[test]
 fn l1c_of_gps_and_qzss_has_the_phase_against_l1_ca_that_an_antenna_recorded() {
-    let Some((i, q)) = read("if/pocket_l1_2021-12-02_4msps_ci8.bin", Format::Ci8) else { return };
-    let metadata = IfMetadata { inverted: true, ..metadata(Format::Ci8, 4e6, 0.0) };
-    let settings = AcquisitionSettings { doppler_max_hz: 4000.0, ..AcquisitionSettings::default() };
-    let mut searcher = Searcher::new(&metadata, &settings).unwrap();
-    let of = |signal: &'static Signal, system, number| signal.link(Sv { system, number });
-    let mut links = [4, 18].map(|number| of(&L1C, System::Gps, number)).to_vec();
-    links.extend([2, 3, 7].map(|number| of(&qzss::l1c::L1C, System::Qzss, number)));
-    let rows = searcher.search(&Block { first: 0, i: &i, q: &q }, &links).unwrap();
-    let hits: Vec<Acquired> = rows.into_iter().filter_map(|(_, hit)| hit).collect();
-    assert!(hits.len() >= 4, "{hits:?}");
-    for hit in hits {
-        let signals = match hit.sv.system {
-            System::Gps => [&L1C, &L1_CA],
-            _ => [&qzss::l1c::L1C, &qzss::l1ca::L1_CA],
-        };
-        let [pilot, civil] = signals.map(|signal| &signal.components[0]);
-        let codes = [pilot, civil].map(|component| (component.code)(hit.sv.number).unwrap());
-        let found = l1c_ahead_of_ca_cycles(&hit, [&i, &q], 4e6, [&codes[0], &codes[1]]);
-        let apart = found - (pilot.phase_cycles - civil.phase_cycles);
-        println!("{}: {found:.3} cycles", hit.sv);
-        assert!((apart - 0.5 * (2.0 * apart).round()).abs() < 0.025, "{}: {found}", hit.sv);
+    let civil = |signal: &'static Signal| if signal.system == System::Gps { &L1_CA } else { &qzss::l1ca::L1_CA };
+    held(&[(&L1C, &[4, 18]), (&qzss::l1c::L1C, &[2, 3, 7])], |signal| &civil(signal).components[0]);
+}
+
+/// Data of 34 dB-Hz, the weakest, have 0.004 cycles and 4 % of noise in half a second.
+#[test]
+fn data_and_pilot_have_the_phase_and_the_powers_of_one_against_the_other_that_an_antenna_recorded() {
+    let signals: [(&'static Signal, &[u8]); 4] =
+        [(&E1, &[7, 15, 27, 30]), (&B1C, &[30, 36, 45]), (&L1C, &[4, 18]), (&qzss::l1c::L1C, &[2, 3, 7])];
+    for (sv, ratio, expected) in held(&signals, |signal| &signal.components[1]) {
+        assert!((ratio / expected - 1.0).abs() < 0.2, "{sv}: {ratio} of {expected}");
     }
 }
 
