@@ -247,7 +247,8 @@ def studies():
     for study, figure, name in [
         ("pll_jitter", "phase_sigma_deg", ""), ("dll_jitter", "code_sigma_m", ""), ("pll_jitter_e1", "phase_sigma_deg", ""),
         ("dll_jitter_e1", "code_sigma_m", ""), ("jitter_maps", "phase_sigma_deg", "phase_"), ("jitter_maps", "code_sigma_m", "code_"),
-        ("loss_of_lock", "phase_sigma_deg", ""), ("pll_samples", "tracking.pll_sigma_deg", "phase_"),
+        ("jitter_pilots", "phase_sigma_deg", "phase_"), ("jitter_pilots", "code_sigma_chips", "code_"),
+        ("loss_of_lock", "phase_sigma_deg", ""), ("pilot_against_data", "phase_sigma_deg", ""), ("pll_samples", "tracking.pll_sigma_deg", "phase_"),
         ("pll_samples", "tracking.dll_sigma_chips", "code_"),
     ]:
         sampled = study == "pll_samples"
@@ -257,6 +258,10 @@ def studies():
         for part, group, words in [("cells", 1, "cells within 5 % of theory"), ("ratio", 2, "measured to theory, least to most")]:
             yield Figure(f"study.{study}.{name}{part}", f"study {study}, {figure}, T·C/N0 ≥ 10: {words}", "",
                          make.Page(report, command, pattern=pattern, text=rf"\{group}"), rooms)
+    for component in ("data", "pilot"):
+        yield Figure(f"study.pilot_against_data.{component}_dbhz", f"C/N0 at which half of the runs hold a minute of Galileo E1 without a slip, {component}, 18 Hz",
+                     "dB-Hz", make.Page("reports/studies/pilot_against_data/report.md", "\"$GNSS_TWIN\" study studies/pilot_against_data.toml",
+                                        pattern=rf"^\| {component} \| 18 \| ([\d.]+) \|"), ("src/receiver/track", "src/study", "studies/pilot_against_data.toml"))
     yield Figure("studies.loops.cells", "cells with T·C/N0 ≥ 10 and B·T ≤ 0.36 whose jitter is within 5 % of theory", "",
                  make.Page("reports/loops.md", "cargo bench --bench loops", pattern=r"(\d+ of \d+) cells are within 5 %"),
                  ("src/receiver/track", "src/study"))
