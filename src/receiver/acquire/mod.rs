@@ -366,7 +366,7 @@ impl Searcher {
                 .filter(|one| Band::of(one.link()) == *band)
                 .filter_map(|one| Some((self.codes.get(&one.link())?, grid.refined(one, stretch.first()))))
                 .collect();
-            let found = self.search_signal(band.signal, grid, window, (&codes, &known));
+            let found = self.search_signal(band.signal, grid, (window, 0.0), (&codes, &known));
             for ((index, ..), result) in chosen.iter().zip(found) {
                 if let Some(slot) = results.get_mut(*index) {
                     *slot = Some(result);
@@ -419,7 +419,7 @@ impl Searcher {
         &self,
         signal: &'static Signal,
         grid: &Grid,
-        mut window: Window,
+        (mut window, taken): (Window, f64),
         (codes, known): (&[(Sv, &Code)], &[Known<'_>]),
     ) -> Vec<(AcquisitionRow, Option<Acquired>)> {
         let Some(component) = lead(signal) else { return Vec::new() };
@@ -427,12 +427,13 @@ impl Searcher {
         let complex = self.metadata.format.is_complex();
         let searched_s = f64::from(grid.periods) * component.period_s();
         tone::remove(&mut window, grid.rate_hz, complex);
-        let mut strongest = 0.0;
+        let mut strongest = taken;
         for (code, place) in known {
             strongest = f64::max(strongest, code.subtract(grid, (code_chips, complex), place, &mut window));
         }
         let rooms = Rooms::default();
-        let (mut findings, mut crowded, mut map) = self.detect(grid, component, &window.block(), codes, (None, &rooms));
+        let (found, mut crowded, mut map) = self.detect(grid, component, &window.block(), codes, (None, &rooms));
+        let mut findings: Vec<Finding> = found.into_iter().map(|finding| finding.beside(strongest)).collect();
         // Codes that are not subtracted yet.
         let mut open: Vec<usize> = (0..codes.len()).collect();
         for _ in 1..LARGEST_LOOKS {
@@ -465,11 +466,8 @@ impl Searcher {
             let (found, still, seen) = self.detect(grid, component, &window.block(), &chosen, (Some(&some), &rooms));
             map.update(&satellites, &seen);
             crowded = still;
-            for (index, mut finding) in again.into_iter().zip(found) {
-                let is_clear = finding.statistic >= DISTANT_EXCESS * finding.threshold;
-                let least_share = if is_clear { LEAST_SHARE } else { DISTANT_SHARE };
-                finding.hit = finding.hit.filter(|hit| hit.power >= least_share * strongest);
-                findings[index] = finding;
+            for (index, finding) in again.into_iter().zip(found) {
+                findings[index] = finding.beside(strongest);
             }
         }
         for index in 1..codes.len() {
@@ -528,6 +526,13 @@ struct Finding {
 }
 
 impl Finding {
+    /// The finding without its hit, if that may be what the subtraction of a code with `strongest` power left.
+    fn beside(self, strongest: f64) -> Self {
+        let is_clear = self.statistic >= DISTANT_EXCESS * self.threshold;
+        let least_share = if is_clear { LEAST_SHARE } else { DISTANT_SHARE };
+        Self { hit: self.hit.filter(|hit| hit.power >= least_share * strongest), ..self }
+    }
+
     fn report(
         &self,
         (signal, followed_db): (&'static Signal, f64),
