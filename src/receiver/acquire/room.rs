@@ -22,8 +22,9 @@ pub fn samples_needed(metadata: &IfMetadata, settings: &AcquisitionSettings) -> 
     Ok(inside.filter_map(one).max().unwrap_or(0))
 }
 
-/// The settings of a search that `have` samples have room for: fewer sums, and sums of fewer code periods
-/// where one is too long; `None` below two code periods.
+/// The settings of a search that `have` samples have room for: fewer sums, sums of fewer code periods where
+/// one is too long, and a longer one where there is room for one and not for two; `None` below two code
+/// periods.
 ///
 /// # Errors
 /// Errors of [`AcquisitionSettings::validate`].
@@ -43,7 +44,19 @@ pub fn shortened(
             let middle = fits + (too_many - fits) / 2;
             if samples_needed(metadata, &with(middle))? > have { too_many = middle } else { fits = middle }
         }
-        return Ok(Some(with(fits)));
+        if fits > 1 || coherent_periods < settings.coherent_periods {
+            return Ok(Some(with(fits)));
+        }
+        // Where a second sum does not fit, one sum takes what is left.
+        let mut longest = with(1);
+        for coherent_periods in coherent_periods + 1..2 * coherent_periods {
+            let longer = AcquisitionSettings { coherent_periods, ..longest.clone() };
+            if longer.validate().is_err() || samples_needed(metadata, &longer)? > have {
+                break;
+            }
+            longest = longer;
+        }
+        return Ok(Some(longest));
     }
     Ok(None)
 }

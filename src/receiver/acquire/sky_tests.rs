@@ -290,11 +290,12 @@ fn a_short_recording_is_searched_by_as_many_sums_as_it_has_room_for() {
     let mut random = Noise(77);
     let sent = satellites(&mut random, &[50.0, 49.0, 48.0, 47.0, 46.0, 45.0]);
     let recording = quantised(record(metadata.clone(), whole, &sent, 4));
-    // 20 ms have room for nine sums of 2 ms, 3.2 ms for one, 2.1 ms for one of 1 ms. One code period's sum of
+    // 20 ms have room for nine sums of 2 ms, 4.2 ms for one of 3 ms, 3.2 ms for one of 2 ms, 2.1 ms for one
+    // of 1 ms. One code period's sum of
     // noise exceeds 2 ln(1 / P) of 64 449 cells, 49.8: it finds 50 dB-Hz (a mean of 200), and half of those
     // of 44 dB-Hz.
     for (ms, coherent, sums, least) in
-        [(20.0, 2, 9, 6), (10.0, 2, 4, 6), (5.2, 2, 2, 5), (3.2, 2, 1, 3), (2.1, 1, 1, 1)]
+        [(20.0, 2, 9, 6), (10.0, 2, 4, 6), (5.2, 2, 2, 5), (4.2, 3, 1, 4), (3.2, 2, 1, 3), (2.1, 1, 1, 1)]
     {
         let have = (2600.0 * ms) as usize;
         let settings = shortened(&metadata, &defaults, have as u64).unwrap().unwrap();

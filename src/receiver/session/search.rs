@@ -174,6 +174,10 @@ impl FrontEnd {
             }
             self.search_opening((&opening, width), shared, sink)?;
         }
+        // What a wider range found may be the middle of a sky of which it cut the rest.
+        if self.follow_sky(shared) {
+            self.search_opening((&opening, 1.0), shared, sink)?;
+        }
         Ok(())
     }
 
