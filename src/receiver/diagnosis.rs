@@ -121,6 +121,10 @@ impl Diagnosis {
         }
         match &stage {
             Stage::NothingSearched { .. } => say("the length: the recording is too short even to search".into()),
+            // Noise exceeds zero in every search.
+            Stage::NothingAcquired { strongest: Some((_, 0.0, _)) } => {
+                say("the samples: all have one value, as of a recorder whose input is off".into());
+            }
             Stage::NothingAcquired { .. } => {
                 say(format!("the sample rate: {rate_hz} Hz was taken"));
                 say(format!("the format: {format} was taken"));
@@ -302,6 +306,9 @@ mod tests {
         for part in ["G07", "41.2", "78.0", "2600000", "ci8", "intermediate frequency", "within a sample"] {
             assert!(text.contains(part), "{part}: {text}");
         }
+        let silent = Stage::NothingAcquired { strongest: Some((Sv::gps(1), 0.0, 95.6)) };
+        let text = Diagnosis::new(silent, 2.0, 2.6e6, "ci8", 0.0, 0, 0).to_string();
+        assert!(text.contains("all have one value") && !text.contains("antenna"), "{text}");
         let stage = Stage::NoEphemeris { complete: vec![Sv::gps(1)], missing: vec![(Sv::gps(9), vec![2, 3])] };
         let text = Diagnosis::new(stage, 20.0, 2.6e6, "ci8", 0.0, 0, 7).with_messages(&[&L1_CA]).to_string();
         assert!(text.contains("G09 lacks subframe 2, 3") && text.contains("LNAV on GPS L1 C/A up to 38 s"), "{text}");

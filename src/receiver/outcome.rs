@@ -129,7 +129,7 @@ impl fmt::Display for Conditioning {
 /// Continuous-wave interference that was met.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Interfered {
-    /// Spectra of a second that had a line.
+    /// Spectra with a line, each of a second, or of all samples where there are fewer.
     pub spectra: u64,
     /// The strongest line.
     pub strongest: LineRow,
@@ -141,7 +141,8 @@ impl fmt::Display for Interfered {
         let what = if *lines > 1 { "lines of interference, the strongest" } else { "a continuous wave" };
         write!(f, "{what} at {:+.1} kHz in the samples, J/N0 {jn0_dbhz:.1} dB-Hz", 1e-3 * frequency_hz)?;
         js_db.map_or(Ok(()), |js_db| write!(f, ", J/S {js_db:.1} dB"))?;
-        write!(f, ", in {} s", self.spectra)
+        let spectra = if self.spectra == 1 { "spectrum" } else { "spectra" };
+        write!(f, ", in {} {spectra}", self.spectra)
     }
 }
 
