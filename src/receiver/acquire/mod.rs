@@ -35,6 +35,7 @@ mod choice;
 mod codes;
 mod dwells;
 mod error;
+mod finding;
 mod grid;
 mod kernel;
 mod multiple_access;
@@ -68,6 +69,7 @@ use codes::{Code, Codes};
 use dwells::Rooms;
 pub(crate) use dwells::pair_sums;
 pub use error::AcquireError;
+use finding::Finding;
 use grid::{Again, Grid, Map};
 use refine::Refined;
 pub use room::{least_samples, samples_needed, shortened};
@@ -80,16 +82,6 @@ use window::Window;
 /// One C/A code appears in the correlator of another at most 21 dB down, several together seldom above 14 dB
 /// down.
 pub(crate) const WEAK_SHARE: f64 = 0.1;
-/// A hit this much weaker than the strongest (40 dB) is not believed even then: subtraction leaves something
-/// over, and without noise to cover it that something has the cross-correlation's peaks.
-const LEAST_SHARE: f64 = 1e-4;
-/// A hit this much weaker (30 dB) has to pass its threshold by a fifth: what a subtraction leaves is at the
-/// edges of chips, and its cross-correlations reach further than those of whole codes. Where a filter follows
-/// the sampling, which the shape that is subtracted does not know, three of 30 skies with a satellite 30 dB
-/// above ten others passed the threshold of one that is not there, by 1 to 5 %, and by less than a fifth one
-/// in a hundred of those that are.
-const DISTANT_SHARE: f64 = 1e-3;
-const DISTANT_EXCESS: f64 = 1.2;
 /// Satellites with this share of the samples' power take 1.2 dB from those that were not found.
 const MASKING_SHARE: f64 = 0.25;
 /// C/N0 times the time searched from which a satellite can crowd the Dopplers of others: at 21 dB down its
@@ -514,53 +506,6 @@ impl Searcher {
             })
             .collect();
         (findings, peaks.crowded, peaks.map)
-    }
-}
-
-/// Result of a search for one satellite.
-struct Finding {
-    statistic: f64,
-    threshold: f64,
-    coarse: Refined,
-    hit: Option<Refined>,
-}
-
-impl Finding {
-    /// The finding without its hit, if that may be what the subtraction of a code with `strongest` power left.
-    fn beside(self, strongest: f64) -> Self {
-        let is_clear = self.statistic >= DISTANT_EXCESS * self.threshold;
-        let least_share = if is_clear { LEAST_SHARE } else { DISTANT_SHARE };
-        Self { hit: self.hit.filter(|hit| hit.power >= least_share * strongest), ..self }
-    }
-
-    fn report(
-        &self,
-        (signal, followed_db): (&'static Signal, f64),
-        sv: Sv,
-        sample: u64,
-        code_chips: f64,
-    ) -> (AcquisitionRow, Option<Acquired>) {
-        let best = self.hit.unwrap_or(self.coarse);
-        let row = AcquisitionRow {
-            sample,
-            sv,
-            signal,
-            acquired: self.hit.is_some(),
-            statistic: self.statistic,
-            threshold: self.threshold,
-            doppler_hz: best.doppler_hz,
-            code_phase_chips: best.code_phase_chips.rem_euclid(code_chips),
-            cn0_dbhz: 10.0 * libm::log10(best.cn0_hz) - followed_db,
-        };
-        let acquired = self.hit.map(|_| Acquired {
-            sv,
-            signal,
-            sample,
-            code_phase_chips: planted!("receiver.acquire.code_phase", row.code_phase_chips, row.code_phase_chips + 2.0),
-            doppler_hz: row.doppler_hz,
-            cn0_dbhz: row.cn0_dbhz,
-        });
-        (row, acquired)
     }
 }
 
