@@ -247,6 +247,7 @@ def studies():
     for study, figure, name in [
         ("pll_jitter", "phase_sigma_deg", ""), ("dll_jitter", "code_sigma_m", ""), ("pll_jitter_e1", "phase_sigma_deg", ""),
         ("dll_jitter_e1", "code_sigma_m", ""), ("jitter_maps", "phase_sigma_deg", "phase_"), ("jitter_maps", "code_sigma_m", "code_"),
+        ("jitter_data", "phase_sigma_deg", "phase_"), ("jitter_data", "code_sigma_chips", "code_"),
         ("jitter_pilots", "phase_sigma_deg", "phase_"), ("jitter_pilots", "code_sigma_chips", "code_"),
         ("loss_of_lock", "phase_sigma_deg", ""), ("pilot_against_data", "phase_sigma_deg", ""), ("pll_samples", "tracking.pll_sigma_deg", "phase_"),
         ("pll_samples", "tracking.dll_sigma_chips", "code_"),
