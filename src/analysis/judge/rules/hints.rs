@@ -1,4 +1,4 @@
-//! Hints about errors of fixes, from the scene's atmosphere and the receiver's corrections.
+//! Hints about errors of fixes, from the scene's atmosphere, the receiver's corrections and its dates.
 
 use serde_json::Value;
 
@@ -7,23 +7,41 @@ use crate::judge::verdict::Verdict;
 use crate::read::Run;
 use gnss::earth::Geodetic;
 use gnss::record::IonosphereModel;
+use gnss::time::WEEK_S;
 
 /// Delays below this are none: a millimetre.
 const NOTHING_M: f64 = 1e-3;
 /// Height above which neither side has a troposphere.
 const AIR_M: f64 = 50e3;
+/// Weeks after which LNAV's count of them begins again.
+const ERA_WEEKS: f64 = 1024.0;
 /// Words of figures that an uncorrected delay spoils.
 const SPOILED: [&str; 6] = ["error", "bias", "NEES", "consistency", "horizontal", "vertical"];
 
 impl Verdict {
     /// Adds what may explain them to failed rows about positions and ranges.
     pub(super) fn hint(&mut self, run: &Run) {
-        let hints = mismatches(run);
+        let hints: Vec<String> = era(run).into_iter().chain(mismatches(run)).collect();
         let spoiled = |figure: &str| SPOILED.iter().any(|word| figure.contains(word)) && !figure.contains("C/N0");
         for row in self.rows.iter_mut().filter(|row| row.status == Status::Fail && spoiled(&row.figure)) {
             row.why.extend(hints.iter().cloned());
         }
     }
+}
+
+/// Hint where the receiver's dates are off by whole multiples of the time after which GPS's weeks repeat.
+fn era(run: &Run) -> Option<String> {
+    let (fix, truth) = (run.fixes.cursor().next()?.ok()?, run.trajectory.first()?);
+    let off_s = (fix.gps_s - truth.gps_s) as f64 - run.time_s(fix.sample) + run.time_s(truth.sample);
+    let weeks = ERA_WEEKS * (off_s / (ERA_WEEKS * WEEK_S as f64)).round();
+    let side = if weeks > 0.0 { "late" } else { "early" };
+    (weeks != 0.0).then(|| {
+        format!(
+            "hint: the receiver's dates are {:.0} weeks {side}, since the message counts weeks modulo 1024 and nothing \
+             said the year: receive with --start TIME, or set [operation] week_reference",
+            weeks.abs()
+        )
+    })
 }
 
 /// Corrections that do not fit the scene, each with its cure.
@@ -95,5 +113,8 @@ mod tests {
         assert!(hinted(&run, 9.0).contains("ionosphere of up to 7.2 m"), "{}", hinted(&run, 9.0));
         run.troposphere_m = 12.0;
         assert!(!hinted(&run, 9.0).contains("troposphere"));
+        assert!(!hinted(&run, 9.0).contains("weeks"));
+        run.fixes.change(|fixes| fixes.iter_mut().for_each(|fix| fix.gps_s += 1024 * WEEK_S));
+        assert!(hinted(&run, 9.0).contains("1024 weeks late"));
     }
 }
