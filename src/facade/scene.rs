@@ -91,8 +91,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [`Fidelity`] is chosen by a [`Grade`]. Fields of a composed scene are public: other ephemerides enter by a
-//! [`Catalogue`], other encoders of messages by [`Senders`].
+//! [`Fidelity`] is chosen by a [`Grade`]: a level, or a [`Budget`] of errors. Fields of a composed scene are
+//! public: other ephemerides enter by a [`Catalogue`], other encoders of messages by [`Senders`].
 //!
 //! ```
 //! use std::sync::Arc;
@@ -121,6 +121,8 @@
 
 #[doc(inline)]
 pub use ::generator::catalogue::Catalogue;
+#[doc(inline)]
+pub use ::generator::fidelity::Budget;
 #[doc(inline)]
 pub use ::generator::message::Senders;
 #[doc(inline)]
