@@ -172,7 +172,7 @@ mod tests {
             };
             let towards = somewhere(1.0);
             let satellites_m: Vec<Vector3<f64>> = (0..12).map(|_| somewhere(2.656e7)).collect();
-            let here_m = towards * 6.4e6 * 60_f64.powf(uniform(0.0, 1.0));
+            let here_m = towards * 6.4e6 * libm::pow(60.0, uniform(0.0, 1.0));
             let mut ranges = ranges_at(&[(0.0, 0.0, 2e7); 12], uniform(-1.0, 1.0));
             for (range, seen_m) in ranges.iter_mut().zip(satellites_m) {
                 let distance_m = (seen_m - here_m).norm();
