@@ -69,7 +69,7 @@ impl Budget {
             code_edge,
             carrier,
             waveform,
-            knot_tolerance_cycles: (self.carrier_cycles - carrier.error_cycles()).min(KNOTS_CYCLES[1]),
+            knot_tolerance_cycles: three_digits(self.carrier_cycles - carrier.error_cycles()).min(KNOTS_CYCLES[1]),
             allowed_m: self.code_m,
             ..Fidelity::of(Grade::Budget(self))
         };
@@ -118,10 +118,19 @@ impl Budget {
             let mut knobs = vec![format!("code_edge {}", code_edge.name())];
             knobs.extend((carrier != chosen.carrier).then(|| format!("carrier {}", carrier.name())));
             knobs.extend((waveform != chosen.waveform).then(|| format!("waveform {}", waveform.name())));
-            told.push(format!("{}: {broken}", knobs.join(", ")));
+            // What breaks the same with a further knob says nothing new.
+            if !told.iter().any(|line| line.ends_with(&broken)) {
+                told.push(format!("{}: {broken}", knobs.join(", ")));
+            }
         }
         told
     }
+}
+
+/// The value below `value` with three digits, or `value` where it has no digits.
+fn three_digits(value: f64) -> f64 {
+    // Rounding adds half a unit of the third digit at most.
+    format!("{:.2e}", 0.995 * value).parse().unwrap_or(value)
 }
 
 /// Knobs for `signals` at a sample rate, cheapest first.
@@ -239,6 +248,8 @@ mod tests {
         let fine = of(Budget { carrier_cycles: 1.5e-6, ..NONE }).unwrap();
         assert_eq!(fine.carrier, Arithmetic::F64);
         assert!((1e-6..1.5e-6).contains(&fine.knot_tolerance_cycles), "{fine:?}");
+        // Three digits, and never above.
+        assert_eq!([9.9e-5, 1.0001e-4].map(three_digits), [9.85e-5, 9.95e-5]);
         for (budget, key) in [
             (Budget { code_m: 1e-6, ..NONE }, "code_m"),
             (Budget { cn0_db: 1e-4, ..NONE }, "cn0_db"),
