@@ -144,6 +144,18 @@ impl Catalogue {
         timeline.sets.get(span.set?)
     }
 
+    /// Times after `from`, up to `to`, from which satellites send another ephemeris than before, in order of
+    /// time.
+    pub fn renewals(&self, from: Epoch, to: Epoch) -> Vec<(Sv, Epoch)> {
+        let of = |(sv, timeline): (&Sv, &Timeline)| {
+            let within = |span: &&Span| span.set.is_some() && from < span.from && span.from <= to;
+            timeline.spans.iter().filter(within).map(|span| (*sv, span.from)).collect::<Vec<_>>()
+        };
+        let mut found: Vec<_> = self.satellites.iter().flat_map(of).collect();
+        found.sort_by(|(_, a), (_, b)| a.since(*b).total_cmp(&0.0));
+        found
+    }
+
     /// Intervals in which `sv` has nothing to send, as far as they concern `from..=to`, in order of time.
     pub fn silences(&self, sv: Sv, from: Epoch, to: Epoch) -> Vec<Silence> {
         let Some(timeline) = self.satellites.get(&sv) else { return vec![Silence { from: None, until: None }] };

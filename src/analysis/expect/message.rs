@@ -58,11 +58,6 @@ impl Message {
         self.ionospheres.iter().find(|sent| sent.model() == model)
     }
 
-    /// True if a satellite sends more than one ephemeris in a message.
-    pub fn renews(&self, sv: Sv) -> bool {
-        self.sets.iter().any(|((own, _), sets)| *own == sv && sets.len() > 1)
-    }
-
     /// True if no ephemeris of a satellite marks the signal as unhealthy.
     pub fn says_healthy(&self, link: Link) -> bool {
         let mut own = self.sets.iter().filter(|((sv, _), _)| *sv == link.sv).flat_map(|(_, sets)| sets);

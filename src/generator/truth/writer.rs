@@ -12,7 +12,7 @@ use super::record::{Record, Sink, TruthError};
 use super::skyline::skyline_deg;
 use crate::scene::{CodeEdge, Scene, sources};
 use crate::switches::{Stray, Switches};
-use gnss::facts::{Fault, FaultKind, FrontEndFacts, OscillatorFacts, SceneFacts, TimeOffset};
+use gnss::facts::{Fault, FaultKind, FrontEndFacts, OscillatorFacts, Renewal, SceneFacts, TimeOffset};
 use gnss::record::{Geographic, TrajectoryRow};
 use gnss::time::Rate;
 
@@ -123,6 +123,17 @@ fn time_offsets(scene: &Scene) -> Vec<TimeOffset> {
 }
 
 /// One of several front ends.
+/// Longest time between the choice of an ephemeris and the end of the units that carry it, seconds.
+const LONGEST_SET_S: f64 = 600.0;
+
+/// Renewals of ephemerides while the part of the scene is received, and just before: units that were begun
+/// with the ephemeris before end first.
+fn renewals(scene: &Scene, part: &Range<u64>) -> Vec<Renewal> {
+    let [from, to] = [part.start, part.end].map(|sample| scene.clock.epoch(sample));
+    let all = scene.catalogue.renewals(from.plus_s(-LONGEST_SET_S), to).into_iter();
+    all.map(|(sv, at)| Renewal { sv, at_s: at.since(from) }).collect()
+}
+
 fn front_end(scene: &Scene) -> FrontEndFacts {
     FrontEndFacts {
         name: scene.front_end_name.clone(),
@@ -236,6 +247,7 @@ impl Writer {
             faults: scene.faults.clone(),
             expect: scene.expect.clone(),
             time_offsets: time_offsets(scene),
+            renewals: renewals(scene, part),
         };
         self.write_facts(&file)?;
         self.driven = scene.switches.as_ref().map(|switches| (Arc::clone(switches), scene.clock.rate, file));

@@ -16,7 +16,7 @@ pub use front_end::{
     BalanceSpec, ConverterSpec, Edge, FilterShape, FilterSpec, StageSpec, converter, filters, oscillator_offset_hz,
 };
 pub use interference::Interference;
-pub use scene::{FrontEndFacts, OscillatorFacts, SceneFacts};
+pub use scene::{FrontEndFacts, OscillatorFacts, Renewal, SceneFacts};
 
 /// Offset of a system's time scale from GPS time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

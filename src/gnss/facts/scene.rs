@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Edge, Expect, Fault, Interference, StageSpec, TimeOffset};
+use crate::satellite::Sv;
 use crate::signal::Layers;
 
 /// Facts of a scene. A key that a file lacks has a default: a scene without that feature.
@@ -110,6 +111,9 @@ pub struct SceneFacts {
     /// Time scales of systems that differ from GPS time by more than whole seconds.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub time_offsets: Vec<TimeOffset>,
+    /// Times at which satellites begin to send another ephemeris, ascending.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub renewals: Vec<Renewal>,
 }
 
 impl SceneFacts {
@@ -140,6 +144,15 @@ impl SceneFacts {
     pub fn balance(&self) -> Option<&super::BalanceSpec> {
         self.front_end.iter().find_map(|stage| if let StageSpec::Iq(balance) = stage { Some(balance) } else { None })
     }
+}
+
+/// Time at which a satellite begins to send another ephemeris.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Renewal {
+    /// The satellite.
+    pub sv: Sv,
+    /// Time from the first sample in seconds, in the time of its system.
+    pub at_s: f64,
 }
 
 /// Power law of the receiver's oscillator.

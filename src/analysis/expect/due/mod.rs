@@ -170,11 +170,16 @@ impl Expectations {
         let in_space = Geodetic::from_ecef(&first.position_m()).height_m >= SPACE_M;
         let access = MultipleAccess::new(run);
         let mut counted = Counted::default();
+        let renewals = run.scene.renewals.iter().fold(BTreeMap::<Sv, Vec<f64>>::new(), |mut all, one| {
+            all.entry(one.sv).or_default().push(one.at_s);
+            all
+        });
         for link in run.truth.keys() {
+            let renewals_s = renewals.get(&link.sv).map_or(&[][..], Vec::as_slice);
             let receiver = found.receiver.of_signal(link.signal);
             let scene = Scene {
                 receiver: &receiver,
-                timetable: Timetable::beside(link.signal, &run.signals, start).renewed(found.message.renews(link.sv)),
+                timetable: Timetable::beside(link.signal, &run.signals, start).renewed(renewals_s),
                 expect: &run.scene.expect,
                 faults: &run.scene.faults,
                 interval_s,

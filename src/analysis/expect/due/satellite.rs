@@ -118,7 +118,7 @@ pub struct Scene<'s> {
     /// Expectations from the receiver's settings.
     pub receiver: &'s Receiver,
     /// Timetable of the message.
-    pub timetable: Timetable,
+    pub timetable: Timetable<'s>,
     /// Expectations that the scene states.
     pub expect: &'s Expect,
     /// Faults of the satellites.

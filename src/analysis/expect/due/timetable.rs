@@ -15,29 +15,26 @@ use gnss::time::Epoch;
 const HEADER_S: f64 = 1.2;
 /// Times of arrival of satellites around the Earth, at most: a geostationary user across the Earth.
 const LIGHT_S: f64 = 0.25;
-/// Satellites change their ephemerides at whole multiples of this: of GPS at even hours, of Galileo every ten
-/// minutes.
-const RENEWAL_S: f64 = 300.0;
 /// Units that are looked through for one: two rounds of LNAV's pages.
 const LARGEST_UNITS: i64 = 250;
 
 /// The timetable as seen from a scene's first sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Timetable {
+pub struct Timetable<'r> {
     message: Option<&'static Message>,
     /// Message of another signal of the satellite, where this one's states neither its time nor its orbit.
     dating: Option<&'static Message>,
     /// The first sample, by the clock of the system that sends.
     start: Epoch,
-    /// True if a new ephemeris comes during the scene.
-    renewed: bool,
+    /// Times at which the satellite begins to send another ephemeris, seconds, ascending.
+    renewals_s: &'r [f64],
 }
 
-impl Timetable {
+impl<'r> Timetable<'r> {
     /// Timetable of a signal in a scene whose first sample was taken at `start`.
     pub fn new(signal: &Signal, start: Epoch) -> Self {
         let message = signal.components.iter().find_map(|component| component.message);
-        Self { message, dating: None, start: signal.time.label(start), renewed: false }
+        Self { message, dating: None, start: signal.time.label(start), renewals_s: &[] }
     }
 
     /// Timetable beside other signals, of which one may have to give time and orbit.
@@ -48,9 +45,10 @@ impl Timetable {
         Self { dating: dating.filter(|_| undated), ..Self::new(signal, start) }
     }
 
-    /// Timetable for satellites that send a new ephemeris during the scene, if `renewed` is true.
-    pub fn renewed(self, renewed: bool) -> Self {
-        Self { renewed, ..self }
+    /// Timetable for a satellite that begins to send another ephemeris at each of these times, seconds,
+    /// ascending.
+    pub fn renewed(self, renewals_s: &'r [f64]) -> Self {
+        Self { renewals_s, ..self }
     }
 
     /// Timetable of the message that states its time and the satellite's orbit.
@@ -94,14 +92,18 @@ impl Timetable {
     pub fn ephemeris_by_s(&self, locked_s: f64) -> f64 {
         let dated = self.dated();
         let Some(message) = dated.message else { return f64::INFINITY };
-        let whole_s = dated.all_by_s(message.set, locked_s);
-        let past_s = dated.start.plus_s(locked_s).tow_s().rem_euclid(RENEWAL_S);
-        let renewed_s = locked_s + RENEWAL_S - past_s;
-        if self.renewed && past_s > 0.0 && renewed_s < whole_s {
-            dated.all_by_s(message.set, renewed_s)
-        } else {
-            whole_s
-        }
+        let from = |begin_s: f64| dated.all_by_s(message.set, begin_s);
+        // A set is sent from the first of its units on: the rest of a frame belongs to the set before.
+        let begin_s = |renewed_s: &f64| {
+            let at = dated.start.plus_s(*renewed_s);
+            let first = message.unit_at(at.seconds());
+            let begins = |unit: &i64| message.unit_of_set(*unit) == *unit && message.unit_start(*unit).since(at) >= 0.0;
+            let unit = (first..first + LARGEST_UNITS).find(begins)?;
+            Some(message.unit_start(unit).since(dated.start))
+        };
+        self.renewals_s.iter().filter_map(begin_s).fold(from(locked_s), |whole_s, begin_s| {
+            if locked_s < begin_s && begin_s < whole_s { from(begin_s) } else { whole_s }
+        })
     }
 
     /// Time in seconds at which reduced elements are complete; infinite where the message has none.
@@ -122,9 +124,10 @@ mod tests {
     use gnss::galileo::e6::E6;
     use gnss::gps::l1ca::L1_CA;
     use gnss::gps::l2c::L2C;
+    use gnss::navic::sps::L5;
     use gnss::signal::synthetic::LONG_BOC;
 
-    fn at(text: &str) -> Timetable {
+    fn at(text: &str) -> Timetable<'static> {
         Timetable::new(&L1_CA, Epoch::parse(text).unwrap())
     }
 
@@ -144,10 +147,21 @@ mod tests {
     fn units_of_two_sets_make_none() {
         // Locked within subframe 1, 26 s before new sets: subframes 2 and 3 are whole by 18 s, subframe 1 by
         // 36 s with the next issue, and with it 2 and 3 by 48 s.
-        let timetable = at("2026-03-09T07:59:30").renewed(true);
+        let timetable = at("2026-03-09T07:59:30").renewed(&[30.0]);
         assert!((timetable.ephemeris_by_s(4.0) - 48.0 - LIGHT_S).abs() < 1e-9, "{}", timetable.ephemeris_by_s(4.0));
-        assert!((timetable.renewed(false).ephemeris_by_s(4.0) - 36.0 - LIGHT_S).abs() < 1e-9);
-        assert_eq!(timetable.ephemeris_by_s(31.0), timetable.renewed(false).ephemeris_by_s(31.0));
+        assert!((timetable.renewed(&[]).ephemeris_by_s(4.0) - 36.0 - LIGHT_S).abs() < 1e-9);
+        assert_eq!(timetable.ephemeris_by_s(31.0), timetable.renewed(&[]).ephemeris_by_s(31.0));
+    }
+
+    #[test]
+    fn a_set_that_begins_within_a_frame_is_sent_from_the_next_frame_on() {
+        // Frames of NavIC, four subframes of 12 s, begin 6 s before the start and at 42 s. Subframe 2 is
+        // whole by 18 s, subframe 1 by 54 s with the next issue, subframe 2 with it by 66 s.
+        let timetable = Timetable::new(&L5, Epoch::parse("2026-03-09T11:08:54").unwrap());
+        assert!((timetable.ephemeris_by_s(4.0) - 54.0 - LIGHT_S).abs() < 1e-9, "{}", timetable.ephemeris_by_s(4.0));
+        let renewed = timetable.renewed(&[20.0]);
+        assert!((renewed.ephemeris_by_s(4.0) - 66.0 - LIGHT_S).abs() < 1e-9, "{}", renewed.ephemeris_by_s(4.0));
+        assert_eq!(timetable.renewed(&[60.0]).ephemeris_by_s(4.0), timetable.ephemeris_by_s(4.0));
     }
 
     #[test]

@@ -81,7 +81,7 @@ struct Witness {
     rows: Vec<SatelliteEpoch>,
     usual_dbhz: f64,
     interval_s: f64,
-    timetable: Timetable,
+    timetable: Timetable<'static>,
 }
 
 impl Witness {
