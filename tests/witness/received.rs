@@ -171,6 +171,21 @@ fn half_a_second_holds_gps_and_galileo_as_listed_and_none_else() {
     assert_found(&found, &[("GPS L1 C/A", "G04 G16 G18 G25 G26 G29 G31 G32", ""), ("Galileo E1", galileo, "E19")]);
 }
 
+/// Both searches of a short recording, of which the second takes 62 ms: what GPS and the unknown signals of
+/// BeiDou make in ten codes passed for J04 to J10, with and without GPS among the candidates.
+#[test]
+fn half_a_second_holds_no_satellite_of_qzss_but_those_whose_l1c_is_there() {
+    let Some(file) = external(POCKET) else { return };
+    for (signals, gps) in
+        [(&["QZSS L1 C/A"][..], ""), (&["QZSS L1 C/A", "GPS L1 C/A"][..], "G04 G16 G18 G25 G26 G29 G31 G32")]
+    {
+        let mut found = received(&file, &POCKET_FLAGS, signals, "");
+        let listed = found.remove("GPS L1 C/A").unwrap_or_default().into_keys().collect::<Vec<String>>().join(" ");
+        assert_eq!(listed, gps);
+        assert_found(&found, &[("QZSS L1 C/A", "J01 J02 J03 J07", "")]);
+    }
+}
+
 /// Codes of 20 ms take long to find: `GNSS_TWIN_LONG=1`. Beyond the list is G27, whose Doppler on L1 is by
 /// sums over 200 ms the one that both carriers' ratio makes of it, to a hertz.
 #[test]

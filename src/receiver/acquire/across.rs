@@ -2,33 +2,28 @@
 //! their lines at whole kilohertz whatever family they are of. Channels of GLONASS share one code, whose
 //! lines pass for a satellite of the channels beside.
 //!
-//! Within a signal and carrier the search subtracts what is strong and looks again. What is left between
-//! signals, or carriers of one signal, is done here, after all of them were searched: a hit 10 dB below one
-//! of another signal or carrier has to show in samples without that one, and above what its subtraction may
-//! leave. A hit is only ever taken away, so the probability of a false alarm stays below the one that is set.
-//! Limits: of the other signal the component that was searched for is subtracted, and the one beside it where
-//! both were searched for together.
+//! Within a family of codes on one carrier (`family`) the search subtracts what is strong and looks again.
+//! What is left between families, or carriers of one signal, is done here, after all of them were searched: a
+//! hit 10 dB below one of another family or carrier has to show in samples without that one, and above what
+//! its subtraction may leave. A hit is only ever taken away, so the probability of a false alarm stays below
+//! the one that is set. Limits: of the other signal the component that was searched for is subtracted, and
+//! the one beside it where both were searched for together.
 
 use std::collections::BTreeMap;
 
 use super::window::Window;
-use super::{AcquireError, Acquired, Band, Code, Known, Searcher, WEAK_SHARE};
+use super::{AcquireError, Acquired, Band, Code, Found, Known, Searcher, WEAK_SHARE};
 use crate::lead::lead;
 use crate::source::Stretch;
-use gnss::record::AcquisitionRow;
-use gnss::satellite::Sv;
 use gnss::signal::Link;
 
-/// A row for a candidate, and where it was found.
-type Found = (AcquisitionRow, Option<Acquired>);
-
-/// True if `hit` may be cross-correlation with `other`, a hit of another signal or carrier.
+/// True if `hit` may be cross-correlation with `other`, a hit of another family or carrier.
 fn is_covered(hit: &Acquired, other: &Acquired) -> bool {
     Band::of(hit.link()) != Band::of(other.link()) && other.cn0_dbhz + 10.0 * libm::log10(WEAK_SHARE) > hit.cn0_dbhz
 }
 
 impl Searcher {
-    /// Takes away hits that do not show without the stronger ones of other signals, which are hits too or
+    /// Takes away hits that do not show without the stronger ones of other families, which are hits too or
     /// `known` before.
     pub(super) fn clear_across(
         &mut self,
@@ -65,14 +60,14 @@ impl Searcher {
             }
             // Those of its own signal that are beyond doubt are taken out as in the search before.
             let sure = hits.iter().filter(|hit| Band::of(hit.link()) == band);
-            let sure = sure.filter(|hit| doubted.iter().all(|(_, other)| other.sv != hit.sv));
+            let sure = sure.filter(|hit| doubted.iter().all(|(_, other)| other.link() != hit.link()));
             let sure: Vec<Known<'_>> = sure
                 .filter_map(|hit| Some((self.codes.get(&hit.link())?, grid.refined(hit, stretch.first()))))
                 .collect();
-            let codes: Vec<(usize, Sv, &Code)> = (doubted.iter())
-                .filter_map(|(index, hit)| Some((*index, hit.sv, self.codes.get(&hit.link())?)))
+            let codes: Vec<(usize, Link, &Code)> = (doubted.iter())
+                .filter_map(|(index, hit)| Some((*index, hit.link(), self.codes.get(&hit.link())?)))
                 .collect();
-            let sought: Vec<(Sv, &Code)> = codes.iter().map(|&(_, sv, code)| (sv, code)).collect();
+            let sought: Vec<(Link, &Code)> = codes.iter().map(|&(_, link, code)| (link, code)).collect();
             let again = self.search_signal(band.signal, grid, (window, taken), (&sought, &sure));
             for ((index, ..), (row, hit)) in codes.iter().zip(again) {
                 // What shows keeps its place: a hit of another place is another hit.
@@ -95,24 +90,25 @@ mod tests {
     use crate::source::Block;
     use gnss::glonass::fdma::G1;
     use gnss::gps::l1ca::L1_CA;
-    use gnss::qzss::l1ca::L1_CA as QZSS_L1_CA;
     use gnss::samples::{Format, IfMetadata};
+    use gnss::satellite::Sv;
+    use gnss::sbas::l1::L1 as SBAS_L1;
 
     #[test]
     fn what_a_strong_signal_makes_in_codes_of_another_is_taken_away_and_what_is_there_stays() {
         let metadata = metadata(Format::Ci8, 2.6e6, 0.0, false);
-        let signals = [&L1_CA, &QZSS_L1_CA].map(|signal| signal.name.to_owned()).to_vec();
+        let signals = [&L1_CA, &SBAS_L1].map(|signal| signal.name.to_owned()).to_vec();
         let settings = AcquisitionSettings { signals, ..AcquisitionSettings::default() };
         let strong = Sent { prn: 5, doppler_hz: 1200.0, phase_chips: 300.4, cn0_dbhz: 60.0 };
-        // J02, whose code has number 194.
-        let there = Sent { prn: 194, doppler_hz: -2300.0, phase_chips: 700.2, cn0_dbhz: 43.0 };
+        // S22, whose code has number 122.
+        let there = Sent { prn: 122, doppler_hz: -2300.0, phase_chips: 700.2, cn0_dbhz: 43.0 };
         let samples = samples_needed(&metadata, &settings).unwrap() as usize;
         let recording = record(metadata.clone(), samples, &[strong, there], 11);
         let block = Block { first: 0, i: &recording.i, q: &recording.q };
         let mut searcher = Searcher::new(&metadata, &settings).unwrap();
         let gps = searcher.search(&block, &[L1_CA.link(Sv::gps(5))]).unwrap();
         let known: Vec<Acquired> = gps.into_iter().filter_map(|(_, hit)| hit).collect();
-        let links: Vec<Link> = QZSS_L1_CA.satellites().map(|sv| QZSS_L1_CA.link(sv)).collect();
+        let links: Vec<Link> = SBAS_L1.satellites().map(|sv| SBAS_L1.link(sv)).collect();
         let mut results = searcher.search(&block, &links).unwrap();
 
         // Every largest cell as if it had passed.
@@ -124,13 +120,13 @@ mod tests {
             row.acquired = true;
         }
         let largest = |results: &[Found]| {
-            let absent = results.iter().filter(|(row, _)| row.sv.number != 2);
+            let absent = results.iter().filter(|(row, _)| row.sv.number != 22);
             absent.map(|(row, _)| row.statistic).fold(0.0, f64::max)
         };
         let before = largest(&results);
         searcher.clear_across(&Stretch::Planes(block), &known, &mut results).unwrap();
         let kept: Vec<u8> = results.iter().filter_map(|(_, hit)| hit.map(|hit| hit.sv.number)).collect();
-        assert_eq!(kept, [2]);
+        assert_eq!(kept, [22]);
         assert!(results.iter().all(|(row, hit)| row.acquired == hit.is_some()));
         // C/A codes meet at 21 to 24 dB down: 20 and 2 · 20 ms · 4000 to 8000 Hz, where noise has 60.
         let after = largest(&results);
@@ -141,7 +137,7 @@ mod tests {
         let mut alone = searcher.search(&block, &links).unwrap();
         let weak: Vec<Acquired> = known.iter().map(|hit| Acquired { cn0_dbhz: 45.0, ..*hit }).collect();
         searcher.clear_across(&Stretch::Planes(block), &weak, &mut alone).unwrap();
-        assert!(alone.iter().any(|(row, hit)| row.sv.number == 2 && hit.is_some()));
+        assert!(alone.iter().any(|(row, hit)| row.sv.number == 22 && hit.is_some()));
     }
 
     /// Samples with GLONASS satellites of these numbers, Dopplers and powers, each carrier with the one code.

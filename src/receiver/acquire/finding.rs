@@ -3,8 +3,7 @@
 use super::Acquired;
 use super::refine::Refined;
 use gnss::record::AcquisitionRow;
-use gnss::satellite::Sv;
-use gnss::signal::Signal;
+use gnss::signal::Link;
 
 /// A hit this much weaker than the strongest (40 dB) is not believed even without those that are stronger:
 /// subtraction leaves something over, and without noise to cover it that something has the
@@ -42,8 +41,7 @@ impl Finding {
     /// Row of a satellite, and what tracking begins with.
     pub fn report(
         &self,
-        (signal, followed_db): (&'static Signal, f64),
-        sv: Sv,
+        (Link { sv, signal }, followed_db): (Link, f64),
         sample: u64,
         code_chips: f64,
     ) -> (AcquisitionRow, Option<Acquired>) {

@@ -11,7 +11,7 @@
 //! strong ones have a good part of all power, or raise the cells of all codes, so is everything else. What is
 //! strong among the rest goes the same way. Signals that are no candidates are not subtracted: where they
 //! raise the cells of all codes, the threshold rises (`multiple_access`). Hits that strong ones of another
-//! signal may have made have to show without these (`across`). Continuous waves that could pass for
+//! family may have made have to show without these (`across`). Continuous waves that could pass for
 //! satellites are taken out first (`tone`).
 //!
 //! **Threshold.** A cell's statistic is Σ|S|² in units of half its noise power: chi-square with 2K degrees of
@@ -35,6 +35,7 @@ mod choice;
 mod codes;
 mod dwells;
 mod error;
+mod family;
 mod finding;
 mod grid;
 mod kernel;
@@ -69,8 +70,10 @@ use codes::{Code, Codes};
 use dwells::Rooms;
 pub(crate) use dwells::pair_sums;
 pub use error::AcquireError;
+use family::Band;
 use finding::Finding;
 use grid::{Again, Grid, Map};
+use multiple_access::LEAST_CODES;
 use refine::Refined;
 pub use room::{least_samples, samples_needed, shortened};
 pub use settings::{ALL, AcquisitionSettings};
@@ -205,20 +208,8 @@ pub struct Searcher {
     codes: Codes,
 }
 
-/// Key of the candidates that share a grid: signal, and carrier offset in hertz from the middle of its band.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Band {
-    signal: &'static Signal,
-    offset_hz: i64,
-}
-
-impl Band {
-    fn of(link: Link) -> Self {
-        let offset_hz = (link.carrier_hz() - link.signal.centre_hz()).round() as i64;
-        Self { signal: link.signal, offset_hz }
-    }
-}
-
+/// Row of a candidate, and its position where it was found.
+type Found = (AcquisitionRow, Option<Acquired>);
 /// A satellite that is known to be there, and its position.
 type Known<'a> = (&'a Code, Refined);
 
@@ -333,33 +324,29 @@ impl Searcher {
         for link in &links {
             self.prepare(*link)?;
         }
+        let of: Vec<Band> = candidates.iter().copied().map(Band::of).collect();
         let mut results: Vec<Option<(AcquisitionRow, Option<Acquired>)>> = vec![None; candidates.len()];
         let bands: Vec<Band> = self.grids.keys().copied().collect();
-        for band in &bands {
-            self.codes.trim();
-            if candidates.iter().all(|link| Band::of(*link) != *band) {
+        for band in bands {
+            let chosen: Vec<(usize, Link)> = (0..)
+                .zip(candidates)
+                .zip(&of)
+                .filter(|(_, own)| **own == band)
+                .map(|((index, link), _)| (index, *link))
+                .collect();
+            if chosen.is_empty() {
                 continue;
             }
-            self.codes.make(&self.grids, links.iter().filter(|link| Band::of(**link) == *band))?;
-            let Some(grid) = self.grids.get(band) else { continue };
-            let chosen: Vec<(usize, Sv, &Code)> = candidates
-                .iter()
-                .enumerate()
-                .filter(|(_, link)| Band::of(**link) == *band)
-                .filter_map(|(index, link)| Some((index, link.sv, self.codes.get(link)?)))
-                .collect();
-            let (have, need) = (stretch.samples() as u64, grid.samples_needed());
-            if have < need {
-                return Err(AcquireError::TooFewSamples { have, need });
+            let mut sought: Vec<Link> = chosen.iter().map(|(_, link)| *link).collect();
+            let mut found = self.search_band(stretch, band, &sought, known)?;
+            if found.iter().any(|(_, hit)| hit.is_some()) {
+                let others = band.others(&sought, &self.metadata);
+                if !others.is_empty() {
+                    sought.extend(others);
+                    found = self.search_band(stretch, band, &sought, known)?;
+                }
             }
-            let codes: Vec<(Sv, &Code)> = chosen.iter().map(|&(_, sv, code)| (sv, code)).collect();
-            let window = Window::centred(stretch, need as usize);
-            let known: Vec<Known<'_>> = (known.iter())
-                .filter(|one| Band::of(one.link()) == *band)
-                .filter_map(|one| Some((self.codes.get(&one.link())?, grid.refined(one, stretch.first()))))
-                .collect();
-            let found = self.search_signal(band.signal, grid, (window, 0.0), (&codes, &known));
-            for ((index, ..), result) in chosen.iter().zip(found) {
+            for ((index, _), result) in chosen.iter().zip(found) {
                 if let Some(slot) = results.get_mut(*index) {
                     *slot = Some(result);
                 }
@@ -370,6 +357,32 @@ impl Searcher {
         self.clear_across(stretch, known, &mut results)?;
         self.codes.trim();
         Ok(results)
+    }
+
+    /// Searches for candidates of one band.
+    fn search_band(
+        &mut self,
+        stretch: &Stretch,
+        band: Band,
+        candidates: &[Link],
+        known: &[Acquired],
+    ) -> Result<Vec<Found>, AcquireError> {
+        let known: Vec<&Acquired> = known.iter().filter(|one| Band::of(one.link()) == band).collect();
+        let known_links: Vec<Link> = known.iter().map(|one| one.link()).collect();
+        self.codes.trim();
+        self.codes.make(&self.grids, candidates.iter().chain(&known_links))?;
+        let Some(grid) = self.grids.get(&band) else { return Ok(Vec::new()) };
+        let (have, need) = (stretch.samples() as u64, grid.samples_needed());
+        if have < need {
+            return Err(AcquireError::TooFewSamples { have, need });
+        }
+        let codes: Vec<(Link, &Code)> =
+            candidates.iter().filter_map(|link| Some((*link, self.codes.get(link)?))).collect();
+        let known: Vec<Known<'_>> = (known.into_iter())
+            .filter_map(|one| Some((self.codes.get(&one.link())?, grid.refined(one, stretch.first()))))
+            .collect();
+        let window = Window::centred(stretch, need as usize);
+        Ok(self.search_signal(band.signal, grid, (window, 0.0), (&codes, &known)))
     }
 
     /// Makes sure that plans are there.
@@ -412,8 +425,8 @@ impl Searcher {
         signal: &'static Signal,
         grid: &Grid,
         (mut window, taken): (Window, f64),
-        (codes, known): (&[(Sv, &Code)], &[Known<'_>]),
-    ) -> Vec<(AcquisitionRow, Option<Acquired>)> {
+        (codes, known): (&[(Link, &Code)], &[Known<'_>]),
+    ) -> Vec<Found> {
         let Some(component) = lead(signal) else { return Vec::new() };
         let code_chips = f64::from(component.code_chips);
         let complex = self.metadata.format.is_complex();
@@ -449,11 +462,15 @@ impl Searcher {
             // Weak hits alone need few codes; what the strong ones hid may be any.
             let again: Vec<usize> =
                 (open.iter().copied()).filter(|&index| findings[index].hit.is_some() || masked || crowding).collect();
-            let chosen: Vec<(Sv, &Code)> = again.iter().map(|&index| codes[index]).collect();
+            // Codes of those that were subtracted are as good a sample as others.
+            let is_sample = again.len() < LEAST_CODES && (masked || crowding);
+            let taken = (0..codes.len()).filter(|index| is_sample && !open.contains(index));
+            let looked: Vec<usize> = again.iter().copied().chain(taken).collect();
+            let chosen: Vec<(Link, &Code)> = looked.iter().map(|&index| codes[index]).collect();
             // Where the strong ones are no noise to speak of, the others are looked at where they were
             // raised.
             let satellites: Vec<(usize, bool)> =
-                again.iter().map(|&index| (index, masked || findings[index].hit.is_some())).collect();
+                looked.iter().map(|&index| (index, masked || findings[index].hit.is_some())).collect();
             let some = Again { before: &map, dopplers: &crowded, satellites: &satellites };
             let (found, still, seen) = self.detect(grid, component, &window.block(), &chosen, (Some(&some), &rooms));
             map.update(&satellites, &seen);
@@ -469,8 +486,8 @@ impl Searcher {
             }
         }
         let rows = findings.iter().zip(codes);
-        let of = (signal, followed_db(component, Layers::Strongest));
-        rows.map(|(finding, (sv, _))| finding.report(of, *sv, window.first, code_chips)).collect()
+        let followed_db = followed_db(component, Layers::Strongest);
+        rows.map(|(finding, (link, _))| finding.report((*link, followed_db), window.first, code_chips)).collect()
     }
 
     /// One search of these samples, and refinement of what passes the threshold; with the crowded Dopplers,
@@ -480,7 +497,7 @@ impl Searcher {
         grid: &Grid,
         component: &Component,
         block: &Block,
-        codes: &[(Sv, &Code)],
+        codes: &[(Link, &Code)],
         (again, rooms): (Option<&Again<'_>>, &Rooms),
     ) -> (Vec<Finding>, Vec<usize>, Map) {
         let (sums, coherent) = (grid.sums, grid.coherent_periods);

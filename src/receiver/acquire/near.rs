@@ -40,7 +40,7 @@ impl Searcher {
                 return Err(AcquireError::TooFewSamples { have, need });
             }
             let window = Window::centred(stretch, need as usize);
-            results.extend(self.search_signal(link.signal, &grid, (window, 0.0), (&[(link.sv, code)], &[])));
+            results.extend(self.search_signal(link.signal, &grid, (window, 0.0), (&[(*link, code)], &[])));
         }
         Ok(results)
     }
