@@ -47,7 +47,8 @@ pub struct OperationSettings {
     /// ephemerides predict. It is a quarter while a satellite is lost, and doubles after each search without
     /// result, up to 16 times.
     pub reacquisition_interval_s: f64,
-    /// Factor on the false-alarm probability in searches after the first.
+    /// Factor on the false-alarm probability in searches after the first, but for those at the end of a
+    /// recording of less than a second.
     pub repeated_false_alarm_share: f64,
     /// Time after which a channel without frame synchronisation is dropped.
     pub frame_limit_s: f64,

@@ -159,6 +159,15 @@ fn both_bands_of_glonass_hold_the_channels_listed_and_none_else() {
     }
 }
 
+/// A local oscillator 9 kHz off, and 4 ms: one sum of 3 ms finds G02, of 40 dB-Hz, and a search around the
+/// Dopplers that a wider one found finds G31, at 11.8 kHz.
+#[test]
+fn four_milliseconds_of_a_distant_oscillator_hold_gps_as_listed_and_none_else() {
+    let Some(file) = external("if/cttc_l1_2012-07-26_4msps_cf32.bin") else { return };
+    let found = received(&file, &["--format", "cf32", "--rate-hz", "4e6"], &["GPS L1 C/A", "QZSS L1 C/A"], "");
+    assert_found(&found, &[("GPS L1 C/A", "G02 G12 G25 G29 G31", "")]);
+}
+
 const POCKET: &str = "if/pocket_l1_2021-12-02_4msps_ci8.bin";
 const POCKET_FLAGS: [&str; 5] = ["--format", "ci8", "--rate-hz", "4e6", "--inverted"];
 
@@ -172,12 +181,13 @@ fn half_a_second_holds_gps_and_galileo_as_listed_and_none_else() {
 }
 
 /// Both searches of a short recording, of which the second takes 62 ms: what GPS and the unknown signals of
-/// BeiDou make in ten codes passed for J04 to J10, with and without GPS among the candidates.
+/// BeiDou make in ten codes passed for J04 to J10, with and without GPS among the candidates. Beyond the list
+/// of GPS is G03: the Doppler of its L2C, −1116.2 Hz, makes −1432.5 Hz on L1, where it is at −1432.2 Hz.
 #[test]
 fn half_a_second_holds_no_satellite_of_qzss_but_those_whose_l1c_is_there() {
     let Some(file) = external(POCKET) else { return };
     for (signals, gps) in
-        [(&["QZSS L1 C/A"][..], ""), (&["QZSS L1 C/A", "GPS L1 C/A"][..], "G04 G16 G18 G25 G26 G29 G31 G32")]
+        [(&["QZSS L1 C/A"][..], ""), (&["QZSS L1 C/A", "GPS L1 C/A"][..], "G03 G04 G16 G18 G25 G26 G29 G31 G32")]
     {
         let mut found = received(&file, &POCKET_FLAGS, signals, "");
         let listed = found.remove("GPS L1 C/A").unwrap_or_default().into_keys().collect::<Vec<String>>().join(" ");

@@ -145,7 +145,8 @@ impl FrontEnd {
     /// Searches the first samples of a recording that ended before a second search was due, all that there
     /// are up to [`OPENING_S`]: once as any recording's, where there was no search yet, and then by as many
     /// sums as there is room for, beside what was found and where the next search would have looked. Ranges
-    /// get wider while there are too few satellites for a fix.
+    /// get wider while there are too few satellites for a fix. These are four searches at most, where an hour
+    /// has 240, so that each has the false alarm probability of the first one.
     ///
     /// A signal for which there is no room is left out: there are sums of one code period where two do not
     /// fit.
@@ -198,8 +199,6 @@ impl FrontEnd {
             settings.doppler_max_hz = (width * sweep.half_hz).min(MOST_DOPPLER_HZ);
             settings.noncoherent_sums = MOST_SUMS;
             is_elsewhere = width > 1.0 || sweep.half_hz > usual.doppler_max_hz;
-            let share = self.settings.operation.repeated_false_alarm_share;
-            settings.false_alarm_probability = (share * settings.false_alarm_probability).max(1e-12);
         }
         let mut searcher = Searcher::fitted(&self.metadata, &settings, centre_hz, have)?;
         let known: Vec<Acquired> = self.opened.clone();
