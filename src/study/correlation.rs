@@ -6,7 +6,7 @@
 
 use analysis::expect::theory::dll::{BandIntegrals, Discriminator, Taps, raw_on_chips};
 use analysis::waveform::Waveform;
-use gnss::signal::{Component, Layers, sinc_squared};
+use gnss::signal::{Component, Layers, PeakTable, sinc_squared};
 use receiver::lead::shapes;
 use receiver::track::loops::CodeShape;
 
@@ -25,13 +25,12 @@ pub enum Correlation {
         /// The replica with itself.
         own: Waveform,
     },
-    /// Correlation behind a front end of `band` chip rates: values and slopes (times the step) at multiples
-    /// of the table's step.
+    /// Correlation behind a front end of `band` chip rates.
     BandLimited {
         /// Bandwidth of the front end, chip rates.
         band: f64,
-        /// Value and slope, the slope times the step, at each step of the lag.
-        table: Vec<(f64, f64)>,
+        /// Values of the peak.
+        table: PeakTable,
         /// Waveform of the code; `None` of an ideal one.
         code: Option<Waveform>,
     },
@@ -41,8 +40,6 @@ pub enum Correlation {
 const STEPS_PER_CHIP: f64 = 128.0;
 /// Chips beyond which nothing is tabulated: no loop locks there.
 const LARGEST_CHIPS: f64 = 3.0;
-/// Intervals of the spectrum's integral in one chip rate.
-const INTERVALS: f64 = 96.0;
 
 impl Correlation {
     /// Correlation of a component with the replica that this receiver makes of it, without a front end.
@@ -72,23 +69,7 @@ impl Correlation {
     }
 
     fn behind(code: Option<&Waveform>, band: f64) -> Self {
-        let intervals = 2 * (0.25 * band * INTERVALS).ceil() as u64;
-        let step = 0.5 * band / intervals as f64;
-        let spectrum: Vec<(f64, f64)> = (0..=intervals)
-            .map(|k| {
-                let f = k as f64 * step;
-                let simpson = if k == 0 || k == intervals { 1.0 } else { 2.0 + 2.0 * (k % 2) as f64 };
-                (std::f64::consts::TAU * f, 2.0 * step / 3.0 * simpson * density(code, f))
-            })
-            .collect();
-        let at = |index: u64| {
-            let chips = index as f64 / STEPS_PER_CHIP;
-            spectrum.iter().fold((0.0, 0.0), |(value, slope), &(w, weight)| {
-                let (sin, cos) = libm::sincos(w * chips);
-                (value + weight * cos, slope - weight * w * sin / STEPS_PER_CHIP)
-            })
-        };
-        let table = (0..=(LARGEST_CHIPS * STEPS_PER_CHIP) as u64).map(at).collect();
+        let table = PeakTable::behind(|f| density(code, f), band, (STEPS_PER_CHIP, LARGEST_CHIPS));
         Self::BandLimited { band, table, code: code.cloned() }
     }
 
@@ -98,16 +79,7 @@ impl Correlation {
         match self {
             Self::Triangle => (1.0 - chips.abs()).max(0.0),
             Self::Pulses(code) | Self::Replica { found: code, .. } => code.correlation(chips / code.chip_rate_hz()),
-            Self::BandLimited { table, .. } => {
-                let x = chips.abs() * STEPS_PER_CHIP;
-                let (index, u) = (x.floor(), x - x.floor());
-                let Some(&[(a, da), (b, db)]) = table.get(index as usize..).and_then(|rest| rest.first_chunk()) else {
-                    return 0.0;
-                };
-                // Cubic through both values and slopes.
-                let c = 3.0 * (b - a) - 2.0 * da - db;
-                a + u * (da + u * (c + u * (da + db - 2.0 * (b - a))))
-            }
+            Self::BandLimited { table, .. } => table.value(chips),
         }
     }
 

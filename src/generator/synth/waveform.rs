@@ -18,7 +18,7 @@ use super::chips::{MAX_STEP, Pace, Spreading, packed, window};
 use super::pulse::Pulse;
 use super::responses::edge_vectors;
 use gnss::satellite::Sv;
-use gnss::signal::{Component, Layer, Layers, Link, Signal};
+use gnss::signal::{Component, Layer, Layers, Link, Signal, least_common_multiple};
 
 /// A sequence with its part in the component.
 #[derive(Clone, Debug)]
@@ -59,10 +59,6 @@ fn edges_cost(layer: &Layer, chips_a_sample: f64) -> f64 {
     let sequences = if layer.pulse.contains(&0) { 2.0 } else { 1.0 };
     let vectors = edge_vectors(chips_a_sample * layer.pulse.len() as f64);
     sequences * EDGE_COST * vectors * (within as f64 + 0.5)
-}
-
-fn least_common_multiple(a: usize, b: usize) -> usize {
-    (a..=a * b.max(1)).step_by(a.max(1)).find(|multiple| multiple.is_multiple_of(b.max(1))).unwrap_or(a)
 }
 
 /// A component's code and pulses for one satellite.

@@ -20,11 +20,13 @@ use crate::time::{Epoch, TimeScale};
 use crate::{beidou, galileo, glonass, gps, navic, qzss, sbas};
 
 mod dated;
+mod peak;
 mod shape;
 #[cfg(any(test, feature = "planted"))]
 pub mod synthetic;
 mod tone;
 
+pub use peak::PeakTable;
 pub use shape::{Shape, chip_kinds, sinc, sinc_squared};
 pub use tone::Tone;
 
@@ -474,7 +476,8 @@ impl Component {
     }
 }
 
-fn least_common_multiple(a: usize, b: usize) -> usize {
+/// Least common multiple of two numbers above zero.
+pub fn least_common_multiple(a: usize, b: usize) -> usize {
     let (mut x, mut y) = (a, b);
     while y > 0 {
         (x, y) = (y, x % y);
