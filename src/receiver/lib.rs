@@ -60,7 +60,7 @@ mod run;
 mod session;
 pub mod settings;
 pub mod source;
-mod threshold;
+pub mod threshold;
 pub mod track;
 
 pub use outcome::{Conditioning, Interfered, Outcome, ReceiveError};

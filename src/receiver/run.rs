@@ -10,6 +10,7 @@ use num_complex::Complex;
 use serde_json::json;
 
 use crate::acquire;
+use crate::correlate::correlator::{Model, Span};
 use crate::diagnosis::{Diagnosis, Stage};
 use crate::followed::Followed;
 use crate::format::Check;
@@ -17,7 +18,7 @@ use crate::outcome::{Outcome, ReceiveError};
 use crate::output::{Record, Sink};
 use crate::session::{Session, held};
 use crate::settings::Settings;
-use crate::source::{Packed, Queue, Source};
+use crate::source::{Queue, Source, Stretch};
 use gnss::gps::l1ca::L1_CA;
 use gnss::samples::IfMetadata;
 use gnss::satellite::Sv;
@@ -55,6 +56,8 @@ pub struct Reception {
     settings: Settings,
     checks: Vec<Check>,
     source: Input,
+    /// Samples that a model answered for.
+    modelled: u64,
     session: Session,
 }
 
@@ -109,6 +112,7 @@ impl Reception {
             settings: settings.clone(),
             checks: metadata.iter().map(|metadata| Check::new(metadata.format)).collect(),
             source,
+            modelled: 0,
             session,
         })
     }
@@ -133,7 +137,7 @@ impl Reception {
         match &mut self.source {
             Input::One(source) => {
                 while let Some(block) = source.next(&mut bytes) {
-                    self.session.process(&[block], sink)?;
+                    self.session.process(&[Stretch::Packed(block)], sink)?;
                 }
             }
             Input::Several { queues, block } => {
@@ -152,6 +156,39 @@ impl Reception {
         Ok(())
     }
 
+    /// Takes the samples before number `to` of the first front end as `models` answer for them, one for each
+    /// front end, in blocks as long as those of samples; the rest of a block waits unless it is the `last`
+    /// one. A reception takes samples or models.
+    ///
+    /// # Errors
+    /// Records that cannot be written.
+    pub fn take_models<M: Model>(
+        &mut self,
+        models: &[M],
+        (to, last): (u64, bool),
+        sink: &mut dyn Sink,
+    ) -> Result<(), ReceiveError> {
+        let block = match &self.source {
+            Input::One(source) => source.block_samples(),
+            Input::Several { block, .. } => *block,
+        };
+        while self.modelled + block <= to || (last && self.modelled < to) {
+            let end = to.min(self.modelled + block);
+            let [firsts, ends] = [self.modelled, end].map(|main| self.session.ends(main));
+            let span = |((first, end), model)| Stretch::Modelled(Span { first, end, model: model as &dyn Model });
+            let spans: Vec<Stretch> = firsts.into_iter().zip(ends).zip(models).map(span).collect();
+            self.session.process(&spans, sink)?;
+            self.modelled = end;
+        }
+        Ok(())
+    }
+
+    /// First sample of each front end about which the model of the next samples can be asked: that of a code
+    /// period that runs, or of a search that waits for more.
+    pub fn needs(&self) -> Vec<u64> {
+        self.session.needs(self.modelled)
+    }
+
     /// Bytes that are best taken at a time: a block, so that none has to be kept for the next.
     fn piece_bytes(&self) -> usize {
         match &self.source {
@@ -163,8 +200,8 @@ impl Reception {
     /// Samples of the first front end taken so far, those of a block that is not full yet left out.
     pub fn samples(&self) -> u64 {
         match &self.source {
-            Input::One(source) => source.samples(),
-            Input::Several { queues, .. } => queues.first().map_or(0, Queue::samples),
+            Input::One(source) => source.samples() + self.modelled,
+            Input::Several { queues, .. } => queues.first().map_or(0, Queue::samples) + self.modelled,
         }
     }
 
@@ -174,7 +211,7 @@ impl Reception {
             Input::One(source) => {
                 let (rest, cut_bytes) = source.rest();
                 if let Some(block) = rest {
-                    self.session.process(&[block], sink)?;
+                    self.session.process(&[Stretch::Packed(block)], sink)?;
                 }
                 Ok(cut_bytes)
             }
@@ -247,7 +284,7 @@ fn take_blocks(
     ends: &[u64],
     sink: &mut dyn Sink,
 ) -> Result<(), ReceiveError> {
-    let blocks: Vec<Packed> = queues.iter().zip(ends).map(|(queue, end)| queue.block(*end)).collect();
+    let blocks: Vec<Stretch> = queues.iter().zip(ends).map(|(queue, end)| Stretch::Packed(queue.block(*end))).collect();
     session.process(&blocks, sink)?;
     queues.iter_mut().zip(ends).for_each(|(queue, end)| queue.take(*end));
     Ok(())

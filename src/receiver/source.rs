@@ -12,6 +12,7 @@ use std::ops::Range;
 
 use kernel::{fixed, unpack};
 
+use crate::correlate::correlator::Span;
 use crate::correlate::fixed::{Fixed, FixedSamples};
 use gnss::samples::Format;
 
@@ -69,11 +70,13 @@ impl Packed<'_> {
     }
 }
 
-/// Samples that something looks at more than once: in planes, or as they were packed.
+/// Samples that something looks at more than once: in planes, or as they were packed; or a model in their
+/// stead.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Stretch<'a> {
     Planes(Block<'a>),
     Packed(Packed<'a>),
+    Modelled(Span<'a>),
 }
 
 impl Stretch<'_> {
@@ -82,6 +85,7 @@ impl Stretch<'_> {
         match self {
             Self::Planes(block) => block.first,
             Self::Packed(packed) => packed.first,
+            Self::Modelled(span) => span.first,
         }
     }
 
@@ -90,7 +94,18 @@ impl Stretch<'_> {
         match self {
             Self::Planes(block) => block.i.len(),
             Self::Packed(packed) => packed.samples(),
+            Self::Modelled(span) => span.end.saturating_sub(span.first) as usize,
         }
+    }
+
+    /// Number of the sample after the last one.
+    pub fn end(&self) -> u64 {
+        self.first() + self.samples() as u64
+    }
+
+    /// The samples as they were packed, if they were.
+    pub fn packed(&self) -> Option<&Packed<'_>> {
+        if let Self::Packed(packed) = self { Some(packed) } else { None }
     }
 
     /// Planes of the first `samples` of them, or of as many as there are.
@@ -102,6 +117,7 @@ impl Stretch<'_> {
                 packed.unpack(0..samples, &mut planes);
                 [planes.i, planes.q]
             }
+            Self::Modelled(_) => [Vec::new(), Vec::new()],
         }
     }
 }
@@ -116,18 +132,36 @@ pub(crate) struct Gathered {
 
 impl Gathered {
     /// A collection that begins with a block, still empty.
-    pub fn from(block: &Packed) -> Self {
-        Self { first: block.first, format: block.format, bytes: Vec::new() }
+    pub fn from(block: &Stretch) -> Self {
+        let format = block.packed().map_or(Format::Cf32Le, |block| block.format);
+        Self { first: block.first(), format, bytes: Vec::new() }
     }
 
-    /// Takes samples of the next block until there are `samples` of them; says whether there are.
-    pub fn take(&mut self, block: &Packed, samples: usize) -> bool {
+    /// Takes samples of the next block until there are `samples` of them; says whether there are. A model
+    /// has those of before too.
+    pub fn take(&mut self, block: &Stretch, samples: usize) -> bool {
+        let Some(block) = block.packed() else { return block.end() >= self.first + samples as u64 };
         let size = self.format.bytes();
         let missing = (samples * size).saturating_sub(self.bytes.len()).min(block.bytes.len());
         // Most searches want a few blocks.
         self.bytes.reserve_exact(missing);
         self.bytes.extend_from_slice(&block.bytes[..missing]);
         self.bytes.len() >= samples * size
+    }
+
+    /// The first `samples` of those that were gathered, the last of them in `block`.
+    pub fn stretch<'a>(&'a self, block: &Stretch<'a>, samples: u64) -> Stretch<'a> {
+        match block {
+            Stretch::Modelled(span) => {
+                Stretch::Modelled(Span { first: self.first, end: self.first + samples, ..*span })
+            }
+            Stretch::Planes(_) | Stretch::Packed(_) => Stretch::Packed(self.packed()),
+        }
+    }
+
+    /// Number of the first sample.
+    pub fn first(&self) -> u64 {
+        self.first
     }
 
     /// Samples gathered so far.
@@ -256,6 +290,11 @@ impl Source {
         self.block_bytes
     }
 
+    /// Samples of a block.
+    pub fn block_samples(&self) -> u64 {
+        (self.block_bytes / self.format.bytes()).max(1) as u64
+    }
+
     /// Samples given out so far.
     pub fn samples(&self) -> u64 {
         self.samples
@@ -335,6 +374,7 @@ mod tests {
                 for bytes in bytes.chunks(piece * size) {
                     let block = Packed { first, format, bytes };
                     let end = block.end() as usize - 500;
+                    let block = Stretch::Packed(block);
                     let is_whole = gathered.get_or_insert_with(|| Gathered::from(&block)).take(&block, samples);
                     assert_eq!(is_whole, end >= samples, "{format} {piece} {end}");
                     first = block.end();

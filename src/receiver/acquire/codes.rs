@@ -17,9 +17,10 @@ use super::removal;
 use super::replica::Replica;
 use super::window::Window;
 use super::{AcquireError, Band, companion};
+use crate::correlate::correlator::{Code as Made, Coded};
 use crate::correlate::{self, Edge, Wave};
 use crate::lead::lead;
-use gnss::signal::{Component, Link};
+use gnss::signal::{Component, Layers, Link};
 
 /// Spectra that are kept from one search to the next, in bytes.
 const KEPT_BYTES: usize = 8 << 20;
@@ -65,9 +66,8 @@ impl Code {
     }
 
     /// The code as correlators want it.
-    pub fn correlator(&self) -> Option<correlate::Replica> {
-        let Sent { component, number, .. } = self.leading;
-        correlate::Replica::of(Wave::new(component, number)?, Edge::Area)
+    pub fn correlator(&self, link: Link) -> Option<Coded> {
+        coded(link, self.leading.component)
     }
 
     /// True if the leading codes are equal.
@@ -98,6 +98,15 @@ impl Code {
         self.leading.bytes() + self.companion.as_ref().map_or(0, Sent::bytes)
     }
 }
+
+/// A replica of the strongest layer of a component, by which cells are refined.
+pub(super) fn coded(link: Link, component: &'static Component) -> Option<Coded> {
+    let replica = correlate::Replica::of(Wave::new(component, link.sv.number)?, Edge::Area)?;
+    Some(Coded { replica, code: Made::new(link, component, SEARCHED) })
+}
+
+/// Replicas that searches make.
+pub const SEARCHED: (Layers, Edge) = (Layers::Strongest, Edge::Area);
 
 /// The codes that were needed so far, as far as they are kept.
 #[derive(Default)]

@@ -39,6 +39,7 @@ mod family;
 mod finding;
 mod grid;
 mod kernel;
+mod modelled;
 mod multiple_access;
 mod near;
 mod pair;
@@ -66,6 +67,7 @@ use gnss::samples::IfMetadata;
 use gnss::satellite::Sv;
 use gnss::signal::{Component, Layers, Link, Signal};
 
+pub use codes::SEARCHED;
 use codes::{Code, Codes};
 use dwells::Rooms;
 pub(crate) use dwells::pair_sums;
@@ -319,6 +321,9 @@ impl Searcher {
         candidates: &[Link],
         known: &[Acquired],
     ) -> Result<Vec<(AcquisitionRow, Option<Acquired>)>, AcquireError> {
+        if let Stretch::Modelled(span) = stretch {
+            return self.search_model(span, candidates);
+        }
         let known_links = known.iter().map(Acquired::link);
         let links: Vec<Link> = candidates.iter().copied().chain(known_links).collect();
         for link in &links {
@@ -508,7 +513,7 @@ impl Searcher {
         let findings = (peaks.of)
             .into_par_iter()
             .zip(codes)
-            .map(|(peak, (_, code))| {
+            .map(|(peak, (link, code))| {
                 let excess = peak.statistic / (2.0 * f64::from(sums)) - 1.0;
                 let coarse = Refined {
                     code_phase_chips: grid.code_phase_chips(peak.half_lag, peak.doppler_hz),
@@ -516,9 +521,9 @@ impl Searcher {
                     cn0_hz: excess.max(f64::MIN_POSITIVE) / coherent_s,
                     power: 0.0,
                 };
-                let replica = if peak.statistic > peak.threshold { code.correlator() } else { None };
+                let coded = if peak.statistic > peak.threshold { code.correlator(*link) } else { None };
                 let periods = grid.periods as usize;
-                let hit = replica.map(|replica| refine::refine(grid, shown, component, &replica, coarse, periods));
+                let hit = coded.map(|coded| refine::refine(grid, shown, component, &coded, coarse, periods));
                 Finding { statistic: peak.statistic, threshold: peak.threshold, coarse, hit }
             })
             .collect();

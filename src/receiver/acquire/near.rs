@@ -25,6 +25,9 @@ impl Searcher {
         for link in &links {
             self.prepare(*link)?;
         }
+        if let Stretch::Modelled(span) = stretch {
+            return Ok(self.search_model_near(span, near, half_hz));
+        }
         let settings = AcquisitionSettings { doppler_max_hz: half_hz, ..self.settings.clone() };
         let mut results = Vec::with_capacity(near.len());
         for (link, doppler_hz) in near {

@@ -11,8 +11,8 @@ use num_complex::Complex;
 
 use super::grid::Grid;
 use super::settings::sign_turns_often;
-use crate::correlate::correlator::{Correlator, Interval};
-use crate::correlate::{Arithmetic, Nco, Replica, TURN, chips_to_units, steps_of_chip, units_to_chips};
+use crate::correlate::correlator::{Coded, Correlator, Interval};
+use crate::correlate::{Arithmetic, Nco, TURN, chips_to_units, steps_of_chip, units_to_chips};
 use gnss::signal::{Component, Layer, Shape};
 
 /// Correlators that measure the noise.
@@ -36,7 +36,9 @@ pub(super) struct Refined {
 struct Correlators<'a, C> {
     grid: &'a Grid,
     correlator: &'a C,
-    replica: &'a Replica,
+    /// Number of the first sample.
+    first: u64,
+    coded: &'a Coded,
     code_chips: f64,
     periods: usize,
 }
@@ -47,12 +49,12 @@ pub(super) fn refine<C: Correlator>(
     grid: &Grid,
     correlator: &C,
     component: &Component,
-    replica: &Replica,
+    coded: &Coded,
     coarse: Refined,
     periods: usize,
 ) -> Refined {
     let code_chips = f64::from(component.code_chips);
-    let correlators = Correlators { grid, correlator, replica, code_chips, periods };
+    let correlators = Correlators { grid, correlator, first: correlator.fresh(), coded, code_chips, periods };
     let mut phase = coarse.code_phase_chips.rem_euclid(code_chips);
     let doppler_hz = if sign_turns_often(component) {
         correlators.unsplit_doppler_hz(phase, coarse.doppler_hz)
@@ -62,7 +64,7 @@ pub(super) fn refine<C: Correlator>(
     let doppler_hz = correlators.fine_doppler_hz(phase, doppler_hz);
 
     let shape = searched_shape(component);
-    let quiet_chips: Vec<f64> = replica.quiet_taps(NOISE_TAPS).into_iter().map(units_to_chips).collect();
+    let quiet_chips: Vec<f64> = coded.replica.quiet_taps(NOISE_TAPS).into_iter().map(units_to_chips).collect();
     // Taps of one pass share the carrier.
     let (fours, rest) = quiet_chips.as_chunks::<4>();
     let of_fours = fours.iter().flat_map(|offsets| correlators.powers(phase, doppler_hz, offsets));
@@ -126,8 +128,11 @@ impl<C: Correlator> Correlators<'_, C> {
         let begin = |period: usize| ((((period + 1) as f64) * self.code_chips - phase_chips) / step).ceil() as usize;
         for period in 0..self.periods {
             let (from, to) = (begin(period), begin(period + 1));
-            let [first, end] = [from, to].map(|sample| self.correlator.fresh() + sample as u64);
-            if first > end || end > self.correlator.end() {
+            let interval = |nco| {
+                let [from, to] = [from, to].map(|sample| self.first + sample as u64);
+                Interval { nco, from, to, end: to }
+            };
+            if from > to || self.first + to as u64 > self.correlator.end() {
                 break;
             }
             let nco = Nco {
@@ -138,8 +143,7 @@ impl<C: Correlator> Correlators<'_, C> {
                 code: chips_to_units(phase_chips + from as f64 * step - (period + 1) as f64 * self.code_chips),
                 code_step: chips_to_units(step) as u64,
             };
-            let interval = Interval { nco, from: first, to: end };
-            let taps = self.correlator.sums(&interval, self.replica, Arithmetic::F32, &taps);
+            let taps = self.correlator.sums(&interval(nco), self.coded, Arithmetic::F32, &taps);
             sums.iter_mut().zip(taps).for_each(|(sum, tap)| sum.push(tap));
         }
         sums

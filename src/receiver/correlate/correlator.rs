@@ -1,12 +1,45 @@
-//! The question that a channel asks, and a search that refines its hits, with its answer from samples.
+//! The question that a channel asks, and its answer from samples or from a model.
 //!
-//! Who asks knows the phases and rates of the oscillators, and wants the sums of a replica's taps over an
-//! interval. Who answers is a [`Correlator`]. [`Shown`] answers by multiplication of samples.
+//! A channel knows the phases and rates of its oscillators, and asks for the sums of a replica's taps over an
+//! interval. Whoever answers is a [`Correlator`]. [`Shown`] answers by multiplication of samples, [`Span`]
+//! asks a [`Model`], which computes what such a multiplication gives.
 
 use num_complex::Complex64;
 
 use super::sums::Samples;
-use super::{Arithmetic, Nco, Replica};
+use super::{Arithmetic, Edge, Nco, Replica};
+use gnss::signal::{Component, Layers, Link};
+
+/// Code of a replica, and the way in which the replica is made.
+#[derive(Clone, Copy, Debug)]
+pub struct Code {
+    /// Satellite and signal.
+    pub link: Link,
+    /// Component of the signal.
+    pub component: &'static Component,
+    /// Index of the segment of a long code, if the replica is one.
+    pub segment: Option<u64>,
+    /// Layers of the component that the replica has.
+    pub waveform: Layers,
+    /// Rule that assigns chips to samples.
+    pub edge: Edge,
+}
+
+impl Code {
+    /// Whole code of a component, in a waveform with an edge rule.
+    pub fn new(link: Link, component: &'static Component, (waveform, edge): (Layers, Edge)) -> Self {
+        Self { link, component, segment: None, waveform, edge }
+    }
+}
+
+/// Replica with its code.
+#[derive(Clone, Debug)]
+pub struct Coded {
+    /// Replica.
+    pub replica: Replica,
+    /// Code of the replica.
+    pub code: Code,
+}
 
 /// An interval of samples, counted from the beginning of the stream, and the oscillators of a replica there.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +50,8 @@ pub struct Interval {
     pub from: u64,
     /// Number of the sample after the last one.
     pub to: u64,
+    /// Number of the sample after the last one of the code period of which the interval is a part.
+    pub end: u64,
 }
 
 /// Source of correlations.
@@ -32,7 +67,7 @@ pub trait Correlator {
     fn sums<const T: usize>(
         &self,
         interval: &Interval,
-        replica: &Replica,
+        coded: &Coded,
         arithmetic: Arithmetic,
         taps: &[i64; T],
     ) -> [Complex64; T];
@@ -78,16 +113,105 @@ impl Correlator for Shown<'_> {
     #[inline]
     fn sums<const T: usize>(
         &self,
-        Interval { nco, from, to }: &Interval,
-        replica: &Replica,
+        Interval { nco, from, to, .. }: &Interval,
+        coded: &Coded,
         arithmetic: Arithmetic,
         taps: &[i64; T],
     ) -> [Complex64; T] {
-        replica.correlate_in(arithmetic, self.part(*from, *to), nco, taps)
+        coded.replica.correlate_in(arithmetic, self.part(*from, *to), nco, taps)
     }
 
     fn power(&self, from: u64, to: u64) -> f64 {
         let samples = self.part(from, to);
         samples.power() / samples.count().max(1) as f64
+    }
+}
+
+/// Model of correlations, in place of samples. Its answers depend on the question alone.
+pub trait Model: Sync {
+    /// Sums of a replica over an interval, as [`Correlator::sums`] gives them: one for each tap.
+    fn sums(&self, interval: &Interval, code: &Code, taps: &[i64], sums: &mut [Complex64]);
+    /// Mean power of the samples in an interval.
+    fn power(&self, from: u64, to: u64) -> f64;
+    /// Largest cell of a search.
+    fn search(&self, sought: &Sought) -> Cell;
+}
+
+impl std::fmt::Debug for dyn Model + '_ {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Model")
+    }
+}
+
+/// Search for one satellite's signal.
+#[derive(Clone, Copy, Debug)]
+pub struct Sought<'a> {
+    /// Code that leads the signal.
+    pub code: Code,
+    /// Code beside it whose powers are added, if there is one.
+    pub beside: Option<Code>,
+    /// Number of the first sample.
+    pub first: u64,
+    /// First sample of each coherent sum, counted from the first one.
+    pub begins: &'a [f64],
+    /// Samples of a coherent sum.
+    pub samples: f64,
+    /// Dopplers, in hertz, at equal steps.
+    pub dopplers_hz: &'a [f64],
+    /// Distance of delays, in chips. There is another cell between any two.
+    pub lag_chips: f64,
+    /// Independent cells of a Doppler.
+    pub cells: usize,
+}
+
+/// Largest cell of a search.
+#[derive(Clone, Copy, Debug)]
+pub struct Cell {
+    /// Sum of powers, in units in which noise alone is chi-square with two degrees of freedom a power.
+    pub statistic: f64,
+    /// Doppler of the cell, in hertz.
+    pub doppler_hz: f64,
+    /// Code phase of the cell at the first sample, in chips.
+    pub code_phase_chips: f64,
+}
+
+/// Interval of samples for which a model answers.
+#[derive(Clone, Copy, Debug)]
+pub struct Span<'a> {
+    /// Number of the first sample that is new.
+    pub first: u64,
+    /// Number of the sample after the last one.
+    pub end: u64,
+    /// Model.
+    pub model: &'a dyn Model,
+}
+
+impl Correlator for Span<'_> {
+    fn first(&self) -> u64 {
+        0
+    }
+
+    fn end(&self) -> u64 {
+        self.end
+    }
+
+    fn fresh(&self) -> u64 {
+        self.first
+    }
+
+    fn sums<const T: usize>(
+        &self,
+        interval: &Interval,
+        coded: &Coded,
+        _: Arithmetic,
+        taps: &[i64; T],
+    ) -> [Complex64; T] {
+        let mut sums = [Complex64::ZERO; T];
+        self.model.sums(interval, &coded.code, taps, &mut sums);
+        sums
+    }
+
+    fn power(&self, from: u64, to: u64) -> f64 {
+        self.model.power(from, to)
     }
 }

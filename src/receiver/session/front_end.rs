@@ -9,7 +9,7 @@ use super::shared::Shared;
 use super::step::{Counted, Step, Tick};
 use super::{gap, plan, suited};
 use crate::acquire::{self, AcquireError, Acquired, Searcher};
-use crate::correlate::correlator::Shown;
+use crate::correlate::correlator::{Shown, Span};
 use crate::correlate::fixed::FixedSamples;
 use crate::correlate::sums::{RunningSums, Samples};
 use crate::decode::Decoder;
@@ -90,12 +90,6 @@ pub(super) struct Window {
     pub samples: Gathered,
     /// Satellites that are searched for; all where there is none.
     pub near: Option<Near>,
-}
-
-impl Window {
-    pub fn stretch(&self) -> Stretch<'_> {
-        Stretch::Packed(self.samples.packed())
-    }
 }
 
 /// The state of one front end between blocks. Samples are its own.
@@ -213,7 +207,7 @@ impl FrontEnd {
     }
 
     /// Takes the next block as far as every front end goes by itself: search, channels, lost samples.
-    pub fn process(&mut self, block: &Packed, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+    pub fn process(&mut self, block: &Stretch, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let ticks = std::mem::take(&mut self.ticks);
         let sink = &mut Counted { sink, step: self.step, ticks: &ticks };
         self.search(block, shared, sink)?;
@@ -232,8 +226,13 @@ impl FrontEnd {
     ///
     /// Each share unpacks the samples for itself, in parts that stay in its core's cache: to read what
     /// another core has written takes longer than to unpack it again.
-    fn advance(&mut self, block: &Packed, ticks: &[Tick]) {
+    fn advance(&mut self, block: &Stretch, ticks: &[Tick]) {
         let ticks: Vec<u64> = ticks.iter().map(|tick| tick.own).collect();
+        let block = match block {
+            Stretch::Packed(block) => block,
+            Stretch::Modelled(span) => return self.advance_by(span, &ticks),
+            Stretch::Planes(_) => return,
+        };
         let share = self.tracks.len().div_ceil(rayon::current_num_threads()).max(1);
         self.rooms.resize_with(self.tracks.len().div_ceil(share), Room::default);
         let longest_s = self.tracks.iter().map(|track| track.channel.period_s()).fold(0.0, f64::max);
@@ -250,6 +249,21 @@ impl FrontEnd {
         });
         let needed = self.tracks.iter().filter_map(|track| track.channel.needs()).min();
         self.lookback.keep(block, needed.unwrap_or(block.end()));
+    }
+
+    /// Takes every channel through an interval in which a model answers.
+    fn advance_by(&mut self, span: &Span, ticks: &[u64]) {
+        self.tracks.par_iter_mut().for_each(|track| {
+            clear(&mut track.report);
+            track.channel.follow(span, ticks, &mut track.report);
+        });
+    }
+
+    /// First sample about which a model can still be asked: of a running code period, or of what is collected
+    /// for a search. `None` where there is neither.
+    pub fn needs(&self) -> Option<u64> {
+        let window = self.window.as_ref().map(|window| window.samples.first());
+        self.tracks.iter().filter_map(|track| track.channel.needs()).chain(window).min()
     }
 
     /// Forms of the samples that the channels need.
@@ -279,9 +293,11 @@ impl FrontEnd {
     }
 
     /// Actions after a block has been measured: the spectrum, the channels that end, the next search.
-    pub fn close(&mut self, block: &Packed, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+    pub fn close(&mut self, block: &Stretch, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let sink = &mut Counted { sink, step: self.step, ticks: &[] };
-        self.watch(Some(block), sink)?;
+        if let Some(block) = block.packed() {
+            self.watch(Some(block), sink)?;
+        }
         self.retire(block.end(), shared, sink)?;
         self.hasten(block.end(), shared);
         Ok(())

@@ -14,7 +14,7 @@ use crate::output::Sink;
 use crate::position::Noises;
 use crate::position::least_squares::LARGEST_CONDITION;
 use crate::settings::{Settings, SettingsError};
-use crate::source::Packed;
+use crate::source::Stretch;
 use crate::track::LoopMargin;
 use front_end::{FrontEnd, Track, Window};
 use gnss::samples::IfMetadata;
@@ -94,8 +94,18 @@ impl Session {
         self.front_ends.iter().map(|front_end| front_end.step.own(main)).collect()
     }
 
+    /// First sample of each front end about which a model can still be asked, where samples before number
+    /// `main` of the first front end were taken.
+    pub fn needs(&self, main: u64) -> Vec<u64> {
+        let needed = |front_end: &FrontEnd| {
+            let next = front_end.step.own(main);
+            front_end.needs().map_or(next, |needed| needed.min(next))
+        };
+        self.front_ends.iter().map(needed).collect()
+    }
+
     /// Takes the next blocks, one a front end over the same time, through the whole chain.
-    pub fn process(&mut self, blocks: &[Packed], sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+    pub fn process(&mut self, blocks: &[Stretch], sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let Some(first) = blocks.first() else { return Ok(()) };
         let measured = self.plan_ticks(first, blocks);
         for (front_end, block) in self.front_ends.iter_mut().zip(blocks) {
@@ -124,7 +134,7 @@ impl Session {
 
     /// Sets the samples of these blocks at which channels report, and gives those of the first front end at
     /// which the receiver measures.
-    fn plan_ticks(&mut self, first: &Packed, blocks: &[Packed]) -> Vec<u64> {
+    fn plan_ticks(&mut self, first: &Stretch, blocks: &[Stretch]) -> Vec<u64> {
         let operation = &self.shared.settings.operation;
         let step_ms = u64::from(operation.tracking_interval_ms);
         let each = u64::from(operation.measurement_interval_ms / operation.tracking_interval_ms).max(1);
@@ -145,12 +155,12 @@ impl Session {
             self.next_tick += 1;
         }
         for (front_end, block) in self.front_ends.iter_mut().zip(blocks) {
-            let Some(last) = block.end().checked_sub(1).filter(|last| *last >= block.first) else {
+            let Some(last) = block.end().checked_sub(1).filter(|last| *last >= block.first()) else {
                 front_end.ticks.clear();
                 continue;
             };
             // A front end that is in step has its tick within the block but for rounding.
-            let own = |main: u64| front_end.step.own(main).clamp(block.first, last);
+            let own = |main: u64| front_end.step.own(main).clamp(block.first(), last);
             front_end.ticks = ticks.iter().map(|&main| Tick { main, own: own(main) }).collect();
             front_end.ticks.dedup_by_key(|tick| tick.own);
         }

@@ -17,7 +17,7 @@ use crate::outcome::ReceiveError;
 use crate::output::{Record, Sink};
 use crate::parting::Line;
 use crate::position::least_squares::UNKNOWNS;
-use crate::source::{Gathered, Packed, Stretch};
+use crate::source::{Gathered, Stretch};
 use crate::track::{Channel, Report};
 use gnss::record::{AcquisitionRow, Event, EventRow};
 use gnss::satellite::Sv;
@@ -53,7 +53,7 @@ impl FrontEnd {
     /// Collects samples while a search is due, searches when there are enough, starts channels.
     pub(super) fn search(
         &mut self,
-        block: &Packed,
+        block: &Stretch,
         shared: &mut Shared,
         sink: &mut dyn Sink,
     ) -> Result<(), ReceiveError> {
@@ -62,9 +62,9 @@ impl FrontEnd {
             return Ok(());
         }
         let opening = self.samples(OPENING_S);
-        if block.first < opening {
+        if block.first() < opening && block.packed().is_some() {
             self.opening.get_or_insert_with(|| Gathered::from(block)).take(block, opening as usize);
-        } else if block.first > self.samples(WIDEN_S) {
+        } else if block.first() > self.samples(WIDEN_S) {
             self.opening = None;
         }
         if self.window.is_none() {
@@ -76,15 +76,16 @@ impl FrontEnd {
             return Ok(());
         }
         let Some(window) = self.window.take() else { return Ok(()) };
+        let stretch = window.samples.stretch(block, self.needed);
         self.refused.retain(|_, until| *until > end);
         if let Some((near, half_hz)) = &window.near {
-            let results = self.searcher.search_near(&window.stretch(), near, *half_hz)?;
+            let results = self.searcher.search_near(&stretch, near, *half_hz)?;
             self.note_missed(&results, end, shared);
             let (believed, doubted) = self.believed(results);
             if doubted {
                 self.next_search = self.next_search.min(end);
             }
-            return self.start_channels(believed, block.first, shared, sink);
+            return self.start_channels(believed, block.first(), shared, sink);
         }
         // Satellites that are followed are searched for too, or taken out of the samples: without that their
         // cross-correlation would pass for others.
@@ -95,9 +96,9 @@ impl FrontEnd {
         let is_followed = |link: &Link| self.tracks.iter().any(|track| track.channel.link().is_alike(*link));
         if !sought.iter().all(is_followed) {
             sought.retain(|link| !known.iter().any(|one| one.link().is_alike(*link)));
-            let results = self.searcher.search_stretch(&window.stretch(), &sought, &known)?;
+            let results = self.searcher.search_stretch(&stretch, &sought, &known)?;
             self.look(&results, end, shared);
-            self.start_channels(results, block.first, shared, sink)?;
+            self.start_channels(results, block.first(), shared, sink)?;
         }
         self.searched = true;
         self.widen(shared);
@@ -129,7 +130,7 @@ impl FrontEnd {
     }
 
     /// Search that begins with this block, if any: one for all, or one for predicted satellites.
-    fn due(&mut self, block: &Packed, shared: &Shared) -> Result<Option<Option<Near>>, AcquireError> {
+    fn due(&mut self, block: &Stretch, shared: &Shared) -> Result<Option<Option<Near>>, AcquireError> {
         if block.end() > self.next_search {
             self.aim(self.sweep(shared))?;
             return Ok(Some(None));
@@ -138,7 +139,7 @@ impl FrontEnd {
             return Ok(None);
         }
         self.next_foreseen = block.end() + self.foreseen_wait();
-        let near = self.foreseen(block.first, shared);
+        let near = self.foreseen(block.first(), shared);
         Ok((!near.0.is_empty()).then_some(Some(near)))
     }
 

@@ -121,7 +121,7 @@ impl Channel {
         let alone = TrackingSettings { spacing_chips: wider * settings.spacing_chips, ..settings.clone() };
         let model = component.and_then(|c| ReplicaModel::new(&alone, c, metadata.rate.hz()));
         let model_power = model.map_or(1.0, |model| model.power);
-        let accumulator = Accumulator::new(component, hit.sv.number, &alone, metadata, model_power);
+        let accumulator = Accumulator::new(component, hit.link(), &alone, metadata, model_power);
         let chip_rate_hz = component.map_or(1.0, |c| c.chip_rate_hz);
         let nco = Oscillators::new(hit, metadata, chip_rate_hz, accumulator.length());
         let period_s = component.map_or(1.0, Component::period_s);
@@ -137,7 +137,7 @@ impl Channel {
             phase_cycles: component.map_or(0.0, |c| c.phase_cycles),
             start: None,
             nco,
-            lost: accumulator.replica.is_none(),
+            lost: accumulator.coded.is_none(),
             accumulator,
             companions,
             loops,
@@ -271,8 +271,8 @@ impl Channel {
         let mut ticks = ticks.iter().copied().peekable();
         let end = correlator.end();
         while !self.lost {
-            if let Some(replica) = &mut self.accumulator.replica {
-                self.companions.ready(replica, self.signs.phase, self.nco.period);
+            if let Some(coded) = &mut self.accumulator.coded {
+                self.companions.ready(coded, self.signs.phase, self.nco.period);
             }
             let (from, to) = (self.nco.first, self.nco.next());
             while let Some(tick) = ticks.next_if(|&tick| tick < to.min(end)) {
@@ -282,7 +282,7 @@ impl Channel {
                 break;
             }
             let (arithmetic, number) = (self.accumulator.arithmetic, self.nco.period);
-            let interval = Interval { nco: self.nco.nco(), from, to };
+            let interval = Interval { nco: self.nco.nco(), from, to, end: to };
             self.correlate(&Period { correlator, arithmetic, number, interval }, report);
         }
     }

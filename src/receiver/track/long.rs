@@ -7,6 +7,7 @@
 //! their true neighbours, two of 20 460.
 
 use super::secondary_code::{SecondaryCodePhase, Shifts};
+use crate::correlate::correlator::{Code, Coded};
 use crate::correlate::{Edge, Replica, Wave};
 use crate::lead::long_beside;
 use gnss::signal::{Component, Signal};
@@ -51,15 +52,16 @@ impl LongCode {
         (number + phase.shift) % self.segments
     }
 
-    /// The replica of a segment; `None` where the documents assign no code.
-    pub fn replica(&mut self, segment: u64) -> Option<Replica> {
+    /// The replica of a segment beside a code; `None` where the documents assign no code.
+    pub fn coded(&mut self, segment: u64, beside: &Code) -> Option<Coded> {
         if self.chips.is_empty() {
             self.chips = (self.component.code)(self.number)?;
         }
         let values = self.chips.chunks_exact(self.length).nth(segment as usize)?.to_vec();
         let sent = values.iter().filter(|&&chip| chip != 0).count();
         let share = sent as f64 / values.len().max(1) as f64;
-        Replica::of(Wave { values, steps_per_chip: 1, share }, self.edge)
+        let replica = Replica::of(Wave { values, steps_per_chip: 1, share }, self.edge)?;
+        Some(Coded { replica, code: Code { component: self.component, segment: Some(segment), ..*beside } })
     }
 
     /// Forgets what was taken.
@@ -69,9 +71,9 @@ impl LongCode {
 
     /// Takes code period `number`, in phase lock; `prompt` gives what it correlates to with a replica, in
     /// phase (noise of unit variance). Gives the phase when it is beyond doubt.
-    pub fn add(&mut self, number: u64, prompt: impl Fn(&Replica) -> f64) -> Option<SecondaryCodePhase> {
+    pub fn add(&mut self, number: u64, beside: &Code, prompt: impl Fn(&Coded) -> f64) -> Option<SecondaryCodePhase> {
         let all: Vec<f64> = (0..self.segments)
-            .map(|shift| self.replica((number + shift) % self.segments).map_or(0.0, |replica| prompt(&replica)))
+            .map(|shift| self.coded((number + shift) % self.segments, beside).map_or(0.0, |coded| prompt(&coded)))
             .collect();
         let taken = self.shifts.add(all.into_iter());
         let found = if taken < LEAST_PERIODS { None } else { self.shifts.decide() };

@@ -19,7 +19,7 @@ use crate::gap::{Edges, Jump, Step, Trend};
 use crate::lead::lead;
 use crate::outcome::ReceiveError;
 use crate::output::{Record, Sink};
-use crate::source::{Packed, Planes};
+use crate::source::{Planes, Stretch};
 use crate::track::loops::Rates;
 use crate::track::{Channel, Glance};
 use gnss::earth::SPEED_OF_LIGHT_MPS;
@@ -179,12 +179,16 @@ impl FrontEnd {
     /// Looks at all codes at the end of a block, and goes on with what it suspects.
     pub(super) fn leap(
         &mut self,
-        block: &Packed,
+        block: &Stretch,
         shared: &mut Shared,
         sink: &mut dyn Sink,
     ) -> Result<(), ReceiveError> {
         if let Stage::Scanning { since, whole } = self.gap.stage {
-            self.scan(block, since, whole, sink)?;
+            match block.packed() {
+                Some(block) => self.scan(block, since, whole, sink)?,
+                // A model loses no samples.
+                None => self.calm(),
+            }
         }
         let now = block.end();
         if now < self.gap.last_look + self.samples(LOOK_S) {

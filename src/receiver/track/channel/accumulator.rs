@@ -3,11 +3,11 @@
 
 use num_complex::Complex64;
 
-use crate::correlate::correlator::{Correlator, Interval};
+use crate::correlate::correlator::{Code, Coded, Correlator, Interval};
 use crate::correlate::{Arithmetic, Nco, Replica, chips_to_units};
 use crate::track::TrackingSettings;
 use gnss::samples::{Format, IfMetadata};
-use gnss::signal::Component;
+use gnss::signal::{Component, Link};
 
 /// Periods over which the power of the samples is averaged.
 const POWER_PERIODS: f64 = 100.0;
@@ -28,21 +28,21 @@ pub(super) struct Period<'a, C> {
 
 impl<C: Correlator> Period<'_, C> {
     /// Sums of a replica at these taps.
-    fn sums<const T: usize>(&self, replica: &Replica, taps: &[i64; T]) -> [Complex64; T] {
-        self.correlator.sums(&self.interval, replica, self.arithmetic, taps)
+    fn sums<const T: usize>(&self, coded: &Coded, taps: &[i64; T]) -> [Complex64; T] {
+        self.correlator.sums(&self.interval, coded, self.arithmetic, taps)
     }
 
     /// Sum of a replica without delay.
-    pub fn prompt(&self, replica: &Replica) -> Complex64 {
-        let [sum] = self.sums(replica, &[0]);
+    pub fn prompt(&self, coded: &Coded) -> Complex64 {
+        let [sum] = self.sums(coded, &[0]);
         sum
     }
 
     /// The sum of [`Self::prompt`] over the first half of the samples.
-    pub fn first_half(&self, replica: &Replica) -> Complex64 {
+    pub fn first_half(&self, coded: &Coded) -> Complex64 {
         let Interval { from, to, .. } = self.interval;
         let half = Interval { to: from + (to - from) / 2, ..self.interval };
-        let [sum] = self.correlator.sums(&half, replica, self.arithmetic, &[0]);
+        let [sum] = self.correlator.sums(&half, coded, self.arithmetic, &[0]);
         sum
     }
 
@@ -67,8 +67,8 @@ pub(super) struct Correlations {
 #[derive(Clone, Debug)]
 pub(super) struct Accumulator {
     pub arithmetic: Arithmetic,
-    /// Replica of the code. `None` where the documents assign no code.
-    pub replica: Option<Replica>,
+    /// Replica with its code. `None` where the documents assign no code.
+    pub coded: Option<Coded>,
     /// Mean power of the replica's samples.
     replica_power: f64,
     /// Code phases of early, prompt and late.
@@ -94,7 +94,7 @@ impl Accumulator {
     /// all of whose chips are sent.
     pub fn new(
         component: Option<&'static Component>,
-        number: u8,
+        link: Link,
         settings: &TrackingSettings,
         metadata: &IfMetadata,
         model_power: f64,
@@ -105,18 +105,22 @@ impl Accumulator {
             (arithmetic, Format::Ci8 | Format::Cu8 | Format::Ri8) => arithmetic,
             (_, Format::Ci16Le | Format::Ri16Le | Format::Cf32Le) => Arithmetic::F32,
         };
-        let mut replica = component.and_then(|c| Replica::made_in(c, number, made, metadata.inverted));
+        let coded = |component| {
+            let replica = Replica::made_in(component, link.sv.number, made, metadata.inverted)?;
+            Some(Coded { replica, code: Code::new(link, component, made) })
+        };
+        let mut coded = component.and_then(coded);
         let chip_rate_hz = component.map_or(1.0, |c| c.chip_rate_hz);
         if arithmetic == Arithmetic::Sums
-            && let Some(replica) = &mut replica
+            && let Some(Coded { replica, .. }) = &mut coded
         {
             replica.prepare(chips_to_units(chip_rate_hz / metadata.rate.hz()).max(1) as u64);
         }
         let half = chips_to_units(0.5 * settings.spacing_chips);
         Self {
             arithmetic,
-            replica_power: model_power * replica.as_ref().map_or(1.0, Replica::share),
-            replica,
+            replica_power: model_power * coded.as_ref().map_or(1.0, |coded| coded.replica.share()),
+            coded,
             taps: [half, 0, -half],
             noise_taps: Vec::new(),
             power: None,
@@ -128,25 +132,30 @@ impl Accumulator {
         }
     }
 
+    /// The replica.
+    pub fn replica(&self) -> Option<&Replica> {
+        self.coded.as_ref().map(|coded| &coded.replica)
+    }
+
     /// Length of a code period in code phase units; one without a code.
     pub fn length(&self) -> i64 {
-        self.replica.as_ref().map_or(1, Replica::period)
+        self.replica().map_or(1, Replica::period)
     }
 
     /// The first integration begins at sample `first`.
     pub fn begin(&mut self, first: u64) {
         self.since = first;
-        self.noise_taps = self.replica.as_ref().map_or(Vec::new(), |replica| replica.quiet_taps(NOISE_PLACES));
+        self.noise_taps = self.replica().map_or(Vec::new(), |replica| replica.quiet_taps(NOISE_PLACES));
     }
 
     /// True if running sums of the samples are used at these steps of the oscillators.
     pub fn takes_sums(&self, nco: &Nco) -> bool {
-        self.arithmetic == Arithmetic::Sums && self.replica.as_ref().is_some_and(|replica| replica.takes_sums(nco))
+        self.arithmetic == Arithmetic::Sums && self.replica().is_some_and(|replica| replica.takes_sums(nco))
     }
 
     /// True if samples in 16 bits are used at these steps of the oscillators.
     pub fn takes_fixed(&self, nco: &Nco) -> bool {
-        self.arithmetic == Arithmetic::Sums && self.replica.as_ref().is_some_and(|replica| replica.takes_fixed(nco))
+        self.arithmetic == Arithmetic::Sums && self.replica().is_some_and(|replica| replica.takes_fixed(nco))
     }
 
     /// The tap at which the noise of code period `number` is measured.
@@ -161,20 +170,20 @@ impl Accumulator {
         quiet: Option<i64>,
         sides: Option<[i64; 2]>,
     ) -> Correlations {
-        let Some(replica) = &self.replica else { return Correlations::default() };
+        let Some(coded) = &self.coded else { return Correlations::default() };
         let [e, p, l] = self.taps;
         match (quiet, sides) {
-            (None, None) => Correlations { sums: period.sums(replica, &self.taps), ..Correlations::default() },
+            (None, None) => Correlations { sums: period.sums(coded, &self.taps), ..Correlations::default() },
             (Some(quiet), None) => {
-                let [e, p, l, noise] = period.sums(replica, &[e, p, l, quiet]);
+                let [e, p, l, noise] = period.sums(coded, &[e, p, l, quiet]);
                 Correlations { sums: [e, p, l], noise: Some(noise), sides: None }
             }
             (None, Some([a, b])) => {
-                let [e, p, l, a, b] = period.sums(replica, &[e, p, l, a, b]);
+                let [e, p, l, a, b] = period.sums(coded, &[e, p, l, a, b]);
                 Correlations { sums: [e, p, l], noise: None, sides: Some([a, b]) }
             }
             (Some(quiet), Some([a, b])) => {
-                let [e, p, l, noise, a, b] = period.sums(replica, &[e, p, l, quiet, a, b]);
+                let [e, p, l, noise, a, b] = period.sums(coded, &[e, p, l, quiet, a, b]);
                 Correlations { sums: [e, p, l], noise: Some(noise), sides: Some([a, b]) }
             }
         }

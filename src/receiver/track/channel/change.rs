@@ -58,9 +58,8 @@ impl Channel {
     pub(super) fn follow_long(&mut self, phase: SecondaryCodePhase) {
         let Some(pilot) = self.companions.long.as_ref().map(LongCode::component) else { return };
         let rates = (self.nco.rate.hz(), self.nco.sense);
-        let number = self.sv().number;
-        self.companions.data =
-            lead(self.signal()).and_then(|data| Data::new(data, pilot, number, &self.settings, rates));
+        let link = self.link();
+        self.companions.data = lead(self.signal()).and_then(|data| Data::new(data, pilot, link, &self.settings, rates));
         // The segment takes the place of a secondary code: no signs are left.
         self.signs.secondary_code = Some(SecondaryCodeSync::new(vec![1]));
         self.signs.polarity = None;

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use super::accumulator::Period;
-use crate::correlate::correlator::Correlator;
+use crate::correlate::correlator::{Code, Coded, Correlator};
 use crate::correlate::{Replica, Wave};
 use crate::lead::beside;
 use crate::track::long::LongCode;
@@ -42,7 +42,7 @@ impl Companions {
         let is_coded = component.secondary_code.periods() > 1 && component.secondary_code.of(sv.number).is_some();
         let data = if is_coded { beside(component, signal) } else { None };
         Self {
-            data: data.and_then(|data| Data::new(data, component, sv.number, settings, rates)),
+            data: data.and_then(|data| Data::new(data, component, link, settings, rates)),
             long: LongCode::beside(component, signal, sv.number, settings.replica),
             segment: None,
             sides: Sides::beside(component, (signal, sv.number), settings, rates),
@@ -51,27 +51,28 @@ impl Companions {
 
     /// Makes the replica ready for code period `number`: with the segment of a long code, or with both
     /// sidebands of a sub-carrier once the secondary code is known, in the signs that they have.
-    pub fn ready(&mut self, replica: &mut Replica, phase: Option<SecondaryCodePhase>, number: u64) {
+    pub fn ready(&mut self, coded: &mut Coded, phase: Option<SecondaryCodePhase>, number: u64) {
         let Some(phase) = phase else { return };
-        if let Some(segment) = self.next_segment(phase, number) {
-            *replica = segment;
-        }
+        self.next_segment(coded, phase, number);
         let Some(sides) = &mut self.sides else { return };
         if let Some(both) = sides.replica() {
-            *replica = both;
+            coded.replica = both;
         }
-        replica.set_second(sides.are_opposed(phase, number));
+        coded.replica.set_second(sides.are_opposed(phase, number));
     }
 
-    /// The long code's replica for code period `number`, where it is another than that of the period before.
-    fn next_segment(&mut self, phase: SecondaryCodePhase, number: u64) -> Option<Replica> {
-        let long = self.long.as_mut()?;
-        let segment = long.segment(phase, number);
-        if self.segment == Some(segment) {
-            return None;
+    /// Takes the long code's replica for code period `number`, where it is another than that of the period
+    /// before.
+    fn next_segment(&mut self, coded: &mut Coded, phase: SecondaryCodePhase, number: u64) {
+        let Some(long) = &mut self.long else { return };
+        let segment = Some(long.segment(phase, number));
+        if self.segment == segment {
+            return;
         }
-        self.segment = Some(segment);
-        long.replica(segment)
+        self.segment = segment;
+        if let Some(next) = segment.and_then(|segment| long.coded(segment, &coded.code)) {
+            *coded = next;
+        }
     }
 
     /// The replica of a code that is the same in every code period; `None` where it is the one that is
@@ -80,14 +81,14 @@ impl Companions {
         // A segment of a long code is there once, and both sidebands of a sub-carrier have signs of their
         // own; the code beside comes in every period.
         let passes = self.segment.is_some() || self.sides.is_some();
-        self.data.as_ref().filter(|_| passes).map(|data| &data.replica)
+        self.data.as_ref().filter(|_| passes).map(|data| &data.coded.replica)
     }
 }
 
 /// Data component that is read beside a pilot.
 #[derive(Clone, Debug)]
 pub(super) struct Data {
-    replica: Replica,
+    coded: Coded,
     /// Turns its prompts to the phase of the pilot's.
     turn: Complex64,
     /// Deviation of the noise in its correlations over that in the pilot's.
@@ -102,22 +103,22 @@ impl Data {
     pub fn new(
         component: &'static Component,
         pilot: &'static Component,
-        number: u8,
+        link: Link,
         settings: &TrackingSettings,
         (rate_hz, sense): (f64, f64),
     ) -> Option<Self> {
         let model = |component| ReplicaModel::new(settings, component, rate_hz);
         let made = (settings.waveform, settings.replica);
-        let replica = Replica::made_in(component, number, made, sense < 0.0)?;
+        let replica = Replica::made_in(component, link.sv.number, made, sense < 0.0)?;
         let share = replica.share() * model(component)?.power;
-        let own = Wave::new(pilot, number)?.share * model(pilot)?.power;
+        let own = Wave::new(pilot, link.sv.number)?.share * model(pilot)?.power;
         let (sin, cos) = libm::sincos(TAU * sense * (pilot.phase_cycles - component.phase_cycles));
         Some(Self {
-            replica,
+            coded: Coded { replica, code: Code::new(link, component, made) },
             turn: Complex64::new(cos, sin),
             deviation: (share / own).sqrt(),
             periods_per_symbol: u64::from(component.periods_per_symbol()?),
-            secondary_code: SecondaryCodeSync::new(component.secondary_code.of(number)?),
+            secondary_code: SecondaryCodeSync::new(component.secondary_code.of(link.sv.number)?),
             sum: (Complex64::ZERO, 0),
         })
     }
@@ -125,7 +126,7 @@ impl Data {
     /// Correlates the data of a code period, and gives the symbol that ends with it; `scale` brings the
     /// pilot's noise to unit variance a component.
     pub fn read<C: Correlator>(&mut self, period: &Period<C>, phase: SecondaryCodePhase, scale: f64) -> Option<Symbol> {
-        let sum = period.prompt(&self.replica);
+        let sum = period.prompt(&self.coded);
         let (number, end) = (period.number, period.interval.to);
         let chip = self.secondary_code.chip(phase, number);
         let at = (number + phase.shift) % self.periods_per_symbol;

@@ -66,7 +66,7 @@ impl Channel {
         // The frequency loop alone has come to rest before.
         let rests = matches!(self.stage, Stage::Assisted(_) | Stage::Tracking(_));
         let is_wanted = self.signs.are_single() && self.whole && !self.held && rests && is_due;
-        self.accumulator.replica.as_ref().filter(|_| is_wanted).map(|replica| period.first_half(replica))
+        self.accumulator.coded.as_ref().filter(|_| is_wanted).map(|coded| period.first_half(coded))
     }
 
     /// Correlates the running period with all segments of the long code, where the carrier is locked to
@@ -76,7 +76,8 @@ impl Channel {
         if !ready || self.stage.begin().is_none() || !self.detectors.lock.is_locked() {
             return None;
         }
-        self.companions.long.as_mut()?.add(period.number, |replica| scale * period.prompt(replica).re)
+        let code = &self.accumulator.coded.as_ref()?.code;
+        self.companions.long.as_mut()?.add(period.number, code, |coded| scale * period.prompt(coded).re)
     }
 
     /// Takes the early, prompt and late correlations of code period `number`.

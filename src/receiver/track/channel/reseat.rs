@@ -125,7 +125,7 @@ impl Channel {
     /// The replica and its oscillators at `sample`, as they would be had the loop moved the code by
     /// `moved_chips` and no other amount, and at these rates.
     pub fn predicted(&self, sample: u64, moved_chips: f64, rates: &[Rates; 2]) -> Option<(&Replica, Nco)> {
-        let replica = self.companions.constant_replica().or(self.accumulator.replica.as_ref())?;
+        let replica = self.companions.constant_replica().or(self.accumulator.replica())?;
         Some((replica, self.nco.predicted(sample, moved_chips - self.glances.moved_chips, rates[0].rate)))
     }
 
@@ -181,7 +181,7 @@ impl Channel {
 
     /// Moves the code by `chips` at sample `now`. The running code period is not used.
     fn shift(&mut self, now: u64, chips: f64) {
-        if self.start.is_none() || self.accumulator.replica.is_none() {
+        if self.start.is_none() || self.accumulator.coded.is_none() {
             return;
         }
         self.pass(now);
