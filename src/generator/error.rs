@@ -25,6 +25,9 @@ pub enum GenerateError {
     /// A signal that cannot be rendered at the scene's rate.
     #[error(transparent)]
     Waveform(#[from] WaveformError),
+    /// Samples of a scene that has none.
+    #[error("fidelity.level = \"correlations\": no samples exist at this level; `gnss-twin run` receives such a scene")]
+    NoSamples,
     /// Front ends without a scene.
     #[error("no front end: expected one at least")]
     NoFrontEnd,

@@ -30,6 +30,8 @@ pub enum Grade {
     Reference,
     /// The cheapest value of each knob whose errors stay within a budget.
     Budget(Budget),
+    /// Correlations from a model in place of samples, whose knobs are those of `balanced` with area edges.
+    Correlations,
 }
 
 /// Model of a chip edge between samples. C/N0 is at the antenna, before the front end: samples have the share
@@ -77,8 +79,12 @@ pub struct Fidelity {
 
 impl Grade {
     /// Levels and their names in a scenario.
-    pub const NAMES: [(&'static str, Self); 3] =
-        [("fast", Self::Fast), ("balanced", Self::Balanced), ("reference", Self::Reference)];
+    pub const NAMES: [(&'static str, Self); 4] = [
+        ("fast", Self::Fast),
+        ("balanced", Self::Balanced),
+        ("reference", Self::Reference),
+        ("correlations", Self::Correlations),
+    ];
 
     /// Name of the level in a scenario; of a budget, the name of its key.
     pub fn name(self) -> &'static str {
@@ -145,7 +151,7 @@ impl Fidelity {
             },
             // 1e-4 cycle is 19 µm: a carrier loop at 50 dB-Hz has forty times that. A budget sets what it
             // needs.
-            Grade::Balanced | Grade::Budget(_) => Self {
+            Grade::Balanced | Grade::Budget(_) | Grade::Correlations => Self {
                 grade,
                 code_edge: CodeEdge::Area,
                 waveform: Layers::Whole,
@@ -237,6 +243,11 @@ impl Wishes {
             knot_tolerance_cycles: None,
             allowed_m,
         }
+    }
+
+    /// Returns these settings with another level.
+    pub fn at(self, grade: Grade) -> Self {
+        Self { grade, ..self }
     }
 
     /// Returns the knobs for `signals` at `rate_hz`.

@@ -192,6 +192,7 @@ impl<'a> Stream<'a> {
     /// # Errors
     /// Errors of [`Stream::next`], and [`GenerateError::Unpushed`] where the motion is not known so far.
     pub fn advance(&mut self, to: u64, truth: &mut dyn Sink, packed: &mut Vec<u8>) -> Result<bool, GenerateError> {
+        self.front.scene.has_samples()?;
         let to = to.min(self.front.part.end);
         if !self.front.is_before(to) {
             packed.clear();

@@ -158,7 +158,7 @@ impl FastPhases {
     pub fn ends(&self, from: u64, to: u64) -> [FastPhase; 2] {
         let Some((nodes, rate)) = self.grid else { return [FastPhase::STILL; 2] };
         let (node, share) = nodes.at(rate, from);
-        let cell = self.cells.get((node - self.first) as usize).copied();
+        let cell = node.checked_sub(self.first).and_then(|place| self.cells.get(place as usize)).copied();
         let [left, right] = cell.unwrap_or([FastPhase::STILL; 2]);
         // The end is the next node, or where nodes lie between samples less than a sample behind it.
         let (last, rest) = nodes.at(rate, to);

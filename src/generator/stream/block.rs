@@ -4,13 +4,21 @@
 //! A block is a pure function of the scene and of what transmitters have prepared, so blocks are made side by
 //! side. What stages look back at is rendered before it and not sent on.
 
-use crate::scene::{CodeEdge, Scene};
+use crate::error::GenerateError;
+use crate::scene::{CodeEdge, Grade, Scene};
 use crate::stage::Block;
 use crate::synth::band::Filter;
 use crate::synth::isa;
 use crate::synth::{Edge, Kernel, RUN_SAMPLES};
 use crate::transmit::{Scratch, Transmitter};
 use gnss::samples::Format;
+
+impl Scene {
+    /// Refuses a level at which no samples exist.
+    pub(super) fn has_samples(&self) -> Result<(), GenerateError> {
+        if self.fidelity.grade == Grade::Correlations { Err(GenerateError::NoSamples) } else { Ok(()) }
+    }
+}
 
 /// The sample at which the run of a sample begins.
 pub(super) fn run_begin(sample: u64) -> u64 {

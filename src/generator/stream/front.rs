@@ -133,6 +133,18 @@ impl<'a> Front<'a> {
         self.transmitters.par_iter_mut().try_for_each(|t| t.prepare(scene, needed, made))
     }
 
+    /// Prepares the data for the samples from `needed` up to `to`, and drops earlier data; no samples are
+    /// made.
+    ///
+    /// # Errors
+    /// Errors of orbits and messages.
+    pub fn pass(&mut self, needed: u64, to: u64) -> Result<(), GenerateError> {
+        let (scene, needed) = (self.scene, needed.min(self.next));
+        self.transmitters.par_iter_mut().try_for_each(|t| t.prepare(scene, needed, to))?;
+        self.next = to;
+        Ok(())
+    }
+
     /// Replaces the content of `packed` by the samples up to `to`, which were prepared.
     pub fn render(&mut self, to: u64, packed: &mut Vec<u8>) {
         let (scene, from) = (self.scene, self.next);

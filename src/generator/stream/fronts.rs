@@ -13,6 +13,7 @@ use super::{GenerateError, Generated, Options, end};
 use crate::geometry::is_shared;
 use crate::scene::Scene;
 use crate::synth::RUN_SAMPLES;
+use crate::transmit::Transmitter;
 use crate::truth::Sink;
 use gnss::record::PassRow;
 
@@ -69,6 +70,7 @@ impl<'a> Fronts<'a> {
         packed: &mut Vec<u8>,
         sink: &mut dyn FnMut(usize, &[u8]) -> io::Result<()>,
     ) -> Result<bool, GenerateError> {
+        self.fronts.iter().try_for_each(|front| front.scene.has_samples())?;
         let Some(ends) = self.ends() else { return Ok(false) };
         for (front, end) in self.fronts.iter_mut().zip(&ends) {
             front.prepare(end.prepared)?;
@@ -83,6 +85,29 @@ impl<'a> Fronts<'a> {
             }
         }
         Ok(true)
+    }
+
+    /// Prepares the signals of each front end from its sample of `needed` on, up to sample `to` of the first
+    /// one, and passes the true values before it to `truth`. Earlier signals are dropped, and no samples are
+    /// made.
+    ///
+    /// # Errors
+    /// [`GenerateError`] of orbits, messages and truth.
+    pub fn pass(&mut self, needed: &[u64], to: u64, truth: &mut dyn Sink) -> Result<(), GenerateError> {
+        let Some((count, seconds)) = self.fronts.first().map(|first| first.scene.clock.rate.ratio()) else {
+            return Ok(());
+        };
+        for (number, (front, needed)) in self.fronts.iter_mut().zip(needed).enumerate() {
+            // Instants of the truth before `to` have their sample in every front end.
+            let own = if number == 0 { to } else { front.scene.clock.rate.first_sample_at(to * seconds, count) + 1 };
+            front.pass(*needed, own.min(front.part.end))?;
+        }
+        self.ticks.give(&self.fronts, to, truth)
+    }
+
+    /// Signals of each front end that were prepared.
+    pub fn transmitters(&self) -> impl Iterator<Item = &[Transmitter]> {
+        self.fronts.iter().map(|front| front.transmitters.as_slice())
     }
 
     /// End of the next slice for every front end; `None` if nothing is left.

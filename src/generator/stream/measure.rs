@@ -73,6 +73,7 @@ fn limiting(scene: &Scene) -> Option<Filter> {
 /// # Errors
 /// Errors of [`super::Stream::next`].
 pub(crate) fn measured(scene: &Scene, stretches: &[Range<u64>]) -> Result<Vec<Stretch>, GenerateError> {
+    scene.has_samples()?;
     let filter = limiting(scene);
     let edge = edge(scene, filter.as_ref());
     let mut transmitters = transmitters(scene, edge)?;

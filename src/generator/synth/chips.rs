@@ -150,7 +150,8 @@ impl Spreading {
         self.pace.at(received, delay_s)
     }
 
-    fn is_overlaid(&self, period: i64) -> bool {
+    /// True if the secondary code inverts a code period.
+    pub fn is_overlaid(&self, period: i64) -> bool {
         let length = self.secondary_code.len();
         length > 0
             && self.secondary_code.get(period.rem_euclid(length as i64) as usize).is_some_and(|&negative| negative)

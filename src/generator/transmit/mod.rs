@@ -4,6 +4,7 @@
 //! the runs of any block of the segment and changes nothing, so blocks are made side by side. Everything is
 //! decided on absolute grids: view by whole seconds, parts and runs by sample numbers.
 
+mod rays;
 mod rising;
 mod symbols;
 
@@ -11,6 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::Arc;
 
+pub use rays::{CodePhase, RayAt, Rays};
 use symbols::{Data, Symbols};
 
 use crate::arrival;
@@ -40,6 +42,8 @@ const DENSE_BREAKS: f64 = 5.0;
 
 /// A sequence of ±1 of a component.
 struct Sent {
+    /// Number of the component in its signal.
+    component: usize,
     spreading: Spreading,
     pulse: Option<Arc<Pulse>>,
     data: Option<Data>,
@@ -164,6 +168,7 @@ impl Transmitter {
             {
                 let cycles = component.phase_cycles + phase_cycles;
                 sent.push(Sent {
+                    component: index,
                     spreading,
                     pulse,
                     data: symbols.of(component),
