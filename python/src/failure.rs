@@ -131,6 +131,7 @@ impl From<TwinError> for Failure {
         match error {
             TwinError::Generate(error) => error.into(),
             TwinError::Receive(error) => error.into(),
+            TwinError::Refused(error) => Self { kind: Kind::Scenario, text: error.to_string() },
         }
     }
 }

@@ -14,6 +14,7 @@ use crate::cli::sink::Spec;
 use crate::cli::study::args::Study;
 use crate::cli::watch::{Watched, tcp_peer};
 use analysis::show::document::Forms;
+use generator::fidelity::Grade;
 use gnss::exchange::Version;
 use gnss::samples::Format;
 use gnss::time::Epoch;
@@ -139,8 +140,15 @@ pub struct Reference {
     pub table: Option<String>,
 }
 
+/// Level of fidelity by its name.
+fn grade(name: &str) -> Result<Grade, String> {
+    let known = Grade::NAMES.iter().find(|(known, _)| *known == name).map(|(_, grade)| *grade);
+    known.ok_or_else(|| format!("expected {}", Grade::NAMES.map(|(name, _)| name).join(", ")))
+}
+
 #[derive(Args, Debug, Default)]
-#[command(after_help = "Example: gnss-twin run scenarios/static.toml --seed 7 --keep-if")]
+#[command(after_help = "Examples:\n  gnss-twin run scenarios/static.toml --seed 7 --keep-if\n  gnss-twin run \
+                        scenarios/static.toml --level correlations")]
 pub struct Run {
     /// Scene to run [default: the embedded scene of GPS and Galileo]
     pub scenario: Option<PathBuf>,
@@ -150,6 +158,10 @@ pub struct Run {
     /// Front end to receive in a scene with several [default: all in one reception]
     #[arg(long, value_name = "NAME")]
     pub front_end: Option<String>,
+    /// Level of fidelity, overrides the scene's: fast, balanced, reference; or correlations, where a model
+    /// answers in place of samples
+    #[arg(long, value_name = "LEVEL", value_parser = grade)]
+    pub level: Option<Grade>,
     /// Noise seed, overrides the scene's
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,

@@ -25,6 +25,7 @@ use analysis::measure::psd::Psd;
 use analysis::read::psd_name;
 use analysis::show::tables;
 use analysis::{self, JudgeError};
+use generator::fidelity::Grade;
 use generator::scenario::Overrides;
 use generator::scene::Scene;
 use generator::stream::Generated;
@@ -43,7 +44,10 @@ const SEEN_BYTES: usize = 1 << 17;
 /// Runs a scene end to end.
 pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     scenario::use_threads(arguments.threads)?;
-    let named = scenario::read(arguments.scenario.as_deref())?.choose(arguments.front_end.as_deref())?;
+    let mut named = scenario::read(arguments.scenario.as_deref())?.choose(arguments.front_end.as_deref())?;
+    if let Some(grade) = arguments.level {
+        named.scenario.front_ends.iter_mut().for_each(|front_end| front_end.fidelity = front_end.fidelity.at(grade));
+    }
     let gate = Gate::read(arguments.check.as_ref(), &SUMMARY)?;
     let (scenes, warnings) = scenario::compose_all(
         &named,
@@ -80,12 +84,21 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     let mut files =
         Rinex::create(&rx_in, arguments.rinex, &scene.name, &settings.acquisition.signals()).map_err(output_error)?;
     let (keep, changing) = (arguments.keep_if, scenes.iter().any(|scene| !scene.interference.is_empty()));
+    let is_sampled = scene.fidelity.grade != Grade::Correlations;
+    if keep && !is_sampled {
+        return Err(generator_error(GenerateError::NoSamples));
+    }
     let tap = |scene: &Scene| Tap::new(scene, run, (keep, changing), scenes.len());
-    let mut taps: Vec<Tap> = scenes.iter().map(tap).collect::<Result<_, _>>()?;
+    let mut taps: Vec<Tap> = scenes.iter().filter(|_| is_sampled).map(tap).collect::<Result<_, _>>()?;
     let mut sentences = sentences(&rx_in)?;
     let mut tracks = Tracks::create(&rx_in, &scene.name).map_err(output_error)?;
     let outputs = &mut (&mut output, &mut (&mut files, &mut (&mut sentences, &mut tracks)));
-    let both = both(&scenes, &settings, &mut truth, outputs, (&mut taps, arguments.printed.in_words()))?;
+    let with_progress = arguments.printed.in_words();
+    let both = if is_sampled {
+        both(&scenes, &settings, &mut truth, outputs, (&mut taps, with_progress))?
+    } else {
+        by_correlations(&scenes, &settings, (&mut truth, outputs), with_progress)?
+    };
     for (place, tap) in taps.iter().enumerate() {
         let later = Some(tap.name.as_str()).filter(|_| place > 0);
         tables::write_psd(&run.join(psd_name(later)), &tap.psd).map_err(judge_error)?;
@@ -169,6 +182,31 @@ fn both(
     let outcome = reception.finish(output).map_err(receiver_error)?;
     let twin::Fed { generated, busy: generator_busy } = fed;
     Ok(Both { generated, outcome, generator_busy, receiver_busy, whole: start.elapsed() })
+}
+
+/// Receives a scene by modelled correlations; shows progress if wanted.
+fn by_correlations(
+    scenes: &[Scene],
+    settings: &Settings,
+    sinks: (&mut dyn truth::Sink, &mut dyn Sink),
+    with_progress: bool,
+) -> Result<Both, CliError> {
+    let name = scenes.first().map_or("", |scene| scene.name.as_str());
+    let progress = Progress::new(&format!("run {name}"), scenes.first().map(|scene| scene.samples), with_progress);
+    let start = Instant::now();
+    let done = twin::correlations::run(scenes, settings, sinks, &mut |samples| progress.set(samples));
+    let twin::Done { generated, outcome } = done.map_err(twin_error)?;
+    let whole = start.elapsed();
+    Ok(Both { generated, outcome, generator_busy: whole, receiver_busy: whole, whole })
+}
+
+/// The exit that a failure of the twin means.
+fn twin_error(error: twin::TwinError) -> CliError {
+    match error {
+        twin::TwinError::Generate(error) => generator_error(error),
+        twin::TwinError::Receive(error) => receiver_error(error),
+        twin::TwinError::Refused(error) => CliError::input(error),
+    }
 }
 
 /// Does `work` and adds the time that it took to `busy`.

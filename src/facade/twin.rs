@@ -35,6 +35,7 @@ use ::gnss::record::Fix;
 use ::receiver::output::{self, Output, OutputError};
 use ::receiver::settings::{Settings, SettingsError};
 use ::receiver::{Outcome, ReceiveError};
+use ::twin::correlations::Refused;
 #[doc(inline)]
 pub use ::twin::{Done, Fed, Listen, feed};
 use ::twin::{TwinError, run};
@@ -56,6 +57,9 @@ pub enum Error {
     /// Scene that cannot be generated.
     #[error(transparent)]
     Generate(#[from] GenerateError),
+    /// Effect of a scene without a model of its correlations.
+    #[error(transparent)]
+    Refused(#[from] Refused),
     /// Samples that cannot be received.
     #[error(transparent)]
     Receive(#[from] ReceiveError),
@@ -84,6 +88,7 @@ impl From<TwinError> for Error {
         match error {
             TwinError::Generate(error) => Self::Generate(error),
             TwinError::Receive(error) => Self::Receive(error),
+            TwinError::Refused(error) => Self::Refused(error),
         }
     }
 }

@@ -35,11 +35,14 @@
 
 #![cfg(all(feature = "generator", feature = "receiver"))]
 
+pub mod correlations;
+
 use std::time::{Duration, Instant};
 
 use thiserror::Error;
 
-use generator::scene::Scene;
+use correlations::Refused;
+use generator::scene::{Grade, Scene};
 use generator::stream::{Fronts, GenerateError, Generated, Options, Stream};
 use generator::truth;
 use gnss::samples::IfMetadata;
@@ -54,6 +57,9 @@ pub enum TwinError {
     /// The scene cannot be generated, or its truth is not taken.
     #[error(transparent)]
     Generate(#[from] GenerateError),
+    /// The scene has an effect that modelled correlations do not have.
+    #[error(transparent)]
+    Refused(#[from] Refused),
     /// The samples cannot be received, or the records are not taken.
     #[error(transparent)]
     Receive(#[from] ReceiveError),
@@ -80,6 +86,9 @@ pub fn run(
     truth: &mut (dyn truth::Sink + Send),
     records: &mut (dyn output::Sink + Send),
 ) -> Result<Done, TwinError> {
+    if scenes.iter().any(|scene| scene.fidelity.grade == Grade::Correlations) {
+        return correlations::run(scenes, settings, (truth, records), &mut |_| ());
+    }
     let metadata: Vec<IfMetadata> = scenes.iter().map(|scene| scene.metadata.clone()).collect();
     let mut reception = Reception::of_several(&metadata, &settings_for(scenes, settings))?;
     let fed =

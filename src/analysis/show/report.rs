@@ -12,6 +12,9 @@ impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let rate_msps = self.sample_rate_hz / 1e6;
         writeln!(f, "{} · {} s at {rate_msps} Msps · seed {}", self.scene, self.duration_s, self.seed)?;
+        if self.fidelity == "correlations" {
+            writeln!(f, "level correlations: sums and searches from a model, no samples")?;
+        }
         self.satellite_lines(f)?;
         writeln!(f, "\n{:<26}{:>12}{:>12}{:>12}", "error", "mean", "sigma", "95 %")?;
         let details = &self.details;

@@ -1,0 +1,199 @@
+//! Replicas that a receiver makes of a scene's signals: their correlation with what is sent, and their noise.
+//!
+//! What is sent and its replica are sequences of equal steps, so their correlation over a code period is a
+//! polygon with corners at whole steps; it is computed from the codes themselves. The components of one
+//! satellite's signal correlate with each other's replicas the same way. Limits: components whose codes are
+//! not of the replica's length, or whole multiples, are white noise; so is what lies chips away.
+
+use std::sync::OnceLock;
+
+use generator::fidelity::CodeEdge;
+use generator::scene::Scene;
+use gnss::signal::{Component, Layer, Layers, PeakTable, Signal, chip_kinds, least_common_multiple};
+use num_complex::Complex64;
+use receiver::acquire::SEARCHED;
+use receiver::correlate::Edge;
+use receiver::correlate::correlator::Code;
+use receiver::lead::lead;
+use receiver::settings::Settings;
+
+/// Steps a chip of the tables of peaks.
+const STEPS_PER_CHIP: f64 = 1024.0;
+/// Chips on either side for which a correlation is computed.
+const LAGS_CHIPS: usize = 3;
+/// Imaginary part of a correlation below which it counts as real.
+const REAL: f64 = 1e-12;
+/// Numbers that a satellite can have.
+const NUMBERS: usize = 256;
+
+/// Correlation of a component, as it is sent with unit power, with a replica.
+#[derive(Debug)]
+pub(super) struct Peak {
+    re: PeakTable,
+    im: Option<PeakTable>,
+}
+
+impl Peak {
+    /// Value at an offset in chips; zero beyond the table.
+    #[inline]
+    pub fn value(&self, chips: f64) -> Complex64 {
+        Complex64::new(self.re.value(chips), self.im.as_ref().map_or(0.0, |table| table.value(chips)))
+    }
+
+    /// Largest offset of the table, in chips.
+    pub fn reach_chips(&self) -> f64 {
+        self.re.reach_chips()
+    }
+}
+
+/// One way of making a replica of a component.
+#[derive(Debug)]
+pub(super) struct Made {
+    pub signal: &'static Signal,
+    /// Number of the component in its signal.
+    pub index: usize,
+    pub component: &'static Component,
+    made: (Layers, Edge),
+    /// Replica with itself.
+    pub own: PeakTable,
+    /// One chip of what is sent with one of the replica.
+    pub pulse: PeakTable,
+    /// Share of samples in which the code has its turn.
+    pub share: f64,
+    /// Chips of a period of the replica: of a long code those of a segment.
+    pub length: u32,
+    sent: Layers,
+    /// Widths of the means over samples, of what is sent and of the replica, in chips.
+    widths_chips: [f64; 2],
+    /// Segments of the longest code of the signal.
+    segments: usize,
+    /// Codes of the components by the satellite's number.
+    codes: Vec<OnceLock<Option<Vec<i8>>>>,
+    /// Peaks by the satellite's number, segment and component.
+    peaks: Vec<OnceLock<Option<Box<Peak>>>>,
+}
+
+impl Made {
+    fn new(scene: &Scene, signal: &'static Signal, index: usize, made: (Layers, Edge)) -> Option<Self> {
+        let component = signal.components.get(index)?;
+        let own = match made.0 {
+            Layers::Strongest => component.shapes_by(made.0, component.strongest()?)[1].clone(),
+            Layers::Whole => component.shape(),
+        };
+        let sample = component.chip_rate_hz / scene.clock.rate.hz();
+        let local = if made.1 == Edge::Area { sample } else { 0.0 };
+        let incoming = if scene.fidelity.code_edge == CodeEdge::Area { sample } else { 0.0 };
+        let number = signal.satellites().next()?.number;
+        let length = lead(signal)?.code_chips;
+        let longest = signal.components.iter().map(|one| one.code_chips).max()?;
+        let segments = (longest / length).max(1) as usize;
+        let count = signal.components.len();
+        Some(Self {
+            signal,
+            index,
+            component,
+            made,
+            own: PeakTable::boxed(&own, [local, local], STEPS_PER_CHIP),
+            pulse: PeakTable::boxed(&component.shape(), [incoming, local], STEPS_PER_CHIP),
+            share: share(&(component.code)(number)?),
+            length,
+            sent: scene.fidelity.waveform,
+            widths_chips: [incoming, local],
+            segments,
+            codes: (0..NUMBERS * count).map(|_| OnceLock::new()).collect(),
+            peaks: (0..NUMBERS * count * segments).map(|_| OnceLock::new()).collect(),
+        })
+    }
+
+    /// Replicas of all components of a scene's signals, as these settings make them and as searches do.
+    pub fn all(scene: &Scene, settings: &Settings) -> Vec<Self> {
+        let mut ways = vec![(settings.tracking.waveform, settings.tracking.replica)];
+        ways.extend(Some(SEARCHED).filter(|way| !ways.contains(way)));
+        let components = |signal: &'static Signal| (0..signal.components.len()).map(move |index| (signal, index));
+        let all = scene.signals.iter().flat_map(|signal| components(signal));
+        all.flat_map(|(signal, index)| {
+            ways.iter().filter_map(move |way| Self::new(scene, signal, index, *way)).collect::<Vec<_>>()
+        })
+        .collect()
+    }
+
+    /// True if this is how a code is made.
+    pub fn is(&self, code: &Code) -> bool {
+        std::ptr::eq(self.component, code.component)
+            && self.signal == code.link.signal
+            && self.made == (code.waveform, code.edge)
+    }
+
+    /// Correlation of component `sent` of a satellite's signal with the replica; of a long code with, or of,
+    /// its `segment`. `None` where they do not correlate.
+    pub fn peak(&self, number: u8, segment: usize, sent: usize) -> Option<&Peak> {
+        let component = self.signal.components.get(sent)?;
+        let count = self.signal.components.len();
+        let place = (usize::from(number) * self.segments + segment % self.segments) * count + sent;
+        let make = || self.made_peak(component, (number, segment % self.segments, sent)).map(Box::new);
+        self.peaks.get(place)?.get_or_init(make).as_deref()
+    }
+
+    fn code(&self, number: u8, index: usize) -> Option<&[i8]> {
+        let place = usize::from(number) * self.signal.components.len() + index;
+        let make = || (self.signal.components.get(index)?.code)(number);
+        self.codes.get(place)?.get_or_init(make).as_deref()
+    }
+
+    fn made_peak(&self, sent: &Component, (number, segment, index): (u8, usize, usize)) -> Option<Peak> {
+        if sent.chip_rate_hz != self.component.chip_rate_hz || !sent.code_chips.is_multiple_of(self.length) {
+            return None;
+        }
+        let length = self.length as usize;
+        let begin = |component: &Component| if component.code_chips > self.length { segment * length } else { 0 };
+        let strongest = self.component.strongest()?;
+        let alone = [Layer { weight: 1.0, phase_cycles: 0.0, ..*strongest }];
+        let layers = if self.made.0 == Layers::Whole { self.component.layers } else { &alone };
+        let replica = steps(self.code(number, self.index)?, layers);
+        let code = self.code(number, index)?;
+        let incoming = steps(code, sent.made_with(self.sent));
+        let per_chip = least_common_multiple(replica.0, incoming.0);
+        let [replica, incoming] = [replica, incoming].map(|(steps, values)| {
+            let repeated = values.into_iter().flat_map(move |value| std::iter::repeat_n(value, per_chip / steps));
+            repeated.collect::<Vec<Complex64>>()
+        });
+        let first = begin(self.component) * per_chip;
+        let replica = replica.get(first..first + length * per_chip)?;
+        let reach = LAGS_CHIPS * per_chip;
+        // The incoming steps from `reach` before the first one on.
+        let total = incoming.len();
+        let around: Vec<Complex64> = (incoming.iter().copied().cycle())
+            .skip((begin(sent) * per_chip + total - reach % total) % total)
+            .take(replica.len() + 2 * reach)
+            .collect();
+        let scale = 1.0 / (replica.len() as f64 * share(code).sqrt());
+        let sum = |lag: usize| {
+            let pairs = around.iter().skip(lag).zip(replica).filter(|(_, local)| **local != Complex64::ZERO);
+            pairs.map(|(incoming, local)| incoming * local.conj()).sum::<Complex64>() * scale
+        };
+        let sums: Vec<Complex64> = (0..=2 * reach).map(sum).collect();
+        let step_chips = 1.0 / per_chip as f64;
+        let table = |of: fn(&Complex64) -> f64| {
+            let lags: Vec<f64> = sums.iter().map(of).collect();
+            let is_there = lags.iter().any(|value| value.abs() > REAL);
+            is_there.then(|| PeakTable::of_lags(&lags, step_chips, self.widths_chips, STEPS_PER_CHIP))
+        };
+        Some(Peak { re: table(|sum| sum.re)?, im: table(|sum| sum.im) })
+    }
+}
+
+/// Share of a code's chips that are its turn.
+fn share(chips: &[i8]) -> f64 {
+    chips.iter().filter(|&&chip| chip != 0).count() as f64 / chips.len().max(1) as f64
+}
+
+/// Steps of all chips of a code with these layers, and the number of them in a chip.
+fn steps(chips: &[i8], layers: &[Layer]) -> (usize, Vec<Complex64>) {
+    let (kinds, pattern) = chip_kinds(layers);
+    let kind = |index: usize| pattern.get(index % pattern.len().max(1)).and_then(|kind| kinds.get(*kind));
+    let wave = |(index, chip): (usize, &i8)| {
+        let chip = f64::from(*chip);
+        kind(index).into_iter().flatten().map(move |step| step * chip)
+    };
+    (kinds.first().map_or(1, Vec::len), chips.iter().enumerate().flat_map(wave).collect())
+}

@@ -1,0 +1,187 @@
+//! One ray in a correlator: the mean of the correlation over an interval.
+
+use generator::scene::Scene;
+use generator::transmit::{RayAt, Transmitter};
+use num_complex::Complex64;
+use receiver::correlate::correlator::{Code, Interval};
+use receiver::correlate::units_to_chips;
+
+use super::made::{Made, Peak};
+
+/// 2^64 as a float.
+const TURN: f64 = 18_446_744_073_709_551_616.0;
+/// Share of an interval below which a piece has one node.
+const SHORT: f64 = 0.03;
+
+/// Nodes and weights of Gauss and Legendre on [−1, 1], positive ones: M. Abramowitz, I. Stegun, table 25.4.
+const TWO: [(f64, f64); 1] = [(0.577_350_269_189_625_8, 1.0)];
+const FOUR: [(f64, f64); 2] =
+    [(0.339_981_043_584_856_3, 0.652_145_154_862_546_1), (0.861_136_311_594_052_6, 0.347_854_845_137_453_9)];
+const EIGHT: [(f64, f64); 4] = [
+    (0.183_434_642_495_649_8, 0.362_683_783_378_362),
+    (0.525_532_409_916_329, 0.313_706_645_877_887_3),
+    (0.796_666_477_413_626_7, 0.222_381_034_453_374_5),
+    (0.960_289_856_497_536_2, 0.101_228_536_290_376_26),
+];
+
+/// The sums that a receiver asks for.
+pub(super) struct Question<'a> {
+    pub interval: Interval,
+    pub code: &'a Code,
+    pub made: &'a Made,
+}
+
+/// Differences of a ray's component and a replica, as polynomials in the share of the interval that has
+/// passed.
+struct Course<'a> {
+    /// Number of the component in the signal.
+    sent: usize,
+    /// Correlation of the component with the replica.
+    peak: &'a Peak,
+    /// Code in chips: at the beginning, and what it gains.
+    chips: [f64; 2],
+    /// Carrier in cycles: at the beginning, and the coefficients of share and square.
+    cycles: [f64; 3],
+    /// Code periods of the ray: share of the running one at the beginning, and what passes.
+    periods: [f64; 2],
+    /// Number of the running one.
+    period: i64,
+    amplitude: f64,
+}
+
+/// One ray at the first sample of an interval, in the middle, and at the end.
+type Ends = [RayAt; 3];
+
+impl Question<'_> {
+    /// Adds the sums of a satellite's rays.
+    pub fn add(&self, scene: &Scene, transmitter: &Transmitter, taps: &[f64], sums: &mut [Complex64]) {
+        let Interval { from, to, .. } = self.interval;
+        if to <= from {
+            return;
+        }
+        let middle = from + (to - from) / 2;
+        let Some(rays) = transmitter.rays(scene, middle) else { return };
+        for ray in 0..rays.count() {
+            let ends = [from, middle, to].map(|sample| rays.at(ray, sample));
+            let [Some(first), Some(half), Some(last)] = ends else { continue };
+            let ends = [first, half, last];
+            let cycles = self.cycles(scene, transmitter, &ends);
+            for sent in 0..self.made.signal.components.len() {
+                if let Some(course) = self.course(scene, transmitter, (&ends, cycles), sent) {
+                    self.integrate(transmitter, &course, taps, sums);
+                }
+            }
+        }
+    }
+
+    /// Difference of the carriers in cycles: at the beginning, and the coefficients of share and square.
+    fn cycles(&self, scene: &Scene, transmitter: &Transmitter, [first, half, last]: &Ends) -> [f64; 3] {
+        let Interval { nco, from, to, .. } = self.interval;
+        let samples = (to - from) as f64;
+        let (turns, step) = transmitter.turns_at(scene, from, first);
+        let begin_cycles = turns.wrapping_sub(nco.carrier) as i64 as f64 / TURN;
+        let local_cycles = step.wrapping_sub(nco.carrier_step) as i64 as f64 / TURN * samples;
+        let at = ((to - from) / 2) as f64 / samples;
+        let [to_half, to_end] = [half, last].map(|ray| ray.carrier_cycles - first.carrier_cycles);
+        let bend = if at > 0.0 && at < 1.0 { (to_end * at - to_half) / (at * (1.0 - at)) } else { 0.0 };
+        [begin_cycles, local_cycles - (to_end - bend), -bend]
+    }
+
+    fn course(
+        &self,
+        scene: &Scene,
+        transmitter: &Transmitter,
+        ([first, half, last], cycles): (&Ends, [f64; 3]),
+        sent: usize,
+    ) -> Option<Course<'_>> {
+        let Interval { nco, from, to, .. } = self.interval;
+        let (made, rate_hz, samples) = (self.made, scene.clock.rate.hz(), (to - from) as f64);
+        let component = made.signal.components.get(sent)?;
+        let code = transmitter.code_at(scene, sent, from, first.delay_s)?;
+        let (length, local_length) = (f64::from(component.code_chips), f64::from(made.length));
+        let sent_s = samples / rate_hz - (last.delay_s - first.delay_s);
+        let passed = sent_s * component.chip_rate_hz;
+        let phase = code.share * length;
+        // Segment of a long code: that of the replica, or else that which is sent.
+        let running = || ((phase + 0.5 * passed).rem_euclid(length) / local_length) as u64;
+        let is_long = component.code_chips > made.length;
+        let segment = self.code.segment.unwrap_or_else(|| if is_long { running() } else { 0 });
+        let begin = if is_long { segment as f64 * local_length } else { 0.0 };
+        let local = begin + units_to_chips(nco.code).rem_euclid(local_length);
+        let apart = (phase - local + 0.5 * length).rem_euclid(length) - 0.5 * length;
+        let peak = made.peak(self.code.link.sv.number, segment as usize, sent)?;
+        let gained = passed - units_to_chips(nco.code_step as i64) * samples;
+        let [begin_cycles, rate, bend] = cycles;
+        let noise_lsb = f64::from(scene.noise_lsb);
+        Some(Course {
+            sent,
+            peak,
+            chips: [apart, gained],
+            cycles: [begin_cycles + component.phase_cycles, rate, bend],
+            periods: [code.share, passed / length],
+            period: code.at.period,
+            amplitude: noise_lsb * (2.0 * half.cn0_hz / rate_hz * component.power_share).sqrt() * samples,
+        })
+    }
+
+    /// Adds the mean of a course, piece by piece between changes of sign.
+    fn integrate(&self, transmitter: &Transmitter, course: &Course, taps: &[f64], sums: &mut [Complex64]) {
+        let reach = course.peak.reach_chips() + course.chips[1].abs();
+        if taps.iter().all(|tap| (course.chips[0] - tap).abs() > reach) {
+            return;
+        }
+        // The sum of samples is the integral from half a sample before the first one.
+        let ahead = 0.5 / (self.interval.to - self.interval.from) as f64;
+        let [share, passed] = course.periods;
+        let (mut from, end) = (-ahead, 1.0 - ahead);
+        let mut period = course.period;
+        let mut sign = transmitter.sign(course.sent, period);
+        while from < end {
+            let (mut to, mut next) = (end, sign);
+            // The next change of sign.
+            loop {
+                let edge = ((period - course.period + 1) as f64 - share) / passed;
+                if edge >= end {
+                    break;
+                }
+                period += 1;
+                next = transmitter.sign(course.sent, period);
+                if next != sign && edge > from {
+                    to = edge;
+                    break;
+                }
+                sign = next;
+            }
+            piece(course, (from, to), sign, taps, sums);
+            (from, sign) = (to, next);
+        }
+    }
+}
+
+/// Adds the mean of a course between two shares of the interval.
+fn piece(course: &Course, (from, to): (f64, f64), sign: f64, taps: &[f64], sums: &mut [Complex64]) {
+    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+    let [_, rate, bend] = course.cycles;
+    let turned = (rate + 2.0 * bend * middle).abs() * 2.0 * half + bend.abs() * half * half;
+    let mut node = |share: f64, weight: f64| {
+        let chips = course.chips[0] + course.chips[1] * share;
+        let cycles = course.cycles[0] + share * (rate + share * bend);
+        let (sin, cos) = libm::sincos(std::f64::consts::TAU * (cycles - cycles.round()));
+        let phasor = Complex64::new(cos, sin) * (sign * weight * course.amplitude);
+        for (sum, tap) in sums.iter_mut().zip(taps) {
+            *sum += phasor * course.peak.value(chips - tap);
+        }
+    };
+    if half < SHORT {
+        return node(middle, 2.0 * half);
+    }
+    let rule: &[(f64, f64)] = match turned {
+        turned if turned < 0.06 => &TWO,
+        turned if turned < 0.6 => &FOUR,
+        _ => &EIGHT,
+    };
+    for (at, weight) in rule {
+        node(middle - half * at, half * weight);
+        node(middle + half * at, half * weight);
+    }
+}
