@@ -33,6 +33,7 @@ mod single;
 pub mod sums;
 pub mod wave;
 
+pub use carrier::phasor;
 use pattern::Pattern;
 use pieces::Pieces;
 use rows::Rows;

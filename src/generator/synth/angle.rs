@@ -4,7 +4,7 @@
 
 /// Cosine and sine of `words` / 2^32 turns.
 #[inline(always)]
-pub(crate) fn cos_sin<const N: usize>(words: &[u32; N]) -> ([f32; N], [f32; N]) {
+pub fn cos_sin<const N: usize>(words: &[u32; N]) -> ([f32; N], [f32; N]) {
     let (mut cos, mut sin) = ([0.0; N], [0.0; N]);
     for k in 0..N {
         let quadrant = words[k].wrapping_add(1 << 29) >> 30;

@@ -8,7 +8,7 @@
 //! lane-array code that [`isa`] compiles for each instruction set with the same bits on all. Limits: 15 code
 //! steps per sample.
 
-pub(crate) mod angle;
+pub mod angle;
 pub mod band;
 pub mod bank;
 pub mod chips;

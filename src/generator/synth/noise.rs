@@ -73,9 +73,9 @@ fn next(state: &mut [Words; 4]) -> Words {
 
 /// `sigma · sqrt(−2 ln u)` with u = (word + 1/2) / 2^32.
 #[inline(always)]
-fn radius(words: &Words, sigma: f32) -> [f32; LANES] {
-    let mut out = [0.0; LANES];
-    for k in 0..LANES {
+fn radius<const N: usize>(words: &[u32; N], sigma: f32) -> [f32; N] {
+    let mut out = [0.0; N];
+    for k in 0..N {
         let u = (words[k] as f32 + 0.5) * (1.0 / 4_294_967_296.0);
         // u = m · 2^e with m from sqrt(1/2) to sqrt(2): subtracting the bits of sqrt(1/2) carries e into the
         // exponent.
@@ -90,6 +90,13 @@ fn radius(words: &Words, sigma: f32) -> [f32; LANES] {
         out[k] = sigma * (-2.0 * ln).max(0.0).sqrt();
     }
     out
+}
+
+/// Complex normals of unit variance a component, real and imaginary parts, each from a word of its own.
+pub fn normals<const N: usize>(words: &[u64; N]) -> [[f32; N]; 2] {
+    let radius = radius(&words.map(|word| word as u32), 1.0);
+    let (cos, sin) = cos_sin(&words.map(|word| (word >> 32) as u32));
+    [std::array::from_fn(|k| radius[k] * cos[k]), std::array::from_fn(|k| radius[k] * sin[k])]
 }
 
 /// [`add_block`] in `f64`: the same words, with logarithm, sine and cosine from `libm`.

@@ -52,6 +52,32 @@ impl Transmitter {
         if negative { -1.0 } else { 1.0 }
     }
 
+    /// Signs of a component's code periods from period `first` on, as [`Self::sign`] gives them, into
+    /// `signs`.
+    pub fn signs(&self, component: usize, first: i64, signs: &mut [f64]) {
+        signs.fill(1.0);
+        let Some(sent) = self.sent.iter().find(|sent| sent.component == component) else { return };
+        let (mut negative, mut end) = (false, i64::MIN);
+        for (period, sign) in (first..).zip(signs) {
+            if period >= end {
+                (negative, end) = self.symbols.negative(sent.data, period);
+            }
+            if negative ^ sent.spreading.is_overlaid(period) {
+                *sign = -1.0;
+            }
+        }
+    }
+
+    /// First samples of the polynomials of the prepared segment, and the samples after their last ones.
+    pub fn spans(&self) -> impl Iterator<Item = (u64, u64)> {
+        self.parts.iter().map(|part| (part.start, part.end))
+    }
+
+    /// Rays of polynomial number `number` of [`Self::spans`].
+    pub fn rays_of(&self, number: usize) -> Option<Rays<'_>> {
+        self.parts.get(number).map(|part| Rays { of: self, part })
+    }
+
     /// Position of a component's code at a sample, for a delay.
     pub fn code_at(&self, scene: &Scene, component: usize, sample: u64, delay_s: f64) -> Option<CodePhase> {
         let sent = self.sent.iter().find(|sent| sent.component == component)?;

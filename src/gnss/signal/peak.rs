@@ -103,7 +103,8 @@ impl PeakTable {
     #[inline]
     pub fn value(&self, chips: f64) -> f64 {
         let x = self.first_chips.map_or(chips.abs(), |first_chips| chips - first_chips) * self.steps_per_chip;
-        let (index, u) = (x as usize, x - x.floor());
+        let index = x as usize;
+        let u = x - index as f64;
         let Some(&[(a, da), (b, db)]) = self.entries.get(index..).and_then(|rest| rest.first_chunk()) else {
             return 0.0;
         };

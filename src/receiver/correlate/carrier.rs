@@ -118,7 +118,7 @@ pub(super) fn filled<T: Copy + Default, const N: usize>(rest: &[T]) -> [T; N] {
 
 /// e^{jθ} of a phase in 2⁻⁶⁴ turns, to 2e-16: Taylor's polynomials on either side of the nearest quarter.
 #[inline(always)]
-fn phasor(turns: u64) -> Complex64 {
+pub fn phasor(turns: u64) -> Complex64 {
     let quarter = turns.wrapping_add(1 << 61) >> 62;
     let x = turns.wrapping_sub(quarter << 62) as i64 as f64 * (std::f64::consts::TAU / TURN);
     let z = x * x;

@@ -7,25 +7,26 @@
 //! Understanding GPS 2nd ed., 4.3.2). Limits: delays and phases are parabolas within a second, the difference
 //! of Dopplers and the strength are constant there; the strongest ray alone; carriers are equal.
 
-use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use generator::scene::Scene;
-use generator::transmit::Transmitter;
-use gnss::signal::{Component, Link};
+use generator::synth::angle::cos_sin;
+use gnss::signal::{Component, Link, Signal};
 use num_complex::Complex64;
 use receiver::correlate::correlator::Interval;
 use receiver::correlate::units_to_chips;
 use receiver::lead::lead;
 
-use super::made::Made;
+use super::sent::{Sent, centred, split, turns};
+use super::taps::{LANES, POSITIONS, Taps};
 
 /// Chips of a code from which on cross-correlation with other satellites counts as white noise.
 pub(super) const LEAST_LONG_CHIPS: u32 = 4000;
 /// Lags beyond the difference of the codes for which sums are made.
 const MARGIN: i64 = 3;
-/// Code periods before and after the second for which signs are kept: of integrations that began before it.
-const MOST_PERIODS: i64 = 50;
+/// Satellites whose phases are turned at once.
+const TOGETHER: usize = 4;
+/// Lanes of the sums over a code.
+const SUMS: usize = 8;
 /// 2^64 as a float.
 const TURN: f64 = 18_446_744_073_709_551_616.0;
 
@@ -52,52 +53,54 @@ pub(super) struct Course {
     /// Cycles of the carrier in the samples.
     cycles: Parabola,
     /// Signs of the code periods, from number `signed` on.
-    signs: Vec<f64>,
+    signs: Vec<f32>,
     signed: i64,
     /// Amplitude in a sample.
     amplitude: f64,
 }
 
 impl Course {
-    /// A transmitter over a second of samples; `None` for long codes, and for one that is not received.
-    pub fn new(scene: &Scene, transmitter: &Transmitter, (from, to): (u64, u64)) -> Option<Self> {
-        let component = lead(transmitter.signal).filter(|lead| lead.code_chips < LEAST_LONG_CHIPS)?;
-        let index = transmitter.signal.components.iter().position(|one| std::ptr::eq(one, component))?;
+    /// A satellite over a second of samples; `None` for long codes, and for one that is not received.
+    pub fn new(sent: &Sent, (from, to): (u64, u64)) -> Option<Self> {
+        let signal = sent.transmitter.signal;
+        let component = lead(signal).filter(|lead| lead.code_chips < LEAST_LONG_CHIPS)?;
+        let index = index_of(component, signal)?;
         let middle = from + (to - from) / 2;
-        let rays = transmitter.rays(scene, middle)?;
-        let [first, half, last] = [from, middle, to].map(|sample| rays.at(0, sample));
+        let leg = sent.leg(middle)?;
+        let anchor = leg.anchors.first()?;
+        let [first, half, last] = [from, middle, to].map(|sample| leg.rays.at(0, sample));
         let (first, half, last) = (first?, half?, last?);
-        let code = transmitter.code_at(scene, index, from, first.delay_s)?;
-        let (turns, step) = transmitter.turns_at(scene, from, &first);
-        let (count, rate_hz) = ((to - from) as f64, scene.clock.rate.hz());
+        let (count, rate_hz, period_s) = ((to - from) as f64, sent.scene.clock.rate.hz(), component.period_s());
+        let (period, share) = anchor.code_at(index, period_s, anchor.elapsed_s(from, rate_hz), &first)?;
+        let (turns, step) = anchor.turns_at(from, &first);
         let passed = |sample: u64, delay_s: f64| {
             let sent_s = (sample - from) as f64 / rate_hz - (delay_s - first.delay_s);
-            code.share + sent_s / component.period_s()
+            share + sent_s / period_s
         };
         let turned = |sample: u64, cycles: f64| {
             turns as f64 / TURN + step as i64 as f64 / TURN * (sample - from) as f64 - (cycles - first.carrier_cycles)
         };
-        let cn0_hz = rays.cn0_hz(from) * component.power_share;
-        let signed = code.at.period - MOST_PERIODS;
-        let end = code.at.period + (count / rate_hz / component.period_s()) as i64 + MOST_PERIODS;
+        let cn0_hz = leg.rays.cn0_hz(from) * component.power_share;
+        let (signed, signs) = sent.signs(index)?;
         Some(Self {
             span: (from, count),
             component,
-            periods: through([code.share, passed(middle, half.delay_s), passed(to, last.delay_s)]),
-            period: code.at.period,
+            periods: through([share, passed(middle, half.delay_s), passed(to, last.delay_s)]),
+            period,
             cycles: through([
                 turns as f64 / TURN,
                 turned(middle, half.carrier_cycles),
                 turned(to, last.carrier_cycles),
             ]),
-            signs: (signed..end).map(|period| transmitter.sign(index, period)).collect(),
+            signs: signs.iter().map(|sign| *sign as f32).collect(),
             signed,
-            amplitude: f64::from(scene.noise_lsb) * (2.0 * cn0_hz / rate_hz).sqrt(),
+            amplitude: f64::from(sent.scene.noise_lsb) * (2.0 * cn0_hz / rate_hz).sqrt(),
         })
     }
 
     /// Sign of a code period.
-    fn sign(&self, period: i64) -> f64 {
+    #[inline]
+    fn sign(&self, period: i64) -> f32 {
         self.signs.get((period - self.signed) as usize).copied().unwrap_or(1.0)
     }
 
@@ -107,12 +110,24 @@ impl Course {
     }
 }
 
+/// Number of a component in its signal.
+fn index_of(component: &Component, signal: &Signal) -> Option<usize> {
+    signal.components.iter().position(|one| std::ptr::eq(one, component))
+}
+
 /// Another satellite in the correlations of a code.
 struct Other {
     course: Arc<Course>,
+    /// Number of its code period that runs at the first lag, at the beginning of the second.
+    period: i64,
+    /// Chips by which its code is ahead of the own one.
+    ahead: Parabola,
     first_lag: i64,
-    /// Means over the code's chips for each lag, of those before the other's period ends and of those after.
-    means: Vec<[Complex64; 2]>,
+    /// Number of lags at which that period runs on.
+    same: usize,
+    /// Sums over the own code's chips for each lag, in a sample's amplitude, where the period after has the
+    /// same sign and where it has the other one.
+    means: [Vec<[f32; 2]>; 2],
 }
 
 /// The other satellites in the correlations of one satellite's short code, over a second.
@@ -122,85 +137,144 @@ pub(super) struct Crowd {
 }
 
 impl Crowd {
-    /// The satellites beside number `own` of `transmitters`, with the courses of all. `None` for long codes.
-    pub fn new(transmitters: &[Transmitter], own: usize, courses: &[Option<Arc<Course>>]) -> Option<Self> {
-        let (this, course) = (transmitters.get(own)?, courses.get(own)?.as_ref()?);
-        let code = (course.component.code)(this.sv.number)?;
-        let one = |(transmitter, other): (&Transmitter, &Option<Arc<Course>>)| {
-            let other = other.as_ref().filter(|_| is_alike(this.link(), transmitter.link()))?;
-            Other::new((course, &code), &(other.component.code)(transmitter.sv.number)?, other)
+    /// The satellites beside number `own` of `sent`, with the courses of all and their codes. `None` for long
+    /// codes.
+    pub fn new<'c>(
+        sent: &[Sent],
+        own: usize,
+        courses: &[Option<Arc<Course>>],
+        code: impl Fn(&Sent, usize) -> Option<&'c [i8]>,
+    ) -> Option<Self> {
+        let (this, course) = (sent.get(own)?, courses.get(own)?.as_ref()?);
+        let of = |sent: &Sent, course: &Course| code(sent, index_of(course.component, sent.transmitter.signal)?);
+        let chips = of(this, course)?;
+        let link = this.transmitter.link();
+        let one = |(sent, other): (&Sent, &Option<Arc<Course>>)| {
+            let other = other.as_ref().filter(|_| is_alike(link, sent.transmitter.link()))?;
+            Some(Other::new((course, chips), (other, of(sent, other)?)))
         };
-        Some(Self { own: Arc::clone(course), others: transmitters.iter().zip(courses).filter_map(one).collect() })
+        let others = sent.iter().zip(courses).filter_map(one).collect();
+        Some(Self { own: Arc::clone(course), others })
     }
 
-    /// Adds the other satellites' sums over an interval that begins with a code period, at taps in chips.
-    pub fn add(&self, interval: &Interval, made: &Made, taps: &[f64], sums: &mut [Complex64]) {
+    /// Adds the other satellites' sums over an interval that begins with a code period.
+    pub fn add(&self, interval: &Interval, taps: &Taps, sums: &mut [Complex64]) {
         let Interval { nco, from, to, .. } = *interval;
         let length = f64::from(self.own.component.code_chips);
         let x = self.own.share(from);
-        let local = (units_to_chips(nco.code) + 0.5 * length).rem_euclid(length) - 0.5 * length;
+        let local = centred(units_to_chips(nco.code), length);
         let own = length * at(self.own.periods, x);
-        let apart = (own - local + 0.5 * length).rem_euclid(length) - 0.5 * length;
+        let apart = centred(own - local, length);
         // Whole periods from the other's first one to the replica's first chip.
-        let whole = ((own - apart - local) / length).round() as i64;
-        let chips = self.own.component.code_chips.into();
-        for Other { course, first_lag, means } in &self.others {
-            let lag = length * at(course.periods, x) - own + apart;
-            let cycles = at(course.cycles, x) - nco.carrier as f64 / TURN;
-            let (sin, cos) = libm::sincos(TAU * (cycles - cycles as i64 as f64));
-            let phasor = Complex64::new(cos, sin) * (course.amplitude * (to - from) as f64);
-            // Periods of the lags about this one.
-            let wraps = (lag as i64 - 8).div_euclid(chips);
-            let sign = |ahead: i64| course.sign(course.period + whole + wraps + ahead);
-            let signs = [sign(0), sign(1), sign(2)];
-            for (sum, tap) in sums.iter_mut().zip(taps) {
-                let place = lag - tap;
-                let nearest = (place - *first_lag as f64) as i64 + first_lag;
-                for lag in nearest - 1..=nearest + 2 {
-                    let Some([before, after]) = means.get((lag - first_lag) as usize) else { continue };
-                    let pulse = made.pulse.value(place - lag as f64);
-                    let signs = if lag.div_euclid(chips) > wraps { &signs[1..] } else { &signs[..2] };
-                    *sum += phasor * (before * signs[0] + after * signs[1]) * pulse;
+        let whole = split((own - apart - local) / length + 0.5).0;
+        let mut all = [[0.0; LANES]; 2];
+        for together in self.others.chunks(TOGETHER) {
+            let mut words = [0; TOGETHER];
+            let turned = |other: &Other| (turns(at(other.course.cycles, x)).wrapping_sub(nco.carrier) >> 32) as u32;
+            words.iter_mut().zip(together).for_each(|(word, other)| *word = turned(other));
+            let (cos, sin) = cos_sin(&words);
+            for (other, (cos, sin)) in together.iter().zip(cos.into_iter().zip(sin)) {
+                let [re, im] = other.at(at(other.ahead, x) + apart, taps, other.period + whole);
+                for lane in 0..LANES {
+                    all[0][lane] += cos * re[lane] - sin * im[lane];
+                    all[1][lane] += cos * im[lane] + sin * re[lane];
                 }
+            }
+        }
+        let [re, im] = all.map(|part| part.map(|value| f64::from(value) * (to - from) as f64));
+        sums.iter_mut().zip(re.into_iter().zip(im)).for_each(|(sum, (re, im))| *sum += Complex64::new(re, im));
+    }
+}
+
+impl Other {
+    fn new((own, code): (&Course, &[i8]), (course, sent): (&Arc<Course>, &[i8])) -> Self {
+        let length = code.len() as i64;
+        let ahead: Parabola = std::array::from_fn(|k| length as f64 * (course.periods[k] - own.periods[k]));
+        let [begin, end] = [at(ahead, 0.0), at(ahead, 1.0)];
+        let first_lag = split(begin.min(end)).0 - MARGIN;
+        let last_lag = split(begin.max(end)).0 + 1 + MARGIN;
+        // Turn of the carriers' difference in a chip.
+        let cycles_hz = (course.cycles[1] + course.cycles[2]) - (own.cycles[1] + own.cycles[2]);
+        let periods = own.periods[1] + own.periods[2];
+        let turned = turned(code, cycles_hz / (periods * length as f64), course.amplitude / length as f64);
+        // Twice, so that any lag is one piece of it.
+        let sent: Vec<f32> = sent.iter().chain(sent).map(|chip| f32::from(*chip)).collect();
+        let mut means: [Vec<[f32; 2]>; 2] = Default::default();
+        for lag in first_lag..=last_lag {
+            let ahead = lag.rem_euclid(length) as usize;
+            let rest = code.len() - ahead;
+            let sum = |from: usize, to: usize| {
+                turned.each_ref().map(|own| product(&own[from..to], &sent[from + ahead..to + ahead]))
+            };
+            let (before, after) = (sum(0, rest), sum(rest, code.len()));
+            means[0].push(std::array::from_fn(|part| before[part] + after[part]));
+            means[1].push(std::array::from_fn(|part| before[part] - after[part]));
+        }
+        let wraps = first_lag.div_euclid(length);
+        let same = ((wraps + 1) * length - first_lag) as usize;
+        Self { course: Arc::clone(course), period: course.period + wraps, ahead, first_lag, same, means }
+    }
+
+    /// Sums at taps, real and imaginary parts, where the other code is `lag` chips ahead, and its code period
+    /// at the first lag has number `period`.
+    #[inline]
+    fn at(&self, lag: f64, taps: &Taps, period: i64) -> [[f32; LANES]; 2] {
+        let (chip, share) = split(lag);
+        let weights = taps.weights((share * POSITIONS as f64 + 0.5) as usize);
+        let first = (chip + taps.first - self.first_lag) as usize;
+        // Beyond `same` the next period runs.
+        let here = self.same.saturating_sub(first).min(weights.len());
+        let (weights, later) = weights.split_at(here);
+        let mut all = [[0.0; LANES]; 2];
+        self.add(first, weights, period, &mut all);
+        if !later.is_empty() {
+            self.add(first + here, later, period + 1, &mut all);
+        }
+        all
+    }
+
+    /// Adds the sums at lags from number `first` on, where code period `period` runs.
+    #[inline]
+    fn add(&self, first: usize, weights: &[[f32; LANES]], period: i64, [re, im]: &mut [[f32; LANES]; 2]) {
+        let [sign, next] = [self.course.sign(period), self.course.sign(period + 1)];
+        let [same, other] = &self.means;
+        let means = if sign == next { same } else { other };
+        for (mean, weights) in means.get(first..).unwrap_or_default().iter().zip(weights) {
+            let [a, b] = mean.map(|part| sign * part);
+            for lane in 0..LANES {
+                re[lane] += weights[lane] * a;
+                im[lane] += weights[lane] * b;
             }
         }
     }
 }
 
-impl Other {
-    fn new((own, code): (&Course, &[i8]), sent: &[i8], course: &Arc<Course>) -> Option<Self> {
-        let length = code.len() as i64;
-        let lag = |x: f64| length as f64 * (at(course.periods, x) - at(own.periods, x));
-        let [begin, end] = [lag(0.0), lag(1.0)];
-        let first_lag = begin.min(end).floor() as i64 - MARGIN;
-        let last_lag = begin.max(end).ceil() as i64 + MARGIN;
-        // Turn of the carriers' difference in a chip.
-        let cycles_hz = (course.cycles[1] + course.cycles[2]) - (own.cycles[1] + own.cycles[2]);
-        let periods = own.periods[1] + own.periods[2];
-        let (sin, cos) = libm::sincos(TAU * cycles_hz / (periods * length as f64));
-        let turn = Complex64::new(cos, sin);
-        // From the middle of the first chip on.
-        let mut phasor = turn.sqrt() / length as f64;
-        let turned: Vec<Complex64> = (code.iter())
-            .map(|chip| {
-                let value = phasor * f64::from(*chip);
-                phasor *= turn;
-                value
-            })
-            .collect();
-        let means = (first_lag..=last_lag)
-            .map(|lag| {
-                let ahead = lag.rem_euclid(length) as usize;
-                let (late, early) = sent.split_at(ahead);
-                let mean = |own: &[Complex64], sent: &[i8]| {
-                    own.iter().zip(sent).map(|(own, chip)| own * f64::from(*chip)).sum::<Complex64>()
-                };
-                let (first, rest) = turned.split_at(turned.len() - ahead);
-                [mean(first, early), mean(rest, late)]
-            })
-            .collect();
-        Some(Self { course: Arc::clone(course), first_lag, means })
+/// Chips of a code that turn by so many cycles each, from the middle of the first one on: real and imaginary
+/// parts.
+fn turned(code: &[i8], cycles: f64, amplitude: f64) -> [Vec<f32>; 2] {
+    let step = turns(cycles);
+    let mut parts: [Vec<f32>; 2] = Default::default();
+    for (chips, number) in code.chunks(SUMS).zip((0..).step_by(SUMS)) {
+        let word = |lane: u64| (step.wrapping_mul(number + lane).wrapping_add((step as i64 / 2) as u64) >> 32) as u32;
+        let (cos, sin) = cos_sin::<SUMS>(&std::array::from_fn(|lane| word(lane as u64)));
+        for (part, value) in parts.iter_mut().zip([cos, sin]) {
+            part.extend(chips.iter().zip(value).map(|(chip, value)| f32::from(*chip) * value * amplitude as f32));
+        }
     }
+    parts
+}
+
+/// Sum of products, the same on every processor.
+fn product(a: &[f32], b: &[f32]) -> f32 {
+    let mut sums = [0.0; SUMS];
+    let (a, b) = (a.chunks_exact(SUMS), b.chunks_exact(SUMS));
+    let rest: f32 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
+    for (a, b) in a.zip(b) {
+        for lane in 0..SUMS {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    sums.iter().sum::<f32>() + rest
 }
 
 /// True if another satellite's short code has the carrier and the chips of this one.

@@ -17,6 +17,8 @@ use receiver::correlate::correlator::Code;
 use receiver::lead::lead;
 use receiver::settings::Settings;
 
+use super::taps::{Sets, Taps};
+
 /// Steps a chip of the tables of peaks.
 const STEPS_PER_CHIP: f64 = 1024.0;
 /// Chips on either side for which a correlation is computed.
@@ -67,6 +69,8 @@ pub(super) struct Made {
     widths_chips: [f64; 2],
     /// Segments of the longest code of the signal.
     segments: usize,
+    /// Taps that were asked for.
+    taps: Sets,
     /// Codes of the components by the satellite's number.
     codes: Vec<OnceLock<Option<Vec<i8>>>>,
     /// Peaks by the satellite's number, segment and component.
@@ -100,6 +104,7 @@ impl Made {
             sent: scene.fidelity.waveform,
             widths_chips: [incoming, local],
             segments,
+            taps: Sets::default(),
             codes: (0..NUMBERS * count).map(|_| OnceLock::new()).collect(),
             peaks: (0..NUMBERS * count * segments).map(|_| OnceLock::new()).collect(),
         })
@@ -124,6 +129,12 @@ impl Made {
             && self.made == (code.waveform, code.edge)
     }
 
+    /// Calls `with` for what depends on these taps near the prompt alone.
+    #[inline]
+    pub fn with_taps<R>(&self, chips: &[f64], with: impl FnOnce(&Taps) -> R) -> R {
+        self.taps.with(chips, (&self.own, &self.pulse), with)
+    }
+
     /// Correlation of component `sent` of a satellite's signal with the replica; of a long code with, or of,
     /// its `segment`. `None` where they do not correlate.
     pub fn peak(&self, number: u8, segment: usize, sent: usize) -> Option<&Peak> {
@@ -134,7 +145,8 @@ impl Made {
         self.peaks.get(place)?.get_or_init(make).as_deref()
     }
 
-    fn code(&self, number: u8, index: usize) -> Option<&[i8]> {
+    /// Code of a component of a satellite's signal.
+    pub fn code(&self, number: u8, index: usize) -> Option<&[i8]> {
         let place = usize::from(number) * self.signal.components.len() + index;
         let make = || (self.signal.components.get(index)?.code)(number);
         self.codes.get(place)?.get_or_init(make).as_deref()

@@ -15,6 +15,8 @@ mod noise;
 mod ray;
 mod refusal;
 mod search;
+mod sent;
+mod taps;
 #[cfg(test)]
 mod tests;
 
@@ -41,6 +43,8 @@ use made::Made;
 use noise::Noise;
 use ray::Question;
 pub use refusal::{Refused, refuse};
+use sent::Sent;
+use taps::{MOST, is_near};
 
 use crate::{Done, TwinError, settings_for};
 
@@ -75,7 +79,7 @@ pub fn run(
         to = first.clock.rate.first_sample_at(second + 1, 1).min(first.samples);
         fronts.pass(&reception.needs(), to, truth)?;
         let over = |(plan, transmitters)| Plan::over(plan, transmitters, second);
-        let models: Vec<Correlations> = plans.iter().zip(fronts.transmitters()).map(over).collect();
+        let models: Vec<Correlations<'_>> = plans.iter().zip(fronts.transmitters()).map(over).collect();
         models.iter().try_for_each(Correlations::refuse_near_and_far)?;
         reception.take_models(&models, (to, to == first.samples), records)?;
         progress(to);
@@ -121,27 +125,34 @@ impl<'a> Plan<'a> {
     /// `second`.
     pub fn over(&'a self, transmitters: &'a [Transmitter], second: u64) -> Correlations<'a> {
         let sample = self.scene.clock.rate.first_sample_at(second, 1);
-        let cn0_hz = |one: &Transmitter| one.rays(self.scene, sample).map_or(0.0, |rays| rays.cn0_hz(sample));
-        let cn0_hz: Vec<f64> = transmitters.iter().map(cn0_hz).collect();
+        let span = (sample, self.scene.clock.rate.first_sample_at(second + 1, 1).min(self.scene.samples));
+        let sent: Vec<Sent> = transmitters.iter().map(|one| Sent::new(self.scene, one, span)).collect();
+        let cn0_hz: Vec<f64> =
+            sent.iter().map(|one| one.leg(sample).map_or(0.0, |leg| leg.rays.cn0_hz(sample))).collect();
         let rounding = if self.scene.metadata.format == Format::Cf32Le { 0.0 } else { ROUNDING };
         let floor = if self.scene.noise { self.thermal() + rounding } else { 0.0 };
         let power = 2.0 * floor + 2.0 * self.thermal() * cn0_hz.iter().sum::<f64>() / self.scene.clock.rate.hz();
-        let span = (sample, self.scene.clock.rate.first_sample_at(second + 1, 1).min(self.scene.samples));
-        let crowds = transmitters.iter().map(|_| OnceLock::new()).collect();
-        let courses = OnceLock::new();
         let places = |link: Link| {
             let is = |(place, one): (usize, &Transmitter)| is_of(one, link).then_some(place);
             transmitters.iter().enumerate().filter_map(is).collect()
         };
-        let alike = transmitters.iter().map(|one| places(one.link())).collect();
-        let variances = Vec::new();
-        let mut model =
-            Correlations { plan: self, transmitters, span, cn0_hz, power, floor, variances, alike, crowds, courses };
-        let variance = |one: &Transmitter, number: usize, made: &Made| {
-            if made.signal == one.signal { model.variance(number, one.link()) } else { [0.0; 2] }
+        let mut model = Correlations {
+            plan: self,
+            span,
+            cn0_hz,
+            power,
+            floor,
+            known: Vec::new(),
+            alike: transmitters.iter().map(|one| places(one.link())).collect(),
+            crowds: transmitters.iter().map(|_| OnceLock::new()).collect(),
+            courses: OnceLock::new(),
+            sent,
         };
-        let all = |one| self.made.iter().enumerate().map(|(number, made)| variance(one, number, made)).collect();
-        model.variances = transmitters.iter().map(all).collect();
+        let known = |(number, made): (usize, &Made), link: Link| {
+            (made.signal == link.signal).then(|| model.know(number, made, link))
+        };
+        let all = |one: &Sent| self.made.iter().enumerate().map(|made| known(made, one.transmitter.link())).collect();
+        model.known = model.sent.iter().map(all).collect();
         model
     }
 
@@ -171,42 +182,67 @@ fn separation_s(made: &Made, signal: &Signal, (apart_hz, half_hz): (f64, f64)) -
     step_hz * (0..INTERVALS).map(|k| product((f64::from(k) + 0.5) * step_hz - half_hz)).sum::<f64>()
 }
 
+/// Noise in the correlations with one replica of a link.
+#[derive(Clone, Copy)]
+struct Known {
+    /// Deviations of the noise a component, in a sum of one sample: with all other satellites as noise, and
+    /// without those of [`Correlations::crowds`].
+    deviations: [f64; 2],
+    stream: Stream,
+}
+
+impl Known {
+    /// Stream of a replica, which may be a segment of a long code.
+    fn stream(&self, code: &Code) -> Stream {
+        code.segment.map_or(self.stream, |segment| self.stream.part(segment))
+    }
+}
+
 /// Model of the correlations over a segment of time.
 pub struct Correlations<'a> {
     plan: &'a Plan<'a>,
-    transmitters: &'a [Transmitter],
+    sent: Vec<Sent<'a>>,
     /// First sample of the second, and the one after its last.
     span: (u64, u64),
-    /// C/N0 of each of [`Self::transmitters`].
+    /// C/N0 of each of [`Self::sent`].
     cn0_hz: Vec<f64>,
     /// Mean power of the samples.
     power: f64,
     /// Variance of thermal noise and rounding in a sample, per component.
     floor: f64,
-    /// Variances of the noise of a sample, per component, for each transmitter's own replicas: with all other
-    /// satellites as noise, and without those of [`Self::crowds`].
-    variances: Vec<Vec<[f64; 2]>>,
-    /// Transmitters that a receiver cannot tell from each of [`Self::transmitters`], by their indices.
+    /// Noise of the replicas of each of [`Self::sent`], its own ones alone.
+    known: Vec<Vec<Option<Known>>>,
+    /// Signals that a receiver cannot tell from each of [`Self::sent`], by their indices.
     alike: Vec<Vec<usize>>,
-    /// Other satellites in the correlations of each transmitter's short code.
+    /// Other satellites in the correlations of each short code.
     crowds: Vec<OnceLock<Option<Crowd>>>,
-    /// Courses of the transmitters with short codes.
+    /// Courses of the satellites with short codes.
     courses: OnceLock<Vec<Option<Arc<Course>>>>,
 }
 
 impl Correlations<'_> {
-    /// Way in which a code is made, and variances of the noise in a sample that its correlations have, per
-    /// component: with all other satellites as noise, and without those that are summed by themselves.
-    fn made(&self, code: &Code) -> Option<(&Made, [f64; 2])> {
+    /// Way in which a code is made, the noise of its correlations, and the index of its signal.
+    fn made(&self, code: &Code) -> Option<(&Made, Known, Option<usize>)> {
         let number = self.plan.made.iter().position(|made| made.is(code))?;
-        let known = self.place(code.link).and_then(|place| self.variances.get(place)?.get(number).copied());
-        Some((self.plan.made.get(number)?, known.unwrap_or_else(|| self.variance(number, code.link))))
+        let made = self.plan.made.get(number)?;
+        let place = self.place(code.link);
+        let known = place.and_then(|place| *self.known.get(place)?.get(number)?);
+        Some((made, known.unwrap_or_else(|| self.know(number, made, code.link)), place))
     }
 
-    /// Index of a link among the transmitters, or of one that a receiver cannot tell from it.
+    /// Noise in the correlations with a replica of a link.
+    fn know(&self, number: usize, made: &Made, link: Link) -> Known {
+        let energy = made.share * made.own.value(0.0);
+        let deviations = self.variance(number, link).map(|variance| (variance * energy).sqrt());
+        let stream = self.plan.noise.satellite(link.sv).named(made.signal.name).part(made.index as u64);
+        Known { deviations, stream }
+    }
+
+    /// Index of a link among the signals, or of one that a receiver cannot tell from it.
     fn place(&self, link: Link) -> Option<usize> {
-        let own = self.transmitters.iter().position(|one| one.sv == link.sv && one.signal == link.signal);
-        own.or_else(|| self.transmitters.iter().position(|one| is_of(one, link)))
+        let is_own = |one: &Sent| one.transmitter.sv == link.sv && std::ptr::eq(one.transmitter.signal, link.signal);
+        let own = self.sent.iter().position(is_own);
+        own.or_else(|| self.sent.iter().position(|one| is_of(one.transmitter, link)))
     }
 
     /// Variances of the noise of a sample, per component, for a replica of a link: of all but what the link
@@ -215,27 +251,31 @@ impl Correlations<'_> {
         if self.floor <= 0.0 {
             return [0.0; 2];
         }
-        let others = || self.transmitters.iter().zip(&self.cn0_hz).filter(|(one, _)| !is_of(one, link));
+        let all = self.sent.iter().map(|one| one.transmitter).zip(&self.cn0_hz);
+        let others = || all.clone().filter(|(one, _)| !is_of(one, link));
         let load = |one: &Transmitter, hz: &f64| hz * self.plan.separation_s(made, link, one.link());
         let all = others().map(|(one, hz)| load(one, hz)).sum::<f64>();
         let white = others().filter(|(one, _)| !crowd::is_alike(link, one.link())).map(|(one, hz)| load(one, hz));
         [all, white.sum::<f64>()].map(|load| self.floor + self.plan.thermal() * load)
     }
 
-    /// Other satellites in the correlations of a link's short code.
-    fn crowd(&self, link: Link) -> Option<&Crowd> {
-        let place = self.place(link)?;
-        let course = |one| Course::new(self.plan.scene, one, self.span).map(Arc::new);
-        let courses = || self.courses.get_or_init(|| self.transmitters.iter().map(course).collect());
-        let make = || Crowd::new(self.transmitters, place, courses());
-        self.crowds.get(place)?.get_or_init(make).as_ref()
+    /// Other satellites in the correlations of a signal's short code, by its index.
+    fn crowd(&self, place: usize) -> Option<&Crowd> {
+        let course = |one| Course::new(one, self.span).map(Arc::new);
+        let courses = || self.courses.get_or_init(|| self.sent.iter().map(course).collect());
+        let code = |sent: &Sent, component| {
+            let made = self.plan.made.iter().find(|made| made.signal == sent.transmitter.signal)?;
+            made.code(sent.transmitter.sv.number, component)
+        };
+        self.crowds.get(place)?.get_or_init(|| Crowd::new(&self.sent, place, courses(), code)).as_ref()
     }
 
     /// Refuses satellites whose short codes a receiver finds in each other's correlations.
     fn refuse_near_and_far(&self) -> Result<(), Refused> {
         let is_short = |signal: &'static Signal| lead(signal).is_some_and(|lead| lead.code_chips < LEAST_LONG_CHIPS);
         for signal in self.plan.scene.signals.iter().copied().filter(|one| is_short(one)) {
-            let of = self.transmitters.iter().zip(&self.cn0_hz).filter(|(one, hz)| one.signal == signal && **hz > 0.0);
+            let of = self.sent.iter().zip(&self.cn0_hz);
+            let of = of.filter(|(one, hz)| one.transmitter.signal == signal && **hz > 0.0);
             let (least, most) = of.fold((f64::MAX, 0.0), |(least, most), (_, hz)| (hz.min(least), hz.max(most)));
             let apart_db = 10.0 * libm::log10(most / least);
             if most > 0.0 && apart_db > NEAR_FAR_DB {
@@ -246,22 +286,31 @@ impl Correlations<'_> {
         Ok(())
     }
 
-    /// Signals that a receiver cannot tell from a link.
-    fn alike(&self, link: Link) -> impl Iterator<Item = &Transmitter> {
-        let places = self.place(link).and_then(|place| self.alike.get(place));
-        places.into_iter().flatten().filter_map(|place| self.transmitters.get(*place))
+    /// Signals that a receiver cannot tell from one of this index.
+    fn alike(&self, place: Option<usize>) -> impl Iterator<Item = &Sent<'_>> {
+        let places = place.and_then(|place| self.alike.get(place));
+        places.into_iter().flatten().filter_map(|place| self.sent.get(*place))
     }
 
     /// Adds the expected sums at taps in chips.
     fn expect(&self, question: &Question, taps: &[f64], sums: &mut [Complex64]) {
-        for transmitter in self.alike(question.code.link) {
-            question.add(self.plan.scene, transmitter, taps, sums);
+        for sent in self.alike(question.place) {
+            question.add(sent, taps, sums);
         }
     }
 
-    fn stream(&self, code: &Code, made: &Made) -> Stream {
-        let stream = self.plan.noise.satellite(code.link.sv).named(made.signal.name).part(made.index as u64);
-        code.segment.map_or(stream, |segment| stream.part(segment))
+    /// Adds sums at taps near the prompt, in chips, with noise of this deviation in a code period.
+    fn add_near(&self, question: &Question, taps: &[f64], (noise, deviation): (Noise, f64), sums: &mut [Complex64]) {
+        self.expect(question, taps, sums);
+        let crowd = question.place.and_then(|place| self.crowd(place));
+        question.made.with_taps(taps, |taps| {
+            if let Some(crowd) = crowd {
+                crowd.add(&question.interval, taps, sums);
+            }
+            if deviation > 0.0 {
+                noise.add(taps, deviation, sums);
+            }
+        });
     }
 }
 
@@ -274,23 +323,25 @@ fn is_of(transmitter: &Transmitter, link: Link) -> bool {
 
 impl Model for Correlations<'_> {
     fn sums(&self, interval: &Interval, code: &Code, taps: &[i64], sums: &mut [Complex64]) {
-        let Some((made, [all, white])) = self.made(code) else { return };
-        let mut chips = [0.0; 8];
-        chips.iter_mut().zip(taps).for_each(|(chips, units)| *chips = units_to_chips(*units));
-        let taps = &chips[..taps.len().min(8)];
-        let question = Question { interval: *interval, code, made };
-        self.expect(&question, taps, sums);
-        if let Some(crowd) = self.crowd(code.link) {
-            crowd.add(interval, made, taps, sums);
-        }
-        if white <= 0.0 {
-            return;
-        }
+        let Some((made, known, place)) = self.made(code) else { return };
         let whole = interval.end.saturating_sub(interval.from) as f64;
         let share = interval.to.saturating_sub(interval.from) as f64 / whole;
-        let stream = self.stream(code, made).part(interval.from).part(interval.end);
-        let scales = [white, all].map(|variance| (variance * whole * made.share * made.own.value(0.0)).sqrt());
-        Noise { stream, own: &made.own }.add(taps, share, scales, sums);
+        let [all, white] = known.deviations.map(|deviation| deviation * whole.sqrt());
+        let noise = Noise { stream: known.stream(code).part(interval.from).part(interval.end), share };
+        let (mut near, mut chips, mut count) = ([Complex64::ZERO; MOST], [0.0; MOST], 0);
+        let each = || taps.iter().take(MOST).map(|units| units_to_chips(*units));
+        for (tap, sum) in each().zip(sums.iter_mut()) {
+            if is_near(tap) {
+                chips[count] = tap;
+                count += 1;
+            } else {
+                *sum += all * noise.far(tap);
+            }
+        }
+        let question = Question { interval: *interval, code, made, place };
+        self.add_near(&question, &chips[..count], (noise, white), &mut near[..count]);
+        let of_near = each().zip(sums).filter(|(tap, _)| is_near(*tap));
+        of_near.zip(near).for_each(|((_, sum), near)| *sum += near);
     }
 
     fn power(&self, _: u64, _: u64) -> f64 {

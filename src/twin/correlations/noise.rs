@@ -1,72 +1,71 @@
 //! Noise of correlators: pure functions of seed, code, interval and tap.
 //!
 //! Taps of one replica over one interval have the covariance of the replica with itself; taps far apart are
-//! independent. A part of a code period has its part of the period's noise.
+//! independent. A part of a code period has its part of the period's noise. Limits: single precision, below
+//! 6.77 deviations.
 
 use generator::random::Stream;
-use gnss::signal::PeakTable;
+use generator::synth::noise::normals;
 use num_complex::Complex64;
 
-/// Taps that correlate with each other lie within this of the prompt, in chips.
-const NEAR_CHIPS: f64 = 4.0;
-/// Taps of one question, at most.
-const MOST: usize = 8;
+use super::taps::{LANES, MOST, Taps};
+
 /// Number of the draw that splits a code period.
 const SPLIT: u64 = 1 << 40;
+/// Number of the first draw for taps near the prompt.
+const NEAR: u64 = 1 << 32;
 
 /// Standard normal noise of one code period's correlations.
-pub(super) struct Noise<'a> {
+pub(super) struct Noise {
     /// Stream of the code and the interval.
     pub stream: Stream,
-    /// Replica with itself.
-    pub own: &'a PeakTable,
+    /// Share of the code period that is taken, from its beginning on. The noise has that variance.
+    pub share: f64,
 }
 
-impl Noise<'_> {
-    fn normal(&self, index: u64) -> Complex64 {
-        let (re, im) = self.stream.normals(index);
-        Complex64::new(re, im)
-    }
-
-    /// Adds noise of these deviations a component to sums at taps in chips near the prompt, and at others. Of
-    /// a code period the first `share` is taken, and the noise has that variance.
-    pub fn add(&self, taps: &[f64], share: f64, [scale, far]: [f64; 2], sums: &mut [Complex64]) {
-        let mut order: [usize; MOST] = [0, 1, 2, 3, 4, 5, 6, 7];
-        let near = |tap: f64| tap.abs() <= NEAR_CHIPS;
-        let order = &mut order[..taps.len().min(MOST)];
-        order.sort_by(|a, b| taps[*a].abs().total_cmp(&taps[*b].abs()));
-        let power = self.own.value(0.0);
-        let mut factors = [[0.0; MOST]; MOST];
-        let mut normals = [Complex64::ZERO; MOST];
-        for row in 0..order.len() {
-            let tap = taps[order[row]];
-            if !near(tap) {
-                // Whole chips tell such taps apart.
-                let noise = self.split(tap.round() as i64 as u64, share);
-                sums[order[row]] += far * noise;
-                continue;
-            }
-            let mut left = 1.0;
-            for column in 0..row {
-                let inner: f64 = (0..column).map(|k| factors[row][k] * factors[column][k]).sum();
-                let pivot: f64 = factors[column][column];
-                let common = self.own.value(tap - taps[order[column]]) / power;
-                factors[row][column] = if pivot > 1e-6 { (common - inner) / pivot } else { 0.0 };
-                left -= factors[row][column] * factors[row][column];
-            }
-            factors[row][row] = f64::max(left, 0.0).sqrt();
-            normals[row] = self.split((1 << 32) + row as u64, share);
-            let noise: Complex64 = (0..=row).map(|k| normals[k] * factors[row][k]).sum();
-            sums[order[row]] += scale * noise;
-        }
-    }
-
-    /// Noise of the first `share` of a code period: a Brownian bridge to that of the whole.
-    fn split(&self, index: u64, share: f64) -> Complex64 {
-        let whole = self.normal(index);
-        if share >= 1.0 {
+impl Noise {
+    /// Draws from number `first` on, real and imaginary parts.
+    #[inline]
+    fn draws<const N: usize>(&self, first: u64) -> [[f32; N]; 2] {
+        let mut words = [0; N];
+        (first..).zip(&mut words).for_each(|(number, word)| *word = self.stream.word(number));
+        let whole = normals(&words);
+        if self.share >= 1.0 {
             return whole;
         }
-        whole * share + self.normal(index ^ SPLIT) * (share * (1.0 - share)).sqrt()
+        // A Brownian bridge to the noise of the whole.
+        (first ^ SPLIT..).zip(&mut words).for_each(|(number, word)| *word = self.stream.word(number));
+        let bridge = normals(&words);
+        let (share, spread) = (self.share as f32, (self.share * (1.0 - self.share)).sqrt() as f32);
+        std::array::from_fn(|part| std::array::from_fn(|k| share * whole[part][k] + spread * bridge[part][k]))
+    }
+
+    /// Adds noise of this deviation a component to sums at taps near the prompt.
+    #[inline]
+    pub fn add(&self, taps: &Taps, scale: f64, sums: &mut [Complex64]) {
+        if taps.order.len() <= LANES {
+            add(taps, scale, &self.draws::<LANES>(NEAR), sums);
+        } else {
+            add(taps, scale, &self.draws::<MOST>(NEAR), sums);
+        }
+    }
+
+    /// Noise of unit deviation a component at a tap far from the prompt.
+    pub fn far(&self, chips: f64) -> Complex64 {
+        // Whole chips tell such taps apart.
+        let [[re], [im]] = self.draws::<1>(chips.round() as i64 as u64);
+        Complex64::new(re.into(), im.into())
+    }
+}
+
+#[inline]
+fn add<const N: usize>(taps: &Taps, scale: f64, [re, im]: &[[f32; N]; 2], sums: &mut [Complex64]) {
+    for (row, (index, factors)) in taps.order.iter().zip(&taps.factors).enumerate() {
+        let Some(sum) = sums.get_mut(*index) else { continue };
+        let draws = factors.iter().zip(re.iter().zip(im)).take(row + 1);
+        let noise = draws.fold(Complex64::ZERO, |noise, (factor, (re, im))| {
+            noise + Complex64::new(f64::from(*re), f64::from(*im)) * *factor
+        });
+        *sum += scale * noise;
     }
 }

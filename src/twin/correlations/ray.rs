@@ -1,12 +1,13 @@
 //! One ray in a correlator: the mean of the correlation over an interval.
 
 use generator::scene::Scene;
-use generator::transmit::{RayAt, Transmitter};
+use generator::transmit::RayAt;
 use num_complex::Complex64;
 use receiver::correlate::correlator::{Code, Interval};
-use receiver::correlate::units_to_chips;
+use receiver::correlate::{phasor, units_to_chips};
 
 use super::made::{Made, Peak};
+use super::sent::{Anchor, Sent, centred, split, turns};
 
 /// 2^64 as a float.
 const TURN: f64 = 18_446_744_073_709_551_616.0;
@@ -29,6 +30,8 @@ pub(super) struct Question<'a> {
     pub interval: Interval,
     pub code: &'a Code,
     pub made: &'a Made,
+    /// Index of the signal, if it is sent.
+    pub place: Option<usize>,
 }
 
 /// Differences of a ray's component and a replica, as polynomials in the share of the interval that has
@@ -54,31 +57,33 @@ type Ends = [RayAt; 3];
 
 impl Question<'_> {
     /// Adds the sums of a satellite's rays.
-    pub fn add(&self, scene: &Scene, transmitter: &Transmitter, taps: &[f64], sums: &mut [Complex64]) {
+    pub fn add(&self, sent: &Sent, taps: &[f64], sums: &mut [Complex64]) {
         let Interval { from, to, .. } = self.interval;
         if to <= from {
             return;
         }
         let middle = from + (to - from) / 2;
-        let Some(rays) = transmitter.rays(scene, middle) else { return };
-        for ray in 0..rays.count() {
-            let ends = [from, middle, to].map(|sample| rays.at(ray, sample));
-            let [Some(first), Some(half), Some(last)] = ends else { continue };
+        let Some(leg) = sent.leg(middle) else { return };
+        for (ray, anchor) in leg.anchors.iter().enumerate() {
+            let [Some(first), Some(half), Some(last)] = [from, middle, to].map(|sample| leg.rays.at(ray, sample))
+            else {
+                continue;
+            };
             let ends = [first, half, last];
-            let cycles = self.cycles(scene, transmitter, &ends);
-            for sent in 0..self.made.signal.components.len() {
-                if let Some(course) = self.course(scene, transmitter, (&ends, cycles), sent) {
-                    self.integrate(transmitter, &course, taps, sums);
+            let cycles = self.cycles(anchor, &ends);
+            for component in 0..self.made.signal.components.len() {
+                if let Some(course) = self.course((sent.scene, anchor), (&ends, cycles), component) {
+                    self.integrate(sent, &course, taps, sums);
                 }
             }
         }
     }
 
     /// Difference of the carriers in cycles: at the beginning, and the coefficients of share and square.
-    fn cycles(&self, scene: &Scene, transmitter: &Transmitter, [first, half, last]: &Ends) -> [f64; 3] {
+    fn cycles(&self, anchor: &Anchor, [first, half, last]: &Ends) -> [f64; 3] {
         let Interval { nco, from, to, .. } = self.interval;
         let samples = (to - from) as f64;
-        let (turns, step) = transmitter.turns_at(scene, from, first);
+        let (turns, step) = anchor.turns_at(from, first);
         let begin_cycles = turns.wrapping_sub(nco.carrier) as i64 as f64 / TURN;
         let local_cycles = step.wrapping_sub(nco.carrier_step) as i64 as f64 / TURN * samples;
         let at = ((to - from) / 2) as f64 / samples;
@@ -89,26 +94,25 @@ impl Question<'_> {
 
     fn course(
         &self,
-        scene: &Scene,
-        transmitter: &Transmitter,
+        (scene, anchor): (&Scene, &Anchor),
         ([first, half, last], cycles): (&Ends, [f64; 3]),
         sent: usize,
     ) -> Option<Course<'_>> {
         let Interval { nco, from, to, .. } = self.interval;
         let (made, rate_hz, samples) = (self.made, scene.clock.rate.hz(), (to - from) as f64);
         let component = made.signal.components.get(sent)?;
-        let code = transmitter.code_at(scene, sent, from, first.delay_s)?;
+        let (period, share) = anchor.code_at(sent, component.period_s(), anchor.elapsed_s(from, rate_hz), first)?;
         let (length, local_length) = (f64::from(component.code_chips), f64::from(made.length));
         let sent_s = samples / rate_hz - (last.delay_s - first.delay_s);
         let passed = sent_s * component.chip_rate_hz;
-        let phase = code.share * length;
+        let phase = share * length;
         // Segment of a long code: that of the replica, or else that which is sent.
         let running = || ((phase + 0.5 * passed).rem_euclid(length) / local_length) as u64;
         let is_long = component.code_chips > made.length;
         let segment = self.code.segment.unwrap_or_else(|| if is_long { running() } else { 0 });
         let begin = if is_long { segment as f64 * local_length } else { 0.0 };
-        let local = begin + units_to_chips(nco.code).rem_euclid(local_length);
-        let apart = (phase - local + 0.5 * length).rem_euclid(length) - 0.5 * length;
+        let local = begin + local_length * split(units_to_chips(nco.code) / local_length).1;
+        let apart = centred(phase - local, length);
         let peak = made.peak(self.code.link.sv.number, segment as usize, sent)?;
         let gained = passed - units_to_chips(nco.code_step as i64) * samples;
         let [begin_cycles, rate, bend] = cycles;
@@ -118,14 +122,14 @@ impl Question<'_> {
             peak,
             chips: [apart, gained],
             cycles: [begin_cycles + component.phase_cycles, rate, bend],
-            periods: [code.share, passed / length],
-            period: code.at.period,
+            periods: [share, passed / length],
+            period,
             amplitude: noise_lsb * (2.0 * half.cn0_hz / rate_hz * component.power_share).sqrt() * samples,
         })
     }
 
     /// Adds the mean of a course, piece by piece between changes of sign.
-    fn integrate(&self, transmitter: &Transmitter, course: &Course, taps: &[f64], sums: &mut [Complex64]) {
+    fn integrate(&self, sent: &Sent, course: &Course, taps: &[f64], sums: &mut [Complex64]) {
         let reach = course.peak.reach_chips() + course.chips[1].abs();
         if taps.iter().all(|tap| (course.chips[0] - tap).abs() > reach) {
             return;
@@ -135,7 +139,7 @@ impl Question<'_> {
         let [share, passed] = course.periods;
         let (mut from, end) = (-ahead, 1.0 - ahead);
         let mut period = course.period;
-        let mut sign = transmitter.sign(course.sent, period);
+        let mut sign = sent.sign(course.sent, period);
         while from < end {
             let (mut to, mut next) = (end, sign);
             // The next change of sign.
@@ -145,7 +149,7 @@ impl Question<'_> {
                     break;
                 }
                 period += 1;
-                next = transmitter.sign(course.sent, period);
+                next = sent.sign(course.sent, period);
                 if next != sign && edge > from {
                     to = edge;
                     break;
@@ -166,8 +170,7 @@ fn piece(course: &Course, (from, to): (f64, f64), sign: f64, taps: &[f64], sums:
     let mut node = |share: f64, weight: f64| {
         let chips = course.chips[0] + course.chips[1] * share;
         let cycles = course.cycles[0] + share * (rate + share * bend);
-        let (sin, cos) = libm::sincos(std::f64::consts::TAU * (cycles - cycles.round()));
-        let phasor = Complex64::new(cos, sin) * (sign * weight * course.amplitude);
+        let phasor = phasor(turns(cycles)) * (sign * weight * course.amplitude);
         for (sum, tap) in sums.iter_mut().zip(taps) {
             *sum += phasor * course.peak.value(chips - tap);
         }

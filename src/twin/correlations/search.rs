@@ -49,8 +49,9 @@ fn own_cells(model: &Correlations, sought: &Sought) -> Vec<Cell> {
     let [first_hz, second_hz, ..] = sought.dopplers_hz else { return Vec::new() };
     let step_hz = second_hz - first_hz;
     let mut found = Vec::new();
-    for transmitter in model.alike(sought.code.link) {
-        let Some((made, _)) = model.made(&sought.code) else { continue };
+    let Some((made, _, place)) = model.made(&sought.code) else { return found };
+    for sent in model.alike(place) {
+        let transmitter = sent.transmitter;
         let middle = sought.first + (0.5 * sought.begins.iter().fold(0.0, |a: f64, b| a.max(*b))) as u64;
         let Some(rays) = transmitter.rays(scene, middle) else { continue };
         let later = middle + (1e-3 * rate_hz) as u64;
@@ -79,7 +80,7 @@ fn at_doppler(model: &Correlations, sought: &Sought, phase: f64, doppler_hz: f64
     for code in std::iter::once(&sought.code).chain(&sought.beside) {
         for (dwell, begin) in sought.begins.iter().enumerate() {
             let sums = dwell_sums(model, sought, code, (phase, doppler_hz), (*begin, dwell as u64, bin), &offsets)?;
-            let (made, _) = model.made(code)?;
+            let (made, ..) = model.made(code)?;
             let common = made.own.value(sought.lag_chips) / made.own.value(0.0);
             let between = |a: Complex64, b: Complex64| (a + b).norm_sqr() / (2.0 * (1.0 + common));
             let [a, b, c] = sums;
@@ -101,7 +102,7 @@ fn dwell_sums(
     (begin, dwell, bin): (f64, u64, i64),
     offsets: &[f64; 3],
 ) -> Option<[Complex64; 3]> {
-    let (made, [variance, _]) = model.made(code)?;
+    let (made, known, place) = model.made(code)?;
     let scene = model.plan.scene;
     let (rate_hz, carrier_hz) = (scene.clock.rate.hz(), code.link.carrier_hz());
     let from = sought.first + begin.ceil() as u64;
@@ -116,15 +117,15 @@ fn dwell_sums(
         code_step: chips_to_units(step) as u64,
     };
     let mut sums = [Complex64::ZERO; 3];
-    let question = Question { interval: Interval { nco, from, to, end: to }, code, made };
+    let question = Question { interval: Interval { nco, from, to, end: to }, code, made, place };
     model.expect(&question, offsets, &mut sums);
-    let deviation = (variance * (to - from) as f64 * made.share * made.own.value(0.0)).sqrt();
+    let deviation = known.deviations[0] * ((to - from) as f64).sqrt();
     if deviation <= 0.0 {
         // Without noise what is there exceeds any threshold.
         return Some(sums);
     }
     sums.iter_mut().for_each(|sum| *sum /= deviation);
-    let stream = model.stream(code, made).part(SEARCH).part(sought.first).part(dwell).part(bin as u64);
-    Noise { stream, own: &made.own }.add(offsets, 1.0, [1.0; 2], &mut sums);
+    let stream = known.stream(code).part(SEARCH).part(sought.first).part(dwell).part(bin as u64);
+    made.with_taps(offsets, |taps| Noise { stream, share: 1.0 }.add(taps, 1.0, &mut sums));
     Some(sums)
 }
