@@ -40,7 +40,7 @@ static OWN: Signal = Signal {
         phase_cycles: 0.0,
         chip_rate_hz: 1.023e6,
         code_chips: 4092,
-        code: |number| (1..=32).contains(&number).then(|| code(number)),
+        code: &|number| (1..=32).contains(&number).then(|| code(number)),
         layers: &[Layer::BOC11],
         secondary_code: SecondaryCode::None,
         message: Some(&FRAMES),

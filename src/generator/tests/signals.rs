@@ -48,7 +48,7 @@ static LAYERED: Signal = Signal {
         phase_cycles: 0.1,
         chip_rate_hz: 1.023e6,
         code_chips: 93,
-        code: |number| Some((0..93_u8).map(|k| [1, 0, -1, -1, 1][usize::from((k ^ number) % 5)]).collect()),
+        code: &|number| Some((0..93_u8).map(|k| [1, 0, -1, -1, 1][usize::from((k ^ number) % 5)]).collect()),
         layers: &[
             Layer { weight: 0.5, ..Layer::BPSK },
             Layer { weight: -0.4, phase_cycles: 0.2, ..Layer::BOC11 },
@@ -419,7 +419,7 @@ fn what_cannot_be_rendered_is_refused_by_name() {
     assert!(mixed.voices(Layers::Whole, Edge::Area, 0.8184e6).is_ok());
     static SHORT: Signal = Signal {
         name: "short",
-        components: &[Component { code: |_| Some(vec![1; 5]), code_chips: 6, ..TEMPLATE }],
+        components: &[Component { code: &|_| Some(vec![1; 5]), code_chips: 6, ..TEMPLATE }],
         ..L1_CA
     };
     static OFF_GRID: Signal =
@@ -434,7 +434,7 @@ fn what_cannot_be_rendered_is_refused_by_name() {
         phase_cycles: 0.0,
         chip_rate_hz: 1.023e6,
         code_chips: 5,
-        code: |number| (number < 9).then(|| vec![1, -1, 0, 1, 1]),
+        code: &|number| (number < 9).then(|| vec![1, -1, 0, 1, 1]),
         layers: &[Layer::BPSK],
         secondary_code: SecondaryCode::None,
         message: None,
@@ -574,7 +574,7 @@ fn a_rate_that_a_scene_cannot_have_is_refused_with_the_rate_that_it_could() {
             phase_cycles: 0.0,
             chip_rate_hz: 10.23e6,
             code_chips: 10_230,
-            code: |_| Some(vec![1; 10_230]),
+            code: &|_| Some(vec![1; 10_230]),
             layers: &[Layer::BOC11],
             secondary_code: SecondaryCode::None,
             message: None,

@@ -40,7 +40,7 @@ pub static B1C: Signal = Signal {
             phase_cycles: 0.25,
             chip_rate_hz: 1.023e6,
             code_chips: CODE_CHIPS,
-            code: |number| code(Code::Pilot, number),
+            code: &|number| code(Code::Pilot, number),
             layers: &[
                 Layer { weight: 0.937_436_866_561_091_8, ..Layer::BOC11 }, // √(29/33)
                 Layer { weight: 0.348_155_311_911_395_6, phase_cycles: -0.25, ..Layer::BOC61 }, // √(4/33)
@@ -53,7 +53,7 @@ pub static B1C: Signal = Signal {
             phase_cycles: 0.0,
             chip_rate_hz: 1.023e6,
             code_chips: CODE_CHIPS,
-            code: |number| code(Code::Data, number),
+            code: &|number| code(Code::Data, number),
             layers: &[Layer::BOC11],
             secondary_code: SecondaryCode::None,
             message: Some(&B_CNAV1),

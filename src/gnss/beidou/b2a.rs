@@ -37,7 +37,7 @@ pub static B2A: Signal = Signal {
             phase_cycles: 0.0,
             chip_rate_hz: 10.23e6,
             code_chips: CODE_CHIPS,
-            code: |number| code(Code::Data, number),
+            code: &|number| code(Code::Data, number),
             layers: &[Layer::BPSK],
             secondary_code: SecondaryCode::Shared(&[1, 1, 1, -1, 1]), // 00010
             message: Some(&B_CNAV2),
@@ -47,7 +47,7 @@ pub static B2A: Signal = Signal {
             phase_cycles: 0.25,
             chip_rate_hz: 10.23e6,
             code_chips: CODE_CHIPS,
-            code: |number| code(Code::Pilot, number),
+            code: &|number| code(Code::Pilot, number),
             layers: &[Layer::BPSK],
             secondary_code: SecondaryCode::PerSatellite { chips: SECONDARY_CODE_CHIPS, of: secondary_code },
             message: None,

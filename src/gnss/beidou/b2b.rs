@@ -35,7 +35,7 @@ pub static B2B: Signal = Signal {
         phase_cycles: 0.0,
         chip_rate_hz: 10.23e6,
         code_chips: CODE_CHIPS,
-        code,
+        code: &code,
         layers: &[Layer::BPSK],
         secondary_code: SecondaryCode::None,
         message: Some(&B_CNAV3),

@@ -46,7 +46,7 @@ pub static B3I: Signal = Signal {
     name: "BeiDou B3I",
     rinex: "6I",
     carrier: Carrier::Common(1_268.52e6),
-    components: &[Component { chip_rate_hz: 10.23e6, code_chips: 10_230, code: long, ..SHORT }],
+    components: &[Component { chip_rate_hz: 10.23e6, code_chips: 10_230, code: &long, ..SHORT }],
     ..B1I
 };
 
@@ -55,7 +55,7 @@ const SHORT: Component = Component {
     phase_cycles: 0.0,
     chip_rate_hz: 2.046e6,
     code_chips: 2046,
-    code: short,
+    code: &short,
     layers: &[Layer::BPSK],
     secondary_code: SecondaryCode::None,
     message: Some(&D1_D2),

@@ -12,7 +12,7 @@
 //! whole, within ±32.5 MHz.
 
 use super::e5::{self, Code};
-use crate::signal::{Carrier, Component, Layer, Signal};
+use crate::signal::{Carrier, Codes, Component, Layer, Signal};
 
 /// Definition of E5 with I/NAV on its upper and F/NAV on its lower sideband.
 pub static E5: Signal = Signal {
@@ -21,16 +21,16 @@ pub static E5: Signal = Signal {
     carrier: Carrier::Common(1_191.795e6), // 2.1, table 2
     minimum_power_dbw: Some(-152.24),      // 2.7.1, table 12: −155.25 on either side
     components: &[
-        side(&UP, &e5::E5B.components[0], |number| code(Code::E5bData, number)),
-        side(&UP, &e5::E5B.components[1], |number| code(Code::E5bPilot, number)),
-        side(&DOWN, &e5::E5A.components[0], |number| code(Code::E5aData, number)),
-        side(&DOWN, &e5::E5A.components[1], |number| code(Code::E5aPilot, number)),
+        side(&UP, &e5::E5B.components[0], &|number| code(Code::E5bData, number)),
+        side(&UP, &e5::E5B.components[1], &|number| code(Code::E5bPilot, number)),
+        side(&DOWN, &e5::E5A.components[0], &|number| code(Code::E5aData, number)),
+        side(&DOWN, &e5::E5A.components[1], &|number| code(Code::E5aPilot, number)),
     ],
     ..e5::E5A
 };
 
 /// A component of E5a or E5b on the sub-carrier's side, with a quarter of the power.
-const fn side(layers: &'static [Layer], alone: &Component, code: fn(u8) -> Option<Vec<i8>>) -> Component {
+const fn side(layers: &'static [Layer], alone: &Component, code: &'static Codes) -> Component {
     Component {
         power_share: 0.25,
         phase_cycles: alone.phase_cycles,

@@ -11,7 +11,7 @@ use crate::galileo::fnav::FNAV;
 use crate::galileo::inav::INAV_E5B;
 use crate::message::Message;
 use crate::satellite::System;
-use crate::signal::{Carrier, Component, Layer, SecondaryCode, Signal, always};
+use crate::signal::{Carrier, Codes, Component, Layer, SecondaryCode, Signal, always};
 use crate::time::GST;
 
 /// Chips in a code period.
@@ -28,8 +28,8 @@ pub static E5A: Signal = Signal {
     sent: always,
     minimum_power_dbw: Some(-155.25), // 2.7.1, table 12: both components
     components: &[
-        data(|number| code(Code::E5aData, number), SecondaryCode::Shared(&CS20), &FNAV),
-        pilot(|number| code(Code::E5aPilot, number), secondary_code),
+        data(&|number| code(Code::E5aData, number), SecondaryCode::Shared(&CS20), &FNAV),
+        pilot(&|number| code(Code::E5aPilot, number), secondary_code),
     ],
 };
 
@@ -39,9 +39,9 @@ pub static E5B: Signal = Signal {
     rinex: "7Q",
     carrier: Carrier::Common(1_207.14e6), // 2.1, table 2
     components: &[
-        data(|number| code(Code::E5bData, number), SecondaryCode::Shared(&CS4), &INAV_E5B),
+        data(&|number| code(Code::E5bData, number), SecondaryCode::Shared(&CS4), &INAV_E5B),
         // Table 19: numbers 51 to 100 are those of E5b.
-        pilot(|number| code(Code::E5bPilot, number), |number| secondary_code(number.checked_add(SATELLITES)?)),
+        pilot(&|number| code(Code::E5bPilot, number), |number| secondary_code(number.checked_add(SATELLITES)?)),
     ],
     ..E5A
 };
@@ -49,7 +49,7 @@ pub static E5B: Signal = Signal {
 const SATELLITES: u8 = 50;
 
 /// The component in phase.
-const fn data(code: fn(u8) -> Option<Vec<i8>>, secondary_code: SecondaryCode, message: &'static Message) -> Component {
+const fn data(code: &'static Codes, secondary_code: SecondaryCode, message: &'static Message) -> Component {
     Component {
         power_share: 0.5,
         phase_cycles: 0.0,
@@ -63,7 +63,7 @@ const fn data(code: fn(u8) -> Option<Vec<i8>>, secondary_code: SecondaryCode, me
 }
 
 /// The component in quadrature, a quarter of a cycle ahead.
-const fn pilot(code: fn(u8) -> Option<Vec<i8>>, of: fn(u8) -> Option<Vec<i8>>) -> Component {
+const fn pilot(code: &'static Codes, of: fn(u8) -> Option<Vec<i8>>) -> Component {
     Component {
         power_share: 0.5,
         phase_cycles: 0.25,

@@ -29,7 +29,7 @@ pub static G1: Signal = Signal {
         phase_cycles: 0.0,
         chip_rate_hz: 0.511e6,
         code_chips: 511,
-        code: |number| channel(number).map(|_| code()),
+        code: &|number| channel(number).map(|_| code()),
         layers: &[Layer::BPSK],
         secondary_code: SecondaryCode::None,
         message: Some(&GNAV),

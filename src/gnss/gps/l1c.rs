@@ -42,7 +42,7 @@ pub static L1C: Signal = Signal {
             phase_cycles: AHEAD_OF_CA_CYCLES,
             chip_rate_hz: 1.023e6,
             code_chips: CODE_CHIPS,
-            code: |number| code(Code::Pilot, gps(number)?),
+            code: &|number| code(Code::Pilot, gps(number)?),
             layers: &[Layer { chips: &ONE, ..Layer::BOC11 }, Layer { chips: &SIX, ..Layer::BOC61 }],
             secondary_code: SecondaryCode::PerSatellite {
                 chips: SECONDARY_CODE_CHIPS,
@@ -55,7 +55,7 @@ pub static L1C: Signal = Signal {
             phase_cycles: AHEAD_OF_CA_CYCLES,
             chip_rate_hz: 1.023e6,
             code_chips: CODE_CHIPS,
-            code: |number| code(Code::Data, gps(number)?),
+            code: &|number| code(Code::Data, gps(number)?),
             layers: &[Layer::BOC11],
             secondary_code: SecondaryCode::None,
             message: Some(&CNAV2),

@@ -27,7 +27,7 @@ pub static L1_CA: Signal = Signal {
         phase_cycles: 0.0,
         chip_rate_hz: 1.023e6, // IS-GPS-200N, 3.3.2.3
         code_chips: CODE_CHIPS,
-        code: |prn| Some(gps(prn).and_then(code)?.iter().map(|&one| if one { -1 } else { 1 }).collect()),
+        code: &|prn| Some(gps(prn).and_then(code)?.iter().map(|&one| if one { -1 } else { 1 }).collect()),
         layers: &[Layer::BPSK],
         secondary_code: SecondaryCode::None,
         message: Some(&LNAV),

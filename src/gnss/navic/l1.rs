@@ -37,7 +37,7 @@ pub static L1: Signal = Signal {
             phase_cycles: 0.0,
             chip_rate_hz: 1.023e6,
             code_chips: CODE_CHIPS,
-            code: |number| code(Code::Pilot, number),
+            code: &|number| code(Code::Pilot, number),
             // √(60/64) and √(4/64): of the whole 6/11 and 4/110.
             layers: &[
                 Layer { weight: 0.968_245_836_551_854_2, ..Layer::BOC11 },
@@ -51,7 +51,7 @@ pub static L1: Signal = Signal {
             phase_cycles: 0.25,
             chip_rate_hz: 1.023e6,
             code_chips: CODE_CHIPS,
-            code: |number| code(Code::Data, number),
+            code: &|number| code(Code::Data, number),
             // √(40/46) and √(6/46): of the whole 4/11, and 6/110 of the product.
             layers: &[
                 Layer { weight: 0.932_504_808_240_313_8, ..Layer::BOC11 },

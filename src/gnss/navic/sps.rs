@@ -25,7 +25,7 @@ pub static L5: Signal = Signal {
     carrier: Carrier::Common(1_176.45e6),
     sent: always,
     minimum_power_dbw: Some(-159.0),
-    components: &[Component { code: |number| signs(&L5_STARTS, number), ..SPS }],
+    components: &[Component { code: &|number| signs(&L5_STARTS, number), ..SPS }],
 };
 
 /// The signal on S.
@@ -35,7 +35,7 @@ pub static S: Signal = Signal {
     carrier: Carrier::Common(2_492.028e6),
     sent: always,
     minimum_power_dbw: Some(-162.3),
-    components: &[Component { code: |number| signs(&S_STARTS, number), ..SPS }],
+    components: &[Component { code: &|number| signs(&S_STARTS, number), ..SPS }],
     ..L5
 };
 
@@ -45,7 +45,7 @@ const SPS: Component = Component {
     phase_cycles: 0.0,
     chip_rate_hz: 1.023e6,
     code_chips: CODE_CHIPS,
-    code: |number| signs(&L5_STARTS, number),
+    code: &|number| signs(&L5_STARTS, number),
     layers: &[Layer::BPSK],
     secondary_code: SecondaryCode::None,
     message: Some(&SPS_NAV),

@@ -22,14 +22,14 @@ pub static L1C: Signal = Signal {
     minimum_power_dbw: Some(-157.0), // 3.1: both components
     components: &[
         Component {
-            code: |number| code(Code::Pilot, prn(number)?),
+            code: &|number| code(Code::Pilot, prn(number)?),
             secondary_code: SecondaryCode::PerSatellite {
                 chips: SECONDARY_CODE_CHIPS,
                 of: |number| secondary_code(prn(number)?),
             },
             ..l1c::L1C.components[0]
         },
-        Component { code: |number| code(Code::Data, prn(number)?), message: Some(&CNAV2), ..l1c::L1C.components[1] },
+        Component { code: &|number| code(Code::Data, prn(number)?), message: Some(&CNAV2), ..l1c::L1C.components[1] },
     ],
     ..l1c::L1C
 };

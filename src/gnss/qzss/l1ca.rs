@@ -19,7 +19,7 @@ pub static L1_CA: Signal = Signal {
     sent: satellites::sends_l1ca,
     minimum_power_dbw: Some(-158.5), // 3.1
     components: &[Component {
-        code: |number| Some(code(prn(number)?)?.iter().map(|&one| if one { -1 } else { 1 }).collect()),
+        code: &|number| Some(code(prn(number)?)?.iter().map(|&one| if one { -1 } else { 1 }).collect()),
         message: Some(&LNAV),
         ..l1ca::L1_CA.components[0]
     }],

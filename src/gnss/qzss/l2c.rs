@@ -19,11 +19,11 @@ pub static L2C: Signal = Signal {
     minimum_power_dbw: Some(-160.0), // 3.1: both components
     components: &[
         Component {
-            code: |number| placed(Code::Moderate, prn(number)?),
+            code: &|number| placed(Code::Moderate, prn(number)?),
             message: Some(&CNAV_L2C),
             ..l2c::L2C.components[0]
         },
-        Component { code: |number| placed(Code::Long, prn(number)?), ..l2c::L2C.components[1] },
+        Component { code: &|number| placed(Code::Long, prn(number)?), ..l2c::L2C.components[1] },
     ],
     ..l2c::L2C
 };

@@ -18,8 +18,8 @@ pub static L5: Signal = Signal {
     sent: always,
     minimum_power_dbw: Some(-154.9), // 3.1: -157.9 dBW a component
     components: &[
-        Component { code: |number| code(Code::Data, prn(number)?), message: Some(&CNAV), ..l5::L5.components[0] },
-        Component { code: |number| code(Code::Pilot, prn(number)?), ..l5::L5.components[1] },
+        Component { code: &|number| code(Code::Data, prn(number)?), message: Some(&CNAV), ..l5::L5.components[0] },
+        Component { code: &|number| code(Code::Pilot, prn(number)?), ..l5::L5.components[1] },
     ],
     ..l5::L5
 };

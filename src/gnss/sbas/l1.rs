@@ -23,7 +23,7 @@ pub static L1: Signal = Signal {
     sent: always,
     minimum_power_dbw: Some(-161.0), // A.2
     components: &[Component {
-        code: |number| Some(code(prn(number)?)?.iter().map(|&one| if one { -1 } else { 1 }).collect()),
+        code: &|number| Some(code(prn(number)?)?.iter().map(|&one| if one { -1 } else { 1 }).collect()),
         message: Some(&SBAS),
         ..l1ca::L1_CA.components[0]
     }],

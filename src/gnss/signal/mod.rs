@@ -139,8 +139,10 @@ pub enum Carrier {
     },
 }
 
+/// Codes of a component's satellites by their numbers ([`Component::code`]).
+pub(crate) type Codes = dyn Fn(u8) -> Option<Vec<i8>> + Sync;
+
 /// One spreading code on a carrier.
-#[derive(Debug)]
 pub struct Component {
     /// Share of the signal's power.
     pub power_share: f64,
@@ -153,7 +155,7 @@ pub struct Component {
     /// Function that returns the code of a satellite number: `code_chips` values. They are +1 for a logical
     /// 0, −1 for a logical 1, and 0 where another component's code has its turn. `None` if the document
     /// assigns no code.
-    pub code: fn(u8) -> Option<Vec<i8>>,
+    pub code: &'static (dyn Fn(u8) -> Option<Vec<i8>> + Sync),
     /// Layers whose sum is the waveform of a chip.
     pub layers: &'static [Layer],
     /// Secondary code: a chip for each period of the code.
@@ -483,6 +485,15 @@ pub fn least_common_multiple(a: usize, b: usize) -> usize {
         (x, y) = (y, x % y);
     }
     a / x * b
+}
+
+impl fmt::Debug for Component {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { power_share, chip_rate_hz, code_chips, layers, message, .. } = self;
+        let mut shown = f.debug_struct("Component");
+        shown.field("power_share", power_share).field("chip_rate_hz", chip_rate_hz).field("code_chips", code_chips);
+        shown.field("layers", layers).field("message", message).finish_non_exhaustive()
+    }
 }
 
 impl PartialEq for Signal {

@@ -129,7 +129,7 @@ mod tests {
             phase_cycles: 0.0,
             chip_rate_hz: 1.023e6,
             code_chips: 4092,
-            code: |_| None,
+            code: &|_| None,
             layers,
             secondary_code: SecondaryCode::None,
             message: None,

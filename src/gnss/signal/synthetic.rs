@@ -35,7 +35,7 @@ pub static LONG_BOC: Signal = Signal {
             phase_cycles: 0.0,
             chip_rate_hz: 1.023e6,
             code_chips: 4092,
-            code: |number| assigned(number, 36, || random(4092, u64::from(number))),
+            code: &|number| assigned(number, 36, || random(4092, u64::from(number))),
             layers: &[Layer::BOC11],
             secondary_code: SecondaryCode::None,
             message: Some(&INAV),
@@ -45,7 +45,7 @@ pub static LONG_BOC: Signal = Signal {
             phase_cycles: 0.5,
             chip_rate_hz: 1.023e6,
             code_chips: 4092,
-            code: |number| assigned(number, 36, || random(4092, 100 + u64::from(number))),
+            code: &|number| assigned(number, 36, || random(4092, 100 + u64::from(number))),
             layers: &[Layer::BOC11],
             secondary_code: SecondaryCode::Shared(&[
                 1, 1, -1, -1, 1, 1, 1, 1, 1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, -1, 1, -1, -1, 1, -1,
@@ -72,7 +72,7 @@ pub static QUADRATURE: Signal = Signal {
             phase_cycles: 0.0,
             chip_rate_hz: 10.23e6,
             code_chips: 10_230,
-            code: |number| assigned(number, 32, || random(10_230, 200 + u64::from(number))),
+            code: &|number| assigned(number, 32, || random(10_230, 200 + u64::from(number))),
             layers: &[Layer::BPSK],
             secondary_code: SecondaryCode::Shared(&[1, 1, 1, 1, -1, -1, 1, -1, 1, -1]),
             message: None,
@@ -82,7 +82,7 @@ pub static QUADRATURE: Signal = Signal {
             phase_cycles: -0.25,
             chip_rate_hz: 10.23e6,
             code_chips: 10_230,
-            code: |number| assigned(number, 32, || random(10_230, 300 + u64::from(number))),
+            code: &|number| assigned(number, 32, || random(10_230, 300 + u64::from(number))),
             layers: &[Layer::BPSK],
             secondary_code: SecondaryCode::PerSatellite {
                 chips: 20,
@@ -122,7 +122,7 @@ pub static CHANNELS: Signal = Signal {
         phase_cycles: 0.0,
         chip_rate_hz: 0.511e6,
         code_chips: 511,
-        code: |number| assigned(number, 24, || random(511, 500)),
+        code: &|number| assigned(number, 24, || random(511, 500)),
         layers: &[Layer::BPSK],
         secondary_code: SecondaryCode::None,
         message: None,
@@ -145,7 +145,7 @@ pub static MULTIPLEXED: Signal = Signal {
             phase_cycles: 0.0,
             chip_rate_hz: 1.023e6,
             code_chips: 20_460,
-            code: |number| assigned(number, 32, || in_turn(10_230, 0, 600 + u64::from(number))),
+            code: &|number| assigned(number, 32, || in_turn(10_230, 0, 600 + u64::from(number))),
             layers: &[Layer::BPSK],
             secondary_code: SecondaryCode::None,
             message: None,
@@ -155,7 +155,7 @@ pub static MULTIPLEXED: Signal = Signal {
             phase_cycles: 0.0,
             chip_rate_hz: 1.023e6,
             code_chips: 1_534_500,
-            code: |number| assigned(number, 32, || in_turn(767_250, 1, 700 + u64::from(number))),
+            code: &|number| assigned(number, 32, || in_turn(767_250, 1, 700 + u64::from(number))),
             layers: &[Layer::BPSK],
             secondary_code: SecondaryCode::None,
             message: None,
@@ -192,7 +192,7 @@ pub static MIXED: Signal = Signal {
             phase_cycles: 0.0,
             chip_rate_hz: 1.023e6,
             code_chips: 10_230,
-            code: |number| assigned(number, 10, || random(10_230, 800 + u64::from(number))),
+            code: &|number| assigned(number, 10, || random(10_230, 800 + u64::from(number))),
             layers: &[Layer { chips: &ONE, ..Layer::BOC11 }, Layer { chips: &SIX, ..Layer::BOC61 }],
             secondary_code: SecondaryCode::PerSatellite {
                 chips: 1800,
@@ -205,7 +205,7 @@ pub static MIXED: Signal = Signal {
             phase_cycles: 0.0,
             chip_rate_hz: 1.023e6,
             code_chips: 10_230,
-            code: |number| assigned(number, 10, || random(10_230, 1000 + u64::from(number))),
+            code: &|number| assigned(number, 10, || random(10_230, 1000 + u64::from(number))),
             layers: &[Layer::BOC11],
             secondary_code: SecondaryCode::None,
             message: None,
@@ -227,7 +227,7 @@ pub static SIDES: Signal = Signal {
     components: &[
         Component {
             phase_cycles: 0.0,
-            code: |number| assigned(number, 36, || random(2046, 1100 + u64::from(number))),
+            code: &|number| assigned(number, 36, || random(2046, 1100 + u64::from(number))),
             secondary_code: SecondaryCode::Shared(&[1, -1]),
             message: Some(&INAV_E5B),
             ..UPPER_PILOT
@@ -235,7 +235,7 @@ pub static SIDES: Signal = Signal {
         UPPER_PILOT,
         Component {
             phase_cycles: 0.0,
-            code: |number| assigned(number, 36, || random(2046, 1400 + u64::from(number))),
+            code: &|number| assigned(number, 36, || random(2046, 1400 + u64::from(number))),
             secondary_code: SecondaryCode::Shared(&[1, 1, -1, 1, -1, -1, -1, 1, 1, 1]),
             message: Some(&FNAV),
             ..LOWER_PILOT
@@ -249,7 +249,7 @@ const UPPER_PILOT: Component = Component {
     phase_cycles: 0.25,
     chip_rate_hz: 1.023e6,
     code_chips: 2046,
-    code: |number| assigned(number, 36, || random(2046, 1200 + u64::from(number))),
+    code: &|number| assigned(number, 36, || random(2046, 1200 + u64::from(number))),
     layers: &UP,
     secondary_code: SecondaryCode::PerSatellite {
         chips: 20,
@@ -259,7 +259,7 @@ const UPPER_PILOT: Component = Component {
 };
 
 const LOWER_PILOT: Component = Component {
-    code: |number| assigned(number, 36, || random(2046, 1500 + u64::from(number))),
+    code: &|number| assigned(number, 36, || random(2046, 1500 + u64::from(number))),
     layers: &DOWN,
     secondary_code: SecondaryCode::PerSatellite {
         chips: 20,
