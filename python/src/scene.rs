@@ -209,7 +209,7 @@ impl Scene {
         let overrides = overrides(seed, format, allow_outside)?;
         let directory = directory.unwrap_or_else(|| PathBuf::from("."));
         long(py, |_| {
-            let scenario = chosen(Scenario::parse(text, "scenario")?, front_end)?;
+            let scenario = chosen(Scenario::parse_in(text, "scenario", &directory, allow_outside)?, front_end)?;
             Self::compose(scenario, Settings::of_scenario(text, "scenario")?, directory, overrides)
         })
     }
@@ -237,7 +237,8 @@ impl Scene {
                 Some(toml::Value::Table(receiver)) => Settings::from_table(receiver, "receiver")?,
                 Some(_) => return Err(Failure::other("receiver: expected a dict")),
             };
-            let scenario = Scenario::parse(&text, "scenario").map_err(|error| Failure::of_table(&error))?;
+            let scenario = Scenario::parse_in(&text, "scenario", &directory, allow_outside)
+                .map_err(|error| Failure::of_table(&error))?;
             Self::compose(chosen(scenario, front_end)?, settings, directory, overrides)
         })
     }

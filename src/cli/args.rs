@@ -444,6 +444,9 @@ pub struct Receive {
     /// [default: those of the settings; else those of the metadata; else GPS L1 C/A, or all if L1 is outside]
     #[arg(long, value_name = "all|NAMES", value_delimiter = ',')]
     pub signals: Vec<String>,
+    /// File that describes a signal, which --signals and the settings may then name; may be repeated
+    #[arg(long = "signal-file", value_name = "FILE")]
+    pub signal_files: Vec<PathBuf>,
     /// Sample format of a raw file or stream: ci8, cu8, ci16, cf32, ri8, ri16
     #[arg(long)]
     pub format: Option<Format>,

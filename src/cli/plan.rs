@@ -24,7 +24,7 @@ const G_MPS2: f64 = 9.806_65;
 
 /// Prints the plan of a scene.
 pub fn execute(arguments: &args::Plan) -> Result<(), CliError> {
-    let named = scenario::read(arguments.scenario.as_deref())?;
+    let named = scenario::read(arguments.scenario.as_deref(), arguments.allow_outside)?;
     let overrides = Overrides { allow_outside: arguments.allow_outside, ..Overrides::default() };
     let (scenes, warnings) = scenario::compose_all(&named, &overrides)?;
     let settings = scenario::receiver_settings(&named)?;

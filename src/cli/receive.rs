@@ -27,6 +27,7 @@ use receiver::settings::Settings;
 /// Receives a recording or a stream.
 pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
     scenario::use_threads(arguments.threads)?;
+    scenario::describe_signals(&arguments.signal_files)?;
     let settings = match &arguments.receiver {
         None => Settings::default(),
         Some(path) => {

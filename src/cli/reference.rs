@@ -8,6 +8,7 @@ use crate::cli::scenario;
 use analysis::judge::judgement::MARGINAL_SHARE;
 use analysis::judge::schema;
 use generator::scenario::keys::SCENARIO;
+use generator::scenario::keys::signal::SIGNAL;
 use generator::scenario::schema::{Listed, tables_of};
 use gnss::place::nearest;
 use receiver::settings::reference as receiver;
@@ -48,12 +49,14 @@ pub fn whole() -> String {
     out
 }
 
-fn chapters() -> [(&'static str, Vec<Section>); 4] {
+fn chapters() -> [(&'static str, Vec<Section>); 5] {
     let top = "At the top of the file. Paths are relative to the scenario and stay below its directory.";
     let study =
         "At the top of the file. At level = \"samples\" an axis may take any key of the scene or of the receiver.";
+    let signal = "At the top of a file that `signal_file` of a scenario, or `receive --signal-file`, names.";
     [
         ("Scenario", declared(tables_of(SCENARIO, "", top), "scenario", "")),
+        ("Signal file", declared(tables_of(SIGNAL, "", signal), "signal", "signal.")),
         ("Receiver settings", of_receiver()),
         ("Study", declared(tables_of(STUDY, "", study), "study", "study.")),
         ("Limits (`--check`)", vec![Section { name: "limits".to_owned(), text: limits() }]),
@@ -123,7 +126,7 @@ mod tests {
     #[test]
     fn every_declared_key_has_a_meaning_and_stands_in_the_reference() {
         let text = whole();
-        for table in tables_of(SCENARIO, "", "x").into_iter().chain(tables_of(STUDY, "", "x")) {
+        for table in [SCENARIO, SIGNAL, STUDY].into_iter().flat_map(|keys| tables_of(keys, "", "x")) {
             assert!(!table.meaning.is_empty(), "{}", table.path);
             for key in table.keys {
                 assert!(!key.meaning.is_empty(), "{}.{}", table.path, key.name);

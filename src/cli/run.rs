@@ -44,7 +44,8 @@ const SEEN_BYTES: usize = 1 << 17;
 /// Runs a scene end to end.
 pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     scenario::use_threads(arguments.threads)?;
-    let mut named = scenario::read(arguments.scenario.as_deref())?.choose(arguments.front_end.as_deref())?;
+    let mut named = scenario::read(arguments.scenario.as_deref(), arguments.allow_outside)?
+        .choose(arguments.front_end.as_deref())?;
     if let Some(grade) = arguments.level {
         named.scenario.front_ends.iter_mut().for_each(|front_end| front_end.fidelity = front_end.fidelity.at(grade));
     }

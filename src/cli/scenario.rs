@@ -5,7 +5,7 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 use crate::cli::error::{CliError, escaped, shown};
-use generator::scenario::{Overrides, Scenario, ScenarioError};
+use generator::scenario::{Overrides, Scenario, ScenarioError, described_signal};
 use generator::scene::Scene;
 use receiver::settings::{Settings, SettingsError};
 
@@ -38,21 +38,24 @@ impl Named {
 }
 
 /// Reads the scenario at `path`, or the embedded one.
-pub fn read(path: Option<&Path>) -> Result<Named, CliError> {
+pub fn read(path: Option<&Path>, allow_outside: bool) -> Result<Named, CliError> {
     let Some(path) = path else {
         let name = "the embedded scene of two systems".to_owned();
         let scenario = Scenario::parse(EMBEDDED, &name).map_err(CliError::bug)?;
         return Ok(Named { scenario, text: EMBEDDED.to_owned(), name, directory: PathBuf::from(".") });
     };
     let (name, text) = text(path)?;
-    let scenario = Scenario::parse(&text, &name).map_err(|error| {
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let scenario = Scenario::parse_in(&text, &name, directory, allow_outside).map_err(|error| {
+        if matches!(error, ScenarioError::Read { .. }) {
+            return scenario_error(error);
+        }
         // What is wrong with the receiver's own table is said with the rest.
         let syntax = matches!(error, ScenarioError::Toml { .. });
         let settings = if syntax { None } else { Settings::of_scenario(&text, &name).err() };
         let settings = settings.iter().flat_map(SettingsError::each).map(ToString::to_string);
         all(error.each().iter().map(ToString::to_string).chain(settings))
     })?;
-    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     Ok(Named { scenario, text, name, directory: directory.to_owned() })
 }
 
@@ -86,6 +89,15 @@ pub fn use_threads(threads: Option<u16>) -> Result<(), CliError> {
 /// The scenes of all front ends of the scenario.
 pub fn compose_all(named: &Named, overrides: &Overrides) -> Result<(Vec<Scene>, Vec<String>), CliError> {
     named.scenario.compose_all(&named.directory, overrides).map_err(scenario_error)
+}
+
+/// Registers the signals that files describe, for names in settings and flags.
+pub fn describe_signals(files: &[PathBuf]) -> Result<(), CliError> {
+    files.iter().try_for_each(|path| {
+        let (name, text) = text(path)?;
+        let described = described_signal(&text, &name).map(|_| ());
+        described.map_err(|error| all(error.each().iter().map(ToString::to_string)))
+    })
 }
 
 /// The exit that a refused scenario means.

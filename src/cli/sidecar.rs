@@ -95,7 +95,7 @@ mod tests {
         let scene = changes.iter().fold(scene, |text, (from, to)| text.replace(from, to));
         std::fs::write(&path, scene).unwrap();
         let overrides = Overrides { format, ..Overrides::default() };
-        let (mut scenes, _) = compose_all(&read(Some(&path)).unwrap(), &overrides).unwrap();
+        let (mut scenes, _) = compose_all(&read(Some(&path), false).unwrap(), &overrides).unwrap();
         scenes.pop().unwrap()
     }
 

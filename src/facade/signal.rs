@@ -41,8 +41,9 @@
 //! # Ok::<(), std::array::TryFromSliceError>(())
 //! ```
 //!
-//! A signal of one's own is a `static`, which takes from a built-in one what it does not change. It is
-//! [`register`]ed before a scenario names it:
+//! A signal of one's own is described by a file that the key `signal_file` of a scenario names. Or it is a
+//! `static`, which takes from a built-in one what it does not change. It is [`register`]ed before a scenario
+//! names it:
 //!
 //! ```
 //! use gnss_twin::signal::{Component, L1_CA, Layer, NameTaken, Signal, always, register};

@@ -28,6 +28,7 @@ pub mod read;
 mod satellite;
 pub mod schema;
 mod scintillation;
+mod signal_file;
 mod spoofing_and_jamming;
 mod stages;
 #[cfg(test)]
@@ -38,11 +39,11 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
-use toml::de::DeTable;
 
 pub use augmentation::SbasSpec;
 pub use builder::{Builder, put};
 pub use compose::Overrides;
+use files::Files;
 pub use front_end::{FrontEnd, Tuned};
 pub use hardware::ClockSpec;
 pub use interference::{InterferenceSpec, SpooferSpec};
@@ -52,6 +53,7 @@ pub use propagation::{Electrons, Ionosphere, MappingKind, NeutralAtmosphere};
 pub use read::Place;
 use read::{Refusals, Source, Table};
 pub use satellite::{MessageKind, MessageSpec, OrbitsSpec, SatelliteFault};
+pub use signal_file::described_signal;
 use stages::PlaybackSpec;
 
 use crate::effect::multipath::Echo;
@@ -289,32 +291,37 @@ impl Scenario {
             .and_then(|file| file.take(MAX_BYTES as u64 + 1).read_to_string(&mut text))
             .map_err(|error| ScenarioError::Open { path: path.to_owned(), error })?;
         let directory = path.parent().unwrap_or(Path::new(".")).to_owned();
-        Ok(Self { directory, ..Self::parse(&text, &path.display().to_string())? })
+        Self::parse_in(&text, &path.display().to_string(), &directory, false)
     }
 
-    /// Reads a scenario; `origin` names it in errors.
+    /// Reads a scenario; `origin` names it in errors. Files that it names are relative to the working
+    /// directory.
+    ///
+    /// # Errors
+    /// Errors of [`Scenario::parse_in`].
+    pub fn parse(text: &str, origin: &str) -> Result<Self, ScenarioError> {
+        Self::parse_in(text, origin, Path::new("."), false)
+    }
+
+    /// Reads a scenario whose files are relative to `directory`; `origin` names it in errors. Files that
+    /// describe signals are read at once, and outside of the directory only if `allow_outside` is true.
     ///
     /// # Errors
     /// All that is wrong with the text, as [`ScenarioError::Several`] where that is more than one thing.
-    pub fn parse(text: &str, origin: &str) -> Result<Self, ScenarioError> {
+    pub fn parse_in(text: &str, origin: &str, directory: &Path, allow_outside: bool) -> Result<Self, ScenarioError> {
         let source = Source { origin, text };
-        let refuse = |error: &toml::de::Error| ScenarioError::Toml {
-            place: source.place(error.span().map_or(0, |span| span.start)),
-            message: error.message().to_owned(),
-        };
-        if text.len() > MAX_BYTES {
-            let message = format!("{} bytes: expected a scenario of at most {MAX_BYTES}", text.len());
-            return Err(ScenarioError::Toml { place: source.place(0), message });
-        }
-        let document = DeTable::parse(text).map_err(|e| refuse(&e))?;
+        let document = signal_file::parsed(&source)?;
         let root = Table::new(&source, "", 0, document.get_ref(), keys::SCENARIO);
         let mut refusals = Refusals::default();
         root.check(&mut refusals);
-        let receiver = refusals.take(receiver(&root, text).map_err(|e| refuse(&e))).flatten();
-        let scenario = Self::read(&root, &mut refusals);
+        let receiver = refusals.take(receiver(&root, text).map_err(|e| source.refused(&e))).flatten();
+        let overrides = Overrides { allow_outside, ..Overrides::default() };
+        // Signals of a file that is refused would be unknown.
+        let described = signal_file::read(&root, origin, Files { directory, overrides: &overrides });
+        let scenario = refusals.take(described).and_then(|()| Self::read(&root, &mut refusals));
         refusals.finish()?;
         scenario
-            .map(|scenario| Self { origin: origin.to_owned(), receiver, ..scenario })
+            .map(|scenario| Self { origin: origin.to_owned(), directory: directory.to_owned(), receiver, ..scenario })
             .ok_or_else(|| ScenarioError::Toml { place: source.place(0), message: "cannot be read".to_owned() })
     }
 

@@ -8,7 +8,7 @@
 //! `core:datatype` is `ru8`, `gnss_twin:bits` with `encoding`, `components` (`real`, `iq`, `qi`),
 //! `bit_order` (`msb` or `lsb` first), `word_bytes` and `byte_order` (`little` or `big`), and
 //! `gnss_twin:signals` with the names of the signals that samples were made of; names that this version does
-//! not know are passed over.
+//! not know are passed over. `gnss_twin:described_signals` has the texts of those that are not built in.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -18,6 +18,7 @@ use crate::packed::{Components, Encoding, Interleaved};
 use crate::recording::{Description, Samples};
 use crate::samples::{Format, IfMetadata};
 use crate::signal::Signal;
+use crate::signal::described::{DescriptionError, registered, texts_of};
 use crate::time::{Epoch, Rate};
 
 const VERSION: &str = "1.2.0";
@@ -98,6 +99,8 @@ struct Global {
     inverted: Option<Value>,
     #[serde(rename = "gnss_twin:signals", skip_serializing_if = "Option::is_none")]
     signals: Option<Value>,
+    #[serde(rename = "gnss_twin:described_signals", skip_serializing_if = "Vec::is_empty")]
+    described_signals: Vec<String>,
 }
 
 /// Samples of a few bits.
@@ -185,6 +188,7 @@ pub fn write_with(metadata: &IfMetadata, beside: &Beside<'_>) -> String {
             extensions: Some(serde_json::json!([{ "name": EXTENSION, "version": "0.1.0", "optional": optional }])),
             inverted: Some(metadata.inverted.into()),
             signals: (!beside.signals.is_empty()).then(names),
+            described_signals: texts_of(beside.signals.iter().copied()),
             ..Global::default()
         },
         captures: vec![Capture {
@@ -307,6 +311,12 @@ pub fn describe(text: &str, name: &str) -> Result<Description, SigmfError> {
         Some(Value::Bool(inverted)) => inverted,
         Some(other) => return Err(file.bad("gnss_twin:spectrum_inverted", &other, "true or false")),
     };
+    for text in &global.described_signals {
+        let refuse = |error: DescriptionError| {
+            file.bad("gnss_twin:described_signals", &error.to_string().into(), "texts that describe signals")
+        };
+        registered(text).map_err(refuse)?;
+    }
     let signals = file.signals(global.signals)?;
     let channels = file.count("core:num_channels", global.channels, 1)?;
     let channels = u32::try_from(channels).ok().filter(|channels| (1..=64).contains(channels));

@@ -82,7 +82,7 @@ fn kinds() -> [Kind; 4] {
             texts: all,
             // As the program does: the receiver's table is read by the receiver.
             read: |text| {
-                Scenario::parse(text, "file").map_err(|e| e.to_string())?;
+                Scenario::parse_in(text, "file", &directory(), false).map_err(|e| e.to_string())?;
                 Settings::of_scenario(text, "file").map(drop).map_err(|e| e.to_string())
             },
         },

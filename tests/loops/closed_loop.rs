@@ -370,6 +370,46 @@ fn qzss_on_three_bands_finds_its_place_through_an_ionosphere_of_maps() {
     assert_eq!(number(&summary, "/tracking/cycle_slips"), 0.0);
 }
 
+/// Runs a signal that a file alone describes. Half of its power is in the data, so its code noise is that of
+/// BOC(2,2) at 3 dB less: a metre holds as for L1 C/A. Judge and receiver are other processes, far from the
+/// file.
+#[test]
+fn a_signal_that_a_file_describes_is_received_and_judged_where_its_file_is_not() {
+    let place = tempfile::tempdir().unwrap();
+    let at = |name: &str| place.path().join(name);
+    let scene = scenarios().join("own_signal.toml");
+    let summary = run_to(&at("run"), &scene, &["--check".as_ref()]);
+    found_and_decoded_what_is_there(&summary);
+    at_most(&summary, "/position/horizontal_p95_m", 1.0);
+    at_most(&summary, "/position/first_fix_s", 30.0);
+    let twin = |arguments: &[&OsStr]| {
+        let done =
+            Command::new(env!("CARGO_BIN_EXE_gnss-twin")).args(arguments).current_dir(place.path()).output().unwrap();
+        let text = String::from_utf8_lossy(&done.stdout).into_owned() + &String::from_utf8_lossy(&done.stderr);
+        (done.status.code(), text)
+    };
+    let (code, text) = twin(&["analyze".as_ref(), "run".as_ref(), "--check".as_ref()]);
+    assert_eq!(code, Some(0), "{text}");
+    // A fifth of a second is enough for a search.
+    let samples = ["--samples", "1840000", "--out", "x.sigmf-data"].map(OsStr::new);
+    let (code, text) = twin(&[&["generate".as_ref(), scene.as_os_str()], &samples[..]].concat());
+    assert_eq!(code, Some(0), "{text}");
+    let found = |out: &str, more: &[&OsStr]| {
+        let (_, text) =
+            twin(&[&["receive".as_ref(), "x.sigmf-data".as_ref(), "--out".as_ref(), out.as_ref()], more].concat());
+        let rows =
+            std::fs::read_to_string(at(out).join("acquisition.csv")).unwrap_or_else(|error| panic!("{error}: {text}"));
+        rows.lines().filter(|row| row.contains("own L1 BOC,true")).count()
+    };
+    let named = found("named", &[]);
+    assert!(named >= 8, "{named} satellites found by the metadata");
+    // The same samples without metadata, and the file in the receiver's hands.
+    std::fs::remove_file(at("x.sigmf-meta")).unwrap();
+    let file = scenarios().join("own_boc.signal");
+    let raw = ["--format", "ci8", "--rate-hz", "9.2e6", "--signals", "own L1 BOC", "--signal-file"].map(OsStr::new);
+    assert_eq!(found("raw", &[&raw[..], &[file.as_os_str()]].concat()), named);
+}
+
 /// SBAS's bars: a metre by three satellites of GPS, which alone give no place, and three of WAAS, whose
 /// HDOP of 1.04 and, by theory, 0.4 m of code noise leave one fix in a hundred beyond it.
 #[test]

@@ -26,6 +26,7 @@ use gnss::record::{
     RayRow, SkyRow, TrackingRow, TrajectoryRow,
 };
 use gnss::satellite::Sv;
+use gnss::signal::described::registered;
 use gnss::signal::{Link, Signal, all};
 
 /// Speed of the stages: `speed.json`, and the section of the summary.
@@ -242,8 +243,13 @@ impl Run {
     }
 
     fn read_truth_by(truth: &Path, directory: &Path) -> Result<Self, JudgeError> {
-        let scene = truth.join("scene.json");
-        let mut scene: SceneFacts = json(&scene)?.ok_or_else(|| missing(&scene, TRUTH))?;
+        let path = truth.join("scene.json");
+        let mut scene: SceneFacts = json(&path)?.ok_or_else(|| missing(&path, TRUTH))?;
+        for text in &scene.described_signals {
+            // Rows name signals, so they are registered before any is read.
+            let refuse = |error| JudgeError::Json { path: path.clone(), source: serde::de::Error::custom(error) };
+            registered(text).map_err(refuse)?;
+        }
         let own_hz = |place: usize| scene.front_ends.get(place).map_or(0.0, FrontEndFacts::doppler_hz);
         if let Some(other) = (1..scene.front_ends.len()).find(|place| own_hz(*place) != own_hz(0)) {
             let expected = "the offset of the first front end: Dopplers are judged against one of all";

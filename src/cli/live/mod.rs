@@ -59,7 +59,8 @@ pub fn execute(arguments: &args::Live) -> Result<(), CliError> {
             "--to -: standard output is a terminal: name a sink with --to, or a pipe behind |",
         ));
     }
-    let mut named = scenario::read(Some(&arguments.scenario))?.choose(arguments.front_end.as_deref())?;
+    let mut named =
+        scenario::read(Some(&arguments.scenario), arguments.allow_outside)?.choose(arguments.front_end.as_deref())?;
     let start = arguments.start_at.map(instant).transpose()?;
     if let Some((epoch, _)) = start {
         named.scenario.start = epoch;

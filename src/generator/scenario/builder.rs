@@ -115,8 +115,7 @@ impl Builder {
             return Err(refuse(reason));
         }
         let text = toml::to_string(&self.document).map_err(|error| refuse(error.to_string()))?;
-        let scenario = Scenario::parse(&text, ORIGIN).map_err(placeless)?;
-        Ok(Scenario { directory: self.directory, ..scenario })
+        Scenario::parse_in(&text, ORIGIN, &self.directory, false).map_err(placeless)
     }
 }
 
@@ -127,6 +126,8 @@ fn nowhere() -> Place {
 /// Error about a text that nobody has seen, with its lines left out.
 fn placeless(error: ScenarioError) -> ScenarioError {
     match error {
+        // A file that describes a signal has lines.
+        error if error.place().is_some_and(|place| place.origin != ORIGIN) => error,
         ScenarioError::Toml { message, .. } => ScenarioError::Toml { place: nowhere(), message },
         ScenarioError::UnknownKey { key, nearest, known, .. } => {
             ScenarioError::UnknownKey { place: nowhere(), key, nearest, known }

@@ -4,6 +4,7 @@ mod navigation;
 mod propagation;
 mod satellite;
 mod shipped;
+mod signal_file;
 mod spoofing_and_jamming;
 
 use std::path::Path;

@@ -14,6 +14,7 @@ use crate::scene::{CodeEdge, Scene, sources};
 use crate::switches::{Stray, Switches};
 use gnss::facts::{Fault, FaultKind, FrontEndFacts, OscillatorFacts, Renewal, SceneFacts, TimeOffset};
 use gnss::record::{Geographic, TrajectoryRow};
+use gnss::signal::described::texts_of;
 use gnss::time::Rate;
 
 struct Table {
@@ -231,6 +232,7 @@ impl Writer {
             mask_deg: Some(scene.mask_rad.to_degrees()),
             truth_interval_s: scene.truth_interval_s,
             signals: signals(scenes),
+            described_signals: texts_of(scenes.iter().flat_map(|scene| scene.signals.iter().copied())),
             noise: scene.noise,
             noise_arithmetic: scene.fidelity.noise.name().to_owned(),
             noise_lsb: Some(decimal(scene.noise_lsb)),

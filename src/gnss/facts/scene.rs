@@ -65,6 +65,9 @@ pub struct SceneFacts {
     /// Names of the signals.
     #[serde(default)]
     pub signals: Vec<String>,
+    /// Texts that describe those of the signals that are not built in.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub described_signals: Vec<String>,
     /// True if thermal noise was added.
     #[serde(default = "yes")]
     pub noise: bool,

@@ -3,8 +3,8 @@
 //!
 //! To add a signal: one file in `gnss/<system>/` with a `static` [`Signal`], one word in [`SIGNALS`]. Law
 //! tests walk that registry. A program that has a signal of its own calls [`register`] before it names it
-//! anywhere. Nothing outside `gnss` may branch on a signal's name. A component's spectrum and correlation
-//! follow from its pulses ([`Shape`]).
+//! anywhere; a text describes one by [`described`]. Nothing outside `gnss` may branch on a signal's name. A
+//! component's spectrum and correlation follow from its pulses ([`Shape`]).
 
 use std::fmt;
 use std::hash::{Hash, Hasher};
@@ -20,6 +20,7 @@ use crate::time::{Epoch, TimeScale};
 use crate::{beidou, galileo, glonass, gps, navic, qzss, sbas};
 
 mod dated;
+pub mod described;
 mod peak;
 mod shape;
 #[cfg(any(test, feature = "planted"))]

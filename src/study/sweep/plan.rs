@@ -340,9 +340,9 @@ fn parse(path: &Path) -> Result<Study, StudyError> {
 
 fn base(written: &Path, path: &Path, text: &str) -> Result<Base, StudyError> {
     // As it is first, so that its own errors have their position.
-    let scenario = Scenario::parse(text, &path.display().to_string())?;
-    let document = text.parse().map_err(|e: toml::de::Error| StudyError::input(path, e.message()))?;
     let directory = path.parent().unwrap_or(Path::new(".")).to_owned();
+    let scenario = Scenario::parse_in(text, &path.display().to_string(), &directory, false)?;
+    let document = text.parse().map_err(|e: toml::de::Error| StudyError::input(path, e.message()))?;
     Ok(Base { written: written.to_owned(), directory, name: scenario.name, document })
 }
 
@@ -388,6 +388,9 @@ fn named_files(study: &Study, base: &Base) -> Vec<PathBuf> {
         match value {
             Value::Table(table) => table.iter().for_each(|(key, value)| match value {
                 Value::String(path) if is_file(key) => found.push(PathBuf::from(path)),
+                Value::Array(paths) if is_file(key) => {
+                    found.extend(paths.iter().filter_map(Value::as_str).map(PathBuf::from));
+                }
                 other => walk(other, found),
             }),
             Value::Array(items) => items.iter().for_each(|item| walk(item, found)),

@@ -120,7 +120,7 @@ pub fn patched(base: &Base, values: &[(&Axis, &Value)]) -> Result<toml::Table, S
 /// Refusals of the reader.
 pub fn read(base: &Base, document: &toml::Table) -> Result<(Scenario, Settings), String> {
     let text = toml::to_string(document).map_err(|e| e.to_string())?;
-    let scenario = Scenario::parse(&text, "scene").map_err(|e| e.without_place())?;
+    let scenario = Scenario::parse_in(&text, "scene", &base.directory, false).map_err(|e| e.without_place())?;
     let settings = Settings::from_table(scenario.receiver.clone().unwrap_or_default(), "receiver");
     let settings = settings.map_err(|e| e.to_string());
     settings.map(|settings| (scenario, settings)).map_err(|e| format!("{}: {e}", base.written.display()))

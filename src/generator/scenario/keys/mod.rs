@@ -3,13 +3,14 @@
 pub(crate) mod hardware;
 pub(crate) mod motion;
 pub(crate) mod satellites;
+pub mod signal;
 pub(crate) mod spoofing_and_jamming;
 pub(crate) mod way;
 
 use super::schema::{Key, flag, foreign, integer, number, one_or_more, table, tables, text, texts, time, word, words};
 use crate::scene::{Arithmetic, CodeEdge, Grade};
 use gnss::facts::{Fixes, Losses, Sizes};
-use gnss::signal::{Layers, SIGNALS};
+use gnss::signal::{Layers, all};
 
 pub(super) const A_PATH: &str = "a path";
 pub(super) const SATELLITES: &str = "an array of satellites like [\"G01\", \"G12\"]";
@@ -33,6 +34,12 @@ pub const SCENARIO: &[Key] = &[
         "transmitted signals. At a leap second GLONASS repeats one second; no available document specifies this",
     )
     .or_else("[\"GPS L1 C/A\"]"),
+    texts(
+        "signal_file",
+        "a path, or an array of paths",
+        "files that describe signals of one's own, relative to the scenario and below its directory; \
+         `signals` may then name them",
+    ),
     table("navigation", NAVIGATION, "Broadcast navigation data. Absent: the embedded files."),
     table("satellites", SATELLITE_CHOICE, "Selection of satellites."),
     table("orbits", satellites::ORBITS, "True orbits and clocks. Absent: the broadcast ones."),
@@ -207,6 +214,6 @@ fn sizes() -> Vec<&'static str> {
 
 /// The names of the signals that a scenario may hold.
 pub(super) fn signals_expected() -> String {
-    let known: Vec<String> = SIGNALS.iter().map(|signal| format!("{:?}", signal.name)).collect();
+    let known: Vec<String> = all().iter().map(|signal| format!("{:?}", signal.name)).collect();
     format!("an array of different signals out of {}", known.join(", "))
 }

@@ -48,6 +48,12 @@ impl Source<'_> {
         }
     }
 
+    /// Refusal of a text that is no TOML.
+    pub fn refused(&self, error: &toml::de::Error) -> ScenarioError {
+        let place = self.place(error.span().map_or(0, |span| span.start));
+        ScenarioError::Toml { place, message: error.message().to_owned() }
+    }
+
     /// Text of a value, shortened and without control characters.
     pub fn excerpt(&self, span: &Range<usize>) -> String {
         let text = self.text.get(span.clone()).unwrap_or("");

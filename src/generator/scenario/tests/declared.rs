@@ -160,6 +160,7 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
                 ("front_end", "name" | "center_hz" | "signals" | "local_oscillator" | "filter" | "iq" | "adc") => {
                     cases.push((with("front_end", &format!("{key} = 1")), table, key))
                 }
+                ("", "signal_file") => cases.push((with("", "signal_file = 1"), table, key)),
                 ("satellites", "only") => cases.push((with("satellites", "only = 1"), table, key)),
                 ("fidelity", "budget") => cases.push((with("fidelity", "budget = 1"), table, key)),
                 ("fidelity.budget", _) => {
