@@ -35,7 +35,8 @@ fn a_scene_names_the_signal_of_its_file_and_what_it_takes_from_another_is_that_o
 
 #[test]
 fn every_fault_of_a_file_is_refused_at_its_place() {
-    let line = "signal_file = \"own.signal\"\nsignals = [\"filed\"]";
+    let line = "signal_file = \"own.signal\"\nsignals = [\"faulty\"]";
+    let good = || good().replace("filed", "faulty");
     for (from, to, refusals) in [
         ("rinex", "rinx", vec!["own.signal:2:1: unknown key 'rinx': did you mean 'rinex'?"]),
         (
