@@ -49,10 +49,42 @@ impl Grid {
             let highest = place_of_largest(heights);
             let bin = if heights[highest] >= sure[highest] { highest } else { place_of_largest(&shares) };
             let (statistic, threshold) = (heights[bin], bar.thresholds[bin]);
-            let (doppler_hz, half_lag) = (self.dopplers_hz[bin], strips[bin][satellite].half_lag);
+            let summit = self.summit(strips, satellite, heights, bin);
+            let (doppler_hz, half_lag) = (self.dopplers_hz[summit], strips[summit][satellite].half_lag);
             (bin, Peak { statistic, threshold, is_sure: statistic >= sure[bin], doppler_hz, half_lag })
         };
         (heights.iter().enumerate().map(choice).collect(), bar.crowded)
+    }
+
+    /// The Doppler at which the lobe of a peak is highest, at the peak's code phase. The slope of a lobe passes
+    /// alone where other satellites raise the threshold of its top.
+    fn summit(&self, strips: &[Vec<Strip>], satellite: usize, heights: &[f64], bin: usize) -> usize {
+        let (halves, half_lag) = (2 * self.lags, |bin: usize| strips[bin][satellite].half_lag);
+        let is_own = |other: &usize| {
+            let apart = half_lag(*other).abs_diff(half_lag(bin));
+            apart.min(halves - apart.min(halves)) <= 2 * self.near_cells()
+        };
+        self.lobe(bin).filter(is_own).fold(bin, |best, n| if heights[n] > heights[best] { n } else { best })
+    }
+
+    /// Numbers of the Dopplers within the inverse coherent time of one.
+    fn lobe(&self, bin: usize) -> impl Iterator<Item = usize> {
+        let lobe_hz = self.rate_hz / (f64::from(self.coherent_periods) * self.period_samples);
+        let centre_hz = self.dopplers_hz[bin];
+        (self.dopplers_hz.iter().enumerate())
+            .filter_map(move |(n, doppler_hz)| ((doppler_hz - centre_hz).abs() < lobe_hz).then_some(n))
+    }
+
+    /// Dopplers and satellites whose lobe passes beside one that other satellites raise, where it was left.
+    pub fn left_lobes(&self, map: &Map, peaks: &[(usize, Peak)]) -> Vec<(usize, usize)> {
+        let passing = peaks.iter().enumerate().filter(|(_, (_, peak))| peak.statistic >= peak.threshold);
+        let left = |satellite: usize, bin: usize| {
+            matches!(map.raised[bin], Raised::Yes(_)) && map.strips[bin][satellite].sums < self.sums
+        };
+        passing
+            .flat_map(|(satellite, (bin, _))| self.lobe(*bin).map(move |other| (other, satellite)))
+            .filter(|(bin, satellite)| left(*satellite, *bin))
+            .collect()
     }
 
     /// True if a Doppler may be crowded but lacks sums of some codes.

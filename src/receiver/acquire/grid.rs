@@ -305,7 +305,8 @@ impl Grid {
         let (strips, raised) =
             (0..self.dopplers_hz.len()).into_par_iter().map(|bin| rooms.with(self, |room| one(room, bin))).unzip();
         let mut map = Map { strips, raised, scale };
-        self.complete(&mut map.strips, spectra, &sums, rooms);
+        let missing = self.missing(&map.strips, spectra.len());
+        self.complete(&mut map.strips, &missing, spectra, &sums, rooms);
         // Satellites that are not looked at again were seen beside what has been subtracted since.
         let old = |bin: usize, satellite: usize| {
             let again = again.filter(|again| !again.dopplers.contains(&bin));
@@ -314,6 +315,11 @@ impl Grid {
         let mut filled = BTreeSet::new();
         let (of, mut crowded) = loop {
             let (of, crowded) = self.peaks(&map, spectra.len());
+            let left = self.left_lobes(&map, &of);
+            if !left.is_empty() {
+                self.complete(&mut map.strips, &left, spectra, &sums, rooms);
+                continue;
+            }
             // Of others all sums are enough: what was subtracted since made them larger, if anything.
             let is_open = |bin: usize, satellite: usize| {
                 !filled.contains(&bin) && (old(bin, satellite) || self.is_unknown(&map, bin))
@@ -343,22 +349,32 @@ impl Grid {
         self.law.threshold
     }
 
-    /// Completes one strip of every satellite with all dwells. Where no strip stayed, it is the one that came
-    /// nearest to the bar.
-    fn complete(&self, strips: &mut [Vec<Strip>], spectra: &[Spectra<'_>], sums: &Sums<'_>, rooms: &Rooms) {
-        let missing: Vec<(usize, usize)> = (0..spectra.len())
+    /// Dopplers of satellites of which no strip stayed: of each the one that came nearest to the bar.
+    fn missing(&self, strips: &[Vec<Strip>], satellites: usize) -> Vec<(usize, usize)> {
+        (0..satellites)
             .filter(|&satellite| strips.iter().all(|column| column[satellite].sums < self.sums))
             .filter_map(|satellite| {
                 let height = |bin: &usize| strips[*bin][satellite].peak;
                 let best = (0..strips.len()).max_by(|a, b| height(a).total_cmp(&height(b)))?;
                 Some((best, satellite))
             })
-            .collect();
+            .collect()
+    }
+
+    /// Completes strips of given Dopplers and satellites with all dwells.
+    fn complete(
+        &self,
+        strips: &mut [Vec<Strip>],
+        wanted: &[(usize, usize)],
+        spectra: &[Spectra<'_>],
+        sums: &Sums<'_>,
+        rooms: &Rooms,
+    ) {
         let whole = |&(bin, satellite): &(usize, usize)| {
             rooms.with(self, |room| self.whole(&spectra[satellite], &mut sums.at(self, bin), room))
         };
-        let found: Vec<Strip> = missing.par_iter().map(whole).collect();
-        for ((bin, satellite), strip) in missing.into_iter().zip(found) {
+        let found: Vec<Strip> = wanted.par_iter().map(whole).collect();
+        for (&(bin, satellite), strip) in wanted.iter().zip(found) {
             strips[bin][satellite] = strip;
         }
     }

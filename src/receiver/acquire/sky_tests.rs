@@ -217,6 +217,36 @@ fn satellites_far_below_another_are_found() {
 }
 
 #[test]
+fn satellites_of_a_small_family_are_found_at_their_doppler_though_they_share_it() {
+    // Fourteen codes, as NavIC has. The cells of six satellites at one Doppler raise its threshold.
+    let (metadata, samples, mut searcher) = searcher(&AcquisitionSettings::default());
+    let family: Vec<Link> = (1..=14).map(|prn| gnss::gps::l1ca::L1_CA.link(Sv::gps(prn))).collect();
+    let (mut there, mut found, mut beside) = (0, 0, 0);
+    for seed in skies(8) {
+        let mut random = Noise(300 + seed);
+        let mut one = |k: u8| {
+            let (doppler_hz, phase_chips) = (240.0 * random.uniform() - 120.0, 20.0 * 1023.0 * random.uniform());
+            Sent { prn: 2 * k + 1, doppler_hz, phase_chips, cn0_dbhz: 39.0 }
+        };
+        let sent: Vec<Sent> = (0..6).map(&mut one).collect();
+        let recording = quantised(record(metadata.clone(), samples, &sent, seed));
+        let block = Block { first: 0, i: &recording.i, q: &recording.q };
+        there += sent.len();
+        for hit in searcher.search(&block, &family).unwrap().into_iter().filter_map(|(_, hit)| hit) {
+            let own = sent.iter().find(|sent| sent.prn == hit.sv.number);
+            let near = |own: &&Sent| difference_chips(hit.code_phase_chips, own.phase_chips).abs() < 1.0;
+            let Some(own) = own.filter(near) else { continue };
+            found += 1;
+            // A step of the search.
+            beside += usize::from((hit.doppler_hz - own.doppler_hz).abs() > 250.0);
+        }
+    }
+    println!("{there} there, {found} found, {beside} beside their Doppler");
+    assert_eq!(beside, 0);
+    assert!(found >= there / 2, "{found} of {there}: the test would show nothing");
+}
+
+#[test]
 fn beside_satellites_that_are_known_weak_ones_are_found_and_none_that_is_not_there() {
     let (metadata, samples, mut searcher) = searcher(&AcquisitionSettings::default());
     let (mut total, mut blind) = (Count::default(), 0);
