@@ -1,7 +1,8 @@
 //! Expected accuracy of a sound receiver: errors of fixes and the sigmas that it should state.
 //!
 //! [`air`] has the receiver's model of the ionosphere, and [`ranges`] has bias and noise of every range.
-//! [`links`] has the loops of every satellite. [`solution`] applies weighted least squares to the ranges at
+//! [`links`] has the loops of every satellite, and `rates`
+//! the velocity. [`solution`] applies weighted least squares to the ranges at
 //! each fix. [`dispersion`] has the ionosphere measured with two bands, and [`heard`] the times from which
 //! messages are known. All follow from truth and settings. The receiver's statements about its own quality do
 //! not enter. Of its results, only the list of observations enters.
@@ -11,5 +12,6 @@ pub mod dispersion;
 pub mod heard;
 pub mod links;
 pub mod ranges;
+mod rates;
 mod settled;
 pub mod solution;

@@ -12,6 +12,7 @@ use std::iter::Peekable;
 use nalgebra::Vector3;
 
 use super::air::{Air, Sight};
+use super::rates::Unshared;
 use crate::error::JudgeError;
 use crate::expect::beats::Beats;
 use crate::expect::due::satellite::{FADE_DB, is_stepping};
@@ -121,6 +122,8 @@ const MASK_SLACK_RAD: f64 = 2e-3;
 pub struct Forecast {
     /// The satellite.
     pub sv: Sv,
+    /// Index of the signal in the run's list.
+    pub signal: usize,
     /// Index in [`Scene::scales`] of the clock that the range is counted against.
     pub clock: usize,
     /// Frequency of the carrier, in hertz.
@@ -185,6 +188,7 @@ pub struct Scene<'r> {
     /// Knowledge of the receiver about the satellites.
     pub(in crate::judge) heard: Heard,
     stated: &'r Stated,
+    pub(super) unshared: Unshared,
     beats: Beats,
     /// Error of chip edges with a code at rest, root mean square.
     edges_m: BTreeMap<&'static Signal, f64>,
@@ -199,11 +203,12 @@ impl<'r> Scene<'r> {
         let Some(choices) = Choices::of(run) else { return Ok(None) };
         Ok(Some(Self {
             run,
-            choices,
             message: Message::of(run),
             scales: scales(run),
             heard: Heard::of(run),
             stated,
+            unshared: Unshared::new(run, &choices),
+            choices,
             beats: Beats::new(run)?,
             edges_m: (run.signals.iter())
                 .filter(|_| run.scene.code_edge == Edge::Area)
@@ -270,8 +275,11 @@ impl<'r> Scene<'r> {
         let (_, rate_hz) = theory.noise(Loop::Fll, cn0_hz, &Places::default());
         let (sin, cos) = libm::sincos(elevation_rad);
         let (east, north) = libm::sincos(look.azimuth_rad);
+        let signal = self.run.signals.iter().position(|own| *own == true_row.signal).unwrap_or(0);
+        let rate_mps = rate_hz * true_row.link().wavelength_m();
         let forecast = Forecast {
             sv: true_row.sv,
+            signal,
             clock: self.scales.iter().position(|scale| *scale == true_row.signal.time.name).unwrap_or(0),
             carrier_hz,
             sight: Vector3::new(east * cos, north * cos, sin),
@@ -284,7 +292,7 @@ impl<'r> Scene<'r> {
             short_m2: self.short_m2(true_row.sv, row.sample),
             other_m2: self.edge_m2(true_row),
             memory_s: 0.0,
-            rate_sigma_mps: rate_hz * true_row.link().wavelength_m(),
+            rate_sigma_mps: libm::hypot(rate_mps, self.unshared.own_mps(signal)),
             rate_bias_mps: 0.0,
             cn0_hz,
             steady,

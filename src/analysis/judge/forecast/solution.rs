@@ -14,6 +14,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix4, Vector4};
 
 use super::air::Air;
 use super::ranges::{Forecast, Scene};
+use super::rates::{Rates, Unshared};
 use crate::error::JudgeError;
 use crate::measure::errors::Errors;
 use crate::read::spill_store::Words;
@@ -40,9 +41,7 @@ struct Sums {
     stepping: DVector<f64>,
     ionosphere: DVector<f64>,
     troposphere: DVector<f64>,
-    rate_normal: Matrix4<f64>,
-    rate_noise: Matrix4<f64>,
-    rate_bias: Vector4<f64>,
+    rates: Rates,
     memory_s: f64,
 }
 
@@ -54,8 +53,8 @@ const SAME_BAND: f64 = 0.05;
 const COMMON: usize = 3;
 
 impl Sums {
-    /// No ranges yet, of as many time scales.
-    fn new(scales: usize) -> Self {
+    /// No ranges yet, of as many time scales and signals.
+    fn new(scales: usize, signals: usize) -> Self {
         let unknowns = 3 + scales + COMMON;
         let (matrix, vector) = (DMatrix::zeros(unknowns, unknowns), DVector::zeros(unknowns));
         let mut prior = matrix.clone();
@@ -75,9 +74,7 @@ impl Sums {
             stepping: vector.clone(),
             ionosphere: vector.clone(),
             troposphere: vector,
-            rate_normal: Matrix4::zeros(),
-            rate_noise: Matrix4::zeros(),
-            rate_bias: Vector4::zeros(),
+            rates: Rates::new(signals),
             memory_s: 0.0,
         }
     }
@@ -133,13 +130,7 @@ impl Sums {
         bias.axpy(weight * range.bias_m, &row, 1.0);
         self.ionosphere.axpy(weight * range.air.delay_m, &row, 1.0);
         self.troposphere.axpy(weight * range.troposphere_m, &row, 1.0);
-        // All systems' times run alike: one drift.
-        let row = Vector4::new(-range.sight.x, -range.sight.y, -range.sight.z, 1.0);
-        let outer = row * row.transpose();
-        self.rate_normal += range.cn0_hz * outer;
-        let spread = range.cn0_hz * range.rate_sigma_mps;
-        self.rate_noise += spread * spread * outer;
-        self.rate_bias += range.cn0_hz * range.rate_bias_mps * row;
+        self.rates.add(range);
         self.memory_s = self.memory_s.max(range.memory_s);
     }
 }
@@ -220,14 +211,14 @@ pub fn expected(
     }
     let mut places = scene.run.trajectory.finder()?;
     for fix in scene.run.fixes.in_order()? {
-        let (fix, mut sums) = (fix?, Sums::new(scene.scales.len().max(1)));
+        let (fix, mut sums) = (fix?, Sums::new(scene.scales.len().max(1), scene.run.signals.len()));
         let place = places.get(fix.sample);
         for ranges in &mut links {
             ranges.of_fix(&fix, place.as_ref(), |range| sums.take(range, choice))?;
         }
         sums.finish(choice);
         let corrected = fix.ionosphere != IonosphereModel::Grid;
-        if let (Some(place), Some((expected, offsets))) = (place, one(fix.sample, &sums, corrected)) {
+        if let (Some(place), Some((expected, offsets))) = (place, one(fix.sample, &sums, corrected, &scene.unshared)) {
             see(fix, place, expected, &offsets)?;
         }
     }
@@ -259,7 +250,7 @@ fn combined(first: &Forecast, second: &Forecast) -> Forecast {
     }
 }
 
-fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<(Expected, Vec<Offset>)> {
+fn one(sample: u64, sums: &Sums, corrected: bool, unshared: &Unshared) -> Option<(Expected, Vec<Offset>)> {
     if sums.most < 4 {
         return None;
     }
@@ -298,7 +289,7 @@ fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<(Expected, Vec<Offse
     let offsets = (4..places.len()).map(offset).collect();
     // Of all clocks the first is the fix's.
     let of = |matrix: &DMatrix<f64>| matrix.fixed_view::<4, 4>(0, 0).into_owned();
-    let rates = Cholesky::new(sums.rate_normal)?.inverse();
+    let (rate_noise, rate_allowed) = sums.rates.solved(unshared)?;
     let expected = Expected {
         sample,
         satellites: (sums.least, sums.most),
@@ -314,8 +305,8 @@ fn one(sample: u64, sums: &Sums, corrected: bool) -> Option<(Expected, Vec<Offse
         steady: !sums.unsteady,
         fading: sums.fading,
         memory_s: sums.memory_s,
-        rate_noise: rates * sums.rate_noise * rates,
-        rate_allowed: 2.0 * (rates * sums.rate_bias).abs(),
+        rate_noise,
+        rate_allowed,
     };
     Some((expected, offsets))
 }
@@ -400,6 +391,7 @@ mod tests {
     fn range(number: u8, carrier_hz: f64, near_mask: bool, excluded: bool) -> Forecast {
         Forecast {
             sv: Sv::gps(number),
+            signal: 0,
             clock: 0,
             carrier_hz,
             sight: Vector3::new(0.6, 0.0, 0.8),
@@ -439,7 +431,7 @@ mod tests {
         ];
         // A combination of two is left out with either.
         for (combines, expected) in [(false, (2, 3)), (true, (1, 2))] {
-            let mut sums = Sums::new(1);
+            let mut sums = Sums::new(1, 1);
             all.iter().for_each(|range| sums.take(*range, (combines, 0.5)));
             sums.finish((combines, 0.5));
             assert_eq!((sums.least, sums.most), expected, "{combines}");
@@ -478,14 +470,14 @@ mod tests {
 
     #[test]
     fn the_longest_axis_of_a_covariance_need_not_be_a_coordinate_s() {
-        let mut sums = Sums::new(1);
+        let mut sums = Sums::new(1, 1);
         let sights = [[0.6, 0.0, 0.8], [-0.6, 0.0, 0.8], [0.0, 0.6, 0.8], [0.0, -0.8, 0.6], [0.0, 0.0, 1.0]];
         for (number, [east, north, up]) in (1..).zip(sights) {
             let sight = Vector3::new(east, north, up);
             sums.take(Forecast { sight, rate_sigma_mps: 0.1, ..range(number, L1_HZ, false, false) }, (false, 0.5));
         }
         sums.finish((false, 0.5));
-        let (mut expected, _) = one(0, &sums, true).unwrap();
+        let (mut expected, _) = one(0, &sums, true, &Unshared::default()).unwrap();
         // 3 m/s along the diagonal of the cube, 1 m/s across it: √(1 + 8/3) along each coordinate.
         let diagonal = Vector3::new(1.0, 1.0, 1.0) / 3.0_f64.sqrt();
         let turned = nalgebra::Matrix3::identity() + 8.0 * diagonal * diagonal.transpose();

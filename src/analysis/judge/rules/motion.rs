@@ -6,7 +6,7 @@
 use std::cell::RefCell;
 
 use crate::error::JudgeError;
-use crate::expect::loops::{exact_loop, natural_radps};
+use crate::expect::closed::{exact_loop, natural_radps};
 use crate::judge::forecast::ranges::Choices;
 use crate::read::Run;
 use crate::read::levels::Levels;
