@@ -124,6 +124,7 @@ pub const ORDER: Order<'static> = &[
             &["spectrum"],
             &["stated"],
             &["peak", "timeline"],
+            &["closed"],
             &["loops"],
             &["beats", "due", "multipath"],
         ],
@@ -147,7 +148,10 @@ pub const ORDER: Order<'static> = &[
             &["rules"],
         ],
     ),
-    ("analysis/judge/forecast", &[&["air", "heard", "settled"], &["links"], &["ranges"], &["dispersion", "solution"]]),
+    (
+        "analysis/judge/forecast",
+        &[&["air", "heard", "settled", "unshared"], &["links"], &["ranges"], &["dispersion", "rates"], &["solution"]],
+    ),
     (
         "analysis/judge/foreign",
         &[&["fit", "pairs"], &["measured", "place"], &["carriers", "judged"], &["observables", "report"]],

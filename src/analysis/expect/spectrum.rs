@@ -90,7 +90,7 @@ type Null = (f64, f64);
 
 /// Decibels of C/N0 that filter and converter of its front end cost each signal's replica, noise alone
 /// counted: a filter passes less of the code than of noise with the code's spectrum, and rounding adds noise.
-/// What edges between samples cost beside is [`edge_cost_db`].
+/// The cost of edges between samples is apart: [`edge_cost_db`].
 pub fn costs_db(run: &Run) -> BTreeMap<&'static Signal, f64> {
     let kept = |signal: &'static Signal| {
         let place = run.front_end(signal);

@@ -345,7 +345,7 @@ fn foreign(first: &csv::StringRecord) -> Option<Fault> {
 }
 
 /// Bytes that end in an error where a row is too long: one that nothing ends, or whose quotes nothing closes.
-/// What a signal has interrupted is read again, as the table's reader does not.
+/// A read that a signal interrupts is repeated, since the table's reader does not repeat it.
 struct ShortRows<R> {
     inner: R,
     since_end: usize,

@@ -56,8 +56,8 @@ impl Grid {
         (heights.iter().enumerate().map(choice).collect(), bar.crowded)
     }
 
-    /// The Doppler at which the lobe of a peak is highest, at the peak's code phase. The slope of a lobe passes
-    /// alone where other satellites raise the threshold of its top.
+    /// The Doppler at which the lobe of a peak is highest, at the peak's code phase. The slope of a lobe
+    /// passes alone where other satellites raise the threshold of its top.
     fn summit(&self, strips: &[Vec<Strip>], satellite: usize, heights: &[f64], bin: usize) -> usize {
         let (halves, half_lag) = (2 * self.lags, |bin: usize| strips[bin][satellite].half_lag);
         let is_own = |other: &usize| {

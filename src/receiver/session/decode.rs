@@ -11,7 +11,7 @@ use gnss::satellite::Sv;
 
 impl Session {
     /// Gives the decoders the symbols that ended by a tick of the running block, or all that are left of it.
-    /// What is measured at a tick knows no message of later samples, however long the blocks are.
+    /// A measurement at a tick knows no message of later samples, however long the blocks are.
     pub(super) fn decode(&mut self, tick: Option<u64>, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         for front_end in &mut self.front_ends {
             let own = tick.map(|main| {

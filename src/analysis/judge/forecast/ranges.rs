@@ -12,7 +12,7 @@ use std::iter::Peekable;
 use nalgebra::Vector3;
 
 use super::air::{Air, Sight};
-use super::rates::Unshared;
+use super::unshared::Unshared;
 use crate::error::JudgeError;
 use crate::expect::beats::Beats;
 use crate::expect::due::satellite::{FADE_DB, is_stepping};
@@ -207,7 +207,7 @@ impl<'r> Scene<'r> {
             scales: scales(run),
             heard: Heard::of(run),
             stated,
-            unshared: Unshared::new(run, &choices),
+            unshared: Unshared::new(run, choices.loops, &choices.updates_s),
             choices,
             beats: Beats::new(run)?,
             edges_m: (run.signals.iter())

@@ -14,7 +14,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix4, Vector4};
 
 use super::air::Air;
 use super::ranges::{Forecast, Scene};
-use super::rates::{Rates, Unshared};
+use super::rates::Rates;
+use super::unshared::Unshared;
 use crate::error::JudgeError;
 use crate::measure::errors::Errors;
 use crate::read::spill_store::Words;

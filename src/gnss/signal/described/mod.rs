@@ -111,10 +111,11 @@ pub fn registered(text: &str) -> Result<&'static Signal, DescriptionError> {
     if let Some(known) = described.iter().find(|known| known.description == description) {
         return Ok(known.signal);
     }
-    if Signal::find(&description.name).is_some() {
+    let signal = description.signal()?;
+    if Signal::find(signal.name).is_some() {
         return Err(refused("name", "a name that no other signal has"));
     }
-    let signal: &'static Signal = Box::leak(Box::new(description.signal()?));
+    let signal: &'static Signal = Box::leak(Box::new(signal));
     register(signal).map_err(|taken| refused("name", &taken.to_string()))?;
     described.push(Entry { signal, description, text: text.to_owned() });
     Ok(signal)

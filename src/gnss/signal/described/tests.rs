@@ -66,6 +66,9 @@ fn a_text_describes_one_signal_however_often_it_is_read_and_no_other_of_its_name
     assert!(std::ptr::eq(registered(&format!("# a comment\n{text}")).unwrap(), signal));
     let other = registered(&text.replace("\"1A\"", "\"1B\"")).unwrap_err().to_string();
     assert!(other.contains("name: expected a name that no other signal has"), "{other}");
+    // A wrong value is said before the name, which another file may have taken.
+    let wrong = registered(&text.replace("code_chips = 1023", "code_chips = 0")).unwrap_err().to_string();
+    assert!(wrong.contains("component[1].code_chips"), "{wrong}");
     assert_eq!(texts_of([signal, &L1_CA]), [text.as_str()]);
     assert_eq!(texts_of([&L1_CA]), [""; 0]);
 }
