@@ -124,9 +124,12 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     }
     text += &printed::last_fix_line(both.outcome.last_fix.as_ref());
     text += &format!("margins       {}\n", both.outcome.conditioning);
-    let how = if scene.fidelity.grade == Grade::Correlations { "modelled" } else { "made" };
     for generated in &both.generated {
-        text += &format!("{how:<14}{generated}\n");
+        text += &if is_sampled {
+            format!("made          {generated}\n")
+        } else {
+            format!("modelled      {}\n", generated.modelled(duration_s))
+        };
     }
     text += &format!("results in {}\n", target.display());
     let verdict = &summary.details.verdict;

@@ -56,7 +56,7 @@ impl Default for Options {
 /// Summary of a generator run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Generated {
-    /// Samples made.
+    /// Samples made; none at the level of correlations.
     pub samples: u64,
     /// Satellites that were in view at some time.
     pub satellites: Vec<Sv>,
@@ -70,22 +70,37 @@ pub struct Generated {
     pub knot_tolerance_cycles: f64,
 }
 
+impl Generated {
+    /// Text about what was modelled over `duration_s` seconds without samples.
+    pub fn modelled(&self, duration_s: f64) -> String {
+        format!("{duration_s} s of {}; {}", self.sent(), self.accuracy())
+    }
+
+    fn sent(&self) -> String {
+        let names: Vec<String> = self.satellites.iter().map(Sv::to_string).collect();
+        format!("{} satellites ({})", names.len(), names.join(" "))
+    }
+
+    fn accuracy(&self) -> String {
+        let (worst, allowed) = (self.worst_knot_cycles, self.knot_tolerance_cycles);
+        let left = 100.0 * (1.0 - worst / allowed);
+        let share = if worst > allowed {
+            format!("beyond the {allowed:e} that the scene allows: knots are no closer")
+        } else {
+            format!("{left:.0} % below what the scene allows, {allowed:e}")
+        };
+        format!("the carrier is up to {worst:.1e} cycles off between {} knots, {share}", self.knots)
+    }
+}
+
 impl fmt::Display for Generated {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let names: Vec<String> = self.satellites.iter().map(Sv::to_string).collect();
-        write!(f, "{} samples of {} satellites ({})", self.samples, names.len(), names.join(" "))?;
+        write!(f, "{} samples of {}", self.samples, self.sent())?;
         if self.clipped > 0 {
             let share = self.clipped as f64 / (2.0 * self.samples as f64);
             write!(f, "; {} components clipped ({:.1e} of them)", self.clipped, share)?;
         }
-        let (worst, allowed) = (self.worst_knot_cycles, self.knot_tolerance_cycles);
-        write!(f, "; the carrier is up to {worst:.1e} cycles off between {} knots, ", self.knots)?;
-        let left = 100.0 * (1.0 - worst / allowed);
-        if worst > allowed {
-            write!(f, "beyond the {allowed:e} that the scene allows: knots are no closer")
-        } else {
-            write!(f, "{left:.0} % below what the scene allows, {allowed:e}")
-        }
+        write!(f, "; {}", self.accuracy())
     }
 }
 

@@ -11,9 +11,11 @@ use crate::statistics::Spread;
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let rate_msps = self.sample_rate_hz / 1e6;
-        writeln!(f, "{} · {} s at {rate_msps} Msps · seed {}", self.scene, self.duration_s, self.seed)?;
+        let Self { scene, duration_s, seed, .. } = self;
         if self.fidelity == "correlations" {
-            writeln!(f, "level correlations: sums and searches from a model, no samples")?;
+            writeln!(f, "{scene} · {duration_s} s modelled at level correlations, without samples · seed {seed}")?;
+        } else {
+            writeln!(f, "{scene} · {duration_s} s at {rate_msps} Msps · seed {seed}")?;
         }
         self.satellite_lines(f)?;
         writeln!(f, "\n{:<26}{:>12}{:>12}{:>12}", "error", "mean", "sigma", "95 %")?;

@@ -85,7 +85,9 @@ pub fn run(
         progress(to);
         second += 1;
     }
-    Ok(Done { generated: fronts.finish(truth)?, outcome: reception.finish(records)? })
+    let mut generated = fronts.finish(truth)?;
+    generated.iter_mut().for_each(|one| one.samples = 0);
+    Ok(Done { generated, outcome: reception.finish(records)? })
 }
 
 /// Everything that does not depend on time.

@@ -14,9 +14,12 @@ const CLIPPED_SIGMAS: f32 = 3.5;
 
 /// Effect for which there is no model of correlations.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("level correlations: {effect} has no model here; level samples has it")]
+#[error(
+    "[fidelity] level = \"correlations\" has no model of {effect}: leave it out, or take the level \"balanced\" \
+     ([fidelity] level, run --level), which makes samples"
+)]
 pub struct Refused {
-    /// Name of the effect, as a scenario writes it.
+    /// Name of the effect, with the key of a scenario that has it.
     pub effect: String,
 }
 
@@ -27,23 +30,24 @@ pub struct Refused {
 pub fn refuse(scenes: &[Scene]) -> Result<(), Refused> {
     let levels = || scenes.iter().map(|scene| scene.fidelity.grade);
     let mixed = levels().zip(levels().skip(1)).any(|(one, next)| one != next);
-    let mixed = mixed.then(|| "a level of its own for a front end".to_owned());
+    let mixed = mixed.then(|| "front ends with different [fidelity] levels".to_owned());
     mixed.into_iter().chain(scenes.iter().filter_map(refused)).try_for_each(|effect| Err(Refused { effect }))
 }
 
 /// The first effect of a front end that has no model, by its name.
 fn refused(scene: &Scene) -> Option<String> {
     let format = scene.metadata.format;
-    let stage = scene.front_end.first().map(|stage| format!("[front_end] {}", stage.name()));
+    let stage = scene.front_end.first().map(|stage| format!("[{}]", stage.name()));
+    let real = || format!("real samples (front_end.format = \"{}\")", format.name());
     let jammer = scene.interference.first().map(|_| "[[interference]]".to_owned());
     None.or_else(|| scene.playback.as_ref().map(|_| "[playback]".to_owned()))
         .or(jammer)
         .or_else(|| scene.spoofers.first().map(|_| "[[spoofer]]".to_owned()))
-        .or_else(|| scene.switches.as_ref().map(|_| "pushed motion".to_owned()))
+        .or_else(|| scene.switches.as_ref().map(|_| "motion that is pushed while the scene runs".to_owned()))
         .or(stage)
-        .or_else(|| (!format.is_complex()).then(|| format!("format {}, whose samples are real,", format.name())))
+        .or_else(|| (!format.is_complex()).then(real))
         .or_else(|| quantisation(scene))
-        .or_else(|| scene.metadata.inverted.then(|| "an inverted spectrum".to_owned()))
+        .or_else(|| scene.metadata.inverted.then(|| "front_end.spectrum_inverted".to_owned()))
         .or_else(|| edge(scene.fidelity.code_edge))
         .or_else(|| scene.signals.iter().find_map(|one| signal(one)))
 }
@@ -55,16 +59,16 @@ pub(super) fn signal(signal: &'static Signal) -> Option<String> {
         layers.iter().any(|layer| !layer.chips.is_empty()) || layers.windows(2).any(|pair| differ(&pair[0], &pair[1]))
     };
     if signal.sides_hz() > 0.0 {
-        return Some(format!("{signal}, both sidebands of which are followed,"));
+        return Some(format!("{signal} (signals), both sidebands of which are followed"));
     }
     // Channels lose such a pilot here from time to time, which they do not by samples.
     let longest = signal.components.iter().map(|one| one.code_chips).max();
     if lead(signal).map(|lead| lead.code_chips) != longest {
-        return Some(format!("{signal}, the pilot of which has a code longer than is searched for,"));
+        return Some(format!("{signal} (signals), the pilot of which has a code longer than is searched for"));
     }
     // Sums of samples differ by 3 and 5 cm.
     let is_mixed = signal.components.iter().any(|one| is_mixed(one.layers));
-    is_mixed.then(|| format!("{signal}, whose pulses take turns or are in quadrature,"))
+    is_mixed.then(|| format!("{signal} (signals), whose pulses take turns or are in quadrature"))
 }
 
 /// Whole numbers whose rounding is no noise of its own, or that clip.
@@ -75,10 +79,12 @@ fn quantisation(scene: &Scene) -> Option<String> {
         Format::Ci8 | Format::Cu8 | Format::Ri8 => 127.0,
     };
     if !scene.noise {
-        return Some("the rounding of samples without noise to whole numbers".to_owned());
+        let name = scene.metadata.format.name();
+        return Some(format!("whole numbers (front_end.format = \"{name}\") without [noise]"));
     }
     let fits = scene.noise_lsb >= LEAST_LSB && scene.noise_lsb * CLIPPED_SIGMAS <= largest;
-    (!fits).then(|| format!("noise of {} LSB in samples of format {}", scene.noise_lsb, scene.metadata.format.name()))
+    let name = scene.metadata.format.name();
+    (!fits).then(|| format!("front_end.noise_lsb = {} with front_end.format = \"{name}\"", scene.noise_lsb))
 }
 
 fn edge(edge: CodeEdge) -> Option<String> {

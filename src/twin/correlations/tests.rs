@@ -266,6 +266,7 @@ fn a_reception_by_correlations_finds_the_satellites_strengths_noise_and_position
     assert_eq!(by_samples.outcome.acquired, by_model.outcome.acquired);
     assert_eq!(by_samples.outcome.used, by_model.outcome.used);
     assert_eq!(by_samples.generated[0].satellites, by_model.generated[0].satellites);
+    assert_eq!((by_samples.generated[0].samples, by_model.generated[0].samples), (scene.samples, 0));
     let [all, own] = [&sampled, &modelled].map(|records| levels(records, &scene));
     for (sv, (cn0_dbhz, chips)) in &all {
         let (own_dbhz, own_chips) = own[sv];
@@ -303,6 +304,8 @@ fn an_effect_without_a_model_is_refused_by_name() {
     let refused = |rest: &str| refuse(&[kanpur(1.0, rest)]).map(|_| ()).unwrap_err().to_string();
     assert!(refused("[front_end]\nsample_rate_hz = 2.6e6\nif_hz = 6e5\nformat = \"ri8\"\n").contains("ri8"));
     assert!(refused("[fidelity]\ncode_edge = \"band_limited\"\n").contains("band_limited"));
+    let filtered = refused("[filter]\nkind = \"brick_wall\"\nbandwidth_hz = 2.2e6\n");
+    assert!(filtered.contains("[filter]") && filtered.contains("run --level"), "{filtered}");
     let jammer = "[[interference]]\nkind = \"cw\"\njs_db = 20\noffset_hz = 1e5\n";
     assert!(refused(jammer).contains("[[interference]]"));
     assert!(refuse(&[kanpur(1.0, ""), kanpur(1.0, "[fidelity]\ncode_edge = \"band_limited\"\n")]).is_err());

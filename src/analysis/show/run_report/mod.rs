@@ -163,16 +163,23 @@ fn facts(judged: &Judged<'_>) -> Vec<(String, String)> {
         ("tolerance", "knot_tolerance_cycles"),
         ("noise", "noise_arithmetic"),
     ];
+    let is_modelled = scene.fidelity == "correlations";
+    // Arithmetic of samples that were not made.
+    let of_samples = ["carrier", "noise"];
     let knobs: Vec<String> = knobs
         .into_iter()
+        .filter(|(name, _)| !(is_modelled && of_samples.contains(name)))
         .filter_map(|(name, key)| {
             Some(format!("{name} {}{}", text(key)?, if name == "tolerance" { " cycles" } else { "" }))
         })
         .collect();
     let satellites = &summary.satellites;
+    let front_end = format!("{} Msps, {}", number(scene.sample_rate_hz / 1e6), scene.format);
+    let modelled = format!("{} s of correlations, no samples", number(summary.duration_s));
     let mut facts = vec![
         ("program", Some(concat!("gnss-twin ", env!("CARGO_PKG_VERSION")).to_owned())),
-        ("samples", Some(format!("{} Msps, {}", number(scene.sample_rate_hz / 1e6), scene.format))),
+        ("modelled", is_modelled.then_some(modelled)),
+        (if is_modelled { "front end" } else { "samples" }, Some(front_end)),
         ("centre", scene.center_hz.map(|hz| format!("{} MHz", hz / 1e6))),
         ("signals", text("signals")),
         ("fidelity", Some(format!("{} ({})", scene.fidelity, knobs.join(", ")))),
