@@ -74,9 +74,7 @@ impl<'a> Front<'a> {
             let authentic = transmitters.iter_mut().filter(|t| t.from.number == 0);
             authentic.for_each(|t| t.places = Some(Arc::clone(&places)));
         }
-        // What stages look back at is rendered twice: blocks are long against it.
-        let lead = scene.memory_samples().next_multiple_of(RUN_SAMPLES) as u64;
-        let block = (u64::from(options.block_runs.max(1)) * RUN_SAMPLES as u64).max(LEADS_PER_BLOCK * lead);
+        let (lead, block) = lengths(scene, options);
         let batch = block * u64::from(options.batch_blocks.max(1));
         let (next, level) = (part.start, options.level);
         Ok(Self {
@@ -198,6 +196,13 @@ impl<'a> Front<'a> {
             knot_tolerance_cycles: self.scene.fidelity.knot_tolerance_cycles,
         }
     }
+}
+
+/// Samples that stages look back at, in whole runs, and samples of a block. What is looked back at is rendered
+/// twice: blocks are long against it.
+pub(super) fn lengths(scene: &Scene, options: &Options) -> (u64, u64) {
+    let lead = scene.memory_samples().next_multiple_of(RUN_SAMPLES) as u64;
+    (lead, (u64::from(options.block_runs.max(1)) * RUN_SAMPLES as u64).max(LEADS_PER_BLOCK * lead))
 }
 
 /// Shares the geometry among all signals that front ends receive from one satellite of one constellation.

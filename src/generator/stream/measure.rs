@@ -2,16 +2,16 @@
 
 use std::ops::Range;
 
-use super::GenerateError;
 use super::block::{Worker, edge, first_run, pack, run_begin, satellites};
-use super::front::transmitters;
+use super::front::{lengths, transmitters};
+use super::{GenerateError, Options};
 use crate::scene::{CodeEdge, Scene};
 use crate::stage::Block;
 use crate::stopwatch::Stopwatch;
 use crate::synth::band::Filter;
 use crate::synth::isa::Level;
 use crate::synth::waveform::Waveform;
-use crate::synth::{Edge, Kernel, RUN_SAMPLES};
+use crate::synth::{Edge, Kernel};
 use gnss::signal::{Component, Signal};
 
 /// Statistics of a segment of the scene's samples.
@@ -24,8 +24,8 @@ pub(crate) struct Stretch {
     pub square_lsb2: f64,
     /// Number of components that were clipped.
     pub clipped: u64,
-    /// Processor time in seconds per sample for everything that is made, including the samples that stages
-    /// look back at.
+    /// Processor time in seconds for a sample that is sent, with its share of the samples that stages look
+    /// back at, which a stream makes twice.
     pub sample_s: f64,
 }
 
@@ -79,7 +79,8 @@ pub(crate) fn measured(scene: &Scene, stretches: &[Range<u64>]) -> Result<Vec<St
     let mut transmitters = transmitters(scene, edge)?;
     let kernel = Kernel { edge, arithmetic: scene.fidelity.carrier, level: Level::detect() };
     let (memory, format) = (scene.memory_samples(), scene.metadata.format);
-    let lead = memory.next_multiple_of(RUN_SAMPLES) as u64;
+    let (lead, block_samples) = lengths(scene, &Options::default());
+    let made_share = 1.0 + lead as f64 / block_samples as f64;
     let (mut worker, mut bytes) = (Worker::default(), Vec::new());
     let mut found = Vec::new();
     for stretch in stretches {
@@ -111,7 +112,7 @@ pub(crate) fn measured(scene: &Scene, stretches: &[Range<u64>]) -> Result<Vec<St
             components: if format.is_complex() { 2 } else { 1 } * samples as u64,
             square_lsb2,
             clipped,
-            sample_s: watch.elapsed_s() / block.i.len().max(1) as f64,
+            sample_s: made_share * watch.elapsed_s() / block.i.len().max(1) as f64,
         });
     }
     Ok(found)
