@@ -198,8 +198,8 @@ impl<'a> Front<'a> {
     }
 }
 
-/// Samples that stages look back at, in whole runs, and samples of a block. What is looked back at is rendered
-/// twice: blocks are long against it.
+/// Samples that stages look back at, in whole runs, and samples of a block. What is looked back at is
+/// rendered twice: blocks are long against it.
 pub(super) fn lengths(scene: &Scene, options: &Options) -> (u64, u64) {
     let lead = scene.memory_samples().next_multiple_of(RUN_SAMPLES) as u64;
     (lead, (u64::from(options.block_runs.max(1)) * RUN_SAMPLES as u64).max(LEADS_PER_BLOCK * lead))
