@@ -43,9 +43,9 @@ const LONGEST: usize = 200_000;
 impl Response {
     pub fn of(closed: &PhaseLoop) -> Self {
         let mut state = [0.0; 3];
-        let rate_after_steps = rates_after_step(closed).iter().map(|rate| rate * rate).sum();
-        let mut found = Self { phase: 0.0, put_out: 0.0, difference: 0.0, rate: 0.0, cross: 0.0, rate_after_steps };
-        let mut before = 0.0;
+        let mut found =
+            Self { phase: 0.0, put_out: 0.0, difference: 0.0, rate: 0.0, cross: 0.0, rate_after_steps: 0.0 };
+        let (mut before, mut ran_after_step) = (0.0, 0.0);
         for k in 0..LONGEST {
             let noise = if k == 0 { 1.0 } else { 0.0 };
             found.phase += state[0] * state[0];
@@ -53,6 +53,9 @@ impl Response {
             let ran = state[1] + 0.5 * state[2];
             found.rate += ran * ran;
             found.cross += state[0] * ran;
+            // A step is one value in every interval from its own on.
+            ran_after_step += ran;
+            found.rate_after_steps += ran_after_step * ran_after_step;
             let put_out = noise - state[0];
             found.put_out += put_out * put_out;
             found.difference += (put_out - before) * (put_out - before);
@@ -137,6 +140,8 @@ mod tests {
         assert!((0.5 * response.phase - 0.05).abs() < 1e-6, "{response:?}");
         // A value is white: what is put out is its own variance and the estimate's, which knows it not yet.
         assert!((response.put_out - 1.0 - response.phase).abs() < 1e-9, "{response:?}");
+        let after_steps: f64 = rates_after_step(&found).iter().map(|rate| rate * rate).sum();
+        assert!((response.rate_after_steps / after_steps - 1.0).abs() < 1e-6, "{response:?} {after_steps}");
     }
 
     #[test]

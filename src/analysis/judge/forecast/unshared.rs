@@ -41,27 +41,27 @@ impl Unshared {
         });
         let theories: Vec<Option<Theory>> = theories.collect();
         let white = theories.iter().flatten().map(Theory::white_frequency_noise).fold(0.0, f64::max);
-        let follower = |theory: &Option<Theory>| theory.as_ref().map_or_else(Follower::default, Follower::of);
-        let followers: Vec<Follower> = theories.iter().map(follower).collect();
+        let followers: Vec<Option<Follower>> =
+            theories.iter().map(|theory| theory.as_ref().map(Follower::of)).collect();
         Self::of(&followers, white)
     }
 
-    fn of(followers: &[Follower], white: f64) -> Self {
+    /// Noise of signals in their order, of which those without a loop have none.
+    fn of(followers: &[Option<Follower>], white: f64) -> Self {
         let count = followers.len();
         let (mut own, mut between) = (vec![0.0; count], DMatrix::zeros(count, count));
-        let held = || followers.iter().enumerate().filter(|(_, follower)| follower.update_s > 0.0);
-        if let Some((first, _)) = held().next().filter(|_| white > 0.0) {
-            let step_s = held().map(|(_, f)| f.update_s).fold(f64::INFINITY, f64::min) / f64::from(POINTS);
-            let end_s = held().map(|(_, f)| f.end_s()).fold(0.0, f64::max);
+        let held: Vec<(usize, &Follower)> =
+            followers.iter().enumerate().filter_map(|(k, of)| Some((k, of.as_ref()?))).collect();
+        if !held.is_empty() && white > 0.0 {
+            let step_s = held.iter().map(|(_, f)| f.update_s).fold(f64::INFINITY, f64::min) / f64::from(POINTS);
+            let end_s = held.iter().map(|(_, f)| f.end_s()).fold(0.0, f64::max);
             let scale = 0.5 * white * SPEED_OF_LIGHT_MPS * SPEED_OF_LIGHT_MPS * step_s;
             for k in 0..(end_s / step_s) as usize {
-                let moments: Vec<[f64; 2]> = followers.iter().map(|f| f.moments((k as f64 + 0.5) * step_s)).collect();
-                for (one, _) in held() {
-                    let [mean, square] = moments[one];
+                let moments: Vec<[f64; 2]> = held.iter().map(|(_, f)| f.moments((k as f64 + 0.5) * step_s)).collect();
+                for (&(one, _), &[mean, square]) in held.iter().zip(&moments) {
                     own[one] += scale * (square - mean * mean).max(0.0);
-                    for (other, _) in held() {
-                        let apart = |of: usize| moments[of][0] - moments[first][0];
-                        between[(one, other)] += scale * apart(one) * apart(other);
+                    for (&(other, _), &[its_mean, _]) in held.iter().zip(&moments) {
+                        between[(one, other)] += scale * (mean - moments[0][0]) * (its_mean - moments[0][0]);
                     }
                 }
             }
@@ -80,7 +80,7 @@ impl Unshared {
 }
 
 /// Rate of a phase loop after a unit step of its phase.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 struct Follower {
     /// Rates from update to update, per second.
     rates_per_s: Vec<f64>,
@@ -143,10 +143,10 @@ mod tests {
         ((b ^ (b >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    fn follower(ticks: usize) -> Follower {
+    fn follower(ticks: usize) -> Option<Follower> {
         let update_s = ticks as f64 * TICK_S;
         let rates = rates_after_step(&exact_loop(3, 18.0 * update_s).unwrap());
-        Follower { rates_per_s: rates.into_iter().map(|rate| rate / update_s).collect(), update_s }
+        Some(Follower { rates_per_s: rates.into_iter().map(|rate| rate / update_s).collect(), update_s })
     }
 
     #[test]
@@ -190,5 +190,15 @@ mod tests {
     fn a_clock_without_noise_moves_no_loops_apart() {
         let found = Unshared::of(&[follower(8), follower(20)], 0.0);
         assert_eq!([found.own_mps(0), found.own_mps(1), found.between(1, 1)], [0.0; 3]);
+    }
+
+    #[test]
+    fn a_signal_without_a_loop_has_no_part_and_changes_no_other() {
+        let both = Unshared::of(&[follower(8), follower(20)], 2e-18);
+        let three = Unshared::of(&[None, follower(8), follower(20)], 2e-18);
+        assert_eq!([three.own_mps(0), three.between(0, 2), three.between(2, 0)], [0.0; 3]);
+        assert_eq!([three.own_mps(1), three.own_mps(2)], [both.own_mps(0), both.own_mps(1)]);
+        assert_eq!(three.between(2, 2), both.between(1, 1));
+        assert!(both.between(1, 1) > 0.0);
     }
 }
