@@ -37,6 +37,7 @@ pub mod earth;
 pub mod exchange;
 pub mod facts;
 pub mod fec;
+pub mod framed;
 pub mod galileo;
 pub mod geoid;
 pub mod glonass;

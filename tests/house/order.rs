@@ -21,7 +21,7 @@ pub const ORDER: Order<'static> = &[
             &["augmentation", "broadcast", "facts"],
             &["record"],
             &["message"],
-            &["nmea", "exchange"],
+            &["nmea", "exchange", "framed"],
             &["gps", "galileo", "navic", "beidou", "glonass"],
             &["qzss", "sbas"],
             &["rinex"],

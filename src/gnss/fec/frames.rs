@@ -3,13 +3,12 @@
 
 use std::collections::VecDeque;
 
-/// Frames in a row that fail where they are expected before they are sought elsewhere.
-const FAILURES: u32 = 4;
-
 /// Looks for frames.
 #[derive(Clone, Debug)]
 pub struct Frames {
     length: usize,
+    /// Frames in a row that fail where they are expected before they are sought elsewhere.
+    most_failures: u32,
     /// The latest symbols, a frame at most; `next` numbers the one to come.
     symbols: VecDeque<f32>,
     next: u64,
@@ -19,19 +18,26 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Creates the state for frames of `length` symbols.
-    pub fn new(length: usize) -> Self {
-        Self { length, symbols: VecDeque::with_capacity(length), next: 0, frame: None, failures: 0 }
+    /// Creates the state for frames of `length` symbols, which are sought elsewhere after `most_failures` in
+    /// a row.
+    pub fn new(length: usize, most_failures: u32) -> Self {
+        let symbols = VecDeque::with_capacity(length);
+        Self { length, most_failures, symbols, next: 0, frame: None, failures: 0 }
     }
 
-    /// Takes the next symbol; gives the frame that ends with it. Until one is known `may_begin` states of
-    /// every position whether `decode` is worth its time.
+    /// True if the positions of frames are known.
+    pub fn are_known(&self) -> bool {
+        self.frame.is_some()
+    }
+
+    /// Takes the next symbol. Returns the frame that ends with it and the number of its first symbol. Until
+    /// one is known `may_begin` states of every position whether `decode` is worth its time.
     pub fn take<F>(
         &mut self,
         soft: f32,
         may_begin: impl Fn(&[f32]) -> bool,
         decode: impl Fn(&[f32]) -> Option<F>,
-    ) -> Option<F> {
+    ) -> Option<(F, u64)> {
         if self.symbols.len() == self.length {
             self.symbols.pop_front();
         }
@@ -54,11 +60,11 @@ impl Frames {
             (self.frame, self.failures) = (Some(begin), 0);
         } else {
             self.failures += 1;
-            if self.failures >= FAILURES {
+            if self.failures >= self.most_failures {
                 self.doubt();
             }
         }
-        found
+        Some((found?, begin))
     }
 
     /// Informs the search that symbols are missing before the next one.
@@ -80,17 +86,19 @@ mod tests {
     #[test]
     fn frames_are_found_at_every_place_followed_where_they_were_and_sought_anew_after_four_failures() {
         // A frame is 1, 0, 0; its check is that the last is 0.
-        let mut frames = Frames::new(3);
+        let mut frames = Frames::new(3, 4);
         let mut take = |soft: f32| frames.take(soft, |own| own[0] == 1.0, |own| (own[2] == 0.0).then(|| own.to_vec()));
-        let ends = |takes: &mut dyn FnMut(f32) -> Option<Vec<f32>>, symbols: &[f32]| -> Vec<usize> {
-            symbols.iter().enumerate().filter_map(|(at, soft)| takes(*soft).map(|_| at)).collect()
+        type Found = Option<(Vec<f32>, u64)>;
+        // Numbers of first symbols, counted from the first of all.
+        let begins = |takes: &mut dyn FnMut(f32) -> Found, symbols: &[f32]| -> Vec<u64> {
+            symbols.iter().filter_map(|soft| takes(*soft)).map(|(_, begin)| begin).collect()
         };
-        assert_eq!(ends(&mut take, &[5.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 1.0, 0.0, 0.0]), [3, 6, 9]);
+        assert_eq!(begins(&mut take, &[5.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 1.0, 0.0, 0.0]), [1, 4, 7]);
         // Four of the positions where one is due fail; then 1, 2, 0 is found a position later.
         let moved = [2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 3.0, 1.0, 2.0, 0.0];
-        assert_eq!(ends(&mut take, &moved), [15]);
+        assert_eq!(begins(&mut take, &moved), [23]);
         frames.skip();
         let mut take = |soft: f32| frames.take(soft, |own| own[0] == 1.0, |own| (own[2] == 0.0).then(|| own.to_vec()));
-        assert_eq!(ends(&mut take, &[0.0, 0.0, 1.0, 3.0, 0.0]), [4]);
+        assert_eq!(begins(&mut take, &[0.0, 0.0, 1.0, 3.0, 0.0]), [28]);
     }
 }

@@ -16,6 +16,7 @@ use crate::broadcast::Ephemeris;
 use crate::crc::crc24q;
 use crate::fec::frames::Frames;
 use crate::fec::ldpc64::Ldpc64;
+use crate::framed::Reported;
 use crate::message::{Common, Message, Parameters, Raw, Read, Reader, Sender, UtcNumbers};
 use crate::record::NavigationRow;
 use crate::satellite::Sv;
@@ -28,6 +29,8 @@ const NUMBER_BITS: usize = 6;
 /// 0.89 at an amplitude of √2 standard deviations, near which the codes begin to fail. Of data 22 symbols
 /// reach it once in a thousand.
 const LEAST_SHARE: f32 = 0.65;
+/// Messages in a row that fail where they are expected before they are sought elsewhere.
+const FAILURES: u32 = 4;
 
 /// Layout of the messages of one kind.
 pub(in crate::beidou) struct Layout {
@@ -210,16 +213,16 @@ pub(in crate::beidou) struct TypedReader {
     frames: Frames,
     /// The latest messages of an ephemeris, the newest last.
     parts: Vec<Part>,
-    /// Parameters of the ephemeris that was reported last.
-    complete: Option<Parameters>,
+    reported: Reported,
     accuracies: Accuracies,
 }
 
 impl TypedReader {
     /// Creates a reader that has received no symbols.
     pub fn new(layout: &'static Layout, sv: Sv) -> Self {
-        let frames = Frames::new(layout.symbols());
-        Self { layout, sv, frames, parts: Vec::new(), complete: None, accuracies: Accuracies::default() }
+        let frames = Frames::new(layout.symbols(), FAILURES);
+        let (reported, accuracies) = (Reported::default(), Accuracies::default());
+        Self { layout, sv, frames, parts: Vec::new(), reported, accuracies }
     }
 
     /// Takes a message that ends with the newest symbol.
@@ -272,12 +275,7 @@ impl TypedReader {
 
     fn look_for_set(&mut self, near: Epoch, news: &mut Vec<Read>) {
         let Some((set, all)) = self.found(near) else { return };
-        if self.complete.as_ref() != Some(&all) {
-            let rows = NavigationRow::each(self.sv, self.layout.message.name, u32::from(set.iode), all.clone());
-            news.push(Read::Ephemeris(Box::new(set)));
-            news.push(Read::Parameters(rows.collect()));
-            self.complete = Some(all);
-        }
+        self.reported.take(self.layout.message.name, all, (|| Some(set), "messages"), news);
     }
 
     /// The ephemeris in the latest messages, with its parameters.
@@ -321,7 +319,7 @@ impl Reader for TypedReader {
             another.get().is_none().then_some((bits, inverted))
         };
         match (self.frames.take(soft, may_begin, own), another.get()) {
-            (Some((bits, inverted)), _) => self.read(bits, inverted, near),
+            (Some(((bits, inverted), _)), _) => self.read(bits, inverted, near),
             (None, another) => another.map(|another| Read::names_another("a message", another)).into_iter().collect(),
         }
     }

@@ -5,8 +5,8 @@
 
 use super::{B_CNAV1, Frame, SYMBOLS, SYMBOLS_1, beside_in, decode, elements, likely_time, of_set_in};
 use crate::beidou::bcnav::{Accuracies, accuracies_in, electrons_in};
-use crate::fec::frames::Frames;
-use crate::message::{Parameters, Read, Reader};
+use crate::framed::{Content, Framed, Reported};
+use crate::message::{Parameters, Read};
 use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::Epoch;
@@ -16,26 +16,50 @@ use crate::time::Epoch;
 /// data symbols agrees by less than half.
 const LEAST_SHARE: f32 = 0.65;
 
-/// Reads B-CNAV1.
+/// Reader of B-CNAV1.
+pub type BCnav1Reader = Framed<BCnav1Content>;
+
+impl BCnav1Reader {
+    /// Creates a reader that has received no symbols.
+    pub fn new(sv: Sv) -> Self {
+        Self::of(BCnav1Content {
+            sv,
+            reported: Reported::default(),
+            electrons: None,
+            accuracies: Accuracies::default(),
+        })
+    }
+}
+
+/// Content of a satellite's frames.
 #[derive(Clone, Debug)]
-pub struct BCnav1Reader {
+pub struct BCnav1Content {
     sv: Sv,
-    frames: Frames,
-    /// Parameters of the ephemeris that was reported last.
-    complete: Option<Parameters>,
+    reported: Reported,
     /// The coefficients of the ionosphere that were reported last, and of which issue.
     electrons: Option<(u32, Parameters)>,
     accuracies: Accuracies,
 }
 
-impl BCnav1Reader {
-    /// Creates a reader that has received no symbols.
-    pub fn new(sv: Sv) -> Self {
-        Self { sv, frames: Frames::new(SYMBOLS), complete: None, electrons: None, accuracies: Accuracies::default() }
+impl BCnav1Content {
+    fn rows(&self, issue: u32, parameters: Parameters) -> Vec<NavigationRow> {
+        NavigationRow::each(self.sv, B_CNAV1.name, issue, parameters).collect()
+    }
+}
+
+impl Content for BCnav1Content {
+    type Frame = Frame;
+    const SYMBOLS: usize = SYMBOLS;
+
+    fn may_begin(&self, symbols: &[f32]) -> bool {
+        symbols.get(..SYMBOLS_1).is_some_and(|first| likely_time(self.sv.number, first).1.abs() > LEAST_SHARE)
     }
 
-    /// Takes a frame that ends with the newest symbol.
-    fn read(&mut self, frame: &Frame, near: Epoch) -> Vec<Read> {
+    fn decode(&self, symbols: &[f32]) -> Option<Frame> {
+        decode(self.sv.number, symbols)
+    }
+
+    fn read(&mut self, frame: Frame, _: u64, near: Epoch) -> Vec<Read> {
         let sent = frame.sent_at(near);
         let unit = Read::Unit { symbols: SYMBOLS as u64, of_week_s: frame.of_week_s(), inverted: frame.inverted };
         let mut news = vec![unit, Read::Time(sent)];
@@ -55,39 +79,11 @@ impl BCnav1Reader {
                 self.electrons = own;
             }
         }
-        if self.complete.as_ref() != Some(&all) {
-            let rows = self.rows(issue, all.clone());
-            self.complete = Some(all);
-            news.push(Read::Ephemeris(Box::new(set)));
-            news.push(Read::Parameters(rows));
-        }
+        self.reported.take(B_CNAV1.name, all, (|| Some(set), "a frame"), &mut news);
         news
     }
 
-    fn rows(&self, issue: u32, parameters: Parameters) -> Vec<NavigationRow> {
-        NavigationRow::each(self.sv, B_CNAV1.name, issue, parameters).collect()
-    }
-}
-
-impl Reader for BCnav1Reader {
-    fn take(&mut self, soft: f32, near: Epoch) -> Vec<Read> {
-        let number = self.sv.number;
-        let may_begin = |symbols: &[f32]| {
-            symbols.get(..SYMBOLS_1).is_some_and(|first| likely_time(number, first).1.abs() > LEAST_SHARE)
-        };
-        let found = self.frames.take(soft, may_begin, |symbols| decode(number, symbols));
-        found.map_or_else(Vec::new, |frame| self.read(&frame, near))
-    }
-
-    fn skip(&mut self) {
-        self.frames.skip();
-    }
-
-    fn doubt(&mut self) {
-        self.frames.doubt();
-    }
-
     fn missing(&self) -> Vec<u8> {
-        if self.complete.is_some() { Vec::new() } else { vec![1] }
+        if self.reported.is_none() { vec![1] } else { Vec::new() }
     }
 }

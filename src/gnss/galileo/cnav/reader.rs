@@ -2,8 +2,8 @@
 
 use super::{CNAV, PAGE_SYMBOLS, PATTERN, PATTERN_SYMBOLS, decode_soft, parameters};
 use crate::bits::bits_of;
-use crate::fec::frames::Frames;
-use crate::message::{Read, Reader};
+use crate::framed::{Content, Framed};
+use crate::message::Read;
 use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::Epoch;
@@ -12,40 +12,41 @@ use crate::time::Epoch;
 /// codes hold one in twenty is wrong.
 const WRONG_SYMBOLS: usize = 3;
 
-/// Reads C/NAV.
-#[derive(Clone, Debug)]
-pub struct CnavReader {
-    sv: Sv,
-    pages: Frames,
-}
+/// Reader of C/NAV.
+pub type CnavReader = Framed<CnavContent>;
 
 impl CnavReader {
     /// Creates a reader that has received no symbols.
     pub fn new(sv: Sv) -> Self {
-        Self { sv, pages: Frames::new(PAGE_SYMBOLS) }
+        Self::of(CnavContent { sv })
     }
 }
 
-/// True if the symbols may begin with the pattern, normal or inverted.
-fn may_begin(symbols: &[f32]) -> bool {
-    let pattern = bits_of(PATTERN, PATTERN_SYMBOLS);
-    let wrong = symbols.iter().zip(pattern).filter(|(soft, bit)| (**soft < 0.0) != *bit).count();
-    wrong.min(PATTERN_SYMBOLS - wrong) <= WRONG_SYMBOLS
+/// Content of a satellite's pages.
+#[derive(Clone, Debug)]
+pub struct CnavContent {
+    sv: Sv,
 }
 
-impl Reader for CnavReader {
-    fn take(&mut self, soft: f32, _: Epoch) -> Vec<Read> {
-        let Some((page, inverted)) = self.pages.take(soft, may_begin, decode_soft) else { return Vec::new() };
+impl Content for CnavContent {
+    /// A page, and true if its symbols were inverted.
+    type Frame = (Vec<bool>, bool);
+    const SYMBOLS: usize = PAGE_SYMBOLS;
+
+    /// The pattern may be there, normal or inverted.
+    fn may_begin(&self, symbols: &[f32]) -> bool {
+        let pattern = bits_of(PATTERN, PATTERN_SYMBOLS);
+        let wrong = symbols.iter().zip(pattern).filter(|(soft, bit)| (**soft < 0.0) != *bit).count();
+        wrong.min(PATTERN_SYMBOLS - wrong) <= WRONG_SYMBOLS
+    }
+
+    fn decode(&self, symbols: &[f32]) -> Option<Self::Frame> {
+        decode_soft(symbols)
+    }
+
+    fn read(&mut self, (page, inverted): Self::Frame, _: u64, _: Epoch) -> Vec<Read> {
         let rows = NavigationRow::each(self.sv, CNAV.name, 0, parameters(&page)).collect();
         vec![Read::Undated { symbols: PAGE_SYMBOLS as u64, inverted }, Read::Parameters(rows)]
-    }
-
-    fn skip(&mut self) {
-        self.pages.skip();
-    }
-
-    fn doubt(&mut self) {
-        self.pages.doubt();
     }
 
     fn missing(&self) -> Vec<u8> {

@@ -32,7 +32,7 @@ pub static INAV_E5B: Message = Message {
     set_parameters: of_issue,
     elements: of_integers,
     parameters: opened,
-    reader: |sv| Box::new(InavReader::of(&INAV_E5B, sv)),
+    reader: |sv| Box::new(InavReader::on(&INAV_E5B, sv)),
     form,
     sets: &INAV_SETS,
     quantised,

@@ -1,32 +1,47 @@
 //! Finds pages in soft symbols, normal or inverted, and collects the content of their words.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 
 use super::redundancy::{REDUNDANT, completed, is_redundant, issue, low_issue};
 use super::{
     INAV, PAGE_SYMBOLS, PART_SYMBOLS, PATTERN, REDUCED, WORDS_OF_SET, decode_any, elements, elements_in_short,
     gps_offset, ionosphere, is_alert, parameters, sent_at, time_of_week, word_of, word_type,
 };
-use crate::message::{Message, Read, Reader};
+use crate::framed::{Content, Framed};
+use crate::message::{Message, Read};
 use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::Epoch;
 
-/// Pages in a row that fail where they are expected before they are sought elsewhere.
-const FAILURES: u32 = 5;
+/// Reader of I/NAV.
+pub type InavReader = Framed<InavContent>;
 
-/// Reads I/NAV.
+impl InavReader {
+    /// Creates a reader of E1-B that has received no symbols.
+    pub fn new(sv: Sv) -> Self {
+        Self::on(&INAV, sv)
+    }
+
+    /// Creates a reader of either carrier.
+    pub(super) fn on(message: &'static Message, sv: Sv) -> Self {
+        Self::of(InavContent {
+            sv,
+            message,
+            words: BTreeMap::new(),
+            issue: None,
+            complete: None,
+            reduced: None,
+            timed: None,
+        })
+    }
+}
+
+/// Content of a satellite's pages.
 #[derive(Clone, Debug)]
-pub struct InavReader {
+pub struct InavContent {
     sv: Sv,
     /// Message of the reader's carrier.
     message: &'static Message,
-    /// The latest symbols, a page at most; `next` numbers the one to come.
-    symbols: VecDeque<f32>,
-    next: u64,
-    /// Number of the first symbol of some page, and pages that failed since the last one that did not.
-    page: Option<u64>,
-    failures: u32,
     /// The latest words by their types.
     words: BTreeMap<u8, u128>,
     /// The issue of data of the latest of words 1 to 4.
@@ -39,40 +54,9 @@ pub struct InavReader {
     timed: Option<(u64, Epoch)>,
 }
 
-impl InavReader {
-    /// Creates a reader of E1-B that has received no symbols.
-    pub fn new(sv: Sv) -> Self {
-        Self::of(&INAV, sv)
-    }
-
-    /// Creates a reader of either carrier.
-    pub(super) fn of(message: &'static Message, sv: Sv) -> Self {
-        Self {
-            sv,
-            message,
-            symbols: VecDeque::with_capacity(PAGE_SYMBOLS),
-            next: 0,
-            page: None,
-            failures: 0,
-            words: BTreeMap::new(),
-            issue: None,
-            complete: None,
-            reduced: None,
-            timed: None,
-        }
-    }
-
-    /// True if both parts of a possible page begin with the pattern, both normal or both inverted.
-    fn has_patterns(&self) -> bool {
-        let is_one = |place: usize| self.symbols.get(place).is_some_and(|soft| *soft < 0.0);
-        let pattern = |first: usize, flip: bool| {
-            PATTERN.iter().enumerate().all(|(place, bit)| is_one(first + place) == (bit ^ flip))
-        };
-        [false, true].into_iter().any(|flip| pattern(0, flip) && pattern(PART_SYMBOLS, flip))
-    }
-
+impl InavContent {
     /// Takes the word of the page whose first symbol has the number `begin`.
-    fn read(&mut self, word: u128, begin: u64, inverted: bool, near: Epoch) -> Vec<Read> {
+    fn take(&mut self, word: u128, begin: u64, inverted: bool, near: Epoch) -> Vec<Read> {
         let mut news = Vec::new();
         let dated = sent_at(&word, near);
         if let Some(tow_s) = time_of_week(&word).map(i64::from) {
@@ -154,50 +138,33 @@ impl InavReader {
     }
 }
 
-impl Reader for InavReader {
-    fn take(&mut self, soft: f32, near: Epoch) -> Vec<Read> {
-        if self.symbols.len() == PAGE_SYMBOLS {
-            self.symbols.pop_front();
-        }
-        self.symbols.push_back(soft);
-        self.next += 1;
-        let Some(begin) = self.next.checked_sub(PAGE_SYMBOLS as u64).filter(|_| self.symbols.len() == PAGE_SYMBOLS)
-        else {
-            return Vec::new();
+impl Content for InavContent {
+    /// Both parts of a page, and true if their symbols were inverted.
+    type Frame = ([Vec<bool>; 2], bool);
+    const SYMBOLS: usize = PAGE_SYMBOLS;
+    const FAILURES: u32 = 5;
+
+    /// Both parts begin with the pattern, both normal or both inverted.
+    fn may_begin(&self, symbols: &[f32]) -> bool {
+        let is_one = |place: usize| symbols.get(place).is_some_and(|soft| *soft < 0.0);
+        let pattern = |first: usize, flip: bool| {
+            PATTERN.iter().enumerate().all(|(place, bit)| is_one(first + place) == (bit ^ flip))
         };
-        let due = self.page.is_some_and(|page| begin.abs_diff(page).is_multiple_of(PAGE_SYMBOLS as u64));
-        if (self.page.is_some() && !due) || (self.page.is_none() && !self.has_patterns()) {
-            return Vec::new();
-        }
-        match decode_any(self.symbols.make_contiguous()) {
-            Some((parts, _)) if is_alert(&parts) => {
-                (self.page, self.failures) = (Some(begin), 0);
-                vec![Read::Refused("a page is an alert page".to_owned())]
-            }
-            Some((parts, inverted)) => {
-                (self.page, self.failures) = (Some(begin), 0);
-                self.read(word_of(&parts), begin, inverted, near)
-            }
-            None => {
-                if due {
-                    self.failures += 1;
-                    if self.failures >= FAILURES {
-                        self.doubt();
-                    }
-                }
-                Vec::new()
-            }
-        }
+        [false, true].into_iter().any(|flip| pattern(0, flip) && pattern(PART_SYMBOLS, flip))
     }
 
-    fn skip(&mut self) {
-        self.symbols.clear();
-        self.doubt();
+    fn decode(&self, symbols: &[f32]) -> Option<Self::Frame> {
+        decode_any(symbols)
     }
 
-    fn doubt(&mut self) {
-        (self.page, self.failures) = (None, 0);
-        // Symbols between pages are no longer known by their number.
+    fn read(&mut self, (parts, inverted): Self::Frame, begin: u64, near: Epoch) -> Vec<Read> {
+        if is_alert(&parts) {
+            return vec![Read::Refused("a page is an alert page".to_owned())];
+        }
+        self.take(word_of(&parts), begin, inverted, near)
+    }
+
+    fn forget_places(&mut self) {
         (self.reduced, self.timed) = (None, None);
     }
 

@@ -1,21 +1,20 @@
 //! Finds strings in soft symbols, normal or inverted, learns time and sender, and gathers
 //! ephemerides.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 
 use super::{
     GNAV, GlonassString, MARK_SYMBOLS, STRING_SYMBOLS, STRINGS, TIME, alike, decode_soft, elements, frame_began, id,
     parameters, slot,
 };
 use crate::bits::Store;
+use crate::framed::{Content, Framed, Reported};
 use crate::glonass::fdma::channel;
-use crate::message::{Read, Reader};
+use crate::message::{Parameters, Read};
 use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::Epoch;
 
-/// Strings in a row that fail where they are expected before they are sought elsewhere.
-const FAILURES: u32 = 3;
 /// Symbols of the time mark that may be wrong: of a million positions one looks like it then, and the checks
 /// decide.
 const TOLERATED: usize = 2;
@@ -25,55 +24,62 @@ const RATE_HZ: f64 = 100.0;
 /// A string and the number of its first symbol.
 type Placed = (u64, GlonassString);
 
-/// Reads the message.
-#[derive(Clone, Debug)]
-pub struct GnavReader {
-    sv: Sv,
-    /// The latest symbols, a string at most; `next` numbers the one to come.
-    symbols: VecDeque<f32>,
-    next: u64,
-    /// Number of the first symbol of some string, and those that failed since the last one that did not.
-    string: Option<u64>,
-    failures: u32,
-    /// The latest of strings 1 to 5.
-    parts: BTreeMap<u8, Placed>,
-    /// The latest string 1 whose frame could be dated, and when that frame began.
-    dated: Option<(u64, Epoch)>,
-    /// Parameters of the ephemeris that was reported last.
-    complete: Option<Vec<(&'static str, i64)>>,
-    /// A time that is known to within a year.
-    known: Option<Epoch>,
-}
+/// Reader of the message.
+pub type GnavReader = Framed<GnavContent>;
 
 impl GnavReader {
     /// Creates a reader that has received no symbols.
     pub fn new(sv: Sv) -> Self {
-        Self {
-            sv,
-            symbols: VecDeque::with_capacity(STRING_SYMBOLS),
-            next: 0,
-            string: None,
-            failures: 0,
-            parts: BTreeMap::new(),
-            dated: None,
-            complete: None,
-            known: None,
-        }
+        Self::of(GnavContent { sv, parts: BTreeMap::new(), dated: None, reported: Reported::default(), known: None })
+    }
+}
+
+/// Content of a satellite's strings.
+#[derive(Clone, Debug)]
+pub struct GnavContent {
+    sv: Sv,
+    /// The latest of strings 1 to 5.
+    parts: BTreeMap<u8, Placed>,
+    /// The latest string 1 whose frame could be dated, and when that frame began.
+    dated: Option<(u64, Epoch)>,
+    reported: Reported,
+    /// A time that is known to within a year.
+    known: Option<Epoch>,
+}
+
+/// Symbols of a string that agree with the time mark, which ends it.
+fn alike_in(symbols: &[f32]) -> usize {
+    alike(symbols.iter().skip(STRING_SYMBOLS - MARK_SYMBOLS).copied())
+}
+
+impl Content for GnavContent {
+    /// A string, and true if its symbols were inverted.
+    type Frame = (GlonassString, bool);
+    const SYMBOLS: usize = STRING_SYMBOLS;
+    const FAILURES: u32 = 3;
+
+    fn may_begin(&self, symbols: &[f32]) -> bool {
+        !(TOLERATED + 1..MARK_SYMBOLS - TOLERATED).contains(&alike_in(symbols))
     }
 
-    /// Takes the string whose newest symbol is the last.
-    fn read(&mut self, begin: u64, string: GlonassString, inverted: bool) -> Vec<Read> {
+    fn decode(&self, symbols: &[f32]) -> Option<Self::Frame> {
+        let alike = alike_in(symbols);
+        let inverted = planted!("gnss.glonass.mark", alike < MARK_SYMBOLS / 2, alike > MARK_SYMBOLS / 2);
+        Some((decode_soft(symbols)?, inverted))
+    }
+
+    fn read(&mut self, (string, inverted): Self::Frame, begin: u64, _: Epoch) -> Vec<Read> {
         let number = id(&string);
         let mut news = Vec::new();
         if let Some(slot) = (number == 4).then(|| slot(&string)).filter(|slot| *slot != self.sv.number) {
             // On a channel that is not its slot's nothing is known of it.
             if channel(slot).is_none() || channel(slot) != channel(self.sv.number) {
-                self.forget();
+                self.forget_places();
                 return vec![Read::names_another("string 4", slot)];
             }
             // What was read under the other name is forgotten: another satellite may have sent it.
             self.sv = Sv { number: slot, ..self.sv };
-            self.complete = None;
+            self.reported = Reported::default();
             news.push(Read::Sender(self.sv));
         }
         if number <= 5 {
@@ -98,6 +104,21 @@ impl GnavReader {
         news
     }
 
+    fn know(&mut self, near: Epoch) {
+        self.known = Some(near);
+    }
+
+    fn forget_places(&mut self) {
+        self.parts.clear();
+        self.dated = None;
+    }
+
+    fn missing(&self) -> Vec<u8> {
+        (1..=5).filter(|number| !self.parts.contains_key(number)).collect()
+    }
+}
+
+impl GnavContent {
     /// Start time of the string whose first symbol is `begin`, from strings 1, 4 and 5 of the last frame or
     /// the one before. In the first frame of a day, strings 4 and 5 of the frame before it have another date.
     fn begun(&mut self, begin: u64) -> Option<Result<Epoch, String>> {
@@ -116,11 +137,6 @@ impl GnavReader {
         is_recent.then(|| Ok(frame.plus_s((begin as f64 - placed as f64) / RATE_HZ)))
     }
 
-    fn forget(&mut self) {
-        self.parts.clear();
-        self.dated = None;
-    }
-
     fn look_for_set(&mut self, (begin, start): (u64, Epoch), news: &mut Vec<Read>) {
         let [one, two, three, four] = [1, 2, 3, 4].map(|number| self.parts.get(&number));
         let (Some(one), Some(two), Some(three), Some(four)) = (one, two, three, four) else { return };
@@ -133,72 +149,11 @@ impl GnavReader {
         if ![one, two, three, four].into_iter().all(is_of_set) {
             return;
         }
-        let content: Vec<(&'static str, i64)> =
-            [one, two, three, four].into_iter().flat_map(|(_, string)| parameters(string)).collect();
-        if self.complete.as_ref() == Some(&content) {
-            return;
-        }
-        let rows = self.rows(u32::from(set.iode), content.clone());
-        news.push(Read::Ephemeris(Box::new(set)));
-        news.push(Read::Parameters(rows));
-        self.complete = Some(content);
+        let all = [one, two, three, four].into_iter().flat_map(|(_, string)| parameters(string)).collect();
+        self.reported.take(GNAV.name, all, (|| Some(set), "strings 1 to 4"), news);
     }
 
-    fn rows(&self, issue: u32, parameters: Vec<(&'static str, i64)>) -> Vec<NavigationRow> {
+    fn rows(&self, issue: u32, parameters: Parameters) -> Vec<NavigationRow> {
         NavigationRow::each(self.sv, GNAV.name, issue, parameters).collect()
-    }
-}
-
-impl Reader for GnavReader {
-    fn take(&mut self, soft: f32, _: Epoch) -> Vec<Read> {
-        if self.symbols.len() == STRING_SYMBOLS {
-            self.symbols.pop_front();
-        }
-        self.symbols.push_back(soft);
-        self.next += 1;
-        let whole = self.symbols.len() == STRING_SYMBOLS;
-        let Some(begin) = self.next.checked_sub(STRING_SYMBOLS as u64).filter(|_| whole) else {
-            return Vec::new();
-        };
-        let due = self.string.map(|string| begin.abs_diff(string).is_multiple_of(STRING_SYMBOLS as u64));
-        if due == Some(false) {
-            return Vec::new();
-        }
-        let alike = alike(self.symbols.iter().skip(STRING_SYMBOLS - MARK_SYMBOLS).copied());
-        if due.is_none() && (TOLERATED + 1..MARK_SYMBOLS - TOLERATED).contains(&alike) {
-            return Vec::new();
-        }
-        let inverted = planted!("gnss.glonass.mark", alike < MARK_SYMBOLS / 2, alike > MARK_SYMBOLS / 2);
-        match decode_soft(self.symbols.make_contiguous()) {
-            Some(string) => {
-                (self.string, self.failures) = (Some(begin), 0);
-                self.read(begin, string, inverted)
-            }
-            None => {
-                self.failures += u32::from(due.is_some());
-                if self.failures >= FAILURES {
-                    self.doubt();
-                }
-                Vec::new()
-            }
-        }
-    }
-
-    fn know(&mut self, near: Epoch) {
-        self.known = Some(near);
-    }
-
-    fn skip(&mut self) {
-        self.symbols.clear();
-        self.doubt();
-    }
-
-    fn doubt(&mut self) {
-        (self.string, self.failures) = (None, 0);
-        self.forget();
-    }
-
-    fn missing(&self) -> Vec<u8> {
-        (1..=5).filter(|number| !self.parts.contains_key(number)).collect()
     }
 }

@@ -6,6 +6,7 @@ use super::fields::DELAY;
 use super::{BITS, IONOSPHERE, MESSAGE_S, elements, ionosphere, is_message, message_type, parameters};
 use crate::bits::number;
 use crate::fec::running::Running;
+use crate::framed::Reported;
 use crate::message::{Message, Parameters, Read, Reader};
 use crate::record::NavigationRow;
 use crate::satellite::Sv;
@@ -22,14 +23,19 @@ pub struct CnavReader {
     code: Running,
     /// The latest messages by type.
     messages: BTreeMap<u8, Vec<bool>>,
-    /// Parameters of the ephemeris that was reported last.
-    complete: Option<Parameters>,
+    reported: Reported,
 }
 
 impl CnavReader {
     /// Creates a reader of one of the two messages that has received no symbols.
     pub fn of(message: &'static Message, sv: Sv) -> Self {
-        Self { message, sv, code: Running::new(BITS, is_message), messages: BTreeMap::new(), complete: None }
+        Self {
+            message,
+            sv,
+            code: Running::new(BITS, is_message),
+            messages: BTreeMap::new(),
+            reported: Reported::default(),
+        }
     }
 
     /// Takes a message that began so many symbols before the newest.
@@ -79,18 +85,9 @@ impl CnavReader {
         let [Some(one), Some(two), Some(three)] = own else { return };
         let messages = [one, two, three];
         let all: Parameters = messages.into_iter().filter_map(parameters).flatten().collect();
-        if self.complete.as_ref() == Some(&all) {
-            return;
-        }
         let Some(sent) = self.sent_at(one, near) else { return };
-        let Some(set) = elements(self.sv, messages, sent) else {
-            news.extend(self.complete.is_none().then(|| Read::make_no_set("messages 10, 11 and 30")));
-            return;
-        };
-        self.complete = Some(all.clone());
-        let rows = NavigationRow::each(self.sv, self.message.name, u32::from(set.iode), all).collect();
-        news.push(Read::Ephemeris(Box::new(set)));
-        news.push(Read::Parameters(rows));
+        let set = || elements(self.sv, messages, sent);
+        self.reported.take(self.message.name, all, (set, "messages 10, 11 and 30"), news);
     }
 }
 

@@ -4,10 +4,9 @@
 //! subframe 2 decides.
 
 use super::{CNAV2, FRAME, Frame, SYMBOLS, decode, elements, klobuchar, of_set_in};
-use crate::fec::frames::Frames;
+use crate::framed::{Content, Framed, Reported};
 use crate::ionosphere::Coefficients;
-use crate::message::{Parameters, Read, Reader};
-use crate::record::NavigationRow;
+use crate::message::Read;
 use crate::satellite::Sv;
 use crate::time::Epoch;
 
@@ -16,25 +15,38 @@ use crate::time::Epoch;
 /// data symbols agrees by less than half.
 const LEAST_SHARE: f32 = 0.65;
 
-/// Reads CNAV-2.
-#[derive(Clone, Debug)]
-pub struct Cnav2Reader {
-    sv: Sv,
-    frames: Frames,
-    /// The latest page 1.
-    page_1: Option<Vec<bool>>,
-    /// Parameters of the ephemeris that was reported last.
-    complete: Option<Parameters>,
-}
+/// Reader of CNAV-2.
+pub type Cnav2Reader = Framed<Cnav2Content>;
 
 impl Cnav2Reader {
     /// Creates a reader that has received no symbols.
     pub fn new(sv: Sv) -> Self {
-        Self { sv, frames: Frames::new(SYMBOLS), page_1: None, complete: None }
+        Self::of(Cnav2Content { sv, page_1: None, reported: Reported::default() })
+    }
+}
+
+/// Content of a satellite's frames.
+#[derive(Clone, Debug)]
+pub struct Cnav2Content {
+    sv: Sv,
+    /// The latest page 1.
+    page_1: Option<Vec<bool>>,
+    reported: Reported,
+}
+
+impl Content for Cnav2Content {
+    type Frame = Frame;
+    const SYMBOLS: usize = SYMBOLS;
+
+    fn may_begin(&self, symbols: &[f32]) -> bool {
+        FRAME.likely_times(symbols).1 > LEAST_SHARE
     }
 
-    /// Takes a frame that ends with the newest symbol.
-    fn read(&mut self, frame: &Frame, near: Epoch) -> Vec<Read> {
+    fn decode(&self, symbols: &[f32]) -> Option<Frame> {
+        decode(symbols)
+    }
+
+    fn read(&mut self, frame: Frame, _: u64, near: Epoch) -> Vec<Read> {
         if let Some(other) = frame.prn().filter(|prn| *prn != u128::from(self.sv.prn())) {
             return vec![Read::names_another("a frame", other)];
         }
@@ -47,33 +59,12 @@ impl Cnav2Reader {
         }
         let Some(beside) = &self.page_1 else { return news };
         let all = of_set_in(&frame.two, beside);
-        if self.complete.as_ref() != Some(&all) {
-            let set = elements(self.sv, &frame.two, beside, sent);
-            let rows = NavigationRow::each(self.sv, CNAV2.name, u32::from(set.iode), all.clone()).collect();
-            self.complete = Some(all);
-            news.push(Read::Ephemeris(Box::new(set)));
-            news.push(Read::Parameters(rows));
-        }
+        let set = || Some(elements(self.sv, &frame.two, beside, sent));
+        self.reported.take(CNAV2.name, all, (set, "a frame"), &mut news);
         news
-    }
-}
-
-impl Reader for Cnav2Reader {
-    fn take(&mut self, soft: f32, near: Epoch) -> Vec<Read> {
-        let may_begin = |symbols: &[f32]| FRAME.likely_times(symbols).1 > LEAST_SHARE;
-        let found = self.frames.take(soft, may_begin, decode);
-        found.map_or_else(Vec::new, |frame| self.read(&frame, near))
-    }
-
-    fn skip(&mut self) {
-        self.frames.skip();
-    }
-
-    fn doubt(&mut self) {
-        self.frames.doubt();
     }
 
     fn missing(&self) -> Vec<u8> {
-        if self.complete.is_some() { Vec::new() } else { vec![1] }
+        if self.reported.is_none() { vec![1] } else { Vec::new() }
     }
 }

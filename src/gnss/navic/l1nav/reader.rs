@@ -4,8 +4,8 @@
 //! subframe 2 decides.
 
 use super::{FRAME, Frame, L1_NAV, SYMBOLS, coefficients_in, decode, elements, of_electrons_in, of_set_in};
-use crate::fec::frames::Frames;
-use crate::message::{Parameters, Read, Reader};
+use crate::framed::{Content, Framed, Reported};
+use crate::message::Read;
 use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::Epoch;
@@ -15,23 +15,36 @@ use crate::time::Epoch;
 /// data symbols agrees by about half.
 const LEAST_SHARE: f32 = 0.65;
 
-/// Reads NavIC's message on L1.
-#[derive(Clone, Debug)]
-pub struct L1NavReader {
-    sv: Sv,
-    frames: Frames,
-    /// Parameters of the ephemeris that was reported last.
-    complete: Option<Parameters>,
-}
+/// Reader of NavIC's message on L1.
+pub type L1NavReader = Framed<L1NavContent>;
 
 impl L1NavReader {
     /// Creates a reader that has received no symbols.
     pub fn new(sv: Sv) -> Self {
-        Self { sv, frames: Frames::new(SYMBOLS), complete: None }
+        Self::of(L1NavContent { sv, reported: Reported::default() })
+    }
+}
+
+/// Content of a satellite's frames.
+#[derive(Clone, Debug)]
+pub struct L1NavContent {
+    sv: Sv,
+    reported: Reported,
+}
+
+impl Content for L1NavContent {
+    type Frame = Frame;
+    const SYMBOLS: usize = SYMBOLS;
+
+    fn may_begin(&self, symbols: &[f32]) -> bool {
+        FRAME.likely_times(symbols).1 > LEAST_SHARE
     }
 
-    /// Takes a frame that ends with the newest symbol.
-    fn read(&mut self, frame: &Frame, near: Epoch) -> Vec<Read> {
+    fn decode(&self, symbols: &[f32]) -> Option<Frame> {
+        decode(symbols)
+    }
+
+    fn read(&mut self, frame: Frame, _: u64, near: Epoch) -> Vec<Read> {
         if let Some(other) = frame.prn().filter(|prn| *prn != u128::from(self.sv.prn())) {
             return vec![Read::names_another("a frame", other)];
         }
@@ -43,39 +56,14 @@ impl L1NavReader {
         let issue = u32::from(set.iode);
         if let Some(three) = frame.electrons() {
             news.push(Read::Ionosphere(coefficients_in(three)));
-            news.push(Read::Parameters(self.rows(issue, of_electrons_in(three))));
+            let rows = NavigationRow::each(self.sv, L1_NAV.name, issue, of_electrons_in(three));
+            news.push(Read::Parameters(rows.collect()));
         }
-        let all = of_set_in(&frame.0.two);
-        if self.complete.as_ref() != Some(&all) {
-            let rows = self.rows(issue, all.clone());
-            self.complete = Some(all);
-            news.push(Read::Ephemeris(Box::new(set)));
-            news.push(Read::Parameters(rows));
-        }
+        self.reported.take(L1_NAV.name, of_set_in(&frame.0.two), (|| Some(set), "a frame"), &mut news);
         news
     }
 
-    fn rows(&self, issue: u32, parameters: Parameters) -> Vec<NavigationRow> {
-        NavigationRow::each(self.sv, L1_NAV.name, issue, parameters).collect()
-    }
-}
-
-impl Reader for L1NavReader {
-    fn take(&mut self, soft: f32, near: Epoch) -> Vec<Read> {
-        let may_begin = |symbols: &[f32]| FRAME.likely_times(symbols).1 > LEAST_SHARE;
-        let found = self.frames.take(soft, may_begin, decode);
-        found.map_or_else(Vec::new, |frame| self.read(&frame, near))
-    }
-
-    fn skip(&mut self) {
-        self.frames.skip();
-    }
-
-    fn doubt(&mut self) {
-        self.frames.doubt();
-    }
-
     fn missing(&self) -> Vec<u8> {
-        if self.complete.is_some() { Vec::new() } else { vec![1] }
+        if self.reported.is_none() { vec![1] } else { Vec::new() }
     }
 }

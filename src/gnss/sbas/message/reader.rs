@@ -5,7 +5,8 @@ use super::{BITS, OF_PLACE, OF_TIME, RATE_HZ, SBAS, TIME, elements, is_block, ty
 use crate::augmentation::Content;
 use crate::bits::integers;
 use crate::fec::running::Running;
-use crate::message::{Parameters, Read, Reader};
+use crate::framed::Reported;
+use crate::message::{Read, Reader};
 use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::{Epoch, WEEK_S};
@@ -19,14 +20,13 @@ pub struct SbasReader {
     time: Option<(u64, Epoch)>,
     /// The latest block of type 9 likewise.
     place: Option<(u64, Vec<bool>)>,
-    /// Parameters of the ephemeris that was reported last.
-    complete: Option<Parameters>,
+    reported: Reported,
 }
 
 impl SbasReader {
     /// Creates a reader that has received no symbols.
     pub fn new(sv: Sv) -> Self {
-        Self { sv, code: Running::new(BITS, is_block), time: None, place: None, complete: None }
+        Self { sv, code: Running::new(BITS, is_block), time: None, place: None, reported: Reported::default() }
     }
 
     /// Start time of the block whose first symbol is `begin`.
@@ -57,15 +57,8 @@ impl SbasReader {
     fn look_for_set(&mut self, news: &mut Vec<Read>) {
         let Some((begin, bits)) = &self.place else { return };
         let Some(sent) = self.begun(*begin) else { return };
-        let content = integers(&super::GEO, bits);
-        if self.complete.as_ref() == Some(&content) {
-            return;
-        }
-        let set = elements(self.sv, bits, sent);
-        let rows = NavigationRow::each(self.sv, SBAS.name, u32::from(set.iode), content.clone()).collect();
-        self.complete = Some(content);
-        news.push(Read::Ephemeris(Box::new(set)));
-        news.push(Read::Parameters(rows));
+        let set = || Some(elements(self.sv, bits, sent));
+        self.reported.take(SBAS.name, integers(&super::GEO, bits), (set, "the position"), news);
     }
 }
 
