@@ -60,6 +60,7 @@ pub mod rinex;
 pub mod samples;
 pub mod satellite;
 pub mod sbas;
+mod set_tables;
 pub mod sigmf;
 pub mod signal;
 pub mod sp3;

@@ -21,7 +21,7 @@ pub const ORDER: Order<'static> = &[
             &["augmentation", "broadcast", "facts"],
             &["record"],
             &["message"],
-            &["nmea", "exchange", "framed"],
+            &["nmea", "exchange", "framed", "set_tables"],
             &["gps", "galileo", "navic", "beidou", "glonass"],
             &["qzss", "sbas"],
             &["rinex"],

@@ -11,7 +11,7 @@
 mod fields;
 mod reader;
 
-use crate::bits::{Element, FieldError, Store, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
+use crate::bits::{Element, FieldError, Store, bits_of, integers, number, write_all};
 use crate::broadcast::{Ephemeris, SetForm};
 use crate::crc::crc24q;
 use crate::fec::interleaver::Interleaver;
@@ -23,6 +23,7 @@ use crate::ionosphere::{Coefficients, Model};
 use crate::message::{Common, IonosphereForm, Message, Parameters, Raw, Records, Sender};
 use crate::nequick::NequickG;
 use crate::satellite::Sv;
+use crate::set_tables::SetTables;
 use crate::time::{Epoch, TimePolynomial, WEEK_S};
 pub use fields::tables;
 use fields::{PAGE_1, PAGE_2, PAGE_3, PAGE_4, PAGE_4_GPS, PAGE_4_UTC, PAGE_5, PAGE_6};
@@ -44,11 +45,8 @@ pub static FNAV: Message = Message {
     set: &PAGES_OF_SET,
     reduced: &[],
     ionosphere: IonosphereForm { model: Model::NequickG, unit: |start| page_at(start) == 1, coefficients: ionosphere },
-    set_parameters: || {
-        let names = of_set().into_iter().flatten().map(|element| element.field.name);
-        names.filter(|name| *name != "tow_s").collect()
-    },
-    elements: of_integers,
+    set_parameters: || OF_SET.parameters(),
+    elements: |sv, raw, near| OF_SET.elements(sv, raw, near),
     parameters: |symbols| {
         let soft: Vec<f32> = symbols.iter().map(|&bit| if bit { -1.0 } else { 1.0 }).collect();
         let (page, _) = decode_soft(&soft)?;
@@ -61,9 +59,9 @@ pub static FNAV: Message = Message {
     },
     sets: &FNAV_SETS,
     quantised,
-    adjustable,
+    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust,
+    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "FNAV", common: "IFNV", fields: tables, lines: None }),
 };
 
@@ -200,27 +198,17 @@ pub fn parameters(page: &Vec<bool>) -> Option<Parameters> {
     Some(found)
 }
 
-fn of_set() -> [&'static [Element<Orbit>]; 4] {
-    [&PAGE_1, &PAGE_2, &PAGE_3, &PAGE_4]
-}
-
-/// Creates content in which nothing has been decoded, with the transmission time `at`.
-fn blank(sv: Sv, at: Epoch) -> Orbit {
-    Orbit { ephemeris: Ephemeris { form: &FNAV_SETS, ..Ephemeris::blank(sv, at) }, nequick: [0.0; 3] }
-}
-
-/// The elements that raw integers of pages 1 to 4 give, as if they had been sent at `near`.
-fn of_integers(sv: Sv, raw: Raw<'_>, near: Epoch) -> Option<Ephemeris> {
-    let mut orbit = blank(sv, near);
-    for table in of_set() {
-        let mut page = vec![false; DATA_BITS];
-        for field in table.iter().map(|element| &element.field).filter(|field| field.name != "tow_s") {
-            field.write(&mut page, raw(field.name)?);
-        }
-        read_all(table, &page, &mut orbit);
-    }
-    Some(orbit.ephemeris)
-}
+/// Parameters by which ephemerides and senders are distinguished, and what all satellites send alike, are
+/// fixed.
+static OF_SET: SetTables<Orbit, Vec<bool>> = SetTables {
+    parts: &[&PAGE_1, &PAGE_2, &PAGE_3, &PAGE_4],
+    passing: &["tow_s"],
+    fixed: &["iodnav", "svid", "week", "tow_s", "ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"],
+    sets: &FNAV_SETS,
+    blank: || vec![false; DATA_BITS],
+    content: |ephemeris| Orbit { ephemeris, nequick: [0.0; 3] },
+    ephemeris: |orbit| orbit.ephemeris,
+};
 
 /// The coefficients of the ionosphere that raw integers of page 1 give.
 fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
@@ -238,26 +226,7 @@ fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
 /// # Errors
 /// A value that the message cannot carry.
 pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    let mut sent = Orbit { ephemeris: ephemeris.clone(), nequick: [0.0; 3] };
-    of_set().into_iter().try_for_each(|table| quantise_all(table, &mut sent))?;
-    Ok(sent.ephemeris)
-}
-
-/// Parameters by which ephemerides and senders are distinguished, and what all satellites send alike.
-const FIXED_PARAMETERS: [&str; 7] = ["iodnav", "svid", "week", "tow_s", "ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"];
-
-/// Names of the adjustable parameters in pages 1 to 4.
-fn adjustable() -> Vec<&'static str> {
-    let names = of_set().into_iter().flatten().map(|element| element.field.name);
-    names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
-}
-
-/// Adds `by` to a parameter of pages 1 to 4 in the unit of the tables. Returns false if there is none.
-fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
-    let mut sent = Orbit { ephemeris: ephemeris.clone(), nequick: [0.0; 3] };
-    let found = of_set().into_iter().any(|table| add_to(table, parameter, &mut sent, by));
-    *ephemeris = sent.ephemeris;
-    found
+    OF_SET.quantised(ephemeris.clone())
 }
 
 /// The elements in pages 1 to 4 with the time at which page 1 was sent; `None` where the issues differ or
@@ -268,11 +237,7 @@ fn elements(sv: Sv, pages: [&Vec<bool>; 4], near: Epoch) -> Option<Ephemeris> {
     if !same || one.piece((6, 6)) != u32::from(sv.number) {
         return None;
     }
-    let mut orbit = blank(sv, sent_at(one, near)?);
-    for (table, page) in of_set().into_iter().zip(pages) {
-        read_all(table, page, &mut orbit);
-    }
-    Some(orbit.ephemeris)
+    Some(OF_SET.decoded(sv, pages, sent_at(one, near)?))
 }
 
 /// A page's own week and time of week, the week near `near`; `None` for pages without them.

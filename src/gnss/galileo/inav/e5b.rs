@@ -6,8 +6,8 @@
 
 use super::reader::InavReader;
 use super::{
-    INAV, INAV_SETS, On, PAGE_S, Pages, SPARE, SUBFRAME_S, adjust, adjustable, alerted, form, ionosphere, of_integers,
-    of_issue, opened, quantised, tables,
+    INAV, INAV_SETS, On, PAGE_S, Pages, SPARE, SUBFRAME_S, alerted, form, ionosphere, of_issue, opened, quantised,
+    tables,
 };
 use crate::ionosphere::Model;
 use crate::message::{IonosphereForm, Message, Records};
@@ -30,15 +30,15 @@ pub static INAV_E5B: Message = Message {
     reduced: &[],
     ionosphere: IonosphereForm { model: Model::NequickG, unit: |start| word_at(start) == 5, coefficients: ionosphere },
     set_parameters: of_issue,
-    elements: of_integers,
+    elements: INAV.elements,
     parameters: opened,
     reader: |sv| Box::new(InavReader::on(&INAV_E5B, sv)),
     form,
     sets: &INAV_SETS,
     quantised,
-    adjustable,
+    adjustable: INAV.adjustable,
     alert: Some(alerted),
-    adjust,
+    adjust: INAV.adjust,
     rinex: Some(Records { set: |_| "INAV", common: "IFNV", fields: tables, lines: None }),
 };
 

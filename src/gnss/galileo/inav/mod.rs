@@ -14,7 +14,7 @@ mod reader;
 mod reduced;
 mod redundancy;
 
-use crate::bits::{Element, FieldError, Store, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
+use crate::bits::{Element, FieldError, Store, bits_of, integers, number, read_all, write_all};
 use crate::broadcast::{Ephemeris, SetForm};
 use crate::crc::crc24q;
 use crate::fec::convolutional::Convolutional;
@@ -26,6 +26,7 @@ use crate::ionosphere::{Coefficients, Model};
 use crate::message::{Common, IonosphereForm, Message, Records, Sender};
 use crate::nequick::NequickG;
 use crate::satellite::Sv;
+use crate::set_tables::SetTables;
 use crate::time::{Epoch, WEEK_S};
 pub use almanac::gps_offset;
 use almanac::{GPS_OFFSET, Triple, WORD_7, WORD_8, WORD_9, WORD_10};
@@ -56,15 +57,15 @@ pub static INAV: Message = Message {
     reduced: &[REDUCED],
     ionosphere: IonosphereForm { model: Model::NequickG, unit: |start| word_at(start) == 5, coefficients: ionosphere },
     set_parameters: of_issue,
-    elements: of_integers,
+    elements: |sv, raw, near| OF_SET.elements(sv, raw, near),
     parameters: opened,
     reader: |sv| Box::new(InavReader::new(sv)),
     form,
     sets: &INAV_SETS,
     quantised,
-    adjustable,
+    adjustable: || OF_SET.adjustable(),
     alert: Some(alerted),
-    adjust,
+    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "INAV", common: "IFNV", fields: tables, lines: None }),
 };
 
@@ -389,21 +390,6 @@ pub fn parameters(word: &u128) -> Option<Vec<(&'static str, i64)>> {
     found.map(|all| all.into_iter().filter(|(name, _)| *name != "tow_s").collect())
 }
 
-/// The elements that raw integers of words 1 to 5 give, as if they had been sent at `near`.
-fn of_integers(sv: Sv, raw: &dyn Fn(&str) -> Option<i64>, near: Epoch) -> Option<Ephemeris> {
-    let blank = Ephemeris { form: &INAV_SETS, ..Ephemeris::blank(sv, near) };
-    let mut orbit = Orbit { ephemeris: blank, nequick: [0.0; 3] };
-    for table in of_set() {
-        let mut word = 0_u128;
-        // The week and time of word 5 are those of its sending, which the ephemeris has already.
-        for field in table.iter().map(|element| &element.field).filter(|field| field.name != "tow_s") {
-            field.write(&mut word, raw(field.name)?);
-        }
-        read_all(table, &word, &mut orbit);
-    }
-    Some(orbit.ephemeris)
-}
-
 /// The coefficients of the ionosphere that raw integers of word 5 give.
 fn ionosphere(raw: &dyn Fn(&str) -> Option<i64>) -> Option<Coefficients> {
     let mut found = [0.0; 3];
@@ -414,35 +400,25 @@ fn ionosphere(raw: &dyn Fn(&str) -> Option<i64>) -> Option<Coefficients> {
     Some(Coefficients::NequickG(NequickG { coefficients: found }))
 }
 
-fn of_set() -> [&'static [Element<Orbit>]; 5] {
-    [&WORD_1, &WORD_2, &WORD_3, &WORD_4, &WORD_5]
-}
+/// Parameters by which ephemerides and senders are distinguished, and what all satellites send alike, are
+/// fixed.
+static OF_SET: SetTables<Orbit, u128> = SetTables {
+    parts: &[&WORD_1, &WORD_2, &WORD_3, &WORD_4, &WORD_5],
+    // The week and time of word 5 are those of its sending, which the ephemeris has already.
+    passing: &["tow_s"],
+    fixed: &["iodnav", "svid", "week", "tow_s", "ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"],
+    sets: &INAV_SETS,
+    blank: || 0,
+    content: |ephemeris| Orbit { ephemeris, nequick: [0.0; 3] },
+    ephemeris: |orbit| orbit.ephemeris,
+};
 
 /// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
 ///
 /// # Errors
 /// A value that the message cannot carry.
 pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    let mut sent = Orbit { ephemeris: ephemeris.clone(), nequick: [0.0; 3] };
-    of_set().into_iter().try_for_each(|table| quantise_all(table, &mut sent))?;
-    Ok(sent.ephemeris)
-}
-
-/// Parameters by which ephemerides and senders are distinguished, and what all satellites send alike.
-const FIXED_PARAMETERS: [&str; 7] = ["iodnav", "svid", "week", "tow_s", "ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"];
-
-/// Names of the adjustable parameters in words 1 to 5.
-fn adjustable() -> Vec<&'static str> {
-    let names = of_set().into_iter().flatten().map(|element| element.field.name);
-    names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
-}
-
-/// Adds `by` to a parameter of words 1 to 5 in the unit of the tables. Returns false if there is none.
-pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
-    let mut sent = Orbit { ephemeris: ephemeris.clone(), nequick: [0.0; 3] };
-    let found = of_set().into_iter().any(|table| add_to(table, parameter, &mut sent, by));
-    *ephemeris = sent.ephemeris;
-    found
+    OF_SET.quantised(ephemeris.clone())
 }
 
 /// The elements in short in word 16, sent at `start`, with the group delays and the health of word 5 where it
@@ -466,12 +442,7 @@ fn elements(sv: Sv, words: [&u128; 5], near: Epoch) -> Option<Ephemeris> {
     if !same || four.piece((16, 6)) != u32::from(sv.number) {
         return None;
     }
-    let blank = Ephemeris { form: &INAV_SETS, ..Ephemeris::blank(sv, sent_at(five, near)?) };
-    let mut orbit = Orbit { ephemeris: blank, nequick: [0.0; 3] };
-    for (table, word) in of_set().into_iter().zip(words) {
-        read_all(table, word, &mut orbit);
-    }
-    Some(orbit.ephemeris)
+    Some(OF_SET.decoded(sv, words, sent_at(five, near)?))
 }
 
 /// The start of the page by its own week and time of week, the week near `near`; `None` for words without

@@ -20,11 +20,12 @@ mod reader;
 
 use std::ops::RangeInclusive;
 
-use crate::bits::{Element, FieldError, Store, add_to, bits_of, integers, quantise_all, read_all, write_all};
+use crate::bits::{FieldError, Store, bits_of, integers, write_all};
 use crate::broadcast::{Ephemeris, SetForm};
 use crate::ionosphere::Model;
-use crate::message::{IonosphereForm, Message, Records, Sender};
+use crate::message::{IonosphereForm, Message, Raw, Records, Sender};
 use crate::satellite::Sv;
+use crate::set_tables::SetTables;
 use crate::time::Epoch;
 pub use fields::{GlonassString, STRING_BITS, tables};
 use fields::{STRING_1, STRING_2, STRING_3, STRING_4, STRING_5, SystemTime, date, midnight};
@@ -47,7 +48,7 @@ pub static GNAV: Message = Message {
     reduced: &[],
     // It says nothing of it.
     ionosphere: IonosphereForm { model: Model::Klobuchar, unit: |_| false, coefficients: |_| None },
-    set_parameters: || of_set().into_iter().flatten().map(|element| element.field.name).collect(),
+    set_parameters: || OF_SET.parameters(),
     elements: of_integers,
     parameters: |symbols| {
         let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
@@ -59,9 +60,9 @@ pub static GNAV: Message = Message {
     form: Ephemeris::clone,
     sets: &GNAV_SETS,
     quantised,
-    adjustable,
+    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust,
+    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "FDMA", common: "FDMA", fields: Vec::new, lines: None }),
 };
 
@@ -248,20 +249,21 @@ pub fn parameters(string: &GlonassString) -> Vec<(&'static str, i64)> {
     }
 }
 
-fn of_set() -> [&'static [Element<Ephemeris>]; 4] {
-    [&STRING_1, &STRING_2, &STRING_3, &STRING_4]
-}
+/// Parameters by which ephemerides and senders are distinguished, and the health, which has a fault of its
+/// own, are fixed.
+static OF_SET: SetTables<Ephemeris, GlonassString> = SetTables {
+    parts: &[&STRING_1, &STRING_2, &STRING_3, &STRING_4],
+    passing: &[],
+    fixed: &["health", "tb_quarters", "unhealthy", "day", "slot"],
+    sets: &GNAV_SETS,
+    blank: GlonassString::default,
+    content: |ephemeris| ephemeris,
+    ephemeris: |ephemeris| ephemeris,
+};
 
 /// The elements that raw integers give, as if they had been sent in the frame nearest to `near`.
-fn of_integers(sv: Sv, raw: &dyn Fn(&str) -> Option<i64>, near: Epoch) -> Option<Ephemeris> {
-    let mut found = Ephemeris { form: &GNAV_SETS, ..Ephemeris::blank(sv, near) };
-    for table in of_set() {
-        let mut string = GlonassString::default();
-        for field in table.iter().map(|element| &element.field) {
-            field.write(&mut string, raw(field.name)?);
-        }
-        read_all(table, &string, &mut found);
-    }
+fn of_integers(sv: Sv, raw: Raw<'_>, near: Epoch) -> Option<Ephemeris> {
+    let found = OF_SET.elements(sv, raw, near)?;
     // Sent in a frame of the ephemeris's own half hour.
     let half_s = 0.5 * found.fit_interval_s();
     let late_s = near.since(found.toe).clamp(-half_s, half_s - FRAME_S as f64);
@@ -271,10 +273,7 @@ fn of_integers(sv: Sv, raw: &dyn Fn(&str) -> Option<i64>, near: Epoch) -> Option
 
 /// The elements in strings 1 to 4, of which the first was sent at `sent`.
 pub fn elements(sv: Sv, strings: [&GlonassString; 4], sent: Epoch) -> Ephemeris {
-    let mut found = Ephemeris { form: &GNAV_SETS, ..Ephemeris::blank(sv, sent) };
-    for (table, string) in of_set().into_iter().zip(strings) {
-        read_all(table, string, &mut found);
-    }
+    let found = OF_SET.decoded(sv, strings, sent);
     // The day is that of sending, and midnight may be between.
     let days = (sent.since(found.toe) / 86_400.0).round();
     let toe = found.toe.plus_s(days * 86_400.0);
@@ -337,23 +336,7 @@ fn check(ephemeris: &Ephemeris) -> Result<(), FieldError> {
 /// A value that the message cannot carry.
 pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     check(ephemeris)?;
-    let mut sent = ephemeris.clone();
-    of_set().into_iter().try_for_each(|table| quantise_all(table, &mut sent))?;
-    Ok(sent)
-}
-
-/// Parameters by which ephemerides and senders are distinguished, and the health, which has a fault of its
-/// own.
-const FIXED_PARAMETERS: [&str; 5] = ["health", "tb_quarters", "unhealthy", "day", "slot"];
-
-fn adjustable() -> Vec<&'static str> {
-    let names = of_set().into_iter().flatten().map(|element| element.field.name);
-    names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
-}
-
-/// Adds `by` to a parameter of strings 1 to 4 in the unit of the tables. Returns false if there is none.
-pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
-    of_set().into_iter().any(|table| add_to(table, parameter, ephemeris, by))
+    OF_SET.quantised(ephemeris.clone())
 }
 
 /// Number of the last symbols of a string that agree with the time mark.
@@ -422,7 +405,7 @@ mod tests {
         let sets = [-900.0, 900.0].map(|from_s| {
             let toe = change.plus_s(from_s);
             let mut set = Ephemeris { form: &GNAV_SETS, toe, toc: toe, ..Ephemeris::blank(sv, toe) };
-            assert!(["x_km", "y_km", "z_km"].into_iter().all(|name| adjust(&mut set, name, from_s)));
+            assert!(["x_km", "y_km", "z_km"].into_iter().all(|name| OF_SET.adjust(&mut set, name, from_s)));
             set
         });
         let mut reader = (GNAV.reader)(sv);
@@ -436,11 +419,12 @@ mod tests {
         assert_eq!(read.iter().map(|set| set.toe).collect::<Vec<_>>(), sets.each_ref().map(|set| set.toe));
         for (read, set) in read.iter().zip(&sets) {
             let raw = |of: &Ephemeris| {
-                of_set().map(|table| {
+                let string = |table: &&'static [_]| {
                     let mut string = GlonassString::default();
                     write_all(table, of, &mut string).unwrap();
                     string
-                })
+                };
+                OF_SET.parts.iter().map(string).collect::<Vec<_>>()
             };
             assert_eq!(raw(read), raw(set));
         }

@@ -17,7 +17,7 @@ mod fields;
 mod on_l2c;
 mod reader;
 
-use crate::bits::{Element, FieldError, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
+use crate::bits::{Element, FieldError, bits_of, integers, number, read_all, write_all};
 use crate::broadcast::{Ephemeris, GPS_CLOCK_CODE, SetForm};
 use crate::crc::crc24q;
 use crate::exchange::modern;
@@ -28,6 +28,7 @@ use crate::ionosphere::{Coefficients, Model};
 use crate::klobuchar::Klobuchar;
 use crate::message::{Common, IonosphereForm, Message, Parameters, Raw, RecordLine, Records, Sender, UtcNumbers};
 use crate::satellite::Sv;
+use crate::set_tables::SetTables;
 use crate::signal::Signal;
 use crate::time::{Epoch, GPST};
 pub use fields::tables;
@@ -56,16 +57,16 @@ pub static CNAV: Message = Message {
         unit: |start| type_at(&CNAV, start) == IONOSPHERE,
         coefficients: ionosphere,
     },
-    set_parameters,
-    elements: of_integers,
+    set_parameters: || OF_SET.parameters(),
+    elements: |sv, raw, near| OF_SET.elements(sv, raw, near),
     parameters: opened,
     reader: |sv| Box::new(CnavReader::of(&CNAV, sv)),
     form,
     sets: &CNAV_SETS,
     quantised,
-    adjustable,
+    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust,
+    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "CNAV", common: "CNVX", fields: tables, lines: Some(record_lines) }),
 };
 
@@ -133,10 +134,6 @@ fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
     let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
     let bits = checked(CODE.decode_open(&soft))?;
     parameters(&bits).map(|found| (true, found))
-}
-
-fn set_parameters() -> Vec<&'static str> {
-    of_set().into_iter().flatten().map(|element| element.field.name).collect()
 }
 
 /// Type of the message that begins at a time.
@@ -290,9 +287,35 @@ pub fn parameters(bits: &Vec<bool>) -> Option<Parameters> {
     (!found.is_empty()).then_some(found)
 }
 
-fn of_set() -> [&'static [Element<Content>]; 4] {
-    [&ORBIT_1, &ORBIT_2, &CLOCKS, &DELAY]
-}
+/// Parameters by which ephemerides are distinguished, that are no ephemeris's, or that all satellites state
+/// alike, are fixed.
+static OF_SET: SetTables<Content, Vec<bool>> = SetTables {
+    parts: &[&ORBIT_1, &ORBIT_2, &CLOCKS, &DELAY],
+    passing: &[],
+    fixed: &[
+        "week",
+        "toe_5min",
+        "top_5min",
+        "op_week",
+        "alpha_0",
+        "alpha_1",
+        "alpha_2",
+        "alpha_3",
+        "beta_0",
+        "beta_1",
+        "beta_2",
+        "beta_3",
+        "integrity_flags",
+        "toc_5min",
+        "ura_ned0_index",
+        "ura_ned1_index",
+        "ura_ned2_index",
+    ],
+    sets: &CNAV_SETS,
+    blank: || vec![false; DATA_BITS],
+    content: blank,
+    ephemeris: |content| content.set,
+};
 
 /// Creates content in which nothing has been decoded.
 fn blank(set: Ephemeris) -> Content {
@@ -312,19 +335,6 @@ fn blank(set: Ephemeris) -> Content {
     }
 }
 
-/// The elements that raw integers of messages 10, 11 and 30 give, as if they had been sent at `near`.
-fn of_integers(sv: Sv, raw: Raw<'_>, near: Epoch) -> Option<Ephemeris> {
-    let mut content = blank(Ephemeris::blank(sv, near));
-    for table in of_set() {
-        let mut bits = vec![false; DATA_BITS];
-        for field in table.iter().map(|element| &element.field) {
-            field.write(&mut bits, raw(field.name)?);
-        }
-        read_all(table, &bits, &mut content);
-    }
-    Some(content.set)
-}
-
 /// The coefficients of the ionosphere that raw integers of message 30 give.
 fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
     let value = |name: &str| {
@@ -341,42 +351,7 @@ fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
 /// # Errors
 /// A value that the message cannot carry.
 pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    let mut content = blank(form(ephemeris));
-    of_set().into_iter().try_for_each(|table| quantise_all(table, &mut content))?;
-    Ok(content.set)
-}
-
-/// Parameters by which ephemerides are distinguished, that are no ephemeris's, or that all satellites state
-/// alike.
-const FIXED_PARAMETERS: [&str; 14] = [
-    "week",
-    "toe_5min",
-    "top_5min",
-    "op_week",
-    "alpha_0",
-    "alpha_1",
-    "alpha_2",
-    "alpha_3",
-    "beta_0",
-    "beta_1",
-    "beta_2",
-    "beta_3",
-    "integrity_flags",
-    "toc_5min",
-];
-
-/// Names of the adjustable parameters in messages 10, 11 and 30.
-fn adjustable() -> Vec<&'static str> {
-    let names = of_set().into_iter().flatten().map(|element| element.field.name);
-    names.filter(|name| !FIXED_PARAMETERS.contains(name) && !name.starts_with("ura_ned")).collect()
-}
-
-/// Adds `by` to a parameter in the unit of the tables. Returns false if there is none.
-fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
-    let mut content = blank(ephemeris.clone());
-    let found = of_set().into_iter().any(|table| add_to(table, parameter, &mut content, by));
-    *ephemeris = content.set;
-    found
+    OF_SET.quantised(form(ephemeris))
 }
 
 /// The ephemeris in messages 10, 11 and 30 of the same reference time, the first sent at `sent`; `None` where

@@ -19,7 +19,7 @@ mod reader;
 
 use std::sync::LazyLock;
 
-use crate::bits::{Element, FieldError, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
+use crate::bits::{Element, FieldError, bits_of, integers, number, read_all, write_all};
 use crate::broadcast::{Ephemeris, SetForm};
 use crate::crc::crc24q;
 use crate::exchange::modern;
@@ -32,6 +32,7 @@ use crate::ionosphere::{Coefficients, Model};
 use crate::klobuchar::Klobuchar;
 use crate::message::{Common, IonosphereForm, Message, Parameters, Raw, RecordLine, Records, Sender, UtcNumbers};
 use crate::satellite::Sv;
+use crate::set_tables::SetTables;
 use crate::signal::Signal;
 use crate::time::{Epoch, GPST, WEEK_S};
 use almanac::{Almanacs, Entry, MEDIUM, OF_MEDIUM, OF_REDUCED, PACKETS, REDUCED, ROUND, is_first};
@@ -56,16 +57,16 @@ pub static CNAV2: Message = Message {
     set: &[1],
     reduced: &[],
     ionosphere: IonosphereForm { model: Model::Klobuchar, unit: is_first, coefficients: ionosphere },
-    set_parameters,
-    elements: of_integers,
+    set_parameters: || OF_SET.parameters(),
+    elements: |sv, raw, near| OF_SET.elements(sv, raw, near),
     parameters: opened,
     reader: |sv| Box::new(Cnav2Reader::new(sv)),
     form,
     sets: &CNAV2_SETS,
     quantised,
-    adjustable,
+    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust,
+    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "CNV2", common: "CNVX", fields: tables, lines: Some(record_lines) }),
 };
 
@@ -269,23 +270,41 @@ fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
     }
 }
 
-/// Tables with parameters of an ephemeris.
-fn of_set() -> [&'static [Element<Content>]; 2] {
-    [&SET, &DELAY]
-}
-
-/// Parameters that are of the frame and not of the ephemeris.
-const PASSING: [&str; 2] = ["week", "itow_2h"];
-
-fn set_parameters() -> Vec<&'static str> {
-    let names = of_set().into_iter().flatten().map(|element| element.field.name);
-    names.filter(|name| !PASSING.contains(name)).collect()
-}
+/// Parameters by which ephemerides are distinguished, that are no ephemeris's, or that all satellites state
+/// alike, are fixed.
+static OF_SET: SetTables<Content, Vec<bool>> = SetTables {
+    parts: &[&SET, &DELAY],
+    passing: &["week", "itow_2h"],
+    fixed: &[
+        "week",
+        "itow_2h",
+        "toe_5min",
+        "top_5min",
+        "op_week",
+        "l1c_health",
+        "integrity_flag",
+        "alpha_0",
+        "alpha_1",
+        "alpha_2",
+        "alpha_3",
+        "beta_0",
+        "beta_1",
+        "beta_2",
+        "beta_3",
+        "ura_ned0_index",
+        "ura_ned1_index",
+        "ura_ned2_index",
+    ],
+    sets: &CNAV2_SETS,
+    blank: || vec![false; BITS_2],
+    content: blank,
+    ephemeris: |content| content.set,
+};
 
 /// The raw integers of the ephemeris in subframe 2.
 fn of_two(two: &Vec<bool>) -> Parameters {
     let mut found = integers(&SET, two);
-    found.retain(|(name, _)| !PASSING.contains(name));
+    found.retain(|(name, _)| !OF_SET.passing.contains(name));
     found
 }
 
@@ -331,19 +350,6 @@ fn nothing() -> Content {
     blank(Ephemeris::blank(Sv::gps(1), Epoch::new(0, 0.0)))
 }
 
-/// The elements that raw integers give, as if they had been sent at `near`.
-fn of_integers(sv: Sv, raw: Raw<'_>, near: Epoch) -> Option<Ephemeris> {
-    let mut content = blank(Ephemeris::blank(sv, near));
-    for table in of_set() {
-        let mut bits = vec![false; BITS_2];
-        for field in table.iter().map(|element| &element.field).filter(|field| !PASSING.contains(&field.name)) {
-            field.write(&mut bits, raw(field.name)?);
-        }
-        read_all(table, &bits, &mut content);
-    }
-    Some(content.set)
-}
-
 /// The coefficients of the ionosphere that raw integers of page 1 give.
 fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
     let mut bits = vec![false; BITS_3];
@@ -365,50 +371,7 @@ fn klobuchar(page_1: &Vec<bool>) -> Klobuchar {
 /// # Errors
 /// A value that the message cannot carry.
 pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    let mut content = blank(form(ephemeris));
-    of_set().into_iter().try_for_each(|table| quantise_all(table, &mut content))?;
-    Ok(content.set)
-}
-
-/// Parameters by which ephemerides are distinguished, that are no ephemeris's, or that all satellites state
-/// alike.
-const FIXED_PARAMETERS: [&str; 15] = [
-    "week",
-    "itow_2h",
-    "toe_5min",
-    "top_5min",
-    "op_week",
-    "l1c_health",
-    "integrity_flag",
-    "alpha_0",
-    "alpha_1",
-    "alpha_2",
-    "alpha_3",
-    "beta_0",
-    "beta_1",
-    "beta_2",
-    "beta_3",
-];
-
-fn adjustable() -> Vec<&'static str> {
-    let names = of_set().into_iter().flatten().map(|element| element.field.name);
-    names.filter(|name| !FIXED_PARAMETERS.contains(name) && !name.starts_with("ura_ned")).collect()
-}
-
-/// Adds `by` to a parameter in the unit of the tables. Returns false if there is none.
-fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
-    let mut content = blank(ephemeris.clone());
-    let found = of_set().into_iter().any(|table| add_to(table, parameter, &mut content, by));
-    *ephemeris = content.set;
-    found
-}
-
-/// The ephemeris in subframe 2 and in page 1, sent at `sent`.
-fn elements(sv: Sv, two: &Vec<bool>, page_1: &Vec<bool>, sent: Epoch) -> Ephemeris {
-    let mut content = blank(Ephemeris::blank(sv, sent));
-    read_all(&SET, two, &mut content);
-    read_all(&DELAY, page_1, &mut content);
-    content.set
+    OF_SET.quantised(form(ephemeris))
 }
 
 #[cfg(test)]

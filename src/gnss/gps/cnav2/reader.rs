@@ -3,7 +3,7 @@
 //! Where a frame begins shows in the code word of its time, which is right by chance at times: the check of
 //! subframe 2 decides.
 
-use super::{CNAV2, FRAME, Frame, SYMBOLS, decode, elements, klobuchar, of_set_in};
+use super::{CNAV2, FRAME, Frame, OF_SET, SYMBOLS, decode, klobuchar, of_set_in};
 use crate::framed::{Content, Framed, Reported};
 use crate::ionosphere::Coefficients;
 use crate::message::Read;
@@ -59,7 +59,7 @@ impl Content for Cnav2Content {
         }
         let Some(beside) = &self.page_1 else { return news };
         let all = of_set_in(&frame.two, beside);
-        let set = || Some(elements(self.sv, &frame.two, beside, sent));
+        let set = || Some(OF_SET.decoded(self.sv, [&frame.two, beside], sent));
         self.reported.take(CNAV2.name, all, (set, "a frame"), &mut news);
         news
     }

@@ -19,7 +19,7 @@ mod reader;
 
 use std::sync::LazyLock;
 
-use crate::bits::{Element, FieldError, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
+use crate::bits::{Element, FieldError, bits_of, integers, number, read_all, write_all};
 use crate::broadcast::{Ephemeris, SetForm};
 use crate::crc::crc24q;
 use crate::exchange::modern;
@@ -34,6 +34,7 @@ use crate::navic::l1::L1;
 use crate::navic::nav::NAVIC_WEEK;
 use crate::navic::sps::L5;
 use crate::satellite::Sv;
+use crate::set_tables::SetTables;
 use crate::signal::Signal;
 use crate::time::{Epoch, WEEK_S};
 pub use fields::tables;
@@ -56,16 +57,16 @@ pub static L1_NAV: Message = Message {
     set: &[1],
     reduced: &[],
     ionosphere: IonosphereForm { model: Model::KlobucharNavic, unit: |_| true, coefficients: ionosphere },
-    set_parameters,
-    elements: of_integers,
+    set_parameters: || OF_SET.parameters(),
+    elements: |sv, raw, near| OF_SET.elements(sv, raw, near),
     parameters: opened,
     reader: |sv| Box::new(L1NavReader::new(sv)),
     form,
     sets: &L1_NAV_SETS,
     quantised,
-    adjustable,
+    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust,
+    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "L1NV", common: "L1NV KLOB", fields: tables, lines: Some(record_lines) }),
 };
 
@@ -239,17 +240,21 @@ fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
     if shares { set.tgd_s } else { set.tgd_s - correction_s }
 }
 
-/// Parameters that are of the frame and not of the ephemeris.
-const PASSING: [&str; 4] = ["week", "itow_2h", "alert", "prn"];
-
-fn set_parameters() -> Vec<&'static str> {
-    SET.iter().map(|element| element.field.name).filter(|name| !PASSING.contains(name)).collect()
-}
+/// Parameters by which ephemerides are distinguished, or that have a fault of their own, are fixed.
+static OF_SET: SetTables<Content, Vec<bool>> = SetTables {
+    parts: &[&SET],
+    passing: &["week", "itow_2h", "alert", "prn"],
+    fixed: &["week", "itow_2h", "alert", "prn", "toe_5min", "iodec", "l1_health", "reference_flag"],
+    sets: &L1_NAV_SETS,
+    blank: || vec![false; BITS_2],
+    content: blank,
+    ephemeris: |content| content.set,
+};
 
 /// The raw integers of the ephemeris in subframe 2.
 fn of_set_in(two: &Vec<bool>) -> Parameters {
     let mut found = integers(&SET, two);
-    found.retain(|(name, _)| !PASSING.contains(name));
+    found.retain(|(name, _)| !OF_SET.passing.contains(name));
     found
 }
 
@@ -285,15 +290,6 @@ fn blank(set: Ephemeris) -> Content {
     }
 }
 
-/// The elements that raw integers give, as if they had been sent at `near`.
-fn of_integers(sv: Sv, raw: Raw<'_>, near: Epoch) -> Option<Ephemeris> {
-    let mut bits = vec![false; BITS_2];
-    for field in SET.iter().map(|element| &element.field).filter(|field| !PASSING.contains(&field.name)) {
-        field.write(&mut bits, raw(field.name)?);
-    }
-    Some(elements(sv, &bits, near))
-}
-
 /// The coefficients of the ionosphere that raw integers of message type 10 give.
 fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
     let mut bits = vec![false; BITS_3];
@@ -316,32 +312,7 @@ fn coefficients_in(three: &Vec<bool>) -> Coefficients {
 /// # Errors
 /// A value that the message cannot carry.
 pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    let mut content = blank(form(ephemeris));
-    quantise_all(&SET, &mut content)?;
-    Ok(content.set)
-}
-
-/// Parameters by which ephemerides are distinguished, or that have a fault of their own.
-const FIXED_PARAMETERS: [&str; 8] =
-    ["week", "itow_2h", "alert", "prn", "toe_5min", "iodec", "l1_health", "reference_flag"];
-
-fn adjustable() -> Vec<&'static str> {
-    SET.iter().map(|element| element.field.name).filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
-}
-
-/// Adds `by` to a parameter in the unit of the tables. Returns false if there is none.
-fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
-    let mut content = blank(ephemeris.clone());
-    let found = add_to(&SET, parameter, &mut content, by);
-    *ephemeris = content.set;
-    found
-}
-
-/// The ephemeris in subframe 2, sent at `sent`.
-fn elements(sv: Sv, two: &Vec<bool>, sent: Epoch) -> Ephemeris {
-    let mut content = blank(Ephemeris::blank(sv, sent));
-    read_all(&SET, two, &mut content);
-    content.set
+    OF_SET.quantised(form(ephemeris))
 }
 
 /// The lines of a record (RINEX 4.02, table A32): of the two pairs of carriers that the clock may be of, the

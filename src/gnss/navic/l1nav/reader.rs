@@ -3,7 +3,7 @@
 //! Where a frame begins shows in the code word of its time, which is right by chance at times: the check of
 //! subframe 2 decides.
 
-use super::{FRAME, Frame, L1_NAV, SYMBOLS, coefficients_in, decode, elements, of_electrons_in, of_set_in};
+use super::{FRAME, Frame, L1_NAV, OF_SET, SYMBOLS, coefficients_in, decode, of_electrons_in, of_set_in};
 use crate::framed::{Content, Framed, Reported};
 use crate::message::Read;
 use crate::record::NavigationRow;
@@ -51,7 +51,7 @@ impl Content for L1NavContent {
         let sent = frame.sent_at(near);
         let (symbols, inverted) = (SYMBOLS as u64, frame.0.inverted);
         let mut news = vec![Read::Unit { symbols, of_week_s: frame.of_week_s(), inverted }, Read::Time(sent)];
-        let set = elements(self.sv, &frame.0.two, sent);
+        let set = OF_SET.decoded(self.sv, [&frame.0.two], sent);
         // A frame is of one ephemeris, and what it says besides bears its issue.
         let issue = u32::from(set.iode);
         if let Some(three) = frame.electrons() {

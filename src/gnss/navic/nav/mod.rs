@@ -13,9 +13,7 @@
 mod fields;
 mod reader;
 
-use crate::bits::{
-    Bits, Element, FieldError, Store, add_to, bits_of, integers, number, quantise_all, read_all, write_all,
-};
+use crate::bits::{Bits, FieldError, Store, bits_of, integers, number, read_all, write_all};
 use crate::broadcast::{Ephemeris, PLAIN};
 use crate::crc::crc24q;
 use crate::fec::convolutional::Convolutional;
@@ -24,6 +22,7 @@ use crate::ionosphere::{Coefficients, Model};
 use crate::klobuchar::Klobuchar;
 use crate::message::{Common, IonosphereForm, Message, Records, Sender};
 use crate::satellite::{Sv, System};
+use crate::set_tables::SetTables;
 use crate::time::{Epoch, WEEK_S};
 use fields::{Almanac, MESSAGE_7, MESSAGE_11, MESSAGE_26, SUBFRAME_1, SUBFRAME_2, Utc};
 pub use fields::{DATA_BITS, Subframe, tables};
@@ -56,8 +55,8 @@ pub static SPS_NAV: Message = Message {
             Some(coefficients(&page))
         },
     },
-    set_parameters: || of_set().into_iter().flatten().map(|element| element.field.name).collect(),
-    elements: of_integers,
+    set_parameters: || OF_SET.parameters(),
+    elements: |sv, raw, near| OF_SET.elements(sv, raw, near).filter(is_whole),
     parameters: |symbols| {
         let subframe = decode_soft(&soft(symbols))?;
         let found = parameters(&subframe);
@@ -67,9 +66,9 @@ pub static SPS_NAV: Message = Message {
     form: Ephemeris::clone,
     sets: &PLAIN,
     quantised,
-    adjustable,
+    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust,
+    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "LNAV", common: "LNAV", fields: tables, lines: None }),
 };
 
@@ -239,30 +238,27 @@ fn coefficients(subframe: &Subframe) -> Coefficients {
     Coefficients::KlobucharNavic(found)
 }
 
-fn of_set() -> [&'static [Element<Ephemeris>]; 2] {
-    [&SUBFRAME_1, &SUBFRAME_2]
-}
+/// Parameters by which ephemerides are distinguished, and the health, which has a fault of its own, are
+/// fixed.
+static OF_SET: SetTables<Ephemeris, Subframe> = SetTables {
+    parts: &[&SUBFRAME_1, &SUBFRAME_2],
+    passing: &[],
+    fixed: &["week", "iodec", "toc_s", "toe_s", "health"],
+    sets: &PLAIN,
+    blank,
+    content: |ephemeris| ephemeris,
+    ephemeris: |ephemeris| ephemeris,
+};
 
-/// The elements that raw integers give, as if their subframes had been sent at `near`.
-fn of_integers(sv: Sv, raw: &dyn Fn(&str) -> Option<i64>, near: Epoch) -> Option<Ephemeris> {
-    let mut found = Ephemeris::blank(sv, near);
-    for table in of_set() {
-        let mut subframe = blank();
-        for field in table.iter().map(|element| &element.field) {
-            field.write(&mut subframe, raw(field.name)?);
-        }
-        read_all(table, &subframe, &mut found);
-    }
-    (found.toe == found.toc).then_some(found)
+/// Equal reference times show that subframes 1 and 2 are of one ephemeris.
+fn is_whole(set: &Ephemeris) -> bool {
+    set.toe == set.toc
 }
 
 /// The elements in subframes 1 and 2 with the time at which subframe 1 was sent; `None` where they are not of
 /// one ephemeris.
 pub fn elements(sv: Sv, one: &Subframe, two: &Subframe, near: Epoch) -> Option<Ephemeris> {
-    let mut found = Ephemeris::blank(sv, sent_at(one, near)?);
-    read_all(&SUBFRAME_1, one, &mut found);
-    read_all(&SUBFRAME_2, two, &mut found);
-    (found.toe == found.toc).then_some(found)
+    Some(OF_SET.decoded(sv, [one, two], sent_at(one, near)?)).filter(is_whole)
 }
 
 /// Start time of subframe 1 from its own week, which is near `near`.
@@ -288,22 +284,7 @@ fn check(ephemeris: &Ephemeris) -> Result<(), FieldError> {
 /// A value that the message cannot carry.
 pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     check(ephemeris)?;
-    let mut sent = ephemeris.clone();
-    of_set().into_iter().try_for_each(|table| quantise_all(table, &mut sent))?;
-    Ok(sent)
-}
-
-/// Parameters by which ephemerides are distinguished, and the health, which has a fault of its own.
-const FIXED_PARAMETERS: [&str; 5] = ["week", "iodec", "toc_s", "toe_s", "health"];
-
-fn adjustable() -> Vec<&'static str> {
-    let names = of_set().into_iter().flatten().map(|element| element.field.name);
-    names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
-}
-
-/// Adds `by` to a parameter of subframes 1 and 2 in the unit of the tables. Returns false if there is none.
-pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
-    of_set().into_iter().any(|table| add_to(table, parameter, ephemeris, by))
+    OF_SET.quantised(ephemeris.clone())
 }
 
 #[cfg(test)]
