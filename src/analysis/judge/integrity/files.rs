@@ -35,8 +35,8 @@ const CARRIER_CYCLES: f64 = 0.05;
 const DOPPLER_HZ: f64 = 1.0;
 /// Half a step of the digit for strength, dB (RINEX 3.05, table 9).
 const CN0_DB: f64 = 3.0;
-/// Half a tenth of a knot: from there on a program that shows tenths shows another speed.
-const SPEED_MPS: f64 = 0.05 * KNOT_MPS;
+/// A tenth of a knot: from there on a program that shows tenths always shows another speed.
+const SPEED_MPS: f64 = 0.1 * KNOT_MPS;
 /// Share of a table's rows that a file may lack, or have elsewhere: a row that somebody mended misleads
 /// nobody.
 const ODD_PERCENT: f64 = 1.0;
