@@ -32,6 +32,11 @@ pub struct Klobuchar {
     pub beta: [f64; 4],
 }
 
+impl Klobuchar {
+    /// Coefficients of which all are zero.
+    pub const ZERO: Self = Self { alpha: [0.0; 4], beta: [0.0; 4] };
+}
+
 /// Coefficients of a nominal ionosphere, for use before any are received. They are even in magnetic latitude,
 /// with a period of 100 000 s.
 ///

@@ -17,12 +17,13 @@
 mod fields;
 mod reader;
 
-use crate::bits::{Bits, FieldError, Store, add_to, integers, quantise_all, read_all, write_all};
+use crate::bits::{Bits, FieldError, Store, integers, read_all, write_all};
 use crate::broadcast::{Ephemeris, PLAIN, SetForm};
 use crate::ionosphere::{Coefficients, Model};
 use crate::klobuchar::Klobuchar;
 use crate::message::{IonosphereForm, Message, Records, Sender};
 use crate::satellite::Sv;
+use crate::set_tables::SetTables;
 use crate::time::{BDT_WEEK, Epoch, WEEK_S};
 use fields::{D1_PARTS, D1_SET, D1Set, D2_PARTS, D2_SET, D2Set, Orbit};
 pub use fields::{SUBFRAME_BITS, tables};
@@ -47,7 +48,7 @@ pub static D1_D2: Message = Message {
         model: Model::KlobucharBeidou,
         unit: |_| true,
         coefficients: |raw| {
-            let mut found = Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] };
+            let mut found = Klobuchar::ZERO;
             for (index, name) in ["alpha_0", "alpha_1", "alpha_2", "alpha_3"].into_iter().enumerate() {
                 *found.alpha.get_mut(index)? = value(name, raw)?;
             }
@@ -57,24 +58,16 @@ pub static D1_D2: Message = Message {
             given(found)
         },
     },
-    set_parameters: || D1_SET.iter().map(|element| element.field.name).collect(),
-    elements: |sv, raw, near| {
-        let mut set = D1Set::default();
-        for field in D1_SET.iter().map(|element| &element.field) {
-            field.write(&mut set, raw(field.name)?);
-        }
-        let mut orbit = Orbit::blank(sv, near);
-        read_all(&D1_SET, &set, &mut orbit);
-        Some(orbit.set())
-    },
+    set_parameters: || OF_SET.parameters(),
+    elements: |sv, raw, near| OF_SET.elements(sv, raw, near).map(numbered),
     parameters: |symbols| parameters(symbols).map(|found| (true, found)),
     reader: |sv| Box::new(D1D2Reader::new(sv)),
     form,
     sets: &D1_SETS,
     quantised,
-    adjustable,
+    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust,
+    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records {
         set: |sv| if sv.is_geostationary() { "D2" } else { "D1" },
         common: "D1D2",
@@ -141,14 +134,13 @@ pub fn issue(toe_of_week_s: f64) -> u16 {
 
 impl Orbit {
     fn blank(sv: Sv, near: Epoch) -> Self {
-        Self { ephemeris: form(&Ephemeris::blank(sv, near)), klobuchar: Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] } }
+        Self { ephemeris: form(&Ephemeris::blank(sv, near)), klobuchar: Klobuchar::ZERO }
     }
+}
 
-    /// The ephemeris, numbered.
-    fn set(mut self) -> Ephemeris {
-        self.ephemeris.iode = issue(self.ephemeris.toe.tow_s());
-        self.ephemeris
-    }
+/// An ephemeris with the number that its reference time gives it.
+fn numbered(set: Ephemeris) -> Ephemeris {
+    Ephemeris { iode: issue(set.toe.tow_s()), ..set }
 }
 
 fn value(name: &str, raw: &dyn Fn(&str) -> Option<i64>) -> Option<f64> {
@@ -174,7 +166,7 @@ impl Sender for Frames {
             return Err(FieldError::Start { message: D1_D2.name, start_s: start.tow_s(), expected });
         }
         let on_air = Ephemeris { transmitted: start, ..ephemeris.clone() };
-        let klobuchar = self.klobuchar.unwrap_or(Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] });
+        let klobuchar = self.klobuchar.unwrap_or(Klobuchar::ZERO);
         let orbit = Orbit { ephemeris: on_air, klobuchar };
         if ephemeris.sv.is_geostationary() { d2(&orbit, start) } else { d1(&orbit, start) }
     }
@@ -335,27 +327,20 @@ fn parameters(symbols: &[bool]) -> Option<Vec<(&'static str, i64)>> {
 /// # Errors
 /// A value that the message cannot carry.
 pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    let mut orbit = Orbit { ephemeris: form(ephemeris), ..Orbit::blank(ephemeris.sv, ephemeris.toe) };
-    quantise_all(&D1_SET, &mut orbit)?;
-    Ok(orbit.ephemeris)
+    OF_SET.quantised(form(ephemeris))
 }
 
 /// Parameters by which ephemerides are distinguished, what all satellites send alike, and the health, which
-/// has a fault of its own.
-const FIXED_PARAMETERS: [&str; 14] = [
-    "week", "toc_s", "toe_s", "health", "aodc", "aode", "alpha_0", "alpha_1", "alpha_2", "alpha_3", "beta_0", "beta_1",
-    "beta_2", "beta_3",
-];
-
-fn adjustable() -> Vec<&'static str> {
-    let names = D1_SET.iter().map(|element| element.field.name);
-    names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
-}
-
-/// Adds `by` to a parameter of an ephemeris in the unit of the tables. Returns false if there is none.
-pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
-    let mut orbit = Orbit { ephemeris: ephemeris.clone(), ..Orbit::blank(ephemeris.sv, ephemeris.toe) };
-    let found = add_to(&D1_SET, parameter, &mut orbit, by);
-    *ephemeris = orbit.ephemeris;
-    found
-}
+/// has a fault of its own, are fixed.
+static OF_SET: SetTables<Orbit, D1Set> = SetTables {
+    parts: &[&D1_SET],
+    passing: &[],
+    fixed: &[
+        "week", "toc_s", "toe_s", "health", "aodc", "aode", "alpha_0", "alpha_1", "alpha_2", "alpha_3", "beta_0",
+        "beta_1", "beta_2", "beta_3",
+    ],
+    sets: &D1_SETS,
+    blank: D1Set::default,
+    content: |ephemeris| Orbit { klobuchar: Klobuchar::ZERO, ephemeris },
+    ephemeris: |orbit| orbit.ephemeris,
+};

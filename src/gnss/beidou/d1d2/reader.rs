@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use super::{
     D1_D2, D1_PARTS, D1_SYMBOLS, D2_PAGE, D2_PARTS, D2_SYMBOLS, SUBFRAME_BITS, Subframe, UNIT_S, chip, decode, given,
-    id, orbit_of, second, sent_at,
+    id, numbered, orbit_of, second, sent_at,
 };
 use crate::bits::Store;
 use crate::message::{Read, Reader};
@@ -156,7 +156,7 @@ impl D1D2Reader {
         let sent = sent_at(first, self.is_d2(), near);
         let (orbit, content) = orbit_of(self.sv, &parts, sent);
         let klobuchar = orbit.klobuchar;
-        let set = orbit.set();
+        let set = numbered(orbit.ephemeris);
         // Equal reference times show that clock and orbit belong together, and else that one frame has both,
         // for ephemerides change between frames.
         let frame_of = |part: &Subframe| i64::from(second(part)) / UNIT_S;

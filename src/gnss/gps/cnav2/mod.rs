@@ -215,7 +215,7 @@ impl Sender for Frames {
             // Predicted for the reference time itself.
             top: set.toe.tow_s() / STEP_S as f64,
             op_week: set.toe.week().rem_euclid(256) as f64,
-            klobuchar: self.common.klobuchar.unwrap_or(Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] }),
+            klobuchar: self.common.klobuchar.unwrap_or(Klobuchar::ZERO),
             utc: UtcNumbers::of(&self.common, start, &GPST, (0, 1)),
             ..blank(set.clone())
         };
@@ -338,7 +338,7 @@ fn blank(set: Ephemeris) -> Content {
         flag: 0.0,
         op_week: 0.0,
         page: PAGE,
-        klobuchar: Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] },
+        klobuchar: Klobuchar::ZERO,
         utc: UtcNumbers::default(),
         toa: Epoch::new(0, 0.0),
         entries: [Entry::empty(); PACKETS],

@@ -16,12 +16,13 @@ pub use fields::tables;
 pub use parity::check_parity;
 pub use reader::LnavReader;
 
-use crate::bits::{add_to, bits_of, integers, number, quantise_all, read_all, write_all};
+use crate::bits::{bits_of, integers, number, read_all, write_all};
 use crate::broadcast::{Ephemeris, PLAIN, SetForm};
 use crate::ionosphere::{Coefficients, Model};
 use crate::klobuchar::Klobuchar;
 use crate::message::{Common, IonosphereForm, Message, Records, Sender};
 use crate::satellite::{Sv, System};
+use crate::set_tables::SetTables;
 use crate::time::{Epoch, WEEK_S};
 use fields::{ALMANAC_PAGE, IONOSPHERE_PAGE, SUBFRAME_1, SUBFRAME_2, SUBFRAME_3, UTC_PAGE};
 
@@ -57,7 +58,7 @@ pub static LNAV: Message = Message {
         model: Model::Klobuchar,
         unit: |start| subframe_at(start) == 4 && start.tow_whole_s() / (5 * SUBFRAME_S) % PAGES == IONOSPHERE_PAGE_AT,
         coefficients: |raw| {
-            let (mut page, mut found) = ([0_u32; 10], Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] });
+            let (mut page, mut found) = ([0_u32; 10], Klobuchar::ZERO);
             for field in IONOSPHERE_PAGE.iter().map(|element| &element.field) {
                 field.write(&mut page, raw(field.name)?);
             }
@@ -65,19 +66,16 @@ pub static LNAV: Message = Message {
             Some(Coefficients::Klobuchar(found))
         },
     },
-    set_parameters: || {
-        let orbit = tables().into_iter().filter(|(name, _)| name.starts_with("subframe"));
-        orbit.flat_map(|(_, fields)| fields).map(|field| field.name).collect()
-    },
+    set_parameters: || OF_SET.parameters(),
     elements: of_integers,
     parameters: opened,
     reader: |sv| Box::new(LnavReader::new(sv)),
     form: |set| Ephemeris { form: &LNAV_SETS, signal_delays_s: Vec::new(), ..set.clone() },
     sets: &LNAV_SETS,
     quantised,
-    adjustable,
+    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust,
+    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "LNAV", common: "LNAV", fields: tables, lines: None }),
 };
 
@@ -236,29 +234,20 @@ fn check_issue(ephemeris: &Ephemeris) -> Result<(), FieldError> {
 /// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
 pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     check_issue(ephemeris)?;
-    let mut sent = ephemeris.clone();
-    quantise_all(&SUBFRAME_1, &mut sent)?;
-    quantise_all(&SUBFRAME_2, &mut sent)?;
-    quantise_all(&SUBFRAME_3, &mut sent)?;
-    Ok(sent)
+    OF_SET.quantised(ephemeris.clone())
 }
 
-/// Parameters by which ephemerides are distinguished, and the health, which has a fault of its own.
-const FIXED_PARAMETERS: [&str; 4] = ["week", "iodc", "iode", "health"];
-
-fn adjustable() -> Vec<&'static str> {
-    let tables = tables().into_iter().filter(|(name, _)| name.starts_with("subframe "));
-    let names = tables.flat_map(|(_, fields)| fields).map(|field| field.name);
-    names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
-}
-
-/// Adds `by` to the parameter of subframes 1 to 3 that the field table calls `parameter`, in its unit;
-/// whether there is one.
-pub fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
-    add_to(&SUBFRAME_1, parameter, ephemeris, by)
-        || add_to(&SUBFRAME_2, parameter, ephemeris, by)
-        || add_to(&SUBFRAME_3, parameter, ephemeris, by)
-}
+/// Parameters by which ephemerides are distinguished, and the health, which has a fault of its own, are
+/// fixed.
+static OF_SET: SetTables<Ephemeris, [u32; 10]> = SetTables {
+    parts: &[&SUBFRAME_1, &SUBFRAME_2, &SUBFRAME_3],
+    passing: &[],
+    fixed: &["week", "iodc", "iode", "health"],
+    sets: &LNAV_SETS,
+    blank: || [0; 10],
+    content: |ephemeris| ephemeris,
+    ephemeris: |ephemeris| ephemeris,
+};
 
 /// Reason for which words are no subframe, or subframes no ephemeris.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
@@ -386,7 +375,7 @@ impl Subframe {
 
     /// Ionosphere coefficients, if this is page 18 of subframe 4.
     pub fn klobuchar(&self) -> Option<Klobuchar> {
-        let mut klobuchar = Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] };
+        let mut klobuchar = Klobuchar::ZERO;
         read_all(&IONOSPHERE_PAGE, &self.data, &mut klobuchar);
         self.is_page_18().then_some(klobuchar)
     }

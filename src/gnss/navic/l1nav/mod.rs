@@ -182,7 +182,7 @@ impl Sender for Frames {
             week: (start.week() - NAVIC_WEEK).rem_euclid(8192) as f64,
             itow: (start.tow_whole_s() / INTERVAL_S) as f64,
             kind: if known.is_some() { ELECTRONS } else { NOTHING },
-            klobuchar: known.unwrap_or(NO_ELECTRONS),
+            klobuchar: known.unwrap_or(Klobuchar::ZERO),
             region_5deg: REGION_5DEG,
             ..blank(set.clone())
         };
@@ -272,9 +272,6 @@ fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
     Some((true, found))
 }
 
-/// Coefficients of a scene without known ionosphere: zeros.
-const NO_ELECTRONS: Klobuchar = Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] };
-
 /// Creates content in which nothing has been decoded.
 fn blank(set: Ephemeris) -> Content {
     Content {
@@ -284,7 +281,7 @@ fn blank(set: Ephemeris) -> Content {
         alert: 0.0,
         kind: NOTHING,
         invalid: 0.0,
-        klobuchar: NO_ELECTRONS,
+        klobuchar: Klobuchar::ZERO,
         region_5deg: [0.0; 4],
         iodk: 0.0,
     }

@@ -233,7 +233,7 @@ pub fn parameters(subframe: &Subframe) -> Vec<(&'static str, i64)> {
 
 /// Ionosphere coefficients of message type 11.
 fn coefficients(subframe: &Subframe) -> Coefficients {
-    let mut found = Klobuchar { alpha: [0.0; 4], beta: [0.0; 4] };
+    let mut found = Klobuchar::ZERO;
     read_all(&MESSAGE_11, subframe, &mut found);
     Coefficients::KlobucharNavic(found)
 }

@@ -20,14 +20,14 @@ mod schedule;
 use std::sync::Arc;
 
 use crate::augmentation::{Content, Network};
-use crate::bits::{FieldError, add_to, bits_of, integers, number, quantise_all, read_all, write_all};
+use crate::bits::{FieldError, bits_of, integers, number, write_all};
 use crate::broadcast::{Ephemeris, SetForm};
 use crate::crc::crc24q;
 use crate::fec::convolutional::Convolutional;
 use crate::fec::running::MARGIN;
 use crate::ionosphere::Model;
-use crate::message::{IonosphereForm, Message, Parameters, Raw, Records, Sender};
-use crate::satellite::Sv;
+use crate::message::{IonosphereForm, Message, Parameters, Records, Sender};
+use crate::set_tables::SetTables;
 use crate::time::Epoch;
 pub(crate) use fields::step_of_day;
 pub use fields::tables;
@@ -51,16 +51,17 @@ pub static SBAS: Message = Message {
     reduced: &[],
     // Its grid is left out.
     ionosphere: IonosphereForm { model: Model::Klobuchar, unit: |_| false, coefficients: |_| None },
-    set_parameters: || GEO.iter().map(|element| element.field.name).collect(),
-    elements: of_integers,
+    set_parameters: || OF_SET.parameters(),
+    // Blocks begin with seconds.
+    elements: |sv, raw, near| OF_SET.elements(sv, raw, Epoch::new(near.seconds(), 0.0)),
     parameters: opened,
     reader: |sv| Box::new(SbasReader::new(sv)),
     form: Ephemeris::clone,
     sets: &SBAS_SETS,
     quantised,
-    adjustable,
+    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust,
+    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "SBAS", common: "SBAS", fields: tables, lines: None }),
 };
 
@@ -186,42 +187,21 @@ fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
     (!parameters.is_empty()).then_some((false, parameters))
 }
 
-/// The ephemeris in a block of type 9 that was sent at `sent`.
-fn elements(sv: Sv, bits: &Vec<bool>, sent: Epoch) -> Ephemeris {
-    let mut found = Ephemeris { form: &SBAS_SETS, ..Ephemeris::blank(sv, sent) };
-    read_all(&GEO, bits, &mut found);
-    found
-}
-
-/// The ephemeris that raw integers give, as if they had been sent at `near`.
-fn of_integers(sv: Sv, raw: Raw<'_>, near: Epoch) -> Option<Ephemeris> {
-    let mut bits = vec![false; DATA_BITS];
-    for field in GEO.iter().map(|element| &element.field) {
-        field.write(&mut bits, raw(field.name)?);
-    }
-    // Blocks begin with seconds.
-    Some(elements(sv, &bits, Epoch::new(near.seconds(), 0.0)))
-}
+/// Parameters by which ephemerides are distinguished, and the accuracy, which is the health, are fixed.
+static OF_SET: SetTables<Ephemeris, Vec<bool>> = SetTables {
+    parts: &[&GEO],
+    passing: &[],
+    fixed: &["iodn", "t0_16s", "ura_index"],
+    sets: &SBAS_SETS,
+    blank: || vec![false; DATA_BITS],
+    content: |ephemeris| ephemeris,
+    ephemeris: |ephemeris| ephemeris,
+};
 
 /// The ephemeris that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
 ///
 /// # Errors
 /// A value that the message cannot carry.
 pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    let mut sent = ephemeris.clone();
-    quantise_all(&GEO, &mut sent)?;
-    Ok(sent)
-}
-
-/// Parameters by which ephemerides are distinguished, and the accuracy, which is the health.
-const FIXED_PARAMETERS: [&str; 3] = ["iodn", "t0_16s", "ura_index"];
-
-fn adjustable() -> Vec<&'static str> {
-    let names = GEO.iter().map(|element| element.field.name);
-    names.filter(|name| !FIXED_PARAMETERS.contains(name)).collect()
-}
-
-/// Adds `by` to a parameter of type 9 in the unit of the tables. Returns false if there is none.
-fn adjust(ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
-    add_to(&GEO, parameter, ephemeris, by)
+    OF_SET.quantised(ephemeris.clone())
 }

@@ -1,7 +1,7 @@
 //! Collects the content of blocks found in soft symbols ([`Running`]): the second of the week by type 12, and
 //! from it on by counting, the satellite's position by type 9, and the content about others from then on.
 
-use super::{BITS, OF_PLACE, OF_TIME, RATE_HZ, SBAS, TIME, elements, is_block, type_of};
+use super::{BITS, OF_PLACE, OF_SET, OF_TIME, RATE_HZ, SBAS, TIME, is_block, type_of};
 use crate::augmentation::Content;
 use crate::bits::integers;
 use crate::fec::running::Running;
@@ -57,7 +57,7 @@ impl SbasReader {
     fn look_for_set(&mut self, news: &mut Vec<Read>) {
         let Some((begin, bits)) = &self.place else { return };
         let Some(sent) = self.begun(*begin) else { return };
-        let set = || Some(elements(self.sv, bits, sent));
+        let set = || Some(OF_SET.decoded(self.sv, [bits], sent));
         self.reported.take(SBAS.name, integers(&super::GEO, bits), (set, "the position"), news);
     }
 }
