@@ -20,16 +20,20 @@ use crate::figures::{ALL, CA, Worst, case};
 use crate::run::{self, Received};
 use crate::skies;
 
-const G: f64 = 9.806_65;
+pub const G: f64 = 9.806_65;
 const TURN: f64 = 18_446_744_073_709_551_616.0;
 
 /// A motion along `way` from the usual place by its path: knots of (time, distance, speed, acceleration).
 fn along(way: Vector3<f64>, knots: &[[f64; 4]], breaks_s: Vec<f64>) -> Trajectory {
-    along_from(Geodetic::from_degrees(26.5123, 80.2329, 130.0).to_ecef(), way, knots, breaks_s)
+    along_from(usual_place(), way, knots, breaks_s)
+}
+
+fn usual_place() -> Vector3<f64> {
+    Geodetic::from_degrees(26.5123, 80.2329, 130.0).to_ecef()
 }
 
 /// A motion along `way` from `place`.
-fn along_from(place: Vector3<f64>, way: Vector3<f64>, knots: &[[f64; 4]], breaks_s: Vec<f64>) -> Trajectory {
+pub fn along_from(place: Vector3<f64>, way: Vector3<f64>, knots: &[[f64; 4]], breaks_s: Vec<f64>) -> Trajectory {
     let knot = |&[t_s, s, v, a]: &[f64; 4]| Knot {
         t_s,
         motion: Motion { position_m: place + way * s, velocity_mps: way * v, acceleration_mps2: way * a },
@@ -44,7 +48,7 @@ fn towards(scene: &Scene) -> Vector3<f64> {
 }
 
 /// A piece of constant jerk after a knot.
-fn after(&[t, s, v, a]: &[f64; 4], dt: f64, jerk: f64) -> [f64; 4] {
+pub fn after(&[t, s, v, a]: &[f64; 4], dt: f64, jerk: f64) -> [f64; 4] {
     [
         t + dt,
         s + v * dt + a * dt * dt / 2.0 + jerk * dt * dt * dt / 6.0,
@@ -55,7 +59,12 @@ fn after(&[t, s, v, a]: &[f64; 4], dt: f64, jerk: f64) -> [f64; 4] {
 
 /// Largest deviation of a signal's carrier (cycles) and code (metres) from the truth's arrivals over samples
 /// `from..to` of a scene of a whole rate, taken at `count` places.
-fn worst_of(scene: &Scene, (sv, signal): (Sv, &'static Signal), (from, to): (u64, u64), count: u64) -> (Worst, Worst) {
+pub fn worst_of(
+    scene: &Scene,
+    (sv, signal): (Sv, &'static Signal),
+    (from, to): (u64, u64),
+    count: u64,
+) -> (Worst, Worst) {
     let mut transmitter = Transmitter::new(scene, sv, signal, Edge::Nearest).unwrap().unwrap();
     transmitter.prepare_alone(scene, from, to).unwrap();
     let waveform = Waveform::new(signal.link(sv), 0).unwrap().unwrap();
@@ -149,8 +158,8 @@ fn a_step_of_a_hundred_g_falls_between_the_knots_of_every_signal() {
     the.at_most("code between knots at the step", code_m, 1e-4 * 0.255 + 1e-7, "m");
 }
 
-/// 1000 g/s for 10 ms, again and again up and down, and 100 ms of it: the gun.
-fn gun(way: Vector3<f64>, at_s: f64, burst_s: f64, hold_s: f64) -> Trajectory {
+/// The gun: from rest 1000 g/s for `burst_s`, what has become of it for `hold_s`, and 1000 g/s down again.
+pub fn gun(place: Vector3<f64>, way: Vector3<f64>, at_s: f64, [burst_s, hold_s]: [f64; 2]) -> Trajectory {
     let mut knots = vec![[0.0; 4], [at_s, 0.0, 0.0, 0.0]];
     for (dt, jerk) in [(burst_s, 1000.0 * G), (hold_s, 0.0), (burst_s, -1000.0 * G)] {
         let next = after(&knots[knots.len() - 1], dt, jerk);
@@ -159,7 +168,7 @@ fn gun(way: Vector3<f64>, at_s: f64, burst_s: f64, hold_s: f64) -> Trajectory {
     let breaks = knots[1..].iter().map(|knot| knot[0]).collect();
     let coast = after(&knots[knots.len() - 1], 60.0, 0.0);
     knots.push(coast);
-    along(way, &knots, breaks)
+    along_from(place, way, &knots, breaks)
 }
 
 #[test]
@@ -167,7 +176,7 @@ fn a_gun_is_followed_by_the_generator_and_told_by_the_receiver() {
     let the = case(24, "1000 g/s jerk, gun", CA);
     let mut scene = front(4.0);
     let way = towards(&scene);
-    scene.trajectory = gun(way, 1.234_567_8, 0.01, 0.5);
+    scene.trajectory = gun(usual_place(), way, 1.234_567_8, [0.01, 0.5]);
     let (carrier, _) = worst_cycles(&scene, Sv::gps(23), (2_600_000, 5_200_000), 20_000);
     the.at_most("carrier between knots, 10 ms of it", carrier, 1e-4, "cycle");
     // 100 ms of it: 100 g, kept 20 ms. A third-order loop of 18 Hz errs by four cycles and lets go.
@@ -184,7 +193,7 @@ fn a_gun_is_followed_by_the_generator_and_told_by_the_receiver() {
     let (sharp, rest): (Vec<Sv>, Vec<Sv>) = run::in_view(&scene).into_iter().partition(along);
     assert!(sharp.len() >= 4, "{sharp:?}");
     scene = run::only(scene, &[&sharp[..], &rest[..3]].concat());
-    scene.trajectory = gun(way, shot_s, 0.1, 0.02);
+    scene.trajectory = gun(usual_place(), way, shot_s, [0.1, 0.02]);
     let received = Received::of(&scene, &run::settings(&whole));
     let events = received.events();
     let (mut flagged, mut latest_s) = (0, Worst::default());

@@ -39,6 +39,16 @@ fn scenario(system: System) -> &'static str {
 /// A scene of some signals of one system, with more tables: the satellites are those of the system's shipped
 /// scenario, and there is nothing between them and the antenna.
 pub fn scene(signals: &[&'static Signal], duration_s: f64, tables: &str) -> Scene {
+    try_scene(signals, duration_s, tables, &toml::Table::new()).unwrap_or_else(|e| panic!("{}: {e}", signals[0]))
+}
+
+/// Such a scene with some keys of its own; its error is text.
+pub fn try_scene(
+    signals: &[&'static Signal],
+    duration_s: f64,
+    tables: &str,
+    own: &toml::Table,
+) -> Result<Scene, String> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
     let path = folder.join(scenario(signals[0].system)).with_extension("toml");
     let shipped: toml::Table = std::fs::read_to_string(path).unwrap().parse().unwrap();
@@ -47,11 +57,12 @@ pub fn scene(signals: &[&'static Signal], duration_s: f64, tables: &str) -> Scen
         kept.extend(shipped.get(key).map(|value| (key.to_owned(), value.clone())));
     }
     let names: Vec<String> = signals.iter().map(|signal| signal.name.to_owned()).collect();
-    kept.insert("signals".to_owned(), names.clone().into());
+    kept.insert("signals".to_owned(), names.into());
     kept.insert("name".to_owned(), "extreme".into());
     kept.insert("duration_s".to_owned(), duration_s.into());
     kept.insert("seed".to_owned(), 3.into());
-    run::try_scene_in(&folder, &format!("{kept}\n{tables}")).unwrap_or_else(|e| panic!("{names:?}: {e}"))
+    kept.extend(own.clone());
+    run::try_scene_in(&folder, &format!("{kept}\n{tables}"))
 }
 
 /// Front end and power of a scene without noise: one of a signal at a rate, its carrier `if_hz` above zero.

@@ -8,6 +8,7 @@ use generator::truth;
 use gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, SPEED_OF_LIGHT_MPS};
 use gnss::gps::l1ca::L1_CA;
 use gnss::satellite::Sv;
+use gnss::signal::Signal;
 use nalgebra::Vector3;
 use receiver::acquire::search;
 use receiver::source::Block;
@@ -15,7 +16,7 @@ use receiver::source::Block;
 use crate::figures::{CA, Case, Worst, case};
 use crate::run::{self, Received};
 
-fn text(name: &str) -> String {
+pub fn text(name: &str) -> String {
     std::fs::read_to_string(run::folder().join(format!("{name}.toml"))).unwrap()
 }
 
@@ -25,9 +26,9 @@ fn shipped(name: &str) -> Scene {
 
 /// Doppler in inertial axes: the ratio of the two clocks' rates by the relativity-free equation of a moving
 /// pair, all orders.
-fn doppler_hz(scene: &Scene, sv: Sv, sample: u64, second_order: bool) -> f64 {
+pub fn doppler_hz(scene: &Scene, (sv, signal): (Sv, &'static Signal), sample: u64, second_order: bool) -> f64 {
     let local = scene.clock.epoch(sample);
-    let seen = truth::seen(scene, sv, &L1_CA, local).unwrap().unwrap();
+    let seen = truth::seen(scene, sv, signal, local).unwrap().unwrap();
     let sight = &seen.emission.sight;
     let w = Vector3::new(0.0, 0.0, EARTH_ROTATION_RADPS);
     let c = SPEED_OF_LIGHT_MPS;
@@ -37,7 +38,7 @@ fn doppler_hz(scene: &Scene, sv: Sv, sample: u64, second_order: bool) -> f64 {
     let (v_user, v_from) = (ahead.dot(&user) / c, ahead.dot(&from) / c);
     let clocks = (1.0 + seen.emission.satellite_clock_drift) / (1.0 + scene.receiver_clock.drift);
     let motion = if second_order { (1.0 + v_user) / (1.0 + v_from) } else { 1.0 + v_user - v_from };
-    L1_CA.centre_hz() * (clocks * motion - 1.0)
+    signal.carrier_hz(sv) * (clocks * motion - 1.0)
 }
 
 /// Largest deviation of the truth's Doppler from the equation, largest Doppler, largest second-order term,
@@ -61,9 +62,13 @@ fn dopplers(scene: &Scene, step_s: f64) -> [Worst; 4] {
             let (Some(here_hz), Some(next_hz)) = (truth_hz(sample), truth_hz(sample + rate_hz as u64)) else {
                 continue;
             };
-            let exact_hz = doppler_hz(scene, sv, sample, true);
-            let found =
-                [here_hz - exact_hz, exact_hz, exact_hz - doppler_hz(scene, sv, sample, false), next_hz - here_hz];
+            let exact_hz = doppler_hz(scene, (sv, &L1_CA), sample, true);
+            let found = [
+                here_hz - exact_hz,
+                exact_hz,
+                exact_hz - doppler_hz(scene, (sv, &L1_CA), sample, false),
+                next_hz - here_hz,
+            ];
             for (most, found) in most.iter_mut().zip(found) {
                 most.take(found.abs(), || format!("{sv}, {t_s} s"));
             }
