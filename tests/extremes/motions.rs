@@ -1,5 +1,5 @@
-//! Cases 17, 24 to 27, 54 and 55 in the sky of every signal: guns, boosts, orbits, a hundredth of light's speed
-//! and the zero of Doppler.
+//! Cases 17, 24 to 27, 54 and 55 in the sky of every signal: guns, boosts, orbits, a hundredth of light's
+//! speed and the zero of Doppler.
 //!
 //! Carrier and code are compared with the truth's arrivals in 128-bit integers, and the truth's Doppler with
 //! the equation of two moving clocks in inertial axes.
@@ -174,7 +174,7 @@ fn at_the_zero_of_doppler_code_and_carrier_of_every_signal_stay_together() {
         let voices = waveform.voices(Layers::Whole, Edge::Nearest, RATE_HZ).unwrap();
         let pace = voices[0].spreading.pace();
         let exact = Exact::new(&link.scene, link.sv, signal);
-        // Delays of code and carrier since the crossing: those of whole steps and of a carrier at rest are exact.
+        // Delays of code and carrier since the crossing: whole steps and a carrier at rest are exact.
         let of = |n: u64| {
             let (turns, place) = transmitter.phases(&link.scene, n).unwrap();
             let steps = i128::from(place.period) * (i128::from(pace.steps) << 48) + place.phase() as i128;
@@ -207,7 +207,7 @@ fn at_the_zero_of_doppler_code_and_carrier_of_every_signal_stay_together() {
     // Two places of a code and two of a carrier, each with a delay and a fraction of a second that resolve
     // 3.3e-8 m.
     the.at_most("code and carrier around the crossing, parted by", parted_m, 2e-7, "m");
-    // Layers that add have most of it where they have equal signs: 1 ms of chips is random to a few hundredths.
+    // Layers that add have most of it where their signs are equal, which 1 ms holds to a few hundredths.
     the.at_least("power of the samples there, of the signal's", power, 0.9, "");
 }
 
