@@ -20,7 +20,7 @@ use receiver::settings::Settings;
 use super::taps::{Sets, Taps};
 
 /// Steps a chip of the tables of peaks.
-const STEPS_PER_CHIP: f64 = 1024.0;
+pub(super) const STEPS_PER_CHIP: f64 = 1024.0;
 /// Chips on either side for which a correlation is computed.
 const LAGS_CHIPS: usize = 3;
 /// Imaginary part of a correlation below which it counts as real.

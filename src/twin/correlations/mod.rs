@@ -16,6 +16,7 @@ mod ray;
 mod refusal;
 mod search;
 mod sent;
+mod separation;
 mod taps;
 #[cfg(test)]
 mod tests;
@@ -44,6 +45,7 @@ use noise::Noise;
 use ray::Question;
 pub use refusal::{Refused, refuse};
 use sent::Sent;
+use separation::Sampled;
 use taps::{MOST, is_near};
 
 use crate::{Done, TwinError, settings_for};
@@ -53,8 +55,6 @@ const ROUNDING: f64 = 1.0 / 12.0;
 /// Difference of powers beyond which a cross-correlation of short codes, 24 dB down at most for C/A, is no
 /// longer noise.
 const NEAR_FAR_DB: f64 = 15.0;
-/// Intervals of the integral over a product of spectra.
-const INTERVALS: u32 = 400;
 
 /// Receives a scene by its correlations: no sample is made. `progress` gets the number of samples that have
 /// been passed.
@@ -104,17 +104,19 @@ impl<'a> Plan<'a> {
     /// A plan for a scene that [`refuse`] has let pass, and a receiver with these settings.
     pub fn new(scene: &'a Scene, settings: &Settings) -> Self {
         let made = Made::all(scene, settings);
-        let half_hz = 0.5 * scene.clock.rate.hz();
+        let rate_hz = scene.clock.rate.hz();
+        let sampled: Vec<Sampled> = scene.signals.iter().map(|signal| Sampled::new(signal, scene)).collect();
         let carriers = |signal: &'static Signal| signal.satellites().map(|sv| signal.carrier_hz(sv));
         let from_all = |made: &Made| {
             let mut all = BTreeMap::new();
-            for (number, signal) in scene.signals.iter().enumerate() {
+            let own = (&made.own, made.component.chip_rate_hz);
+            for (number, (signal, sampled)) in scene.signals.iter().zip(&sampled).enumerate() {
                 for (own_hz, other_hz) in
                     carriers(made.signal).flat_map(|own| carriers(signal).map(move |hz| (own, hz)))
                 {
                     let apart_hz = other_hz - own_hz;
                     let entry = all.entry((number, apart_hz.round() as i64));
-                    entry.or_insert_with(|| separation_s(made, signal, (apart_hz, half_hz)));
+                    entry.or_insert_with(|| sampled.separation_s(own, apart_hz, rate_hz));
                 }
             }
             all
@@ -170,18 +172,6 @@ impl<'a> Plan<'a> {
         let found = place.zip(self.separations_s.get(made)).and_then(|(place, all)| all.get(&(place, apart_hz)));
         found.copied().unwrap_or(0.0)
     }
-}
-
-/// Spectral separation of a replica from a signal whose carrier is `apart_hz` higher, within ±`half_hz`.
-fn separation_s(made: &Made, signal: &Signal, (apart_hz, half_hz): (f64, f64)) -> f64 {
-    let own = made.component.shape();
-    let step_hz = 2.0 * half_hz / f64::from(INTERVALS);
-    let shapes: Vec<_> = signal.components.iter().map(|one| (one.power_share, one.shape())).collect();
-    let product = |hz: f64| {
-        let sent = shapes.iter().map(|(share, shape)| share * shape.density(hz - apart_hz));
-        own.density(hz) * sent.sum::<f64>()
-    };
-    step_hz * (0..INTERVALS).map(|k| product((f64::from(k) + 0.5) * step_hz - half_hz)).sum::<f64>()
 }
 
 /// Noise in the correlations with one replica of a link.
