@@ -104,7 +104,7 @@ mod tests {
         }
     }
 
-    /// Samples of a random code, each the mean over so many of them, from a random place in a chip on.
+    /// Samples of a random code, each the mean over so many of them, from a random position in a chip on.
     fn sampled(layers: &[Layer], chips_per_sample: f64, samples: f64, count: usize, numbers: &mut Numbers) -> Vec<f64> {
         let begin = 2.0 + numbers.share();
         let chips = (begin + chips_per_sample * count as f64) as usize + 4;
