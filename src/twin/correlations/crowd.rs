@@ -5,7 +5,7 @@
 //! amplitude and phase are the correlation of both codes at their delay and difference of Dopplers, summed
 //! over the chips of a period, before and after the other code's own period ends (Kaplan and Hegarty,
 //! Understanding GPS 2nd ed., 4.3.2). Limits: delays and phases are parabolas within a second, the difference
-//! of Dopplers and the strength are constant there; the strongest ray alone; carriers are equal.
+//! of Dopplers and the strength are constant there; carriers are equal.
 
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use receiver::correlate::correlator::Interval;
 use receiver::correlate::units_to_chips;
 use receiver::lead::lead;
 
-use super::sent::{Sent, centred, split, turns};
+use super::sent::{Leg, Sent, centred, split, turns};
 use super::taps::{LANES, POSITIONS, Taps};
 
 /// Chips of a code from which on cross-correlation with other satellites counts as white noise.
@@ -42,7 +42,7 @@ fn at([constant, linear, square]: Parabola, x: f64) -> f64 {
     constant + x * (linear + x * square)
 }
 
-/// One satellite over a second.
+/// One ray of a satellite over a second.
 pub(super) struct Course {
     /// First sample, and the samples of the second.
     span: (u64, f64),
@@ -60,15 +60,25 @@ pub(super) struct Course {
 }
 
 impl Course {
-    /// A satellite over a second of samples; `None` for long codes, and for one that is not received.
-    pub fn new(sent: &Sent, (from, to): (u64, u64)) -> Option<Self> {
+    /// A satellite's rays over a second of samples, the strongest first; none for long codes, and for one that
+    /// is not received.
+    pub fn all(sent: &Sent, span: (u64, u64)) -> Vec<Arc<Self>> {
+        let Some(leg) = sent.leg(span.0 + (span.1 - span.0) / 2) else { return Vec::new() };
+        let cn0_hz = |ray| leg.rays.at(ray, span.0).map_or(0.0, |ray| ray.cn0_hz);
+        let sum_hz: f64 = (0..leg.rays.count()).map(cn0_hz).sum();
+        // Quick fading is common to all.
+        let steady_hz = if sum_hz > 0.0 { leg.rays.cn0_hz(span.0) / sum_hz } else { 0.0 };
+        let one = |ray| Self::new(sent, leg, (ray, steady_hz * cn0_hz(ray)), span).map(Arc::new);
+        (0..leg.rays.count()).filter_map(one).collect()
+    }
+
+    fn new(sent: &Sent, leg: &Leg, (ray, cn0_hz): (usize, f64), (from, to): (u64, u64)) -> Option<Self> {
         let signal = sent.transmitter.signal;
         let component = lead(signal).filter(|lead| lead.code_chips < LEAST_LONG_CHIPS)?;
         let index = index_of(component, signal)?;
         let middle = from + (to - from) / 2;
-        let leg = sent.leg(middle)?;
-        let anchor = leg.anchors.first()?;
-        let [first, half, last] = [from, middle, to].map(|sample| leg.rays.at(0, sample));
+        let anchor = leg.anchors.get(ray)?;
+        let [first, half, last] = [from, middle, to].map(|sample| leg.rays.at(ray, sample));
         let (first, half, last) = (first?, half?, last?);
         let (count, rate_hz, period_s) = ((to - from) as f64, sent.scene.clock.rate.hz(), component.period_s());
         let (period, share) = anchor.code_at(index, period_s, anchor.elapsed_s(from, rate_hz), &first)?;
@@ -80,7 +90,7 @@ impl Course {
         let turned = |sample: u64, cycles: f64| {
             turns as f64 / TURN + step as i64 as f64 / TURN * (sample - from) as f64 - (cycles - first.carrier_cycles)
         };
-        let cn0_hz = leg.rays.cn0_hz(from) * component.power_share;
+        let cn0_hz = cn0_hz * component.power_share;
         let (signed, signs) = sent.signs(index)?;
         Some(Self {
             span: (from, count),
@@ -115,7 +125,7 @@ fn index_of(component: &Component, signal: &Signal) -> Option<usize> {
     signal.components.iter().position(|one| std::ptr::eq(one, component))
 }
 
-/// Another satellite in the correlations of a code.
+/// A ray of another satellite in the correlations of a code.
 struct Other {
     course: Arc<Course>,
     /// Number of its code period that runs at the first lag, at the beginning of the second.
@@ -142,18 +152,17 @@ impl Crowd {
     pub fn new<'c>(
         sent: &[Sent],
         own: usize,
-        courses: &[Option<Arc<Course>>],
+        courses: &[Vec<Arc<Course>>],
         code: impl Fn(&Sent, usize) -> Option<&'c [i8]>,
     ) -> Option<Self> {
-        let (this, course) = (sent.get(own)?, courses.get(own)?.as_ref()?);
+        let (this, course) = (sent.get(own)?, courses.get(own)?.first()?);
         let of = |sent: &Sent, course: &Course| code(sent, index_of(course.component, sent.transmitter.signal)?);
         let chips = of(this, course)?;
         let link = this.transmitter.link();
-        let one = |(sent, other): (&Sent, &Option<Arc<Course>>)| {
-            let other = other.as_ref().filter(|_| is_alike(link, sent.transmitter.link()))?;
-            Some(Other::new((course, chips), (other, of(sent, other)?)))
-        };
-        let others = sent.iter().zip(courses).filter_map(one).collect();
+        let alike = sent.iter().zip(courses).filter(|(sent, _)| is_alike(link, sent.transmitter.link()));
+        let rays = alike.flat_map(|(sent, rays)| rays.iter().map(move |ray| (sent, ray)));
+        let one = |(sent, ray)| Some(Other::new((course, chips), (ray, of(sent, ray)?)));
+        let others = rays.filter_map(one).collect();
         Some(Self { own: Arc::clone(course), others })
     }
 

@@ -208,8 +208,8 @@ pub struct Correlations<'a> {
     alike: Vec<Vec<usize>>,
     /// Other satellites in the correlations of each short code.
     crowds: Vec<OnceLock<Option<Crowd>>>,
-    /// Courses of the satellites with short codes.
-    courses: OnceLock<Vec<Option<Arc<Course>>>>,
+    /// Courses of the rays of each satellite with a short code.
+    courses: OnceLock<Vec<Vec<Arc<Course>>>>,
 }
 
 impl Correlations<'_> {
@@ -253,8 +253,8 @@ impl Correlations<'_> {
 
     /// Other satellites in the correlations of a signal's short code, by its index.
     fn crowd(&self, place: usize) -> Option<&Crowd> {
-        let course = |one| Course::new(one, self.span).map(Arc::new);
-        let courses = || self.courses.get_or_init(|| self.sent.iter().map(course).collect());
+        let rays = |one| Course::all(one, self.span);
+        let courses = || self.courses.get_or_init(|| self.sent.iter().map(rays).collect());
         let code = |sent: &Sent, component| {
             let made = self.plan.made.iter().find(|made| made.signal == sent.transmitter.signal)?;
             made.code(sent.transmitter.sv.number, component)

@@ -202,13 +202,18 @@ fn without_noise_sub_carriers_give_code_and_carrier_of_samples_within_2_cm_and_2
     code_and_carrier_are_those_of_samples(has_steps, (2e-2, 2e-4));
 }
 
-/// Ten satellites make a tenth of a prompt. What is left of it are positions of transitions between samples,
-/// and a change of the Doppler within the second.
+/// Two walls. Reflections of other satellites have half of their amplitude and more, up to a chip later.
+const WALLS: &str = "[[multipath]]\nkind = \"wall\"\nazimuth_deg = 80\ndistance_m = 120\namplitude = 0.7\n\
+                     [[multipath]]\nkind = \"wall\"\nazimuth_deg = 260\ndistance_m = 30\namplitude = 0.6\n";
+
+/// Ten satellites make a tenth of a prompt, and their reflections nearly as much. What is left of it are
+/// positions of transitions between samples, and a change of the Doppler within the second. Of C/A 0.5 % of
+/// the prompt are left; without the phases of reflections it would be 2.5 %.
 #[test]
 fn without_noise_other_satellites_are_found_in_a_short_code_as_in_samples_within_a_fiftieth() {
-    for name in ["GPS L1 C/A", "BeiDou B1I"] {
+    for (name, rest, most) in [("GPS L1 C/A", "", 0.02), ("BeiDou B1I", "", 0.02), ("GPS L1 C/A", WALLS, 0.01)] {
         let signal = Signal::find(name).unwrap();
-        let scene = at_rest(signal, 43.7e6, 0.03, "");
+        let scene = at_rest(signal, 43.7e6, 0.03, rest);
         let sv = first(&scene);
         with_both(&scene, sv, &mut |both| {
             for at in [0.0, 0.3, 0.6, 1.0] {
@@ -216,7 +221,7 @@ fn without_noise_other_satellites_are_found_in_a_short_code_as_in_samples_within
                 for (sampled, modelled) in sampled.iter().zip(modelled) {
                     let apart = (sampled - modelled).norm() / sampled.norm();
                     println!("{name} {at} {apart:.1e}");
-                    assert!(apart < 0.02, "{name} {at}: {sampled} and {modelled}");
+                    assert!(apart < most, "{name} {at}: {sampled} and {modelled}");
                 }
             }
         });
