@@ -60,8 +60,8 @@ pub(super) struct Course {
 }
 
 impl Course {
-    /// A satellite's rays over a second of samples, the strongest first; none for long codes, and for one that
-    /// is not received.
+    /// A satellite's rays over a second of samples, the strongest first; none for long codes, and for one
+    /// that is not received.
     pub fn all(sent: &Sent, span: (u64, u64)) -> Vec<Arc<Self>> {
         let Some(leg) = sent.leg(span.0 + (span.1 - span.0) / 2) else { return Vec::new() };
         let cn0_hz = |ray| leg.rays.at(ray, span.0).map_or(0.0, |ray| ray.cn0_hz);
