@@ -4,9 +4,9 @@
 //! all lags of k samples, R and R' the correlations of the sampled waveforms with themselves, Δf the
 //! distance of the carriers. That holds whatever is sent beyond half the rate fs: it folds back, as nothing
 //! is filtered. R and R' are averages over the positions of chips between samples, and over the difference of
-//! both codes, which moves by chips in a second (J. W. Betz, "Effect of narrowband interference on GPS code
-//! tracking accuracy", ION NTM 2000, has the spectral form). Limits: random codes; rates at which chips rest
-//! on the samples have their own value for each difference of the codes.
+//! both codes, which moves by chips in a second (Kaplan and Hegarty, Understanding GPS 2nd ed., 6.2, has the
+//! spectral form). Limits: random codes; rates at which chips rest on the samples have their own value for
+//! each difference of the codes.
 
 use std::f64::consts::TAU;
 
