@@ -94,7 +94,7 @@ fn synthesise(satellite: &[Sequence], kernel: Kernel<'_>, rate_hz: f64, bank: &m
     }
 }
 
-/// What is counted: callgrind knows it by its name, and that of nothing within it is alike.
+/// Piece that is counted. callgrind finds it by its name, which no function within it shares.
 #[inline(never)]
 fn counted_piece(
     satellite: &[Sequence],
@@ -117,7 +117,7 @@ fn pieces(signal: &'static Signal) -> Vec<(f64, Grade)> {
     rates_hz(signal).into_iter().flat_map(|rate_hz| GRADES.map(|grade| (rate_hz, grade))).collect()
 }
 
-/// Makes every piece of a signal twice, and the second time under callgrind's eyes.
+/// Makes every piece of a signal twice. callgrind counts the second time.
 fn make(signal: &'static Signal) {
     let filter = Filter::new(0.45);
     let mut bank = Bank::default();

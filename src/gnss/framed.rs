@@ -3,11 +3,41 @@
 
 use std::fmt;
 
+use crate::bits::bits_of;
 use crate::broadcast::Ephemeris;
 use crate::fec::frames::Frames;
 use crate::message::{Parameters, Read, Reader};
 use crate::record::NavigationRow;
 use crate::time::Epoch;
+
+/// Symbols that begin or end a frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Pattern {
+    /// Bits of the pattern, the last one sent in the lowest bit.
+    pub bits: u128,
+    /// Number of its symbols.
+    pub symbols: usize,
+    /// Number of symbols that may be wrong.
+    pub tolerated: usize,
+}
+
+impl Pattern {
+    /// Number of soft symbols that agree with the pattern. A logical 1 is negative.
+    fn agreeing(&self, soft: &[f32]) -> usize {
+        soft.iter().zip(bits_of(self.bits, self.symbols)).filter(|(soft, one)| (**soft < 0.0) == *one).count()
+    }
+
+    /// True if soft symbols begin with the pattern, normal or inverted.
+    pub fn begins(&self, soft: &[f32]) -> bool {
+        let agreeing = self.agreeing(soft);
+        agreeing.min(self.symbols - agreeing) <= self.tolerated
+    }
+
+    /// True if soft symbols begin with the inverted pattern rather than the normal one.
+    pub fn is_inverted(&self, soft: &[f32]) -> bool {
+        2 * self.agreeing(soft) < self.symbols
+    }
+}
 
 /// Content of the frames of one satellite.
 pub trait Content: Clone + fmt::Debug + Send + Sync {
@@ -26,7 +56,7 @@ pub trait Content: Clone + fmt::Debug + Send + Sync {
     /// resolves weeks.
     fn read(&mut self, frame: Self::Frame, begin: u64, near: Epoch) -> Vec<Read>;
     /// Forgets what depends on the numbers of symbols, which no longer tell where frames are.
-    fn forget_places(&mut self) {}
+    fn forget_positions(&mut self) {}
     /// Parts of an ephemeris that have not been decoded.
     fn missing(&self) -> Vec<u8>;
     /// Takes a time that is known to within a year.
@@ -52,7 +82,7 @@ impl<C: Content> Reader for Framed<C> {
         let (content, was_known) = (&self.content, self.frames.are_known());
         let found = self.frames.take(soft, |symbols| content.may_begin(symbols), |symbols| content.decode(symbols));
         if was_known && !self.frames.are_known() {
-            self.content.forget_places();
+            self.content.forget_positions();
         }
         found.map_or_else(Vec::new, |(frame, begin)| self.content.read(frame, begin, near))
     }
@@ -63,12 +93,12 @@ impl<C: Content> Reader for Framed<C> {
 
     fn skip(&mut self) {
         self.frames.skip();
-        self.content.forget_places();
+        self.content.forget_positions();
     }
 
     fn doubt(&mut self) {
         self.frames.doubt();
-        self.content.forget_places();
+        self.content.forget_positions();
     }
 
     fn missing(&self) -> Vec<u8> {
@@ -90,14 +120,19 @@ impl Reported {
         Self { last: None, passing }
     }
 
-    /// True before the first ephemeris.
-    pub fn is_none(&self) -> bool {
-        self.last.is_none()
+    /// Numbers of the units that are missing, where one unit has a whole ephemeris: 1 before the first.
+    pub fn missing(&self) -> Vec<u8> {
+        if self.last.is_none() { vec![1] } else { Vec::new() }
     }
 
-    /// Reports the ephemeris that `set` makes of parameters, unless it was the last. `parts` names what makes
-    /// none, which is told until the first ephemeris.
-    pub fn take(
+    /// Reports an ephemeris of parameters, unless it was the last.
+    pub fn take(&mut self, message: &'static str, all: Parameters, set: Ephemeris, news: &mut Vec<Read>) {
+        self.take_whole(message, all, (|| Some(set), ""), news);
+    }
+
+    /// Reports the ephemeris that `set` makes of parameters, unless it was the last. `parts` names what may
+    /// make none, which is told until the first ephemeris.
+    pub fn take_whole(
         &mut self,
         message: &'static str,
         all: Parameters,
@@ -109,12 +144,30 @@ impl Reported {
             return;
         }
         let Some(set) = set() else {
-            news.extend(self.is_none().then(|| Read::make_no_set(parts)));
+            news.extend(self.last.is_none().then(|| Read::make_no_set(parts)));
             return;
         };
         self.last = Some(content);
         let rows = NavigationRow::each(set.sv, message, u32::from(set.iode), all).collect();
         news.push(Read::Ephemeris(Box::new(set)));
         news.push(Read::Parameters(rows));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pattern_is_there_with_as_many_wrong_symbols_as_are_tolerated_either_way_up() {
+        let pattern = Pattern { bits: 0b1101_0010, symbols: 8, tolerated: 1 };
+        let sent = [-1.0, -1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 7.0];
+        for sign in [1.0_f32, -1.0] {
+            let wrong = |count: usize| -> Vec<f32> {
+                sent.iter().enumerate().map(|(k, soft)| sign * if k < count { -soft } else { *soft }).collect()
+            };
+            assert_eq!([0, 1, 2, 4].map(|count| pattern.begins(&wrong(count))), [true, true, false, false]);
+            assert_eq!([0, 1].map(|count| pattern.is_inverted(&wrong(count))), [sign < 0.0; 2]);
+        }
     }
 }

@@ -33,8 +33,21 @@ pub struct Klobuchar {
 }
 
 impl Klobuchar {
+    /// Names of the coefficients in messages, in their order.
+    pub(crate) const PARAMETERS: [&str; 8] =
+        ["alpha_0", "alpha_1", "alpha_2", "alpha_3", "beta_0", "beta_1", "beta_2", "beta_3"];
     /// Coefficients of which all are zero.
     pub const ZERO: Self = Self { alpha: [0.0; 4], beta: [0.0; 4] };
+
+    /// Coefficients by the values of their names; `None` if one is missing.
+    pub(crate) fn named(value: impl Fn(&str) -> Option<f64>) -> Option<Self> {
+        let mut found = Self::ZERO;
+        let Self { alpha, beta } = &mut found;
+        for (own, name) in alpha.iter_mut().chain(beta).zip(Self::PARAMETERS) {
+            *own = value(name)?;
+        }
+        Some(found)
+    }
 }
 
 /// Coefficients of a nominal ionosphere, for use before any are received. They are even in magnetic latitude,

@@ -13,9 +13,9 @@ pub(crate) struct SetTables<C: 'static, S> {
     pub parts: &'static [&'static [Element<C>]],
     /// Parameters that are of a part and not of the ephemeris.
     pub passing: &'static [&'static str],
-    /// Parameters that a fault must not change: they identify ephemeris or sender, all satellites send them
-    /// alike, or they have a fault of their own.
-    pub fixed: &'static [&'static str],
+    /// Lists of the parameters that a fault must not change: they identify ephemeris or sender, all
+    /// satellites send them alike, or they have a fault of their own.
+    pub fixed: &'static [&'static [&'static str]],
     /// Meaning of clock and health.
     pub sets: &'static SetForm,
     /// Function that returns a part without content.
@@ -27,19 +27,25 @@ pub(crate) struct SetTables<C: 'static, S> {
 }
 
 impl<C, S: Store> SetTables<C, S> {
-    fn names(&self, but: &'static [&'static str]) -> Vec<&'static str> {
-        let names = self.parts.iter().copied().flatten().map(|element| element.field.name);
-        names.filter(|name| !but.contains(name)).collect()
+    fn names(&self) -> impl Iterator<Item = &'static str> {
+        self.parts.iter().copied().flatten().map(|element| element.field.name)
+    }
+
+    /// Value of a parameter by its raw integer; `None` if there is none of this name.
+    pub fn value(&self, name: &str, raw: Raw<'_>) -> Option<f64> {
+        let mut fields = self.parts.iter().copied().flatten().map(|element| &element.field);
+        let field = fields.find(|field| field.name == name)?;
+        raw(name).map(|raw| field.value(raw))
     }
 
     /// Names of the parameters of the ephemeris.
     pub fn parameters(&self) -> Vec<&'static str> {
-        self.names(self.passing)
+        self.names().filter(|name| !self.passing.contains(name)).collect()
     }
 
     /// Names of the parameters that a fault may change.
     pub fn adjustable(&self) -> Vec<&'static str> {
-        self.names(self.fixed)
+        self.names().filter(|name| !self.fixed.iter().any(|names| names.contains(name))).collect()
     }
 
     /// Adds `by` to a parameter in the unit of the tables. Returns false if there is none.

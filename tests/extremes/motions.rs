@@ -14,7 +14,6 @@ use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use gnss::satellite::Sv;
 use gnss::signal::{Layers, SIGNALS, Signal};
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 use crate::dynamics::{G, after, along_from, gun, worst_of};
 use crate::exact::{Exact, ONE, signed};
@@ -68,15 +67,6 @@ fn dopplers_hz(scene: &Scene, sv: Sv, signal: &'static Signal, sample: u64) -> O
     Some([row.doppler_hz, doppler_hz(scene, (sv, signal), sample, true)])
 }
 
-/// Worst of each figure over all signals, which are computed side by side.
-fn worst<const N: usize>(of: impl Fn(&'static Signal) -> [Worst; N] + Sync) -> [Worst; N] {
-    let all: Vec<[Worst; N]> = SIGNALS.par_iter().map(|signal| of(signal)).collect();
-    let mut found = all.into_iter();
-    let mut worst = found.next().unwrap();
-    found.for_each(|of| worst.iter_mut().zip(of).for_each(|(worst, of)| worst.merge(of)));
-    worst
-}
-
 #[track_caller]
 fn knots_hold(the: Case, when: &str, carrier: Worst, code_m: Worst) {
     the.at_most(&format!("carrier between knots{when}"), carrier, KNOTS_CYCLES, "cycle");
@@ -86,7 +76,7 @@ fn knots_hold(the: Case, when: &str, carrier: Worst, code_m: Worst) {
 #[test]
 fn a_gun_is_followed_on_every_signal() {
     let the = case(24, "1000 g/s jerk, gun", ALL);
-    let [carrier, code_m] = worst(|signal| {
+    let [carrier, code_m] = skies::worst(|signal| {
         let mut link = Link::of(signal, 4.0, 1e6);
         link.scene.trajectory = gun(link.place, link.way, 1.234_567_8, [0.01, 0.5]);
         link.departures([1.0, 2.0], 2000).into()
@@ -97,7 +87,7 @@ fn a_gun_is_followed_on_every_signal() {
 #[test]
 fn a_minute_of_twenty_g_keeps_code_carrier_and_doppler_of_every_signal() {
     let the = case(25, "20 g for 60 s", ALL);
-    let [carrier, code_m, apart_hz, slowest_mps] = worst(|signal| {
+    let [carrier, code_m, apart_hz, slowest_mps] = skies::worst(|signal| {
         let mut link = Link::of(signal, 60.5, 1e6);
         let begun = [0.0, 0.0, 0.0, 20.0 * G];
         link.scene.trajectory = along_from(link.place, link.way, &[begun, after(&begun, 61.0, 0.0)], Vec::new());
@@ -131,7 +121,7 @@ fn a_hundredth_of_light_s_speed_is_flown_on_every_signal_and_a_tenth_refused() {
             .is_err_and(|e| e.contains("motion") && e.contains("a tenth of light's"))
     });
     the.all("refused with the speed it reaches", refused.count(), SIGNALS.len());
-    let [carrier, code_m, apart, moved_mps] = worst(|signal| {
+    let [carrier, code_m, apart, moved_mps] = skies::worst(|signal| {
         let mut link = Link::of(signal, 1.0, 1e6);
         let begun = [0.0, 0.0, 0.01 * SPEED_OF_LIGHT_MPS, 0.0];
         link.scene.trajectory = along_from(link.place, link.way, &[begun, after(&begun, 2.0, 0.0)], Vec::new());
@@ -152,7 +142,7 @@ fn a_hundredth_of_light_s_speed_is_flown_on_every_signal_and_a_tenth_refused() {
 #[test]
 fn at_the_zero_of_doppler_code_and_carrier_of_every_signal_stay_together() {
     let the = case(27, "Doppler zero crossing", ALL);
-    let [zero_hz, parted_m, power] = worst(|signal| {
+    let [zero_hz, parted_m, power] = skies::worst(|signal| {
         let mut link = Link::of(signal, 4.0, 0.0);
         // As fast as the satellite recedes in the middle, and 0.5 m/s² more.
         let still_mps = link.dopplers_hz((2.0 * RATE_HZ) as u64).unwrap()[1] * signal.wavelength_m(link.sv);
@@ -230,7 +220,7 @@ fn orbits_have_the_dopplers_of_the_equation_on_every_signal() {
         (case(54, "Molniya", ALL), "molniya", 8e3),
         (case(55, "lunar transfer", ALL), "lunar_transfer", 2e3),
     ] {
-        let [carrier, code_m, apart_hz, most_mps] = worst(|signal| {
+        let [carrier, code_m, apart_hz, most_mps] = skies::worst(|signal| {
             let scene = in_orbit(signal, name);
             let own = |sv: &Sv| scene.signals_of(*sv).any(|own| own == signal);
             let (mut apart_hz, mut most_mps) = (Worst::default(), Worst::default());

@@ -75,33 +75,28 @@ fn error_m(scene: &Scene, (sv, signal): (Sv, &'static Signal), second: u64) -> f
 #[test]
 fn between_bands_and_front_ends_of_unlike_rates_phases_stay_together_for_a_month() {
     let the = case(65, "phase between bands and front ends after thirty days", ALL);
-    let of: Vec<Worst> = SIGNALS
-        .par_iter()
-        .map(|signal| {
-            // Against the first signal of its system, through a front end of 65 Msps.
-            let first = SIGNALS.iter().find(|first| first.system == signal.system).unwrap();
-            let (mut here, _) = late(signal, OTHER_HZ, -1_234_567.0, 30 * DAY_S);
-            let (mut there, _) = late(first, RATE_HZ, IF_HZ, 30 * DAY_S);
-            let both = senders(&there, first);
-            let mut worst = Worst::default();
-            let mut looked = 0;
-            for sv in senders(&here, signal).into_iter().filter(|sv| both.contains(sv)) {
-                for second in [30 * DAY_S, 30 * DAY_S + 1, 30 * DAY_S + 37] {
-                    let at = here.clock.start.plus_s(second as f64);
-                    if looked < 6 && below(&mut here, sv, at) && below(&mut there, sv, at) {
-                        let apart_m = error_m(&here, (sv, signal), second) - error_m(&there, (sv, first), second);
-                        let at = || format!("{signal} at 12.34567 Msps, {first} at 65, {sv}, second {second}");
-                        worst.take(apart_m.abs(), at);
-                        looked += 1;
-                    }
+    let [worst] = skies::worst(|signal| {
+        // Against the first signal of its system, through a front end of 65 Msps.
+        let first = SIGNALS.iter().find(|first| first.system == signal.system).unwrap();
+        let (mut here, _) = late(signal, OTHER_HZ, -1_234_567.0, 30 * DAY_S);
+        let (mut there, _) = late(first, RATE_HZ, IF_HZ, 30 * DAY_S);
+        let both = senders(&there, first);
+        let mut worst = Worst::default();
+        let mut looked = 0;
+        for sv in senders(&here, signal).into_iter().filter(|sv| both.contains(sv)) {
+            for second in [30 * DAY_S, 30 * DAY_S + 1, 30 * DAY_S + 37] {
+                let at = here.clock.start.plus_s(second as f64);
+                if looked < 6 && below(&mut here, sv, at) && below(&mut there, sv, at) {
+                    let apart_m = error_m(&here, (sv, signal), second) - error_m(&there, (sv, first), second);
+                    let at = || format!("{signal} at 12.34567 Msps, {first} at 65, {sv}, second {second}");
+                    worst.take(apart_m.abs(), at);
+                    looked += 1;
                 }
             }
-            assert!(!worst.value().is_nan(), "{signal}");
-            worst
-        })
-        .collect();
-    let mut worst = Worst::default();
-    of.into_iter().for_each(|of| worst.merge(of));
+        }
+        assert!(!worst.value().is_nan(), "{signal}");
+        [worst]
+    });
     // Each is within a millionth of its cycle, 0.25 m at the most.
     the.at_most("carriers at one instant, off their integers by unlike lengths", worst, 5e-7, "m");
 }
@@ -159,31 +154,26 @@ fn rates_that_fit_no_code_keep_every_signal_s_phases() {
 #[test]
 fn single_precision_makes_every_signal_s_samples_to_a_hundred_thousandth() {
     let the = case(33, "f_IF = fs/4", ALL);
-    let of: Vec<Worst> = SIGNALS
-        .par_iter()
-        .map(|signal| {
-            let front = skies::front_end(signal, 12.5e6, 3.125e6);
-            let made = |carrier: &str| {
-                let fidelity =
-                    format!("[fidelity]\nlevel = \"reference\"\ncode_edge = \"area\"\ncarrier = \"{carrier}\"\n");
-                let scene = skies::scene(&[signal], 0.01, &format!("{front}{fidelity}"));
-                let sv = skies::in_view(&scene, signal)[0];
-                let scene = run::only(scene, &[sv]);
-                let bytes = run::part(&scene, 5000..30_000, tempfile::tempdir().unwrap().path());
-                (sv, run::planes(&scene, &bytes))
-            };
-            let ((sv, (i, q)), (_, (a, b))) = (made("f32"), made("f64"));
-            let amplitude = i.iter().zip(&q).map(|(i, q)| i.hypot(*q)).fold(0.0, f32::max);
-            let mut worst = Worst::default();
-            for (n, (x, y)) in i.iter().zip(&a).chain(q.iter().zip(&b)).enumerate() {
-                let at = || format!("{signal} of {sv}, sample {}", 5000 + n % i.len());
-                worst.take(f64::from((x - y).abs() / amplitude), at);
-            }
-            worst
-        })
-        .collect();
-    let mut worst = Worst::default();
-    of.into_iter().for_each(|of| worst.merge(of));
+    let [worst] = skies::worst(|signal| {
+        let front = skies::front_end(signal, 12.5e6, 3.125e6);
+        let made = |carrier: &str| {
+            let fidelity =
+                format!("[fidelity]\nlevel = \"reference\"\ncode_edge = \"area\"\ncarrier = \"{carrier}\"\n");
+            let scene = skies::scene(&[signal], 0.01, &format!("{front}{fidelity}"));
+            let sv = skies::in_view(&scene, signal)[0];
+            let scene = run::only(scene, &[sv]);
+            let bytes = run::part(&scene, 5000..30_000, tempfile::tempdir().unwrap().path());
+            (sv, run::planes(&scene, &bytes))
+        };
+        let ((sv, (i, q)), (_, (a, b))) = (made("f32"), made("f64"));
+        let amplitude = i.iter().zip(&q).map(|(i, q)| i.hypot(*q)).fold(0.0, f32::max);
+        let mut worst = Worst::default();
+        for (n, (x, y)) in i.iter().zip(&a).chain(q.iter().zip(&b)).enumerate() {
+            let at = || format!("{signal} of {sv}, sample {}", 5000 + n % i.len());
+            worst.take(f64::from((x - y).abs() / amplitude), at);
+        }
+        [worst]
+    });
     // Within a run the carrier of single precision is 1e-6 cycle off, 6.3e-6 rad, and rounded to 6e-8.
     the.at_most("fast against f64, of the amplitude", worst, 1e-5, "");
 }

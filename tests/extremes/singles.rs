@@ -77,25 +77,20 @@ fn through_air(signal: &'static Signal) -> Scene {
 #[test]
 fn on_both_sides_of_the_antimeridian_ranges_of_every_signal_are_the_same() {
     let the = case(14, "antimeridian", ALL);
-    let of: Vec<Worst> = SIGNALS
-        .par_iter()
-        .map(|signal| {
-            let mut scene = through_air(signal);
-            let mut worst = Worst::default();
-            for sv in senders(&scene, signal) {
-                let mut delay_s = |longitude_deg: f64| {
-                    scene.trajectory = Trajectory::fixed(Geodetic::from_degrees(-16.5, longitude_deg, 30.0).to_ecef());
-                    Some(truth::seen(&scene, sv, signal, scene.clock.start).unwrap()?.arrivals.first()?.delay_s)
-                };
-                let (Some(east_s), Some(west_s)) = (delay_s(180.0), delay_s(-180.0)) else { continue };
-                let apart_m = (east_s - west_s).abs() * SPEED_OF_LIGHT_MPS;
-                worst.take(apart_m, || format!("{signal} of {sv}"));
-            }
-            worst
-        })
-        .collect();
-    let mut worst = Worst::default();
-    of.into_iter().for_each(|of| worst.merge(of));
+    let [worst] = skies::worst(|signal| {
+        let mut scene = through_air(signal);
+        let mut worst = Worst::default();
+        for sv in senders(&scene, signal) {
+            let mut delay_s = |longitude_deg: f64| {
+                scene.trajectory = Trajectory::fixed(Geodetic::from_degrees(-16.5, longitude_deg, 30.0).to_ecef());
+                Some(truth::seen(&scene, sv, signal, scene.clock.start).unwrap()?.arrivals.first()?.delay_s)
+            };
+            let (Some(east_s), Some(west_s)) = (delay_s(180.0), delay_s(-180.0)) else { continue };
+            let apart_m = (east_s - west_s).abs() * SPEED_OF_LIGHT_MPS;
+            worst.take(apart_m, || format!("{signal} of {sv}"));
+        }
+        [worst]
+    });
     // The sine of π is 1.2e-16 in either direction, a nanometre; a delay resolves 8e-9 m.
     the.at_most("pseudorange with atmosphere, 180° against −180°", worst, 1e-7, "m");
 }
@@ -170,40 +165,34 @@ impl Effect for Echo {
 #[test]
 fn two_rays_of_one_satellite_are_the_sum_of_each_alone_on_every_signal() {
     let the = case(22, "one PRN twice", ALL);
-    let of: Vec<Worst> = SIGNALS
-        .par_iter()
-        .map(|signal| {
-            let front = skies::front_end(signal, 12.5e6, 1e6);
-            let scene = |tables: &str| {
-                let scene = skies::scene(&[signal], 0.01, &format!("{front}{tables}"));
-                let up: Vec<Sv> = skies::in_view(&scene, signal).into_iter().take(1).collect();
-                run::only(scene, &up)
-            };
-            let samples = |scene: &Scene| {
-                run::planes(scene, &run::part(scene, 5000..30_000, tempfile::tempdir().unwrap().path()))
-            };
-            let echo = format!(
-                "[[multipath]]\nkind = \"given\"\nexcess_m = {EXCESS_M}\namplitude = {AMPLITUDE}\nphase_deg = 90\n"
-            );
-            let (direct, both) = (scene(""), scene(&echo));
-            let mut alone = scene("");
-            alone.effects.push(Box::new(Echo));
-            let [direct, both, alone] = [samples(&direct), samples(&both), samples(&alone)];
-            let amplitude = direct.0.iter().zip(&direct.1).map(|(i, q)| i.hypot(*q)).fold(0.0, f32::max);
-            let planes = [(&direct.0, &both.0, &alone.0), (&direct.1, &both.1, &alone.1)];
-            let mut worst = Worst::default();
-            for (direct, both, alone) in planes {
-                for (n, ((direct, both), alone)) in direct.iter().zip(both).zip(alone).enumerate() {
-                    let apart = f64::from(*both) - f64::from(*direct) - f64::from(*alone);
-                    let at = || format!("{signal}, sample {}", 5000 + n);
-                    worst.take(apart.abs() / f64::from(amplitude), at);
-                }
+    let [worst] = skies::worst(|signal| {
+        let front = skies::front_end(signal, 12.5e6, 1e6);
+        let scene = |tables: &str| {
+            let scene = skies::scene(&[signal], 0.01, &format!("{front}{tables}"));
+            let up: Vec<Sv> = skies::in_view(&scene, signal).into_iter().take(1).collect();
+            run::only(scene, &up)
+        };
+        let samples =
+            |scene: &Scene| run::planes(scene, &run::part(scene, 5000..30_000, tempfile::tempdir().unwrap().path()));
+        let echo = format!(
+            "[[multipath]]\nkind = \"given\"\nexcess_m = {EXCESS_M}\namplitude = {AMPLITUDE}\nphase_deg = 90\n"
+        );
+        let (direct, both) = (scene(""), scene(&echo));
+        let mut alone = scene("");
+        alone.effects.push(Box::new(Echo));
+        let [direct, both, alone] = [samples(&direct), samples(&both), samples(&alone)];
+        let amplitude = direct.0.iter().zip(&direct.1).map(|(i, q)| i.hypot(*q)).fold(0.0, f32::max);
+        let planes = [(&direct.0, &both.0, &alone.0), (&direct.1, &both.1, &alone.1)];
+        let mut worst = Worst::default();
+        for (direct, both, alone) in planes {
+            for (n, ((direct, both), alone)) in direct.iter().zip(both).zip(alone).enumerate() {
+                let apart = f64::from(*both) - f64::from(*direct) - f64::from(*alone);
+                let at = || format!("{signal}, sample {}", 5000 + n);
+                worst.take(apart.abs() / f64::from(amplitude), at);
             }
-            worst
-        })
-        .collect();
-    let mut worst = Worst::default();
-    of.into_iter().for_each(|of| worst.merge(of));
+        }
+        [worst]
+    });
     // Within a run the carrier of single precision is 1e-6 cycle off, 6.3e-6 rad.
     the.at_most("ray and echo together less each alone, of the amplitude", worst, 1e-5, "");
 }

@@ -36,6 +36,15 @@ fn scenario(system: System) -> &'static str {
     }
 }
 
+/// Worst of each figure over all signals, which are computed side by side.
+pub fn worst<const N: usize>(of: impl Fn(&'static Signal) -> [Worst; N] + Sync) -> [Worst; N] {
+    let all: Vec<[Worst; N]> = SIGNALS.par_iter().map(|signal| of(signal)).collect();
+    let mut found = all.into_iter();
+    let mut worst = found.next().unwrap();
+    found.for_each(|of| worst.iter_mut().zip(of).for_each(|(worst, of)| worst.merge(of)));
+    worst
+}
+
 /// A scene of some signals of one system, with more tables: the satellites are those of the system's shipped
 /// scenario, and there is nothing between them and the antenna.
 pub fn scene(signals: &[&'static Signal], duration_s: f64, tables: &str) -> Scene {

@@ -13,6 +13,11 @@ use super::interleaver::Interleaver;
 use super::ldpc::Ldpc;
 use super::register::RegisterCode;
 
+/// Least agreement of the symbols of a time with the most likely one at which a frame is tried. Symbols with
+/// an amplitude of √2 standard deviations, near which the codes begin to fail, agree by 0.89 ± 0.05. The best
+/// of all times among data symbols agrees by about half.
+const LEAST_SHARE: f32 = 0.65;
+
 /// A form of frames.
 pub struct Subframes {
     /// Code of the time.
@@ -91,6 +96,11 @@ impl Subframes {
         };
         let known = found.into_iter().filter(|(time, _)| self.times.contains(time)).collect();
         (known, sum.abs() / all.max(f32::MIN_POSITIVE))
+    }
+
+    /// True if a frame may begin with these soft symbols, normal or inverted.
+    pub fn may_begin(&self, soft: &[f32]) -> bool {
+        self.likely_times(soft).1 > LEAST_SHARE
     }
 
     /// The frame in soft symbols, positive for a logical 0, normal or inverted; `None` where its checks fail.

@@ -275,7 +275,7 @@ impl TypedReader {
 
     fn look_for_set(&mut self, near: Epoch, news: &mut Vec<Read>) {
         let Some((set, all)) = self.found(near) else { return };
-        self.reported.take(self.layout.message.name, all, (|| Some(set), "messages"), news);
+        self.reported.take(self.layout.message.name, all, set, news);
     }
 
     /// The ephemeris in the latest messages, with its parameters.

@@ -79,11 +79,11 @@ impl Content for BCnav1Content {
                 self.electrons = own;
             }
         }
-        self.reported.take(B_CNAV1.name, all, (|| Some(set), "a frame"), &mut news);
+        self.reported.take(B_CNAV1.name, all, set, &mut news);
         news
     }
 
     fn missing(&self) -> Vec<u8> {
-        if self.reported.is_none() { vec![1] } else { Vec::new() }
+        self.reported.missing()
     }
 }

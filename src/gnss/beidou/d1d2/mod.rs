@@ -47,16 +47,7 @@ pub static D1_D2: Message = Message {
     ionosphere: IonosphereForm {
         model: Model::KlobucharBeidou,
         unit: |_| true,
-        coefficients: |raw| {
-            let mut found = Klobuchar::ZERO;
-            for (index, name) in ["alpha_0", "alpha_1", "alpha_2", "alpha_3"].into_iter().enumerate() {
-                *found.alpha.get_mut(index)? = value(name, raw)?;
-            }
-            for (index, name) in ["beta_0", "beta_1", "beta_2", "beta_3"].into_iter().enumerate() {
-                *found.beta.get_mut(index)? = value(name, raw)?;
-            }
-            given(found)
-        },
+        coefficients: |raw| Klobuchar::named(|name| OF_SET.value(name, raw)).and_then(given),
     },
     set_parameters: || OF_SET.parameters(),
     elements: |sv, raw, near| OF_SET.elements(sv, raw, near).map(numbered),
@@ -141,11 +132,6 @@ impl Orbit {
 /// An ephemeris with the number that its reference time gives it.
 fn numbered(set: Ephemeris) -> Ephemeris {
     Ephemeris { iode: issue(set.toe.tow_s()), ..set }
-}
-
-fn value(name: &str, raw: &dyn Fn(&str) -> Option<i64>) -> Option<f64> {
-    let field = D1_SET.iter().map(|element| &element.field).find(|field| field.name == name)?;
-    raw(name).map(|raw| field.value(raw))
 }
 
 /// Coefficients that are not all zero.
@@ -335,10 +321,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
 static OF_SET: SetTables<Orbit, D1Set> = SetTables {
     parts: &[&D1_SET],
     passing: &[],
-    fixed: &[
-        "week", "toc_s", "toe_s", "health", "aodc", "aode", "alpha_0", "alpha_1", "alpha_2", "alpha_3", "beta_0",
-        "beta_1", "beta_2", "beta_3",
-    ],
+    fixed: &[&["week", "toc_s", "toe_s", "health", "aodc", "aode"], &Klobuchar::PARAMETERS],
     sets: &D1_SETS,
     blank: D1Set::default,
     content: |ephemeris| Orbit { klobuchar: Klobuchar::ZERO, ephemeris },

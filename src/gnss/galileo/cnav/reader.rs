@@ -1,16 +1,14 @@
 //! Finds pages in soft symbols, normal or inverted, and hands on what they carry.
 
 use super::{CNAV, PAGE_SYMBOLS, PATTERN, PATTERN_SYMBOLS, decode_soft, parameters};
-use crate::bits::bits_of;
-use crate::framed::{Content, Framed};
+use crate::framed::{Content, Framed, Pattern};
 use crate::message::Read;
 use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::Epoch;
 
-/// Wrong symbols of the pattern of a position that is tried all the same: of a page at the least C/N0 that
-/// codes hold one in twenty is wrong.
-const WRONG_SYMBOLS: usize = 3;
+/// Pattern of a page. Of a page at the least C/N0 that codes hold one symbol in twenty is wrong.
+const BEGIN: Pattern = Pattern { bits: PATTERN, symbols: PATTERN_SYMBOLS, tolerated: 3 };
 
 /// Reader of C/NAV.
 pub type CnavReader = Framed<CnavContent>;
@@ -33,11 +31,8 @@ impl Content for CnavContent {
     type Frame = (Vec<bool>, bool);
     const SYMBOLS: usize = PAGE_SYMBOLS;
 
-    /// The pattern may be there, normal or inverted.
     fn may_begin(&self, symbols: &[f32]) -> bool {
-        let pattern = bits_of(PATTERN, PATTERN_SYMBOLS);
-        let wrong = symbols.iter().zip(pattern).filter(|(soft, bit)| (**soft < 0.0) != *bit).count();
-        wrong.min(PATTERN_SYMBOLS - wrong) <= WRONG_SYMBOLS
+        BEGIN.begins(symbols)
     }
 
     fn decode(&self, symbols: &[f32]) -> Option<Self::Frame> {

@@ -16,12 +16,11 @@ use crate::broadcast::{Ephemeris, SetForm};
 use crate::crc::crc24q;
 use crate::fec::interleaver::Interleaver;
 use crate::galileo::inav::almanac::{Offset, TRIPLES, Triple, offset_of};
-use crate::galileo::inav::fields::{Orbit, Utc};
+use crate::galileo::inav::fields::{FIXED, Orbit, Utc, coefficients};
 use crate::galileo::inav::{GST_WEEK, INAV, INAV_E5B, code};
 use crate::galileo::status::{self, Band};
 use crate::ionosphere::{Coefficients, Model};
 use crate::message::{Common, IonosphereForm, Message, Parameters, Raw, Records, Sender};
-use crate::nequick::NequickG;
 use crate::satellite::Sv;
 use crate::set_tables::SetTables;
 use crate::time::{Epoch, TimePolynomial, WEEK_S};
@@ -198,26 +197,20 @@ pub fn parameters(page: &Vec<bool>) -> Option<Parameters> {
     Some(found)
 }
 
-/// Parameters by which ephemerides and senders are distinguished, and what all satellites send alike, are
-/// fixed.
+/// Tables of the ephemeris.
 static OF_SET: SetTables<Orbit, Vec<bool>> = SetTables {
     parts: &[&PAGE_1, &PAGE_2, &PAGE_3, &PAGE_4],
     passing: &["tow_s"],
-    fixed: &["iodnav", "svid", "week", "tow_s", "ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"],
+    fixed: &[&FIXED],
     sets: &FNAV_SETS,
     blank: || vec![false; DATA_BITS],
-    content: |ephemeris| Orbit { ephemeris, nequick: [0.0; 3] },
+    content: Orbit::of,
     ephemeris: |orbit| orbit.ephemeris,
 };
 
 /// The coefficients of the ionosphere that raw integers of page 1 give.
 fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
-    let mut found = [0.0; 3];
-    for (name, value) in ["ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"].into_iter().zip(&mut found) {
-        let field = PAGE_1.iter().map(|element| &element.field).find(|field| field.name == name)?;
-        *value = field.value(raw(name)?);
-    }
-    Some(Coefficients::NequickG(NequickG { coefficients: found }))
+    coefficients(|name| OF_SET.value(name, raw))
 }
 
 /// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays, and so does what

@@ -40,7 +40,7 @@ impl FnavContent {
         let pages = [one, two, three, four];
         let all: Parameters = pages.into_iter().filter_map(parameters).flatten().collect();
         let set = || elements(self.sv, pages, near);
-        self.reported.take(FNAV.name, all, (set, "pages 1 to 4"), news);
+        self.reported.take_whole(FNAV.name, all, (set, "pages 1 to 4"), news);
     }
 }
 

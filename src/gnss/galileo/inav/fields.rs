@@ -7,7 +7,9 @@ use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
 use crate::bits::{Element, Field, element, plain};
 use crate::broadcast::Ephemeris;
 use crate::galileo::status::{E1B, E5B};
+use crate::ionosphere::Coefficients;
 use crate::message::Common;
+use crate::nequick::NequickG;
 use crate::time::{Epoch, WEEK_S};
 
 /// Continuous GPS week of week 0 of Galileo's system time (5.1.2).
@@ -18,6 +20,29 @@ pub const GST_WEEK: i64 = 1024;
 pub(in crate::galileo) struct Orbit {
     pub ephemeris: Ephemeris,
     pub nequick: [f64; 3],
+}
+
+impl Orbit {
+    /// Content with an ephemeris and no ionosphere.
+    pub fn of(ephemeris: Ephemeris) -> Self {
+        Self { ephemeris, nequick: [0.0; 3] }
+    }
+}
+
+/// Names of NeQuick-G's coefficients in I/NAV and F/NAV, in their order.
+const NEQUICK: [&str; 3] = ["ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"];
+
+/// Parameters of I/NAV and F/NAV by which ephemerides and senders are distinguished, and what all satellites
+/// send alike.
+pub(in crate::galileo) const FIXED: [&str; 7] = ["iodnav", "svid", "week", "tow_s", NEQUICK[0], NEQUICK[1], NEQUICK[2]];
+
+/// Coefficients of NeQuick-G by the values of their names; `None` if one is missing.
+pub(in crate::galileo) fn coefficients(value: impl Fn(&str) -> Option<f64>) -> Option<Coefficients> {
+    let mut coefficients = [0.0; 3];
+    for (own, name) in coefficients.iter_mut().zip(NEQUICK) {
+        *own = value(name)?;
+    }
+    Some(Coefficients::NequickG(NequickG { coefficients }))
 }
 
 /// Content of word 6 (5.1.7) and its time of transmission.

@@ -24,15 +24,14 @@ use crate::galileo::fnav::FNAV_SETS;
 use crate::galileo::status::{self, Band};
 use crate::ionosphere::{Coefficients, Model};
 use crate::message::{Common, IonosphereForm, Message, Records, Sender};
-use crate::nequick::NequickG;
 use crate::satellite::Sv;
 use crate::set_tables::SetTables;
 use crate::time::{Epoch, WEEK_S};
 pub use almanac::gps_offset;
 use almanac::{GPS_OFFSET, Triple, WORD_7, WORD_8, WORD_9, WORD_10};
 pub use e5b::INAV_E5B;
+use fields::{FIXED, Orbit, Utc, WORD_1, WORD_2, WORD_3, WORD_4, WORD_5, WORD_6, coefficients};
 pub use fields::{GST_WEEK, sisa_index, tables};
-use fields::{Orbit, Utc, WORD_1, WORD_2, WORD_3, WORD_4, WORD_5, WORD_6};
 pub use reader::InavReader;
 pub use reduced::VALID_S as REDUCED_VALID_S;
 use reduced::{Reduced, WORD_16};
@@ -392,24 +391,18 @@ pub fn parameters(word: &u128) -> Option<Vec<(&'static str, i64)>> {
 
 /// The coefficients of the ionosphere that raw integers of word 5 give.
 fn ionosphere(raw: &dyn Fn(&str) -> Option<i64>) -> Option<Coefficients> {
-    let mut found = [0.0; 3];
-    for (name, value) in ["ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"].into_iter().zip(&mut found) {
-        let field = WORD_5.iter().map(|element| &element.field).find(|field| field.name == name)?;
-        *value = field.value(raw(name)?);
-    }
-    Some(Coefficients::NequickG(NequickG { coefficients: found }))
+    coefficients(|name| OF_SET.value(name, raw))
 }
 
-/// Parameters by which ephemerides and senders are distinguished, and what all satellites send alike, are
-/// fixed.
+/// Tables of the ephemeris.
 static OF_SET: SetTables<Orbit, u128> = SetTables {
     parts: &[&WORD_1, &WORD_2, &WORD_3, &WORD_4, &WORD_5],
     // The week and time of word 5 are those of its sending, which the ephemeris has already.
     passing: &["tow_s"],
-    fixed: &["iodnav", "svid", "week", "tow_s", "ai0_sfu", "ai1_sfupdeg", "ai2_sfupdeg2"],
+    fixed: &[&FIXED],
     sets: &INAV_SETS,
     blank: || 0,
-    content: |ephemeris| Orbit { ephemeris, nequick: [0.0; 3] },
+    content: Orbit::of,
     ephemeris: |orbit| orbit.ephemeris,
 };
 
@@ -426,7 +419,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
 fn elements_in_short(sv: Sv, (word, start): (&u128, Epoch), five: Option<&u128>) -> Ephemeris {
     let mut reduced = Reduced::default();
     read_all(&WORD_16, word, &mut reduced);
-    let mut orbit = Orbit { ephemeris: reduced.ephemeris(sv, start), nequick: [0.0; 3] };
+    let mut orbit = Orbit::of(reduced.ephemeris(sv, start));
     if let Some(five) = five {
         read_all(&WORD_5, five, &mut orbit);
     }

@@ -164,7 +164,7 @@ impl Content for InavContent {
         self.take(word_of(&parts), begin, inverted, near)
     }
 
-    fn forget_places(&mut self) {
+    fn forget_positions(&mut self) {
         (self.reduced, self.timed) = (None, None);
     }
 

@@ -254,7 +254,7 @@ pub fn parameters(string: &GlonassString) -> Vec<(&'static str, i64)> {
 static OF_SET: SetTables<Ephemeris, GlonassString> = SetTables {
     parts: &[&STRING_1, &STRING_2, &STRING_3, &STRING_4],
     passing: &[],
-    fixed: &["health", "tb_quarters", "unhealthy", "day", "slot"],
+    fixed: &[&["health", "tb_quarters", "unhealthy", "day", "slot"]],
     sets: &GNAV_SETS,
     blank: GlonassString::default,
     content: |ephemeris| ephemeris,
@@ -337,11 +337,6 @@ fn check(ephemeris: &Ephemeris) -> Result<(), FieldError> {
 pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
     check(ephemeris)?;
     OF_SET.quantised(ephemeris.clone())
-}
-
-/// Number of the last symbols of a string that agree with the time mark.
-fn alike(mark: impl Iterator<Item = f32>) -> usize {
-    mark.zip(bits_of(u128::from(MARK), MARK_SYMBOLS)).filter(|(soft, one)| (*soft < 0.0) == *one).count()
 }
 
 #[cfg(test)]

@@ -4,20 +4,20 @@
 use std::collections::BTreeMap;
 
 use super::{
-    GNAV, GlonassString, MARK_SYMBOLS, STRING_SYMBOLS, STRINGS, TIME, alike, decode_soft, elements, frame_began, id,
+    GNAV, GlonassString, MARK, MARK_SYMBOLS, STRING_SYMBOLS, STRINGS, TIME, decode_soft, elements, frame_began, id,
     parameters, slot,
 };
 use crate::bits::Store;
-use crate::framed::{Content, Framed, Reported};
+use crate::framed::{Content, Framed, Pattern, Reported};
 use crate::glonass::fdma::channel;
 use crate::message::{Parameters, Read};
 use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::Epoch;
 
-/// Symbols of the time mark that may be wrong: of a million positions one looks like it then, and the checks
+/// Time mark of a string. With two wrong symbols one of a million positions looks like it, and the checks
 /// decide.
-const TOLERATED: usize = 2;
+const END: Pattern = Pattern { bits: MARK as u128, symbols: MARK_SYMBOLS, tolerated: 2 };
 /// Symbols of a second.
 const RATE_HZ: f64 = 100.0;
 
@@ -47,9 +47,9 @@ pub struct GnavContent {
     known: Option<Epoch>,
 }
 
-/// Symbols of a string that agree with the time mark, which ends it.
-fn alike_in(symbols: &[f32]) -> usize {
-    alike(symbols.iter().skip(STRING_SYMBOLS - MARK_SYMBOLS).copied())
+/// Symbols of the time mark, which ends a string.
+fn mark(symbols: &[f32]) -> &[f32] {
+    symbols.get(STRING_SYMBOLS - MARK_SYMBOLS..).unwrap_or_default()
 }
 
 impl Content for GnavContent {
@@ -59,12 +59,12 @@ impl Content for GnavContent {
     const FAILURES: u32 = 3;
 
     fn may_begin(&self, symbols: &[f32]) -> bool {
-        !(TOLERATED + 1..MARK_SYMBOLS - TOLERATED).contains(&alike_in(symbols))
+        END.begins(mark(symbols))
     }
 
     fn decode(&self, symbols: &[f32]) -> Option<Self::Frame> {
-        let alike = alike_in(symbols);
-        let inverted = planted!("gnss.glonass.mark", alike < MARK_SYMBOLS / 2, alike > MARK_SYMBOLS / 2);
+        let inverted = END.is_inverted(mark(symbols));
+        let inverted = planted!("gnss.glonass.mark", inverted, !inverted);
         Some((decode_soft(symbols)?, inverted))
     }
 
@@ -74,7 +74,7 @@ impl Content for GnavContent {
         if let Some(slot) = (number == 4).then(|| slot(&string)).filter(|slot| *slot != self.sv.number) {
             // On a channel that is not its slot's nothing is known of it.
             if channel(slot).is_none() || channel(slot) != channel(self.sv.number) {
-                self.forget_places();
+                self.forget_positions();
                 return vec![Read::names_another("string 4", slot)];
             }
             // What was read under the other name is forgotten: another satellite may have sent it.
@@ -108,7 +108,7 @@ impl Content for GnavContent {
         self.known = Some(near);
     }
 
-    fn forget_places(&mut self) {
+    fn forget_positions(&mut self) {
         self.parts.clear();
         self.dated = None;
     }
@@ -150,7 +150,7 @@ impl GnavContent {
             return;
         }
         let all = [one, two, three, four].into_iter().flat_map(|(_, string)| parameters(string)).collect();
-        self.reported.take(GNAV.name, all, (|| Some(set), "strings 1 to 4"), news);
+        self.reported.take(GNAV.name, all, set, news);
     }
 
     fn rows(&self, issue: u32, parameters: Parameters) -> Vec<NavigationRow> {

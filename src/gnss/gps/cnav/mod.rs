@@ -293,23 +293,18 @@ static OF_SET: SetTables<Content, Vec<bool>> = SetTables {
     parts: &[&ORBIT_1, &ORBIT_2, &CLOCKS, &DELAY],
     passing: &[],
     fixed: &[
-        "week",
-        "toe_5min",
-        "top_5min",
-        "op_week",
-        "alpha_0",
-        "alpha_1",
-        "alpha_2",
-        "alpha_3",
-        "beta_0",
-        "beta_1",
-        "beta_2",
-        "beta_3",
-        "integrity_flags",
-        "toc_5min",
-        "ura_ned0_index",
-        "ura_ned1_index",
-        "ura_ned2_index",
+        &[
+            "week",
+            "toe_5min",
+            "top_5min",
+            "op_week",
+            "integrity_flags",
+            "toc_5min",
+            "ura_ned0_index",
+            "ura_ned1_index",
+            "ura_ned2_index",
+        ],
+        &Klobuchar::PARAMETERS,
     ],
     sets: &CNAV_SETS,
     blank: || vec![false; DATA_BITS],
@@ -337,13 +332,7 @@ fn blank(set: Ephemeris) -> Content {
 
 /// The coefficients of the ionosphere that raw integers of message 30 give.
 fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
-    let value = |name: &str| {
-        let field = DELAY.iter().map(|element| &element.field).find(|field| field.name == name)?;
-        Some(field.value(raw(field.name)?))
-    };
-    let alpha = [value("alpha_0")?, value("alpha_1")?, value("alpha_2")?, value("alpha_3")?];
-    let beta = [value("beta_0")?, value("beta_1")?, value("beta_2")?, value("beta_3")?];
-    Some(Coefficients::Klobuchar(Klobuchar { alpha, beta }))
+    Klobuchar::named(|name| OF_SET.value(name, raw)).map(Coefficients::Klobuchar)
 }
 
 /// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.

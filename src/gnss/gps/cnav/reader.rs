@@ -87,7 +87,7 @@ impl CnavReader {
         let all: Parameters = messages.into_iter().filter_map(parameters).flatten().collect();
         let Some(sent) = self.sent_at(one, near) else { return };
         let set = || elements(self.sv, messages, sent);
-        self.reported.take(self.message.name, all, (set, "messages 10, 11 and 30"), news);
+        self.reported.take_whole(self.message.name, all, (set, "messages 10, 11 and 30"), news);
     }
 }
 

@@ -276,24 +276,19 @@ static OF_SET: SetTables<Content, Vec<bool>> = SetTables {
     parts: &[&SET, &DELAY],
     passing: &["week", "itow_2h"],
     fixed: &[
-        "week",
-        "itow_2h",
-        "toe_5min",
-        "top_5min",
-        "op_week",
-        "l1c_health",
-        "integrity_flag",
-        "alpha_0",
-        "alpha_1",
-        "alpha_2",
-        "alpha_3",
-        "beta_0",
-        "beta_1",
-        "beta_2",
-        "beta_3",
-        "ura_ned0_index",
-        "ura_ned1_index",
-        "ura_ned2_index",
+        &[
+            "week",
+            "itow_2h",
+            "toe_5min",
+            "top_5min",
+            "op_week",
+            "l1c_health",
+            "integrity_flag",
+            "ura_ned0_index",
+            "ura_ned1_index",
+            "ura_ned2_index",
+        ],
+        &Klobuchar::PARAMETERS,
     ],
     sets: &CNAV2_SETS,
     blank: || vec![false; BITS_2],
@@ -352,11 +347,7 @@ fn nothing() -> Content {
 
 /// The coefficients of the ionosphere that raw integers of page 1 give.
 fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
-    let mut bits = vec![false; BITS_3];
-    for field in DELAY.iter().map(|element| &element.field).filter(|field| !field.name.starts_with("isc")) {
-        field.write(&mut bits, raw(field.name)?);
-    }
-    Some(Coefficients::Klobuchar(klobuchar(&bits)))
+    Klobuchar::named(|name| OF_SET.value(name, raw)).map(Coefficients::Klobuchar)
 }
 
 /// The coefficients in the bits of page 1.

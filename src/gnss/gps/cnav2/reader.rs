@@ -10,11 +10,6 @@ use crate::message::Read;
 use crate::satellite::Sv;
 use crate::time::Epoch;
 
-/// Least agreement of 52 symbols with a time at which a frame is tried. Symbols with an amplitude of √2
-/// standard deviations, near which the codes begin to fail, agree by 0.89 ± 0.05. The best of all times among
-/// data symbols agrees by less than half.
-const LEAST_SHARE: f32 = 0.65;
-
 /// Reader of CNAV-2.
 pub type Cnav2Reader = Framed<Cnav2Content>;
 
@@ -39,7 +34,7 @@ impl Content for Cnav2Content {
     const SYMBOLS: usize = SYMBOLS;
 
     fn may_begin(&self, symbols: &[f32]) -> bool {
-        FRAME.likely_times(symbols).1 > LEAST_SHARE
+        FRAME.may_begin(symbols)
     }
 
     fn decode(&self, symbols: &[f32]) -> Option<Frame> {
@@ -59,12 +54,12 @@ impl Content for Cnav2Content {
         }
         let Some(beside) = &self.page_1 else { return news };
         let all = of_set_in(&frame.two, beside);
-        let set = || Some(OF_SET.decoded(self.sv, [&frame.two, beside], sent));
-        self.reported.take(CNAV2.name, all, (set, "a frame"), &mut news);
+        let set = OF_SET.decoded(self.sv, [&frame.two, beside], sent);
+        self.reported.take(CNAV2.name, all, set, &mut news);
         news
     }
 
     fn missing(&self) -> Vec<u8> {
-        if self.reported.is_none() { vec![1] } else { Vec::new() }
+        self.reported.missing()
     }
 }

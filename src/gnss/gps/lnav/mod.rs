@@ -242,7 +242,7 @@ pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
 static OF_SET: SetTables<Ephemeris, [u32; 10]> = SetTables {
     parts: &[&SUBFRAME_1, &SUBFRAME_2, &SUBFRAME_3],
     passing: &[],
-    fixed: &["week", "iodc", "iode", "health"],
+    fixed: &[&["week", "iodc", "iode", "health"]],
     sets: &LNAV_SETS,
     blank: || [0; 10],
     content: |ephemeris| ephemeris,

@@ -244,7 +244,7 @@ fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
 static OF_SET: SetTables<Content, Vec<bool>> = SetTables {
     parts: &[&SET],
     passing: &["week", "itow_2h", "alert", "prn"],
-    fixed: &["week", "itow_2h", "alert", "prn", "toe_5min", "iodec", "l1_health", "reference_flag"],
+    fixed: &[&["week", "itow_2h", "alert", "prn", "toe_5min", "iodec", "l1_health", "reference_flag"]],
     sets: &L1_NAV_SETS,
     blank: || vec![false; BITS_2],
     content: blank,

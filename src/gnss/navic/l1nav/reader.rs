@@ -10,11 +10,6 @@ use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::Epoch;
 
-/// Least agreement of 52 symbols with a time at which a frame is tried. Symbols with an amplitude of √2
-/// standard deviations, near which the codes begin to fail, agree by 0.89 ± 0.05. The best of all times among
-/// data symbols agrees by about half.
-const LEAST_SHARE: f32 = 0.65;
-
 /// Reader of NavIC's message on L1.
 pub type L1NavReader = Framed<L1NavContent>;
 
@@ -37,7 +32,7 @@ impl Content for L1NavContent {
     const SYMBOLS: usize = SYMBOLS;
 
     fn may_begin(&self, symbols: &[f32]) -> bool {
-        FRAME.likely_times(symbols).1 > LEAST_SHARE
+        FRAME.may_begin(symbols)
     }
 
     fn decode(&self, symbols: &[f32]) -> Option<Frame> {
@@ -59,11 +54,11 @@ impl Content for L1NavContent {
             let rows = NavigationRow::each(self.sv, L1_NAV.name, issue, of_electrons_in(three));
             news.push(Read::Parameters(rows.collect()));
         }
-        self.reported.take(L1_NAV.name, of_set_in(&frame.0.two), (|| Some(set), "a frame"), &mut news);
+        self.reported.take(L1_NAV.name, of_set_in(&frame.0.two), set, &mut news);
         news
     }
 
     fn missing(&self) -> Vec<u8> {
-        if self.reported.is_none() { vec![1] } else { Vec::new() }
+        self.reported.missing()
     }
 }

@@ -243,7 +243,7 @@ fn coefficients(subframe: &Subframe) -> Coefficients {
 static OF_SET: SetTables<Ephemeris, Subframe> = SetTables {
     parts: &[&SUBFRAME_1, &SUBFRAME_2],
     passing: &[],
-    fixed: &["week", "iodec", "toc_s", "toe_s", "health"],
+    fixed: &[&["week", "iodec", "toc_s", "toe_s", "health"]],
     sets: &PLAIN,
     blank,
     content: |ephemeris| ephemeris,

@@ -6,15 +6,14 @@ use super::{
     ELECTRONS, PATTERN, PATTERN_SYMBOLS, SPS_NAV, SUBFRAME_SYMBOLS, Subframe, UTC, began_s, coefficients, decode_soft,
     elements, id, message_type, parameters, sent_at,
 };
-use crate::bits::bits_of;
-use crate::framed::{Content, Framed, Reported};
+use crate::framed::{Content, Framed, Pattern, Reported};
 use crate::message::{Parameters, Read};
 use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::Epoch;
 
-/// Symbols of the pattern that may be wrong: one of 240 positions looks like it then, and the check decides.
-const TOLERATED: usize = 2;
+/// Pattern of a subframe. With two wrong symbols one of 240 positions looks like it, and the check decides.
+const BEGIN: Pattern = Pattern { bits: PATTERN as u128, symbols: PATTERN_SYMBOLS, tolerated: 2 };
 
 /// Reader of NavIC's message.
 pub type NavReader = Framed<NavContent>;
@@ -24,12 +23,6 @@ impl NavReader {
     pub fn new(sv: Sv) -> Self {
         Self::of(NavContent { sv, set: BTreeMap::new(), reported: Reported::default() })
     }
-}
-
-/// Number of symbols that agree with the synchronisation pattern.
-fn alike(symbols: &[f32]) -> usize {
-    let pattern = bits_of(u128::from(PATTERN), PATTERN_SYMBOLS);
-    symbols.iter().zip(pattern).filter(|(soft, one)| (**soft < 0.0) == *one).count()
 }
 
 /// Content of a satellite's subframes.
@@ -48,11 +41,11 @@ impl Content for NavContent {
     const FAILURES: u32 = 3;
 
     fn may_begin(&self, symbols: &[f32]) -> bool {
-        !(TOLERATED + 1..PATTERN_SYMBOLS - TOLERATED).contains(&alike(symbols))
+        BEGIN.begins(symbols)
     }
 
     fn decode(&self, symbols: &[f32]) -> Option<Self::Frame> {
-        let inverted = alike(symbols) < PATTERN_SYMBOLS / 2;
+        let inverted = BEGIN.is_inverted(symbols);
         let upright: Vec<f32> = symbols.iter().map(|soft| if inverted { -soft } else { *soft }).collect();
         Some((decode_soft(&upright)?, inverted))
     }
@@ -94,7 +87,7 @@ impl NavContent {
         let (Some(one), Some(two)) = (self.set.get(&1), self.set.get(&2)) else { return };
         let all = [parameters(one), parameters(two)].concat();
         let set = || elements(self.sv, one, two, near);
-        self.reported.take(SPS_NAV.name, all, (set, "subframes 1 and 2"), news);
+        self.reported.take_whole(SPS_NAV.name, all, (set, "subframes 1 and 2"), news);
     }
 
     fn rows(&self, issue: u32, parameters: Parameters) -> Vec<NavigationRow> {

@@ -191,7 +191,7 @@ fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
 static OF_SET: SetTables<Ephemeris, Vec<bool>> = SetTables {
     parts: &[&GEO],
     passing: &[],
-    fixed: &["iodn", "t0_16s", "ura_index"],
+    fixed: &[&["iodn", "t0_16s", "ura_index"]],
     sets: &SBAS_SETS,
     blank: || vec![false; DATA_BITS],
     content: |ephemeris| ephemeris,

@@ -57,8 +57,8 @@ impl SbasReader {
     fn look_for_set(&mut self, news: &mut Vec<Read>) {
         let Some((begin, bits)) = &self.place else { return };
         let Some(sent) = self.begun(*begin) else { return };
-        let set = || Some(OF_SET.decoded(self.sv, [bits], sent));
-        self.reported.take(SBAS.name, integers(&super::GEO, bits), (set, "the position"), news);
+        let set = OF_SET.decoded(self.sv, [bits], sent);
+        self.reported.take(SBAS.name, integers(&super::GEO, bits), set, news);
     }
 }
 
