@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Names in the book: links and their headings, files, and in the recipes the items of the code, must exist.
+"""Names in the book: links and their headings, files, and in the recipes the items of the code, must exist. So must what other
+pages of the repository link to, and what they show.
 
 usage: tests/book_names.py
 exit:  0 every name exists; 1 one does not, each with its chapter and line.
@@ -16,6 +17,7 @@ ROOMS = {
     "receiver": ["src/receiver", "src/receiver/track", "src/receiver/position"],
     "judge": ["src/analysis", "src/analysis/judge"],
 }
+PAGES = ("*.md", "book/src/*.md", "python/*.md", "reports/**/*.md")
 RECIPES = "extending"
 # Files of the repository; a run writes its own into directories of `reports`.
 ROOTS = "src|tests|benches|examples|scenarios|studies|assets|python|book|packaging|\\.ci"
@@ -39,17 +41,17 @@ def spans(text):
         yield prose.count("\n", 0, found.start()) + 1, found[1]
 
 
-def links(chapter, text):
+def links(page, text):
     for found in re.finditer(r"\]\(([^)\s]+)\)", text):
         target, _, heading = found[1].partition("#")
         line = text.count("\n", 0, found.start()) + 1
         if re.match(r"\w+:", target):
             continue
-        path = (BOOK / target) if target else BOOK / f"{chapter}.md"
+        path = (page.parent / target) if target else page
         if not path.exists():
             yield line, f"no file {target}"
         elif heading and path.suffix == ".md" and heading not in anchors(path.read_text()):
-            yield line, f"{target or chapter} has no heading #{heading}"
+            yield line, f"{path.name} has no heading #{heading}"
 
 
 def files(chapter, text):
@@ -74,13 +76,15 @@ def main():
     sources = [path for room in ("src", "examples", "tests", "benches") for path in sorted((ROOT / room).rglob("*.rs"))]
     code = "\n".join(path.read_text() for path in sources) + (ROOT / "REFERENCE.md").read_text()
     faults = 0
-    for path in sorted(BOOK.glob("*.md")):
+    for path in [path for pattern in PAGES for path in sorted(ROOT.glob(pattern))]:
         text = path.read_text()
-        found = [*links(path.stem, text), *files(path.stem, text)]
+        found = [*links(path, text)]
+        if path.parent == BOOK:
+            found += files(path.stem, text)
         if path.stem == RECIPES:
             found += items(text, code)
         for line, fault in found:
-            print(f"book/src/{path.name}:{line}: {fault}")
+            print(f"{path.relative_to(ROOT)}:{line}: {fault}")
         faults += len(found)
     print(f"book: {faults} names that do not exist")
     return faults > 0

@@ -4,6 +4,7 @@
 # sockets and logs are in a directory of their own, and every listener is on the loopback.
 #
 # usage: tests/engines.sh TWIN [TIMES [KIND...]]     (default: each kind once; kinds are the functions disturb_* below)
+#        GNSS_TWIN_WRITE_ENGINES names the page that a run of all kinds writes (reports/engines.md).
 # exit:  0 all of it holds; 1 it does not; 75 Slurm, munge or parallel could not be installed.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
@@ -250,15 +251,63 @@ one() {
     "$twin" study run "$directory" >/dev/null
     [ -z "$(find "$directory/shards" -name '.tmp*')" ]
     nodes_are_idle
-    say "$kind: complete, bytes equal, $((SECONDS - begun)) s, $(grep -c '^round\|: job' "$directory.log" || true) submissions"
+    local submissions
+    submissions=$(grep -c '^round\|: job' "$directory.log" || true)
+    printf '%s\t%s\t%s\n' "$kind" $((SECONDS - begun)) "$submissions" >>"$work/complete"
+    say "$kind: complete, bytes equal, $((SECONDS - begun)) s, $submissions submissions"
 }
 queue_is_empty() { [ -z "$(squeue --noheader)" ]; }
 not() { ! "$@"; }
 
+# ---- the page
+# A kind in words, and what brings its run to the end.
+words() {
+    case $1 in
+    nothing) echo "nothing|" ;;
+    task) echo "the tasks' processes are killed|the script gives itself back to Slurm" ;;
+    script) echo "the batch scripts are killed, their tasks live on|the tasks end, or what they lose is submitted again" ;;
+    node) echo "a node dies with all that runs on it|Slurm gives its tasks to the other node after 20 s" ;;
+    controller) echo "the controller is killed and started again|tasks run twice or are held; all shards are there, the rest is cancelled" ;;
+    cancel) echo "half of the array is cancelled|the second submission" ;;
+    truncate) echo "a shard is truncated|it is found damaged and computed again" ;;
+    temporary) echo "half a shard of a dead process is there|nothing reads it, the next run removes it" ;;
+    requeue) echo "running tasks are requeued by the site|they start again" ;;
+    submitter) echo "the submitter is killed and started again|it waits for the job that is still there" ;;
+    parallel) echo "GNU parallel is killed|the second submission" ;;
+    esac
+}
+
+# Prints the page; $1 are the seconds of the run of many shards.
+write_page() {
+    cat <<END
+# Studies on engines
+
+What Slurm and GNU parallel lose. A controller and two nodes of one slot each run on one machine: $(slurmd -V).
+
+A study of 24 shards (the last row: 2500) is submitted by \`study submit\` and disturbed once some shards are there. A run is complete when
+all shards are whole and the merged table has the bytes of a local run. Without an engine the 24 shards take $calm_s s.
+
+| what happens | complete | a run (s) | submissions | what brings it to the end |
+| --- | --- | --- | --- | --- |
+END
+    local kind
+    for kind in "${kinds[@]}"; do
+        awk -F'\t' -v kind="$kind" -v words="$(words "$kind")" -v times="$times" '
+            $1 == kind { if (!n || $2 < low) low = $2; if ($2 > high) high = $2; if ($3 > most) most = $3; ++n }
+            END { split(words, w, "|"); printf "| %s | %d of %d | %s | %s | %s |\n", w[1], n, times, low == high ? low : low " to " high, most, w[2] }
+        ' "$work/complete"
+    done
+    echo "| 2500 shards where an array has indices up to 1000 | 1 of 1 | $1 | 1 | each of 40 tasks runs 62 or 63 shards |"
+    printf '\nComplete: %d of %d runs.\n\n' $(($(wc -l <"$work/complete") + 1)) $((${#kinds[@]} * times + 1))
+    echo 'A controller that was killed leaves its nodes drained ("Duplicate jobid"): the operators of a site release them, as the test does.'
+}
+
 say "a local run that nothing disturbs"
+begun=$SECONDS
 "$twin" study plan "$work/study.toml" -o "$work/calm" --shards 24 >/dev/null
 "$twin" study run "$work/calm"
 "$twin" study merge "$work/calm" -o "$work/calm.csv" >/dev/null
+calm_s=$((SECONDS - begun))
 say "a cluster of two nodes: $(slurmd -V)"
 cluster_up
 for kind in "${kinds[@]}"; do
@@ -274,10 +323,13 @@ sed -e 's/repetitions = 9/repetitions = 625/' -e 's/duration_s = 600/duration_s 
 "$twin" study export slurm "$work/many" --directive=--hold >"$work/many.sh"
 grep -q -- '--array=0-1000$' "$work/many.sh"
 scancel "$(sbatch --parsable "$work/many.sh")"
+begun=$SECONDS
 "$twin" study submit "$work/many" --engine slurm --tasks 40
+many_s=$((SECONDS - begun))
 "$twin" study merge "$work/many" -o "$work/many.csv"
 "$twin" study plan "$work/many.toml" -o "$work/alone" --shards 7 >/dev/null
 "$twin" study run "$work/alone"
 "$twin" study merge "$work/alone" -o "$work/alone.csv" >/dev/null
 cmp "$work/many.csv" "$work/alone.csv"
+[ -z "${GNSS_TWIN_WRITE_ENGINES:-}" ] || write_page "$many_s" >"$GNSS_TWIN_WRITE_ENGINES"
 say "engines: ${#kinds[@]} kinds, $times times each, and 2500 shards: complete, with equal bytes"

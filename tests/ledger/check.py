@@ -76,21 +76,34 @@ def pages(root, patterns):
 
 
 def notices(root, table, figures):
-    """What each page with stale figures has to say below its title."""
-    found = defaultdict(dict)
-    for name, row in table.items():
-        source = figures[name].source if name in figures else None
-        if isinstance(source, make.Page) and is_stale(root, row):
-            key = (row["commit"], row["date"], source.command)
-            part = f", part “{source.mark}”" if source.mark else ""
-            text = f"*Older than the code: measured at commit {row['commit']} on {row['date']}{part}. `{source.command}` makes it again.*\n"
-            found[source.page][key] = text
+    """What each page with stale figures has to say below its title: the page that a long command wrote, and chapters that show them."""
+    stale = {name: row for name, row in table.items() if isinstance(source_of(figures, name), make.Page) and is_stale(root, row)}
+    found, shown_in = defaultdict(dict), defaultdict(list)
+    for name, row in stale.items():
+        source = figures[name].source
+        part = f", part “{source.mark}”" if source.mark else ""
+        found[root / source.page][row["commit"], row["date"], source.command] = (
+            f"*Older than the code: measured at commit {row['commit']} on {row['date']}{part}. `{source.command}` makes it again.*\n"
+        )
+    for path in pages(root, MARKED[1:]):
+        for marker in prose.markers(path.read_text(encoding="utf8")):
+            if marker["id"] in stale:
+                row = stale[marker["id"]]
+                shown_in[path, row["commit"], row["date"], figures[marker["id"]].source.command].append(marker["id"])
+    for (path, commit, date, command), names in shown_in.items():
+        text = f"*Older than the code: {some(names)}, measured at commit {commit} on {date}. `{command}` measures again.*\n"
+        found[path].setdefault((commit, date, command), text)
     return {page: "\n".join(texts.values()) + "\n" for page, texts in found.items()}
 
 
-def measured_pages(figures):
-    """Pages that long commands write."""
-    return sorted({figure.source.page for figure in figures.values() if isinstance(figure.source, make.Page)})
+def source_of(figures, name):
+    return figures[name].source if name in figures else None
+
+
+def pages_with_notices(root, figures):
+    """Pages that long commands write, and all that show figures but the README, which shows no stale ones."""
+    measured = {root / figure.source.page for figure in figures.values() if isinstance(figure.source, make.Page)}
+    return sorted({*filter(Path.is_file, measured), *pages(root, MARKED[1:])})
 
 
 def is_stale(root, row):
@@ -130,10 +143,9 @@ def check(root, figures):
         place = f"{LEDGER}:{line_of_row(root, names[0])}"
         found.append(f"{place}: stale: {some(names)}: of {rooms}, made at {commit}; make again by: --make {family}.")
     expected = notices(root, table, figures)
-    for page in measured_pages(figures):
-        path = root / page
-        if path.is_file() and said(path.read_text(encoding="utf8")) != expected.get(page, ""):
-            found.append(f"{page}:3: the page does not say which of its figures are older than the code; fill it by: --write")
+    for page in pages_with_notices(root, figures):
+        if said(page.read_text(encoding="utf8")) != expected.get(page, ""):
+            found.append(f"{page.relative_to(root)}:3: the page does not say which of its figures are older than the code; fill it by: --write")
     warnings = [
         f"{page}: {len(names)} figures are older than the code, made at {commit} ({some(names)}); "
         f"make them again by: {command}, then --make"
@@ -204,14 +216,14 @@ def write(root, figures):
     """Fills markers and notices; returns the pages that changed."""
     table, changed = read(root), []
     expected = notices(root, table, figures)
-    paged = {root / page: page for page in measured_pages(figures)}
-    for path in sorted({*pages(root, MARKED), *filter(Path.is_file, paged)}):
+    paged = pages_with_notices(root, figures)
+    for path in sorted({*pages(root, MARKED), *paged}):
         text = new = path.read_text(encoding="utf8")
         for marker in reversed(list(prose.markers(text))):
             if marker["id"] in table:
                 start, end = marker.span("text")
                 new = new[:start] + shown(table[marker["id"]], marker["kind"]) + new[end:]
-        notice = expected.get(paged.get(path), "")
+        notice = expected.get(path, "")
         if path in paged and said(new) != notice:
             title, rest = NOTICE.sub("", new).split("\n\n", 1)
             new = f"{title}\n\n{notice}{rest}"

@@ -200,6 +200,12 @@ def counts():
                  make.Page("reports/stability.md", extremes, counted=r"^\| \d+ \|"), rooms)
     yield Figure("validation.extreme_figures", "figures of extreme cases, each beside its bar", "",
                  make.Page("reports/stability.md", extremes, counted=r"^\| *\d* *\|"), rooms)
+    yield Figure("validation.engines", "disturbed runs of a study on Slurm and GNU parallel that end complete", "",
+                 make.Page("reports/engines.md", "GNSS_TWIN_WRITE_ENGINES=$PWD/reports/engines.md bash tests/engines.sh \"$GNSS_TWIN\" 3",
+                           pattern=r"^Complete: (\d+ of \d+) runs"), ("tests/engines.sh", "src/study", "src/cli/study"), "all")
+    yield Figure("validation.levels.differences", "figures of the verdict that differ between samples and correlations, all scenes", "",
+                 make.Page("reports/levels.md", "cargo bench --bench levels", pattern=r"^\*\*\d+ scenes.*: (\d+) differences"),
+                 (*ALL_SAMPLES, "src/twin", "src/analysis/measure", "benches/levels"), "= 0")
     faults = "GNSS_TWIN_LONG=1 GNSS_TWIN_WRITE_ROBUSTNESS=$PWD/reports/robustness.md cargo test --test faults -- --test-threads 1"
     rooms = ("tests/faults", "src/cli", "src/receiver/source")
     for name, what, column in [("cases", "cases of damaged input and of a failing machine", 1), ("failures", "of them failed", 5)]:
@@ -259,6 +265,11 @@ def studies():
         for part, group, words in [("cells", 1, "cells within 5 % of theory"), ("ratio", 2, "measured to theory, least to most")]:
             yield Figure(f"study.{study}.{name}{part}", f"study {study}, {figure}, T·C/N0 ≥ 10: {words}", "",
                          make.Page(report, command, pattern=pattern, text=rf"\{group}"), rooms)
+    for study in ("boc_side_peaks", "stress_jerk", "stress_acceleration", "tracking_maps", "boost_samples", "starts_long"):
+        rooms = ALL_SAMPLES if study in ("boost_samples", "starts_long") else ("src/receiver/track", "src/study")
+        yield Figure(f"study.{study}.cases", f"study {study}: cases measured", "",
+                     make.Page(f"reports/studies/{study}/report.md", f"\"$GNSS_TWIN\" study studies/{study}.toml",
+                               pattern=r" (\d+) cases: \d+ cells"), (*rooms, f"studies/{study}.toml"))
     for component in ("data", "pilot"):
         yield Figure(f"study.pilot_against_data.{component}_dbhz", f"C/N0 at which half of the runs hold a minute of Galileo E1 without a slip, {component}, 18 Hz",
                      "dB-Hz", make.Page("reports/studies/pilot_against_data/report.md", "\"$GNSS_TWIN\" study studies/pilot_against_data.toml",
