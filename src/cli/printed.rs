@@ -16,8 +16,8 @@ use gnss::record::Fix;
 /// Flags of a command with results.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct Printed {
-    /// Print only warnings and errors
-    #[arg(long, short, conflicts_with = "json")]
+    /// Print only warnings and errors, and with --json the object
+    #[arg(long, short)]
     pub quiet: bool,
     /// Print the results as one JSON object on one line, without progress
     #[arg(long)]
@@ -28,8 +28,8 @@ impl Printed {
     /// Prints results in words, as an object or not at all.
     pub fn results(self, text: &str, object: impl FnOnce() -> Value) -> Result<(), CliError> {
         match self {
-            Self { quiet: true, .. } => Ok(()),
             Self { json: true, .. } => scenario::print(&(object().to_string() + "\n")),
+            Self { quiet: true, .. } => Ok(()),
             _ => scenario::print(text),
         }
     }

@@ -68,7 +68,7 @@ pub fn lines_of_sight(scene: &Scene) -> Result<Vec<LineOfSight>, OrbitError> {
     let duration_s = scene.clock.rate.elapsed_s(scene.samples);
     let pulls = pulls(scene, duration_s);
     let mut found = Vec::new();
-    for sv in scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)) {
+    for sv in scene.senders() {
         let looks = looks(scene, sv, duration_s)?;
         let mut line: Option<LineOfSight> = None;
         let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);

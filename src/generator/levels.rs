@@ -167,7 +167,7 @@ impl Levels {
 pub fn strongest(scene: &Scene) -> Result<Option<(Sv, f64)>, OrbitError> {
     let motion = scene.trajectory.at(0.0);
     let mut found: Option<(Sv, f64)> = None;
-    for sv in scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)) {
+    for sv in scene.senders() {
         let seen = emission(&scene.catalogue, sv, scene.clock.start, &motion)?.filter(|e| scene.sees(&e.sight));
         let Some(seen) = seen else { continue };
         for signal in scene.signals_of(sv) {
@@ -237,7 +237,7 @@ fn spoofed(scene: &Scene, kept: &Kept, from: &Constellation) -> Result<Spoofed, 
             continue;
         }
         let local = scene.clock.epoch(sample);
-        for sv in scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv) && from.sends(*sv)) {
+        for sv in scene.satellites().filter(|sv| from.sends(*sv)) {
             if !arrival::in_view_from(scene, from, sv, local)? {
                 continue;
             }

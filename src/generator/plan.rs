@@ -88,6 +88,8 @@ pub struct Plan {
     pub acceleration_mps2: f64,
     /// Satellites that are in view at any time, highest first.
     pub satellites: Vec<InView>,
+    /// Satellites in view at the start that send none of the scene's signals.
+    pub silent: Vec<Sv>,
     /// Models that are computed, and models that are not.
     pub models: Vec<Model>,
     /// Levels of the parts of the sum relative to full scale.
@@ -166,6 +168,7 @@ impl Plan {
             memory_bytes: machinery.block_bytes + knots,
             time_s: scene.samples as f64 * levels.sample_s + machinery.knots_s,
             satellites,
+            silent: silent(scene)?,
             levels,
             machinery,
         })
@@ -192,10 +195,22 @@ impl Together<'_> {
     }
 }
 
-/// The satellites above the mask at any instant looked at, highest first.
+/// Satellites in view at the start that send none of the scene's signals.
+fn silent(scene: &Scene) -> Result<Vec<Sv>, OrbitError> {
+    let motion = scene.trajectory.at(0.0);
+    let mut found = Vec::new();
+    for sv in scene.satellites().filter(|sv| scene.signals_of(*sv).next().is_none()) {
+        if matches!(presence(scene, sv, scene.clock.start, &motion)?, Presence::InView(_)) {
+            found.push(sv);
+        }
+    }
+    Ok(found)
+}
+
+/// Satellites that send and are above the mask at any instant looked at, highest first.
 fn in_view(scene: &Scene, kept: &Kept, duration_s: f64) -> Result<Vec<InView>, OrbitError> {
     let mut rows = Vec::new();
-    for sv in scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)) {
+    for sv in scene.senders() {
         let (mut row, mut absent): (Option<InView>, Option<PassEnd>) = (None, None);
         for k in 0..=INSTANTS {
             let t_s = duration_s * f64::from(k) / f64::from(INSTANTS);
@@ -309,6 +324,10 @@ impl fmt::Display for Plan {
             writeln!(f, "\n{} satellites not behind the Earth", self.satellites.len())?;
         } else {
             writeln!(f, "\n{} satellites above {:.1} deg", self.satellites.len(), self.mask_deg)?;
+        }
+        if !self.silent.is_empty() {
+            let names: Vec<String> = self.silent.iter().map(Sv::to_string).collect();
+            writeln!(f, "  in view, but without a signal of the scene: {}", names.join(" "))?;
         }
         writeln!(f, "  sv   azimuth  elevation  C/N0 dB-Hz  dBFS")?;
         for row in &self.satellites {

@@ -82,7 +82,7 @@ pub struct Missing {
 pub fn missing(scene: &Scene, end_s: f64) -> Result<Vec<Missing>, OrbitError> {
     let (start, end) = (scene.clock.start, scene.clock.start.plus_s(end_s));
     let mut found = Vec::new();
-    for sv in scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)) {
+    for sv in scene.senders() {
         for silence in scene.catalogue.silences(sv, start, end) {
             if would_be_seen(scene, sv, &silence, end_s)? {
                 found.push(Missing { sv, silence });

@@ -125,6 +125,16 @@ impl Scene {
         own.filter(move |signal| !is_link_outside(&self.metadata, signal.link(sv)))
     }
 
+    /// Satellites of the scene that send at least one of its signals in the samples' band.
+    pub fn senders(&self) -> impl Iterator<Item = Sv> {
+        self.satellites().filter(|sv| self.signals_of(*sv).next().is_some())
+    }
+
+    /// Satellites with an ephemeris that the scene does not exclude.
+    pub fn satellites(&self) -> impl Iterator<Item = Sv> {
+        self.catalogue.satellites().filter(|sv| !self.excluded.contains(sv))
+    }
+
     /// True if a satellite is in view: above the mask, or from space not behind the Earth.
     pub fn sees(&self, sight: &Sight) -> bool {
         if sight.user.height_m < SPACE_M {

@@ -69,7 +69,7 @@ impl<'t> Keys<'t> {
     }
 }
 
-/// Candidate most similar to `word`, if any is similar: likeness by Jaro and Winkler above 0.7, whatever the
+/// Candidate most similar to `word`, if any is similar: likeness by Jaro and Winkler above 0.75, whatever the
 /// case.
 pub fn nearest(word: &str, candidates: &[&str]) -> Option<String> {
     let lower = word.to_lowercase();
@@ -77,7 +77,7 @@ pub fn nearest(word: &str, candidates: &[&str]) -> Option<String> {
         .iter()
         .map(|candidate| (strsim::jaro_winkler(&lower, &candidate.to_lowercase()), *candidate))
         .max_by(|a, b| a.0.total_cmp(&b.0))
-        .filter(|(likeness, _)| *likeness > 0.7)
+        .filter(|(likeness, _)| *likeness > 0.75)
         .map(|(_, candidate)| candidate.to_owned())
 }
 

@@ -96,14 +96,16 @@ pub enum SettingsError {
         known: String,
     },
     /// A value of the wrong type.
-    #[error("{origin}: {key}: {message}")]
+    #[error("{origin}: {key} = {value}: expected {expected}")]
     Type {
         /// Name of the file, with line and column where they are known.
         origin: String,
         /// The key with its tables.
         key: String,
-        /// The type as found, and the type as expected.
-        message: String,
+        /// The value as it is written.
+        value: String,
+        /// Values that are expected instead.
+        expected: String,
     },
     /// A value out of its range.
     #[error("{origin}: {key} = {value}: expected {expected}")]
@@ -177,8 +179,12 @@ impl Settings {
             None => Table::new(),
             Some(Value::Table(table)) => table,
             Some(other) => {
-                let message = format!("invalid type: {}, expected a table", other.type_str());
-                return Err(SettingsError::Type { origin: keys.place_of(above), key: above.to_owned(), message });
+                return Err(SettingsError::Type {
+                    origin: keys.place_of(above),
+                    key: above.to_owned(),
+                    value: other.to_string(),
+                    expected: "a table".to_owned(),
+                });
             }
         };
         Self::checked(table, origin).map_err(|faults| {
@@ -205,7 +211,7 @@ impl Settings {
             let settings: Self = match table.clone().try_into() {
                 Ok(settings) => settings,
                 Err(error) => {
-                    faults.push(mistyped(&error, String::new(), origin));
+                    faults.push(SettingsError::Toml { origin: origin.to_owned(), message: error.message().to_owned() });
                     return Err(faults);
                 }
             };
@@ -355,11 +361,6 @@ fn several(mut faults: Vec<SettingsError>) -> SettingsError {
     }
 }
 
-/// Error of a value that serde refuses.
-fn mistyped(error: &toml::de::Error, key: String, origin: &str) -> SettingsError {
-    SettingsError::Type { origin: origin.to_owned(), key, message: error.message().to_owned() }
-}
-
 /// The keys of the defaults, with their defaults.
 fn known() -> Table {
     Table::try_from(Settings::default()).unwrap_or_default()
@@ -388,24 +389,24 @@ fn without_unknown(table: &mut Table, known: &Table, path: &str, origin: &str) -
     faults
 }
 
-/// Takes the values of the wrong type out of `table`, and returns their errors. Each key is read alone.
+/// Takes the values of a wrong type out of a table, and returns their errors.
 fn without_mistyped(table: &mut Table, origin: &str) -> Vec<SettingsError> {
     let mut faults = Vec::new();
-    let mut keep = |path: String, alone: Table| {
-        let refused = alone.try_into::<Settings>().err().map(|error| mistyped(&error, path, origin));
-        let is_sound = refused.is_none();
-        faults.extend(refused);
-        is_sound
+    let mut keep = |key: String, value: &Value, alone: Table| {
+        let Err(error) = alone.try_into::<Settings>() else { return true };
+        let expected = reference::of_type(&key, &error);
+        faults.push(SettingsError::Type { origin: origin.to_owned(), key, value: value.to_string(), expected });
+        false
     };
     table.retain(|section, value| match value {
         Value::Table(given) => {
             given.retain(|key, value| {
                 let alone = Table::from_iter([(key.to_owned(), value.clone())]);
-                keep(format!("{section}.{key}"), Table::from_iter([(section.to_owned(), alone.into())]))
+                keep(format!("{section}.{key}"), value, Table::from_iter([(section.to_owned(), alone.into())]))
             });
             true
         }
-        other => keep(section.to_owned(), Table::from_iter([(section.to_owned(), other.clone())])),
+        other => keep(section.to_owned(), other, Table::from_iter([(section.to_owned(), other.clone())])),
     });
     faults
 }
@@ -447,7 +448,7 @@ mod tests {
         let text = |line: &str| format!("name = \"x\"\n[receiver.tracking]\n{line}\n");
         for (line, expected) in [
             ("pll_order = 7", "s.toml:3:1: tracking.pll_order = 7: expected 2 or 3"),
-            ("pll_order = \"x\"", "s.toml:3:1: receiver.tracking.pll_order: invalid type"),
+            ("pll_order = \"x\"", "s.toml:3:1: receiver.tracking.pll_order = \"x\": expected 2 or 3"),
             ("pll_ordr = 3", "s.toml:3:1: unknown key 'receiver.tracking.pll_ordr'"),
         ] {
             let error = Settings::of_scenario(&text(line), "s.toml").unwrap_err().to_string();
@@ -466,7 +467,7 @@ mod tests {
         let expected = [
             "rx.toml:2:1: acquisition.signals names 'GPS L9': expected some of",
             "rx.toml:4:1: tracking.pll_order = 7: expected 2 or 3",
-            "rx.toml:5:1: tracking.dll_order: invalid type: string \"two\"",
+            "rx.toml:5:1: tracking.dll_order = \"two\": expected ",
             "rx.toml:6:1: unknown key 'tracking.pll_bandwith_hz': did you mean 'pll_bandwidth_hz'?",
             "rx.toml:7:2: unknown key 'positon': did you mean 'position'?",
             "rx.toml:10:1: position.mask_deg = 91: expected 0 to 90",

@@ -622,9 +622,12 @@ fn results_are_words_or_one_object_or_nothing_as_the_flags_say() {
     let quiet = twin(&["receive", "if.sigmf-data", "--out", "rx", "--quiet"], at);
     assert_eq!((code(&quiet), quiet.stdout.len()), (3, 0));
     assert_eq!(stderr(&quiet).lines().count(), 1, "{}", stderr(&quiet));
+    // An object is a result that a script asked for: it is printed, and nothing else is.
+    let both = twin(&["plan", "short.toml", "--quiet", "--json"], at);
+    assert_eq!(code(&both), 0, "{}", stderr(&both));
+    assert!(serde_json::from_slice::<serde_json::Value>(&both.stdout).unwrap()["front_ends"].is_array());
     for arguments in [
-        &["run", "short.toml", "--quiet", "--json"][..],
-        &["generate", "short.toml", "--out", "-", "--json"],
+        &["generate", "short.toml", "--out", "-", "--json"][..],
         &["receive", "if.sigmf-data", "--out", "x", "--nmea", "-", "--json"],
     ] {
         assert_eq!(code(&twin(arguments, at)), 2, "{arguments:?}");

@@ -1,5 +1,6 @@
 //! The table that a terminal shows after a run.
 
+use std::collections::BTreeSet;
 use std::fmt;
 
 use crate::judge::judgement::Status;
@@ -186,10 +187,14 @@ impl Summary {
 impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "verdict       {}", self.in_words())?;
+        // A hint stands below the first figure that it explains.
+        let mut hints = BTreeSet::new();
         for row in self.rows.iter().filter(|row| row.status != Status::Pass) {
             let (value, word, margin) = (row.value_text(), row.status.word(), row.margin_text());
-            writeln!(f, "{word:<14}{} {value} {}, limit {}: {margin}", row.figure, row.unit, row.bound)?;
-            row.why.iter().try_for_each(|line| writeln!(f, "{:<14}  {line}", ""))?;
+            let value = format!("{value} {}", row.unit);
+            writeln!(f, "{word:<14}{} {}, limit {}: {margin}", row.figure, value.trim_end(), row.bound)?;
+            let mut why = row.why.iter().filter(|line| !line.starts_with("hint: ") || hints.insert(line.as_str()));
+            why.try_for_each(|line| writeln!(f, "{:<14}  {line}", ""))?;
         }
         self.not_judged.iter().try_for_each(|text| writeln!(f, "{:<14}{text}", "not judged"))
     }

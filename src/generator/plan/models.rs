@@ -14,7 +14,7 @@ pub(super) fn models(scene: &Scene, kept: &Kept) -> Vec<Model> {
         .collect();
     let mut add = |name: &str, present: bool, why: String| models.push(Model { name: name.to_owned(), present, why });
     let (orbits, departures) = scene.catalogue.describe();
-    let broadcast = "no [orbits]: what satellites broadcast is true, smoothed where one set follows another";
+    let broadcast = "no [orbits]: what satellites broadcast is true, smoothed where one ephemeris follows another";
     add("true orbits", orbits.is_some(), orbits.unwrap_or_else(|| broadcast.to_owned()));
     let faults = [departures, scene.satellite_clocks.descriptions.clone()].concat();
     if faults.is_empty() {

@@ -140,8 +140,8 @@ impl Scenario {
         if most < 4 {
             let mask_deg = self.mask_rad.to_degrees();
             warnings.push(format!(
-                "{most} satellites above satellites.mask_deg = {mask_deg}, or from space not behind the Earth, at the \
-                 start: a position needs 4"
+                "{most} satellites that send one of the scene's signals are above satellites.mask_deg = {mask_deg}, \
+                 or from space not behind the Earth, at the start: a position needs 4"
             ));
         }
         if let Some(first) = scenes.first() {
@@ -294,10 +294,10 @@ impl Scenario {
 fn at_start(scene: &Scene) -> Result<(usize, f64), OrbitError> {
     let motion = scene.trajectory.at(0.0);
     let (mut visible, mut sum_hz) = (0, 0.0);
-    for sv in scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)) {
+    for sv in scene.senders() {
         let found = emission(&scene.catalogue, sv, scene.clock.start, &motion)?;
         let Some(found) = found.filter(|e| scene.sees(&e.sight)) else { continue };
-        visible += usize::from(scene.signals_of(sv).next().is_some());
+        visible += 1;
         for signal in scene.signals_of(sv) {
             let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
             scene.effects.iter().for_each(|effect| effect.act(&found.sight, signal, &mut rays));

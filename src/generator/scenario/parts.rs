@@ -231,10 +231,7 @@ fn unsendable(scenario: &Scenario, set: &Ephemeris) -> Option<String> {
         // Messages count reference times by their system's clock, those that round them by GPS time.
         let labelled = form.clone().timed(|at| time.label(at));
         let error = (message.quantised)(&form).err().and((message.quantised)(&labelled).err())?;
-        Some(format!(
-            "{}: left out the set of reference time {}: {} cannot carry it: {error}",
-            set.sv, set.toe, message.name
-        ))
+        Some(format!("{}: left out the ephemeris of {}: {} cannot carry it: {error}", set.sv, set.toe, message.name))
     })
 }
 

@@ -44,6 +44,22 @@ fn the_static_scene_has_the_satellites_that_its_comment_promises() {
 }
 
 #[test]
+fn a_satellite_without_a_signal_of_the_scene_is_no_satellite_of_the_plan() {
+    // No satellite of 2010 sends L1C.
+    let bare = include_str!("../../../scenarios/static.toml");
+    let text = bare.replacen("[motion]", "signals = [\"GPS L1C\"]\n[motion]", 1);
+    let (civil, whole) = (plan(&text), plan(bare));
+    assert!(civil.satellites.is_empty() && whole.silent.is_empty(), "{civil}");
+    let mut in_view: Vec<Sv> = whole.satellites.iter().map(|satellite| satellite.sv).collect();
+    in_view.sort();
+    assert_eq!(civil.silent, in_view);
+    let scenario = Scenario::parse(&text, "plan").unwrap();
+    let (scene, warnings) = scenario.compose(Path::new("."), &Overrides::default()).unwrap();
+    assert!(crate::dynamics::lines_of_sight(&scene).unwrap().is_empty());
+    assert!(warnings.iter().any(|warning| warning.starts_with("0 satellites that send")), "{warnings:?}");
+}
+
+#[test]
 fn what_is_absent_is_named_with_the_table_that_would_bring_it() {
     let text = plan(include_str!("../../../scenarios/noise_free.toml")).to_string();
     let (_, absent) = text.split_once("not computed").unwrap();

@@ -51,6 +51,18 @@ pub fn tables() -> Vec<(String, Vec<Described>)> {
     defaults.iter().map(of).collect()
 }
 
+/// Values that a key of a table, `section.name`, accepts where serde refused the type of one.
+pub(super) fn of_type(key: &str, error: &toml::de::Error) -> String {
+    let defaults = Table::try_from(Settings::default()).unwrap_or_default();
+    let default = key.split_once('.').and_then(|(section, name)| {
+        let default = defaults.get(section)?.get(name)?;
+        // The range of a number; serde itself names the words of a choice.
+        matches!(default, Value::Float(_) | Value::Integer(_)).then(|| expected(section, name, default))
+    });
+    let tail = || error.message().split_once("expected ").map_or("another type", |(_, tail)| tail).to_owned();
+    default.unwrap_or_else(tail)
+}
+
 /// Values that a key accepts, taken from its error message.
 fn expected(section: &str, name: &str, default: &Value) -> String {
     // What no key can be.

@@ -108,7 +108,7 @@ fn a_record_that_cannot_be_sent_is_left_out_by_name_and_the_scene_goes_on() {
     assert!(common.is_ok());
     let own: Vec<&String> = warnings.iter().filter(|warning| !none.contains(warning)).collect();
     let [warning] = own.as_slice() else { panic!("{warnings:?}") };
-    assert!(warning.starts_with("G01: left out the set of reference time 2010-07-01T00:00:00"), "{warning}");
+    assert!(warning.starts_with("G01: left out the ephemeris of 2010-07-01T00:00:00"), "{warning}");
     assert!(warning.contains("iode = 63 contradicts iodc = 64"), "{warning}");
 }
 
