@@ -6,20 +6,17 @@
 //! A thread of its own waits for them, so that they are noticed whatever the others are at: computing,
 //! reading a pipe that stays silent, or drawing.
 
-use std::io::Read;
-use std::os::unix::net::UnixStream;
 use std::sync::Arc;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-
 use crate::cli::error::CliError;
+use crate::cli::platform::{self, Ear};
 use analysis::show::staged;
 
-/// Polling interval of that thread where it cannot be woken.
+/// Polling interval of who waits for the end of the process.
 const LOOK: Duration = Duration::from_millis(50);
 /// Stack size of that thread.
 const STACK_BYTES: usize = 1 << 18;
@@ -36,26 +33,17 @@ pub fn install() -> Result<(), CliError> {
 fn handle() -> std::io::Result<()> {
     let received = RECEIVED.get_or_init(Default::default);
     let second = Arc::new(AtomicBool::new(false));
-    let (reader, writer) = UnixStream::pair()?;
-    thread::Builder::new().name("signals".to_owned()).stack_size(STACK_BYTES).spawn(move || wait(reader))?;
-    let (handled, detached) = ([SIGINT, SIGTERM, SIGHUP], is_detached());
-    for signal in handled.into_iter().filter(|signal| !(detached && *signal == SIGHUP)) {
+    let (bell, ear) = platform::bell()?;
+    thread::Builder::new().name("signals".to_owned()).stack_size(STACK_BYTES).spawn(move || wait(ear))?;
+    for signal in platform::signals() {
         // Order matters: the shutdown sees the flag that an earlier signal has set, and who is woken finds
         // its number.
         signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&second))?;
         signal_hook::flag::register(signal, Arc::clone(&second))?;
         signal_hook::flag::register_usize(signal, Arc::clone(received), signal as usize)?;
-        signal_hook::low_level::pipe::register(signal, writer.try_clone()?)?;
+        bell.rings_for(signal)?;
     }
     Ok(())
-}
-
-/// True if the program was started to outlive the terminal (`nohup`). Hang-ups are then ignored, and stay so.
-fn is_detached() -> bool {
-    // Linux reports it there (proc(5)), bit 0 for signal 1; elsewhere it is taken not to be.
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask & 1 == 1)
 }
 
 /// The signal that came, if one did.
@@ -66,12 +54,9 @@ fn received() -> Option<i32> {
     }
 }
 
-fn wait(mut reader: UnixStream) {
+fn wait(mut ear: Ear) {
     let signal = loop {
-        // What is read says nothing; a wait that fails becomes a look now and then.
-        if !matches!(reader.read(&mut [0]), Ok(1)) {
-            thread::sleep(LOOK);
-        }
+        ear.wait();
         if let Some(signal) = received() {
             break signal;
         }

@@ -18,6 +18,7 @@ mod packed;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod plan;
+mod platform;
 mod printed;
 mod progress;
 mod receive;

@@ -7,7 +7,6 @@
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
-use std::os::unix::fs::FileTypeExt;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, OnceLock};
@@ -17,6 +16,7 @@ use std::time::Duration;
 use crate::cli::address::{connect, peer_address};
 use crate::cli::error::{CliError, shown};
 use crate::cli::interrupt;
+use crate::cli::platform;
 use crate::cli::scenario;
 use gnss::samples::IfMetadata;
 
@@ -61,7 +61,7 @@ impl Spec {
             Self::Fifo(path) => {
                 let name = shown(path);
                 let about = fs::metadata(path).map_err(|error| CliError::read(&name, &error))?;
-                if !about.file_type().is_fifo() {
+                if !platform::is_fifo(&about) {
                     return Err(CliError::input(format!("{name} is no FIFO: name a file without fifo:")));
                 }
                 scenario::note(&format!("samples: waiting for a writer of {name}"));

@@ -3,8 +3,6 @@
 use std::fs::{self, File};
 use std::io::{self, IsTerminal, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream};
-use std::os::fd::AsFd;
-use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 use std::sync::Arc;
 use std::thread;
@@ -14,6 +12,7 @@ use super::Sink;
 use super::door::Door;
 use crate::cli::address;
 use crate::cli::error::{CliError, shown};
+use crate::cli::platform;
 use crate::cli::scenario;
 use crate::cli::staging::Staging;
 
@@ -38,9 +37,7 @@ impl Pipe {
                  hackrf_transfer -t -`",
             ));
         }
-        // Beside the library's own, which looks for ends of lines.
-        let own = stdout.as_fd().try_clone_to_owned().map_err(|error| CliError::output("standard output", &error))?;
-        Ok(Self(own.into()))
+        platform::own_output(&stdout).map(Self).map_err(|error| CliError::output("standard output", &error))
     }
 
     /// A FIFO, once somebody reads it.
@@ -52,7 +49,7 @@ impl Pipe {
             }
             _ => CliError::create(&name, &error),
         })?;
-        if !about.file_type().is_fifo() {
+        if !platform::is_fifo(&about) {
             return Err(CliError::refused_output(format!("{name} is no FIFO: expected one that `mkfifo` made")));
         }
         scenario::note(&format!("samples: waiting for a reader of {name}"));

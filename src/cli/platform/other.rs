@@ -1,0 +1,61 @@
+//! Systems without FIFOs and without handlers that may write to a socket: Windows.
+
+use std::fs::{File, Metadata};
+use std::io::{self, Stdout};
+use std::os::windows::io::AsHandle;
+use std::thread;
+use std::time::Duration;
+
+use signal_hook::consts::{SIGINT, SIGTERM};
+
+/// Polling interval of the thread that waits for signals.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// True if a file is a FIFO: none is.
+pub fn is_fifo(_: &Metadata) -> bool {
+    false
+}
+
+/// Standard output beside the library's own, which looks for ends of lines.
+///
+/// # Errors
+/// Errors of the system: no handle is left.
+pub fn own_output(output: &Stdout) -> io::Result<File> {
+    output.as_handle().try_clone_to_owned().map(File::from)
+}
+
+/// Signals that end the program.
+pub fn signals() -> Vec<i32> {
+    vec![SIGINT, SIGTERM]
+}
+
+/// Nothing that a signal's handler writes to.
+pub struct Bell;
+
+/// Wait by looking now and then.
+pub struct Ear;
+
+/// Both ends of a wake.
+///
+/// # Errors
+/// None.
+pub fn bell() -> io::Result<(Bell, Ear)> {
+    Ok((Bell, Ear))
+}
+
+impl Bell {
+    /// Does nothing: the thread looks by itself.
+    ///
+    /// # Errors
+    /// None.
+    pub fn rings_for(&self, _: i32) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Ear {
+    /// Waits for a moment.
+    pub fn wait(&mut self) {
+        thread::sleep(LOOK);
+    }
+}
