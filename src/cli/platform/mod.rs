@@ -6,9 +6,9 @@
 #[cfg(unix)]
 mod unix;
 #[cfg(unix)]
-pub use unix::{Bell, Ear, bell, is_fifo, own_output, signals};
+pub use unix::{Ear, bell, is_fifo, own_output, signals};
 
 #[cfg(not(unix))]
 mod other;
 #[cfg(not(unix))]
-pub use other::{Bell, Ear, bell, is_fifo, own_output, signals};
+pub use other::{Ear, bell, is_fifo, own_output, signals};
