@@ -2,14 +2,14 @@
 
 use std::fs;
 use std::io::Write;
-use std::net::{TcpStream, UdpSocket};
+use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
 use serde_json::Value;
 
-const SCENE: &str = r#"
+pub(super) const SCENE: &str = r#"
 name = "live"
 start = 2010-07-01T08:06:00
 duration_s = 1.2
@@ -24,22 +24,22 @@ js_db = 3
 /// A place 520 m above 48.1° north, 11.6° east, ECEF.
 const PLACE_M: [f64; 3] = [4_180_876.0, 858_201.0, 4_724_554.0];
 
-struct Bench {
-    directory: tempfile::TempDir,
+pub(super) struct Bench {
+    pub directory: tempfile::TempDir,
 }
 
 impl Bench {
-    fn new() -> Self {
+    pub fn new() -> Self {
         let directory = tempfile::tempdir().unwrap();
         fs::write(directory.path().join("scene.toml"), SCENE).unwrap();
         Self { directory }
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub fn path(&self, name: &str) -> PathBuf {
         self.directory.path().join(name)
     }
 
-    fn start(&self, arguments: &[&str]) -> Child {
+    pub fn start(&self, arguments: &[&str]) -> Child {
         Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
             .current_dir(self.directory.path())
             .args(["live", "scene.toml"])
@@ -52,7 +52,7 @@ impl Bench {
     }
 
     /// The bytes that a record's replay makes.
-    fn replayed(&self, record: &str) -> Vec<u8> {
+    pub fn replayed(&self, record: &str) -> Vec<u8> {
         let scene = format!("{record}/replay.toml");
         let done = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
             .current_dir(self.directory.path())
@@ -64,7 +64,7 @@ impl Bench {
     }
 }
 
-fn summary(path: &Path) -> Value {
+pub(super) fn summary(path: &Path) -> Value {
     serde_json::from_str(&fs::read_to_string(path.join("live.json")).unwrap()).unwrap()
 }
 
@@ -137,6 +137,20 @@ fn a_rig_with_a_zero_of_its_own_turns_the_body_and_the_record_replays() {
     let (motion, fresh, said) = offset(&[], SCENE);
     assert!(motion["offset_s"].is_null() && fresh == 0, "{motion}");
     assert!(motion["attitudes_not_used"].as_u64().unwrap() >= 100 && said.contains("[attitude] kind"), "{said}");
+}
+
+/// A listener of a child: its address, and what it says after that.
+pub(super) fn listener(child: &mut Child, what: &str) -> (String, std::thread::JoinHandle<String>) {
+    let mut stderr = std::io::BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    let address = loop {
+        line.clear();
+        assert!(std::io::BufRead::read_line(&mut stderr, &mut line).unwrap() > 0, "ended before it listened");
+        if let Some((_, address)) = line.trim().split_once(what) {
+            break address.to_owned();
+        }
+    };
+    (address, std::thread::spawn(move || std::io::read_to_string(&mut stderr).unwrap()))
 }
 
 #[test]
@@ -235,96 +249,6 @@ fn a_killed_run_leaves_a_record_that_replays_and_the_next_run_keeps_it() {
         assert!(errors(&done).contains(kept), "{}", errors(&done));
         assert!(bench.replayed(kept) == replayed && !unfinished.exists(), "{kept}");
     }
-}
-
-/// A listener of a child: its address, and what it says after that.
-fn listener(child: &mut Child, what: &str) -> (String, std::thread::JoinHandle<String>) {
-    let mut stderr = std::io::BufReader::new(child.stderr.take().unwrap());
-    let mut line = String::new();
-    let address = loop {
-        line.clear();
-        assert!(std::io::BufRead::read_line(&mut stderr, &mut line).unwrap() > 0, "ended before it listened");
-        if let Some((_, address)) = line.trim().split_once(what) {
-            break address.to_owned();
-        }
-    };
-    (address, std::thread::spawn(move || std::io::read_to_string(&mut stderr).unwrap()))
-}
-
-#[test]
-fn a_receiver_that_reconnects_goes_on_with_the_same_run() {
-    let bench = Bench::new();
-    fs::write(bench.path("scene.toml"), SCENE.replace("1.2", "3")).unwrap();
-    for clock in ["sink", "host"] {
-        let mut child = bench.start(&["--clock", clock, "--to", "tcp:0", "--record", clock]);
-        let (address, said) = listener(&mut child, "listening on ");
-        let take = |count: usize| {
-            let mut client = TcpStream::connect(&address).unwrap();
-            let mut bytes = vec![0; count];
-            std::io::Read::read_exact(&mut client, &mut bytes).unwrap();
-            (client, bytes)
-        };
-        let (client, first) = take(520_000);
-        drop(client);
-        let (mut client, mut rest) = take(52_000);
-        std::io::Read::read_to_end(&mut client, &mut rest).unwrap();
-        drop(client);
-        let said = said.join().unwrap();
-        assert!(child.wait().unwrap().success(), "{said}");
-        let made = summary(&bench.path(clock));
-        assert_eq!((&made["ended_by"], &made["clients_left"]), (&"scene".into(), &1.into()), "{made}");
-        // The record has all of it; each client has a part without gaps, the second to the end.
-        let all = bench.replayed(clock);
-        assert_eq!(all.len(), 2 * 7_800_000);
-        assert!(all.starts_with(&first) && all.ends_with(&rest), "{clock}");
-        assert!(said.contains("left after"), "{said}");
-        let lost = made["lost_blocks"].as_u64().unwrap();
-        assert!(if clock == "sink" { lost == 1 } else { lost < 300 }, "{made}");
-    }
-    // Where nobody is to come back, the run ends with the client.
-    let mut child = bench.start(&["--to", "tcp:0", "--reconnect", "0"]);
-    let (address, said) = listener(&mut child, "listening on ");
-    drop(TcpStream::connect(address).unwrap());
-    assert_eq!(child.wait().unwrap().code(), Some(74), "{}", said.join().unwrap());
-}
-
-#[test]
-fn without_free_descriptors_a_listener_rests_and_then_takes_the_rig() {
-    let bench = Bench::new();
-    fs::write(bench.path("scene.toml"), SCENE.replace("1.2", "3600")).unwrap();
-    // 16 clients are kept at one time, and the program has some 10 files of its own.
-    let run = format!(
-        "ulimit -n 24; exec {} live scene.toml --clock host --motion tcp:0 --record run",
-        env!("CARGO_BIN_EXE_gnss-twin")
-    );
-    let mut command = Command::new("bash");
-    command.current_dir(bench.directory.path()).args(["-c", &run]);
-    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-    let (address, said) = listener(&mut child, "listening on ");
-    // By then all its files are open.
-    while !bench.path("run.unfinished/replay.toml").is_file() {
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    let silent: Vec<TcpStream> = (0..20).map(|_| TcpStream::connect(&address).unwrap()).collect();
-    std::thread::sleep(Duration::from_secs(1));
-    // The thread that listens: a try each 0.1 s, where one without a pause would have used all of a second.
-    let tasks = fs::read_dir(format!("/proc/{}/task", child.id())).unwrap().map(|task| task.unwrap().path());
-    let listens = |task: &PathBuf| fs::read_to_string(task.join("comm")).is_ok_and(|name| name.trim() == "motion");
-    let task = tasks.into_iter().find(listens).unwrap();
-    let about = fs::read_to_string(task.join("stat")).unwrap();
-    // User and system time are words 14 and 15, and the name is the second; 100 a second.
-    let times = about.rsplit(')').next().unwrap().split_whitespace().skip(11).take(2);
-    assert!(times.map(|time| time.parse::<u64>().unwrap()).sum::<u64>() < 30, "{about}");
-    drop(silent);
-    let mut rig = TcpStream::connect(&address).unwrap();
-    std::thread::sleep(Duration::from_millis(500));
-    rig.write_all(b"jammer 1 off\n").unwrap();
-    std::thread::sleep(Duration::from_millis(500));
-    let id = child.id().to_string();
-    assert!(Command::new("kill").args(["-s", "INT", &id]).status().unwrap().success());
-    let said = (child.wait().unwrap(), said.join().unwrap()).1;
-    assert!(said.contains("cannot take a client"), "{said}");
-    assert_eq!(summary(&bench.path("run"))["events"]["applied"], 1, "{said}");
 }
 
 #[test]
