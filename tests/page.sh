@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Pages in Chromium: the report of a run whose scene has the name of a script, that of a foreign receiver, and a live run.
+# Pages in Chromium: the report of a run whose scene has the name of a script, that of a foreign receiver, that of a study, and a live run.
 #
 # usage: tests/page.sh [GNSS_TWIN_BINARY]     (default: target/release/gnss-twin)
 # needs: Node.js with npm; chromium, which is installed on Debian where it is missing
-# exit:  0 every law of page.mjs and live.mjs holds on each page
+# exit:  0 every law of page.mjs, study.mjs and live.mjs holds on each page
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 twin=$(realpath "${1:-$root/target/release/gnss-twin}")
@@ -12,8 +12,9 @@ trap 'rm -rf "$work"' EXIT
 
 command -v chromium >/dev/null || { apt-get update -qq && apt-get install -y -qq chromium >/dev/null; }
 # The lock file names each package with its hash.
-cp "$root"/tests/page/{package.json,package-lock.json,browser.mjs,page.mjs,live.mjs} "$work/"
+cp "$root"/tests/page/{package.json,package-lock.json,browser.mjs,laws.mjs,page.mjs,study.mjs,live.mjs} "$work/"
 cd "$work"
+if [ -n "${SHOTS:-}" ]; then mkdir -p "$SHOTS"/{foreign,study}; fi
 npm ci --silent --no-audit --no-fund
 
 # Satellites' messages are complete after 36 s; some fixes follow. A run's files may be another's: the name and the text of the scene
@@ -34,6 +35,65 @@ size=$(stat -c %s run/report.html)
 # The run's own records, judged as another receiver's.
 "$twin" analyze --truth run/truth --rinex-obs run/rx/observations.rnx --nmea run/rx/fixes.nmea --out foreign --quiet
 node page.mjs foreign/foreign_report.html ${SHOTS:+--shots "$SHOTS/foreign"}
+
+# A study in words that are scripts: a map of 21 cells, curves beside theory and a crossing.
+cat >study.toml <<END
+name = "page"
+title = "$name"
+about = "</script><img src=x onerror=alert(2)> & words of others."
+level = "correlator"
+seed = 1
+repetitions = 3
+keep = ["code_sigma_m", "phase_sigma_deg"]
+
+[measure]
+settle_s = 1
+duration_s = 4
+
+[[axis]]
+key = "receiver.tracking.spacing_chips"
+values = [0.25, 0.5, 1.0]
+label = "<b>spacing</b> (chips)"
+
+[[axis]]
+key = "signal.cn0_dbhz"
+from = 30
+to = 48
+step = 3
+label = "C/N0 (dB-Hz)"
+
+[[plot]]
+kind = "heat"
+title = "<script>alert(3)</script> code jitter"
+x = "signal.cn0_dbhz"
+y = "receiver.tracking.spacing_chips"
+z = "code_sigma_m"
+log_y = true
+
+[[plot]]
+title = "Code jitter"
+x = "signal.cn0_dbhz"
+y = "code_sigma_m"
+series = "receiver.tracking.spacing_chips"
+log_y = true
+
+[[plot]]
+title = "Phase jitter"
+x = "signal.cn0_dbhz"
+y = "phase_sigma_deg"
+series = "receiver.tracking.spacing_chips"
+
+[[plot]]
+kind = "crossing"
+title = "C/N0 at which the code's jitter is 1 m"
+x = "receiver.tracking.spacing_chips"
+along = "signal.cn0_dbhz"
+z = "code_sigma_m"
+level = 1.0
+END
+"$twin" study study.toml --out study --report html >study.log
+[ ! -e study/report.pdf ] || { echo "page: --report html wrote a PDF" >&2; exit 1; }
+node study.mjs study/report.html --title "$name" --cells 21 ${SHOTS:+--shots "$SHOTS/study"}
 
 # A live run, and its receiver on the same page.
 cat >live.toml <<END

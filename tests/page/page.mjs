@@ -4,49 +4,15 @@
 // exit:  0 if every law holds; 1 with the first that does not
 
 import assert from "node:assert/strict";
-import { statSync } from "node:fs";
-import { join, resolve } from "node:path";
-import { pathToFileURL } from "node:url";
-import { inked, open } from "./browser.mjs";
+import { coloured, drawn, ended, printed, report, small, ticked } from "./laws.mjs";
 
 const [file, ...options] = process.argv.slice(2);
 const option = (name) => (options.includes(name) ? options[options.indexOf(name) + 1] : undefined);
-const title = option("--title"), shots = option("--shots"), url = pathToFileURL(resolve(file)).href;
-const { page, faults, requests, shot, close } = await open(shots);
-
-// Views of all plots; `linked` ones share the axis of time.
-const views = () => page.evaluate(() => [...document.querySelectorAll(".plot")].filter((root) => root.plot.view)
-  .map(({ plot }) => ({ title: plot.chart.title, linked: plot.linked, x: [...plot.view.x], y: [...plot.view.y] })));
-const settled = () => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+const it = await report(file, { title: option("--title"), shots: option("--shots") });
+const { page, shot, views, settled } = it;
 const same = (a, b) => a.every((value, n) => Math.abs(value - b[n]) < 1e-9);
-
-// ---- It opens, alone ----
-
-const begun = performance.now();
-await page.goto(url);
-await settled();
-const opened = performance.now() - begun;
-assert.equal(faults.join("\n"), "", "errors on the console");
-const first = await page.evaluate(() => ({
-  title: document.title, heading: document.querySelector("h1").textContent, scripts: document.scripts.length,
-  images: document.images.length, banner: document.querySelector(".banner").textContent,
-}));
-if (title) assert.deepEqual([first.title, first.heading], [title, title], "the title is text, whatever is in it");
-assert.deepEqual([first.scripts, first.images], [2, 0], "no element comes from a file");
-await shot("first");
-
-// ---- Everything is drawn ----
-
-const count = await page.locator(".plot").count();
-const plots = await views();
+const plots = await views(), count = await drawn(it);
 assert.ok(count >= 5 && plots.length >= 4, `${count} plots`);
-for (let at = 0; at < count; at += 1) {
-  await page.locator(".plot").nth(at).scrollIntoViewIfNeeded();
-  await settled();
-  const { coloured, other, all } = await page.locator(".plot canvas.base").nth(at).evaluate(inked);
-  const name = await page.locator(".plot .plot-title").nth(at).textContent();
-  assert.ok(other > 0.005 * all && coloured > 30, `${name}: ${other} of ${all} pixels drawn, ${coloured} coloured`);
-}
 
 // ---- The wheel moves all axes of time, and no other ----
 
@@ -189,68 +155,10 @@ await controls.getByLabel("failed or marginal only").uncheck();
 if (grouped) await controls.getByLabel("by group").uncheck();
 assert.equal(await rows(), full);
 
-// ---- Colours ----
+// ---- What holds for every report ----
 
-const luminance = (rgb) => {
-  const [r, g, b] = rgb.map((value) => (value / 255 <= 0.04045 ? value / 255 / 12.92 : ((value / 255 + 0.055) / 1.055) ** 2.4));
-  return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-};
-for (const scheme of ["light", "dark"]) {
-  await page.emulateMedia({ colorScheme: scheme });
-  await settled();
-  const colours = await page.evaluate(() => {
-    const style = getComputedStyle(document.documentElement);
-    const rgb = (name) => [1, 3, 5].map((at) => parseInt(style.getPropertyValue(`--${name}`).trim().slice(at, at + 2), 16));
-    return [["ink", "ground"], ["faint", "ground"], ["accent", "ground"], ["good", "ground"], ["caution", "ground"],
-      ["bad", "ground"], ["good", "good-ground"], ["caution", "caution-ground"], ["bad", "bad-ground"], ["faint", "panel"]]
-      .map(([words, ground]) => [words, ground, rgb(words), rgb(ground)]);
-  });
-  for (const [words, ground, a, b] of colours) {
-    const [high, low] = [luminance(a), luminance(b)].sort((x, y) => y - x);
-    // WCAG 2.2, 1.4.3.
-    assert.ok((high + 0.05) / (low + 0.05) >= 4.5, `${scheme}: ${words} on ${ground} ${(high + 0.05) / (low + 0.05)}`);
-  }
-  const ground = await page.evaluate(() => {
-    const { base } = document.querySelector(".plot").plot;
-    return [...base.getContext("2d").getImageData(1, 1, 1, 1).data];
-  });
-  assert.equal(ground[0] > 128, scheme === "light", `plots in ${scheme} colours: ${ground}`);
-  await page.evaluate(() => scrollTo(0, 0));
-  await settled();
-  await shot(`top_${scheme}`);
-}
-
-// ---- Paper ----
-
-const A4 = { width: 688, height: 1016 }; // pixels of 1/96 inch within margins of 14 mm
-await page.setViewportSize(A4);
-await page.emulateMedia({ media: "print", colorScheme: "dark" });
-await page.evaluate(() => dispatchEvent(new Event("beforeprint")));
-await settled();
-const cut = await page.evaluate(({ width, height }) => [...document.querySelectorAll(".plot")].flatMap((root) => {
-  const { left, right, height: tall } = root.getBoundingClientRect(), style = getComputedStyle(root);
-  const pixel = root.plot.base.getContext("2d").getImageData(1, 1, 1, 1).data;
-  const whole = left >= -1 && right <= width + 1 && tall < height && style.breakInside === "avoid" && pixel[0] === 255;
-  return whole ? [] : [`${root.textContent}: ${left} to ${right}, ${tall} high, ${style.breakInside}, ground ${pixel[0]}`];
-}), A4);
-assert.deepEqual(cut, [], "plots are whole on paper");
-const hidden = await page.evaluate(() => [...document.querySelectorAll("nav, .controls")].every((one) => one.offsetHeight === 0));
-assert.ok(hidden, "controls are not printed");
-await page.evaluate(() => dispatchEvent(new Event("afterprint")));
-const paper = await page.pdf({ preferCSSPageSize: true, ...(shots ? { path: join(shots, "print.pdf") } : {}) });
-assert.ok(paper.length > 50_000);
-
-// ---- A small screen ----
-
-await page.emulateMedia({ media: "screen", colorScheme: "light" });
-await page.setViewportSize({ width: 390, height: 800 });
-await settled();
-const wide = await page.evaluate(() => document.documentElement.scrollWidth);
-assert.ok(wide <= 391, `the page is ${wide} wide on a screen of 390`);
-await shot("phone");
-
-assert.equal(faults.join("\n"), "", "errors on the console");
-assert.deepEqual([...new Set(requests)].filter((one) => one !== url), [], "no request but for the file");
-await close();
-const kilobytes = Math.round(statSync(file).size / 1000);
-console.log(`${file}: ${kilobytes} kB, open and drawn after ${Math.round(opened)} ms, ${count} plots, ${linked.length} linked, ${full} rows judged`);
+await ticked(it);
+await coloured(it);
+await printed(it);
+await small(it);
+console.log(`${await ended(it)}, ${count} plots, ${linked.length} linked, ${full} rows judged`);

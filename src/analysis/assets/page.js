@@ -53,49 +53,77 @@
 
   // Ticks at whole multiples of 1, 2 or 5 times a power of ten, at least two; labels have the step's decimals.
   function linearTicks(from, to, most) {
-    let best = [];
+    let best = [[], 0];
     for (let power = Math.floor(Math.log10((to - from) / most)) - 1; ; power += 1) {
       for (const unit of [1, 2, 5]) {
         const step = unit * 10 ** power;
         const first = Math.ceil(from / step - 1e-6), last = Math.floor(to / step + 1e-6);
         // The last step with two ticks stands where the next has fewer.
-        if (last <= first) return best;
-        best = Array.from({ length: last - first + 1 }, (_, n) =>
-          ({ at: (first + n) * step, label: multiple((first + n) * unit, power) }));
-        if (best.length <= most) return best;
+        if (!(last > first)) return labelled(...best);
+        best = [Array.from({ length: last - first + 1 }, (_, n) => (first + n) * unit), power];
+        if (last - first < most) return labelled(...best);
       }
     }
   }
 
-  // The number units·10^power with the digits that it has.
-  function multiple(units, power) {
-    const value = units * 10 ** power;
+  // Characters of a label that fit beside an axis, and digits of a label with an exponent.
+  const MOST_CHARACTERS = 7, MOST_DIGITS = 3;
+
+  // Ticks at numbers of units of 10^power; where many digits are common to all, labels count from an offset.
+  function labelled(units, power) {
+    const ticks = (labels) => units.map((count, n) => ({ at: count * 10 ** power, label: labels[n] }));
+    const isLong = (counts) => counts.some((count) => plain(Math.abs(count), power).length > MOST_CHARACTERS);
+    const words = (counts) => {
+      const written = isLong(counts) ? scientific : plain;
+      return counts.map((count) => written(count, power));
+    };
+    const digits = Math.max(...units.map((count) => String(Math.abs(count)).length));
+    if (!isLong(units) || digits <= MOST_DIGITS) return { ticks: ticks(words(units)) };
+    // The roundest number below the first tick from which the others are few digits away.
+    const round = 10 ** String(units[units.length - 1] - units[0]).length;
+    const offset = Math.floor(units[0] / round) * round;
+    const text = plain(Math.abs(offset), power).length > 2 * MOST_CHARACTERS ? scientific(offset, power)
+      : plain(offset, power).replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "");
+    return { ticks: ticks(words(units.map((count) => count - offset))), offset: text };
+  }
+
+  // The number units·10^power, without and with an exponent.
+  const plain = (units, power) => (units * 10 ** power).toFixed(Math.max(0, -power)).replace("-", "−");
+  function scientific(units, power) {
     if (units === 0) return "0";
-    const digits = String(Math.abs(units)).length;
-    if (power < -7 || Math.abs(value) >= 1e7) return value.toExponential(digits - 1).replace("-", "−");
-    return value.toFixed(Math.max(0, -power)).replace("-", "−");
+    return (units * 10 ** power).toExponential(String(Math.abs(units)).length - 1).replace(/\.?0*e\+?/, "e").replaceAll("-", "−");
   }
+  const multiple = (units, power) => labelled([units], power).ticks[0].label;
 
-  // Ticks of an axis whose numbers are common logarithms.
+  // Ticks of an axis whose numbers are common logarithms: 1, 2 and 5 in each decade, or decades as far apart as `most` needs. A short
+  // axis has those of a linear one.
   function logarithmicTicks(from, to, most) {
-    const ticks = [];
-    const stride = Math.max(1, Math.ceil((to - from) / most));
-    const factors = to - from > 2.5 ? [1] : [1, 2, 5];
-    for (let decade = Math.floor(from); decade <= to; decade += 1) {
-      if (decade % stride) continue;
-      for (const factor of factors) {
-        const at = decade + Math.log10(factor);
-        if (at >= from - 1e-9 && at <= to + 1e-9) ticks.push({ at, label: multiple(factor, decade) });
+    const of = (factors, stride) => {
+      const ticks = [];
+      for (let decade = Math.floor(from / stride) * stride; decade <= to; decade += stride) {
+        for (const factor of factors) {
+          const at = decade + Math.log10(factor);
+          if (at >= from - 1e-9 && at <= to + 1e-9) ticks.push({ at, label: multiple(factor, decade) });
+        }
       }
+      return ticks;
+    };
+    let best = null;
+    for (const [factors, stride] of [[[1, 2, 5], 1], [[1, 3], 1], ...[1, 2, 3, 5, 10, 20, 50, 100].map((stride) => [[1], stride])]) {
+      const ticks = of(factors, stride);
+      if (ticks.length < 2) break;
+      best = { ticks };
+      if (ticks.length <= most) return best;
     }
-    if (ticks.length > 1) return ticks;
-    return linearTicks(from, to, most).map(({ at }) => ({ at, label: (10 ** at).toPrecision(3) }));
+    if (best) return best;
+    const linear = linearTicks(10 ** from, 10 ** to, most);
+    return { ...linear, ticks: linear.ticks.map(({ at, label }) => ({ at: Math.log10(at), label })) };
   }
 
   function namedTicks(names, [from, to], most) {
     const seen = names.filter(([at]) => at >= from && at <= to);
     const stride = Math.ceil(seen.length / Math.max(most, 2));
-    return seen.filter((_, n) => n % stride === 0).map(([at, label]) => ({ at, label }));
+    return { ticks: seen.filter((_, n) => n % stride === 0).map(([at, label]) => ({ at, label })) };
   }
 
   function ticksOf(axis, [from, to], most) {
@@ -150,8 +178,8 @@
     const canvas = element("canvas", { width: 28, height: 28, ariaHidden: "true" });
     const pen = canvas.getContext("2d");
     pen.scale(2, 2);
-    pen.fillStyle = pen.strokeStyle = ink(series.colour);
     const { mark } = series;
+    pen.fillStyle = pen.strokeStyle = mark.tile ? series.colour : ink(series.colour);
     if (mark.line) {
       pen.lineWidth = 2;
       pen.setLineDash(mark.line.map((length) => length / 2));
@@ -290,31 +318,33 @@
       const up = chart.y.names ? 40 : Math.max(2, Math.floor(box.h / 34));
       pen.textAlign = "center";
       pen.textBaseline = "top";
-      for (const { at, label } of ticksOf(chart.x, this.view.x, across)) {
-        const x = Math.round(this.toX(at)) + 0.5;
+      const [x, y] = [ticksOf(chart.x, this.view.x, across), ticksOf(chart.y, this.view.y, up)];
+      for (const { at, label } of x.ticks) {
+        const place = Math.round(this.toX(at)) + 0.5;
         pen.strokeStyle = colours.grid;
-        pen.beginPath(); pen.moveTo(x, box.y); pen.lineTo(x, box.y + box.h); pen.stroke();
+        pen.beginPath(); pen.moveTo(place, box.y); pen.lineTo(place, box.y + box.h); pen.stroke();
         pen.fillStyle = colours.faint;
-        pen.fillText(label, x, box.y + box.h + 5);
+        pen.fillText(label, place, box.y + box.h + 5);
       }
       pen.textAlign = "right";
       pen.textBaseline = "middle";
-      for (const { at, label } of ticksOf(chart.y, this.view.y, up)) {
-        const y = Math.round(this.toY(at)) + 0.5;
+      for (const { at, label } of y.ticks) {
+        const place = Math.round(this.toY(at)) + 0.5;
         pen.strokeStyle = colours.grid;
-        pen.beginPath(); pen.moveTo(box.x, y); pen.lineTo(box.x + box.w, y); pen.stroke();
+        pen.beginPath(); pen.moveTo(box.x, place); pen.lineTo(box.x + box.w, place); pen.stroke();
         pen.fillStyle = colours.faint;
-        pen.fillText(label, box.x - 6, y);
+        pen.fillText(label, box.x - 6, place);
       }
       pen.fillStyle = colours.ink;
       pen.textAlign = "center";
       pen.textBaseline = "bottom";
-      pen.fillText(chart.x.label, box.x + box.w / 2, this.height - 2);
+      const words = (axis, { offset }) => (offset === undefined ? axis.label : `${axis.label}, counted from ${offset}`);
+      pen.fillText(words(chart.x, x), box.x + box.w / 2, this.height - 2);
       pen.save();
       pen.translate(11, box.y + box.h / 2);
       pen.rotate(-Math.PI / 2);
       pen.textBaseline = "middle";
-      pen.fillText(chart.y.label, 0, 0, box.h);
+      pen.fillText(words(chart.y, y), 0, 0, box.h);
       pen.restore();
     }
 
@@ -787,7 +817,7 @@
       return button;
     };
     const names = [...known.values()].flatMap((satellite) => satellite.names);
-    const bar = element("div", { className: "controls satellites", role: "group", ariaLabel: "Satellites" },
+    const bar = element("div", { className: "controls legend satellites", role: "group", ariaLabel: "Satellites" },
       action("all", () => { names.forEach((name) => off.delete(name)); refresh(); }),
       action("none", () => { names.forEach((name) => off.add(name)); refresh(); }),
       action("reset zoom", () => plots.forEach((plot) => plot.reset())));
@@ -823,11 +853,17 @@
       for (const chart of figure.charts) plots.push(new Plot(figure, chart, holder));
       const own = figure.legend.filter((entry) => entry.name !== "" && !isSatellite(entry.name));
       if (own.length === 0) continue;
-      const key = (entry) => figure.charts.flatMap((chart) => chart.series)
-        .filter((series) => series.colour === entry.colour && sameMark(series.mark, entry.mark))
-        .map((series) => `${figure.name}|${series.colour}|${JSON.stringify(series.mark)}`);
-      const legend = element("div", { className: "controls", role: "group", ariaLabel: "Series" });
-      own.forEach((entry) => legend.append(toggle(entry, [...new Set(key(entry))])));
+      const all = figure.charts.flatMap((chart) => chart.series);
+      // An entry names the series of its look or, in a colour of none, all of its kind of mark.
+      const keys = (entry) => {
+        const own = all.filter((series) => series.colour === entry.colour && sameMark(series.mark, entry.mark));
+        const kind = Object.keys(entry.mark)[0], named = own.length > 0 ? own : all.filter((series) => kind in series.mark);
+        return [...new Set(named.map((series) => `${figure.name}|${series.colour}|${JSON.stringify(series.mark)}`))];
+      };
+      const legend = element("div", { className: "controls legend", role: "group", ariaLabel: "Series" });
+      // Colours of a map's values are a scale, and no series can be switched off by them.
+      own.forEach((entry) => legend.append(entry.mark.tile || keys(entry).length === 0
+        ? element("span", { className: "step" }, swatch(entry), entry.name) : toggle(entry, keys(entry))));
       holder.after(legend);
     }
     const times = plots.filter((plot) => plot.linked).map((plot) => plot.home.x);
