@@ -63,8 +63,11 @@ impl Report {
     fn page(&self, scripts: &[&str], rule: &str) -> (String, String) {
         let mut data = Data::default();
         let (overview, chapters) = self.chapters();
-        let (plots, words): (Vec<&Chapter<'_>>, Vec<&Chapter<'_>>) =
-            chapters.iter().partition(|chapter| chapter.items.iter().all(|item| matches!(item, Item::Figure(_))));
+        let is_of_figures = |chapter: &&Chapter<'_>| {
+            let all = chapter.items.iter().all(|item| matches!(item, Item::Figure(_) | Item::Note(_)));
+            all && chapter.items.iter().any(|item| matches!(item, Item::Figure(_)))
+        };
+        let (plots, words): (Vec<&Chapter<'_>>, Vec<&Chapter<'_>>) = chapters.iter().partition(is_of_figures);
         let mut body = Writer::new(&mut data);
         body.section("Overview", &overview);
         if !plots.is_empty() {

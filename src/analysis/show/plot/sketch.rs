@@ -1,7 +1,7 @@
 //! Content of pictures before they are drawn: charts with no more points than the eye can resolve.
 
 use super::canvas::compose;
-use super::chart::{Chart, Series};
+use super::chart::{Chart, Mark, Series};
 use super::dome::Sky;
 use super::drawing::{Drawing, Failure};
 
@@ -49,6 +49,17 @@ impl Sketch {
         Self::Charts { size, columns, charts, legend }
     }
 
+    /// True if the picture has data. Crosses, which are true places, and lines between two points, which are
+    /// limits, are none.
+    pub fn has_data(&self) -> bool {
+        let Self::Charts { charts, .. } = self else { return true };
+        charts.iter().flat_map(|chart| &chart.series).any(|series| match series.mark {
+            Mark::Cross => false,
+            mark if mark.is_line() => series.points.len() > 2,
+            _ => !series.points.is_empty(),
+        })
+    }
+
     /// The picture.
     ///
     /// # Errors
@@ -86,7 +97,7 @@ impl Figure {
 
 #[cfg(test)]
 mod tests {
-    use super::super::chart::{Axis, BLUE, Mark, ORANGE};
+    use super::super::chart::{Axis, BLUE, ORANGE};
     use super::*;
 
     #[test]
@@ -122,5 +133,19 @@ mod tests {
         let names: Vec<(&str, Mark)> = legend.iter().map(|entry| (entry.name.as_str(), entry.mark)).collect();
         assert_eq!(names, [("line", Mark::Line), ("dots", Mark::Dots)]);
         assert_eq!(legend[0].colour, BLUE);
+    }
+
+    #[test]
+    fn limits_and_true_places_are_no_data() {
+        let axis = || Axis::new("", (0.0, 1.0));
+        let of = |series: Vec<Series>| Sketch::charts((100, 100), 1, [Chart::new("", axis(), axis(), series)], []);
+        let line = |count: i32| (0..count).map(|n| (f64::from(n), 0.5)).collect::<Vec<_>>();
+        let frame =
+            || vec![Series::new("limit", BLUE, Mark::Dash, line(2)), Series::new("truth", BLUE, Mark::Cross, line(1))];
+        assert!(!of(frame()).has_data() && !of(Vec::new()).has_data());
+        for (mark, count) in [(Mark::Line, 3), (Mark::Dots, 1), (Mark::Bars(1.0), 1)] {
+            let with = |count| [frame(), vec![Series::new("", ORANGE, mark, line(count))]].concat();
+            assert!(of(with(count)).has_data() && !of(with(0)).has_data(), "{mark:?}");
+        }
     }
 }

@@ -61,7 +61,13 @@ impl RunReport {
             Figure::new("front_sky", sky, "").map_err(failed)?,
             Figure::new("front_errors", errors, "").map_err(failed)?,
         ];
-        self.report.items.splice(self.figures..self.figures, figures.into_iter().map(Item::Figure));
+        // A run that was too short for a fix has nothing to show in half of its pictures.
+        let (figures, empty): (Vec<Figure>, Vec<Figure>) =
+            figures.into_iter().partition(|figure| figure.sketch.has_data());
+        let names: Vec<&str> = empty.iter().map(|figure| figure.name.as_str()).collect();
+        let note = (!names.is_empty())
+            .then(|| Item::Note(format!("Left out, because this run has no data for them: {}.", names.join(", "))));
+        self.report.items.splice(self.figures..self.figures, figures.into_iter().map(Item::Figure).chain(note));
         self.report.items.insert(front, Item::Pair(Box::new(pair)));
         publish(&self.report, &directory.join("report"), forms)
     }
