@@ -55,8 +55,9 @@ def row_of(figure, old):
     commit = made.commit or (make.head_commit(figure.rooms) if figure.rooms else "")
     if old and made.commit == old["commit"] and rooms == old["rooms"]:
         code = old["digest"]
-    elif made.commit and not made.commit.endswith("+") and made.commit != make.head_commit():
-        code = digest_at(made.commit, figure.rooms)
+    elif made.commit and made.commit.rstrip("+") != make.head_commit().rstrip("+"):
+        # Of a tree with changes its commit is the nearest that is known.
+        code = digest_at(made.commit.rstrip("+"), figure.rooms)
     else:
         code = digest.of(make.ROOT, figure.rooms) if figure.rooms else ""
     today = str(datetime.datetime.now(datetime.timezone.utc).date()) if figure.rooms else ""

@@ -1,4 +1,4 @@
-//! Differences between operating systems: FIFOs, signals that wake a thread, and a standard output of one's own.
+//! Differences between systems: FIFOs, signals that wake a thread, and a standard output of one's own.
 //!
 //! Unix has all of it. On Windows a thread looks for signals now and then, and no file is a FIFO.
 //! `.ci/long` compiles the program for Windows; nobody has run it there.
