@@ -49,8 +49,8 @@ impl Sketch {
         Self::Charts { size, columns, charts, legend }
     }
 
-    /// True if the picture has data. Crosses, which are true positions, and lines between two points, which are
-    /// limits, are none.
+    /// True if the picture has data. Crosses, which are true positions, and lines between two points, which
+    /// are limits, are none.
     pub fn has_data(&self) -> bool {
         let Self::Charts { charts, .. } = self else { return true };
         charts.iter().flat_map(|chart| &chart.series).any(|series| match series.mark {
