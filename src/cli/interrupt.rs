@@ -10,14 +10,11 @@ use std::sync::Arc;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread;
-use std::time::Duration;
 
 use crate::cli::error::CliError;
-use crate::cli::platform::{self, Ear};
+use crate::cli::platform::{self, Ear, LOOK};
 use analysis::show::staged;
 
-/// Polling interval of who waits for the end of the process.
-const LOOK: Duration = Duration::from_millis(50);
 /// Stack size of that thread.
 const STACK_BYTES: usize = 1 << 18;
 

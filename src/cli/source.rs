@@ -16,7 +16,7 @@ use std::time::Duration;
 use crate::cli::address::{connect, peer_address};
 use crate::cli::error::{CliError, shown};
 use crate::cli::interrupt;
-use crate::cli::platform;
+use crate::cli::platform::{self, LOOK};
 use crate::cli::scenario;
 use gnss::samples::IfMetadata;
 
@@ -175,8 +175,6 @@ impl Read for Stream {
 const BLOCK_BYTES: usize = 1 << 16;
 /// Number of blocks: 16 MiB together, which is 3 s of 8-bit samples at 2.6 Msps.
 const BLOCKS: usize = 256;
-/// Polling interval for signals while no data comes.
-const LOOK: Duration = Duration::from_millis(50);
 /// Stack of the thread that reads.
 const STACK_BYTES: usize = 1 << 18;
 

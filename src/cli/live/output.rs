@@ -9,6 +9,7 @@ use super::account::Handed;
 use super::ring::{Block, Ring};
 use crate::cli::args::{self, Clock};
 use crate::cli::error::CliError;
+use crate::cli::platform::LOOK;
 use crate::cli::scenario;
 use crate::cli::sink::{Sink, Spec};
 use gnss::time::Rate;
@@ -126,9 +127,6 @@ struct Work {
     first: bool,
     name: String,
 }
-
-/// Polling interval for another client.
-const LOOK: Duration = Duration::from_millis(50);
 
 impl Work {
     fn run(self, mut sink: Box<dyn Sink>) -> io::Result<()> {

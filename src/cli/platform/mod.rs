@@ -3,12 +3,20 @@
 //! Unix has all of it. On Windows a thread looks for signals now and then, and no file is a FIFO.
 //! `.ci/long` compiles the program for Windows; nobody has run it there.
 
+use std::time::Duration;
+
 #[cfg(unix)]
 mod unix;
 #[cfg(unix)]
 pub use unix::{Ear, bell, is_fifo, own_output, signals};
 
-#[cfg(not(unix))]
-mod other;
-#[cfg(not(unix))]
-pub use other::{Ear, bell, is_fifo, own_output, signals};
+#[cfg(windows)]
+mod windows;
+#[cfg(windows)]
+pub use windows::{Ear, bell, is_fifo, own_output, signals};
+
+#[cfg(not(any(unix, windows)))]
+compile_error!("the program runs on Unix and Windows; the library alone compiles with --no-default-features");
+
+/// Polling interval of a thread that waits for what cannot wake it.
+pub const LOOK: Duration = Duration::from_millis(50);

@@ -6,12 +6,10 @@ use std::os::fd::AsFd;
 use std::os::unix::fs::FileTypeExt;
 use std::os::unix::net::UnixStream;
 use std::thread;
-use std::time::Duration;
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
-/// Polling interval of a thread that cannot be woken.
-const LOOK: Duration = Duration::from_millis(50);
+use crate::cli::platform::LOOK;
 
 /// True if a file is a FIFO.
 pub fn is_fifo(about: &Metadata) -> bool {

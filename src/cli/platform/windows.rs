@@ -4,12 +4,10 @@ use std::fs::{File, Metadata};
 use std::io::{self, Stdout};
 use std::os::windows::io::AsHandle;
 use std::thread;
-use std::time::Duration;
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 
-/// Polling interval of the thread that waits for signals.
-const LOOK: Duration = Duration::from_millis(50);
+use crate::cli::platform::LOOK;
 
 /// True if a file is a FIFO: none is.
 pub fn is_fifo(_: &Metadata) -> bool {
