@@ -6,6 +6,7 @@ usage: tests/evidence.py                    checks markers, numbers without a so
        tests/evidence.py --list             lists ids that prose names and the ledger lacks, and numbers without a source
        tests/evidence.py --make [PREFIX…]   makes the figures whose ids begin so (all without one), and writes the ledger
        tests/evidence.py --compare [PREFIX…]   makes runs of scenes and counts, and compares them with the ledger
+       tests/evidence.py --confirm [STUDY…] makes some cases of studies with stale figures again: the page is today's where no digit differs
        tests/evidence.py --self-test        plants faults in a small repository; each must be reported
        GNSS_TWIN names the program that is measured.
 exit:  0 all as it must be; 1 not, each finding with its file, line and cure; 2 a wrong command line.
@@ -48,6 +49,10 @@ def main(arguments):
             return 0
         case ["--make", *prefixes]:
             return renew.make_all(FIGURES, prefixes)
+        case ["--confirm", *names]:
+            import confirm
+
+            return confirm.confirm(FIGURES, names)
         case ["--compare", *prefixes]:
             return renew.compare(FIGURES, prefixes)
     print(__doc__, file=sys.stderr)

@@ -219,7 +219,7 @@ def counts():
 
 def studies():
     page = "reports/studies/starts/report.md"
-    command = "\"$GNSS_TWIN\" study studies/starts.toml --out reports/studies/starts"
+    command = ".ci/reports starts"
     for name, row, unit, what in [
         ("first_fix_s", "position.first_fix_s", "s", "first fix"),
         ("first_horizontal_m", "first.horizontal_m", "m", "horizontal error of the first fix"),
@@ -245,14 +245,14 @@ def studies():
             ("pseudorange_rms_m", "pseudorange error, rms", "m", "observables.pseudorange_rms_m"),
         ]:
             yield Figure(f"studies.motions.{scene}.{name}", f"{what}, mean of five noises: {SCENES[scene]}", unit,
-                         make.Page("reports/studies/motions/report.md", "\"$GNSS_TWIN\" study studies/motions.toml --out reports/studies/motions", row=scene,
+                         make.Page("reports/studies/motions/report.md", ".ci/reports motions", row=scene,
                                    column=column, runs="5"), (*ALL_SAMPLES, "studies/motions.toml", f"scenarios/{scene}.toml"), "", 2)
     yield Figure("studies.starts.slips_per_hour.mean", "cycle slips an hour, mean of 200 starts", "",
                  make.Page(page, command, row="tracking.slips_per_hour", column="mean", runs="200"), (*ALL_SAMPLES, "studies/starts.toml"), "", 2)
     for column in ("mean", "low", "high"):
         words = {"mean": "mean of 40 starts", "low": "lower end of its 95 % interval", "high": "upper end of its 95 % interval"}[column]
         yield Figure(f"studies.starts_thermal.nees.{column}", f"normalised error squared of a run's last fix, {words}", "",
-                     make.Page("reports/studies/starts_thermal/report.md", "\"$GNSS_TWIN\" study studies/starts_thermal.toml --out reports/studies/starts_thermal",
+                     make.Page("reports/studies/starts_thermal/report.md", ".ci/reports starts_thermal",
                                row="broadcast.last_nees", column=column, runs="40"), (*ALL_SAMPLES, "studies/starts_thermal.toml"), "", 3)
     for study, figure, name in [
         ("pll_jitter", "phase_sigma_deg", ""), ("dll_jitter", "code_sigma_m", ""), ("pll_jitter_e1", "phase_sigma_deg", ""),
@@ -265,18 +265,18 @@ def studies():
         sampled = study == "pll_samples"
         rooms = (*(ALL_SAMPLES if sampled else ("src/receiver/track", "src/study")), f"studies/{study}.toml")
         pattern = rf"^{figure}: (\d+ of \d+) cells.*?\(ratios ([\d.]+ to [\d.]+)"
-        report, command = f"reports/studies/{study}/report.md", f"\"$GNSS_TWIN\" study studies/{study}.toml --out reports/studies/{study}"
+        report, command = f"reports/studies/{study}/report.md", f".ci/reports {study}"
         for part, group, words in [("cells", 1, "cells within 5 % of theory"), ("ratio", 2, "measured to theory, least to most")]:
             yield Figure(f"study.{study}.{name}{part}", f"study {study}, {figure}, T·C/N0 ≥ 10: {words}", "",
                          make.Page(report, command, pattern=pattern, text=rf"\{group}"), rooms)
     for study in ("boc_side_peaks", "stress_jerk", "stress_acceleration", "tracking_maps", "boost_samples"):
         rooms = ALL_SAMPLES if study == "boost_samples" else ("src/receiver/track", "src/study")
         yield Figure(f"study.{study}.cases", f"study {study}: cases measured", "",
-                     make.Page(f"reports/studies/{study}/report.md", f"\"$GNSS_TWIN\" study studies/{study}.toml --out reports/studies/{study}",
+                     make.Page(f"reports/studies/{study}/report.md", f".ci/reports {study}",
                                pattern=r" (\d+) cases: \d+ cells"), (*rooms, f"studies/{study}.toml"))
     for component in ("data", "pilot"):
         yield Figure(f"study.pilot_against_data.{component}_dbhz", f"C/N0 at which half of the runs hold a minute of Galileo E1 without a slip, {component}, 18 Hz",
-                     "dB-Hz", make.Page("reports/studies/pilot_against_data/report.md", "\"$GNSS_TWIN\" study studies/pilot_against_data.toml --out reports/studies/pilot_against_data",
+                     "dB-Hz", make.Page("reports/studies/pilot_against_data/report.md", ".ci/reports pilot_against_data",
                                         pattern=rf"^\| {component} \| 18 \| ([\d.]+) \|"), ("src/receiver/track", "src/study", "studies/pilot_against_data.toml"))
     yield Figure("studies.loops.cells", "cells with T·C/N0 ≥ 10 and B·T ≤ 0.36 whose jitter is within 5 % of theory", "",
                  make.Page("reports/loops.md", "cargo bench --bench loops", pattern=r"(\d+ of \d+) cells are within 5 %"),

@@ -4,6 +4,7 @@ import tempfile
 from pathlib import Path
 
 import check
+import confirm
 import digest
 import make
 from figures import Figure
@@ -133,8 +134,8 @@ def run():
                 missed.append(f"{what}: reported though it is no fault: {found}")
             elif expected and not any(text.startswith(expected) or expected in text for text in found):
                 missed.append(f"{what}: expected {expected!r} in {found}")
-    missed += write_mends_what_it_can() + a_stale_page_says_so()
-    print("\n".join(missed) or f"evidence: {len(FAULTS) + 2} planted faults, all found")
+    missed += write_mends_what_it_can() + a_stale_page_says_so() + a_page_is_confirmed_by_its_digits()
+    print("\n".join(missed) or f"evidence: {len(FAULTS) + 3} planted faults, all found")
     return bool(missed)
 
 
@@ -168,3 +169,23 @@ def a_stale_page_says_so():
             in (place.root / chapter).read_text(encoding="utf8")
         )
         return [] if good else [f"a stale page: {silent} {warnings} {told}"]
+
+
+def a_page_is_confirmed_by_its_digits():
+    """A cell counts where all of its repetitions are there; another digit, or another count of values, is a difference."""
+    cells = [{"bandwidth_hz": "8", "error_m": "2.5", "error_m.low": "2", "error_m.count": "2"}]
+    cases = [{"case": str(k), "bandwidth_hz": "8", "error_m": value} for k, value in enumerate(("2", "3"))]
+    other = [cases[0], {**cases[1], "error_m": "3.0000001"}]
+    absent = [cases[0], {**cases[1], "bandwidth_hz": "9"}]
+    found = [confirm.compared(some, cells) for some in (cases, other, absent)]
+    good = found[0] == (1, []) and found[1][0] == 1 and "error_m at bandwidth_hz = 8: 2.5, now 2.5" in found[1][1][0] and found[2] == (0, [])
+    shards = [confirm.chosen(*some) for some in ((90, 5), (200, 1), (3, 1), (2, 5))]
+    good = good and shards == [[0, 1, 2, 3, 4, 85, 86, 87, 88, 89], [0, 50, 100, 149, 199], [0, 1, 2], [0, 1]]
+    with tempfile.TemporaryDirectory() as root:
+        place = Place(root)
+        page = place.root / "reports/page.md"
+        for whole in (3, 7):
+            confirm.write_line(page, whole)
+        text = page.read_text(encoding="utf8")
+        good = good and text.count("Confirmed at") == 1 and "7 cells made again" in text and not place.found()[0]
+        return [] if good else [f"a confirmed page: {found} {shards} {text}"]
