@@ -180,8 +180,8 @@ fn models(text: &mut String, rows: &[SignalRow]) {
         );
     }
     text.push_str(
-        "\n`plan` reads costs from `src/generator/fidelity/costs.csv`, which this bench writes anew at its end. Here \
-         they are as the bench found them, of an earlier run, over what it measured.\n\n\
+        "\n`plan` reads costs from `src/generator/fidelity/costs.csv`, the measurement of one processor, which \
+         `-- --costs FILE` makes again. Here they are over what this run measured.\n\n\
          | edge, arithmetic | least | median | greatest |\n| --- | --- | --- | --- |\n",
     );
     for (name, edge) in CodeEdge::NAMES {
@@ -397,7 +397,6 @@ pub fn write(
     std::fs::write(directory.join("trade.md"), text).unwrap();
     table(&directory.join("trade_signals.csv"), signal_rows);
     table(&directory.join("trade_scenes.csv"), scene_rows);
-    write_costs(Path::new("src/generator/fidelity/costs.csv"), signal_rows);
     draw_signals(directory, signal_rows);
     draw_scenes(directory, scene_rows);
 }
