@@ -4,7 +4,7 @@
 usage: tests/evidence.py                    checks markers, numbers without a source, rows of the ledger against today's code
        tests/evidence.py --write            fills the markers from the ledger, and says in pages which of their figures are stale
        tests/evidence.py --list             lists ids that prose names and the ledger lacks, and numbers without a source
-       tests/evidence.py --make [PREFIX…]   makes the figures whose ids begin so (all without one), and writes the ledger
+       tests/evidence.py --make [PREFIX…]   makes the figures whose ids or pages begin so (all without one), and writes the ledger
        tests/evidence.py --compare [PREFIX…]   makes runs of scenes and counts, and compares them with the ledger
        tests/evidence.py --confirm [STUDY…] makes some cases of studies with stale figures again: the page is today's where no digit differs
        tests/evidence.py --self-test        plants faults in a small repository; each must be reported

@@ -12,10 +12,11 @@ import make
 
 
 def chosen(figures, prefixes):
-    """Figures whose ids begin so, and all others of the pages that they are read from."""
-    some = [figure for name, figure in figures.items() if not prefixes or name.startswith(tuple(prefixes))]
+    """Figures whose ids or pages begin so, and all others of the pages that they are read from."""
+    begin = tuple(prefixes) or ("",)
+    some = [figure for name, figure in figures.items() if name.startswith(begin) or getattr(figure.source, "page", "").startswith(begin)]
     if not some:
-        sys.exit(f"no figure begins with {' or '.join(prefixes)}")
+        sys.exit(f"no figure or page begins with {' or '.join(prefixes)}")
     read = {figure.source.page for figure in some if isinstance(figure.source, make.Page)}
     return [figure for figure in figures.values() if figure in some or getattr(figure.source, "page", None) in read]
 
