@@ -28,9 +28,7 @@ CHAPTER = "book/src/extending.md"
 PATCHES = "tests/recipes"
 # Recipes that no patch follows yet, each with the reason.
 WITHOUT = {
-    "signal": "its patch has not passed its own tests yet",
-    "interference": "its patch has not passed its own tests yet",
-    "discriminator": "its patch has not passed its own tests yet",
+    "signal": "its patch, QZSS L1 C/B, does not pass tests/extremes yet: the skies there have no satellite that sends it",
 }
 # Steps that change the program; a recipe of one list has no such line.
 STEPS = "In the program itself:"
