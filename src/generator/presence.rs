@@ -8,7 +8,8 @@
 use std::ops::Range;
 
 use crate::catalogue::Silence;
-use crate::scene::{SPACE_M, Scene};
+use crate::ray::SPACE_M;
+use crate::scene::Scene;
 use crate::sky::{Emission, emission, emission_of_set};
 use crate::vehicle::Motion;
 use gnss::broadcast::OrbitError;

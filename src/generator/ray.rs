@@ -8,6 +8,9 @@ use gnss::satellite::Sv;
 use gnss::signal::Signal;
 use gnss::time::Epoch;
 
+/// Height in metres from which the Earth hides satellites instead of the elevation mask.
+pub const SPACE_M: f64 = 100e3;
+
 /// Geometry between one satellite and the antenna at one instant of reception.
 #[derive(Clone, Debug)]
 pub struct Sight {

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use crate::catalogue::Catalogue;
 use crate::clock::ReceiverClock;
 use crate::clock::nodes::Nodes;
+use crate::effect::troposphere::TOP_M;
 use crate::fast_phase;
 use crate::fast_phase::satellite::SatelliteClocks;
 use crate::fast_phase::scintillation::Scintillation;
@@ -14,7 +15,7 @@ pub use crate::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade};
 use crate::low_pass::CUTOFF_CPS;
 use crate::message::{MessageFault, Senders};
 use crate::random::Stream;
-use crate::ray::{Effect, Sight};
+use crate::ray::{Effect, SPACE_M, Sight};
 use crate::spoof::Constellation;
 use crate::stage::Stage;
 use crate::stage::interference::Interferer;
@@ -29,12 +30,6 @@ use gnss::samples::IfMetadata;
 use gnss::satellite::Sv;
 use gnss::signal::{Link, Signal};
 use gnss::time::SampleClock;
-
-/// Height in metres from which the Earth hides satellites instead of the elevation mask.
-pub const SPACE_M: f64 = 100e3;
-/// Height below which no ray to a user in space may pass: the neutral atmosphere, which is modelled for rays
-/// that come down through it once.
-const LIMB_M: f64 = 50e3;
 
 /// Description of everything that the generator computes for the samples of one front end.
 pub struct Scene {
@@ -208,11 +203,11 @@ pub fn sources<'s>(scenes: impl Iterator<Item = &'s Scene>) -> Vec<(usize, &'s I
     found
 }
 
-/// True if the Earth, with its atmosphere up to [`LIMB_M`], lies between two positions.
+/// True if the Earth, with its atmosphere up to [`TOP_M`], lies between two positions.
 fn occulted(from_m: &Vector3<f64>, to_m: &Vector3<f64>) -> bool {
     // Axes in which the ellipsoid is the unit sphere.
-    let equator_m = SEMI_MAJOR_AXIS_M + LIMB_M;
-    let pole_m = SEMI_MAJOR_AXIS_M * (1.0 - FLATTENING) + LIMB_M;
+    let equator_m = SEMI_MAJOR_AXIS_M + TOP_M;
+    let pole_m = SEMI_MAJOR_AXIS_M * (1.0 - FLATTENING) + TOP_M;
     let scaled = |m: &Vector3<f64>| Vector3::new(m.x / equator_m, m.y / equator_m, m.z / pole_m);
     let (from, to) = (scaled(from_m), scaled(to_m));
     let along = to - from;

@@ -1,7 +1,8 @@
 //! Cases 16 and 17, and users in orbit: what they see, how it moves, and whether a receiver finds it.
 
 use generator::fidelity::Grade;
-use generator::scene::{Fidelity, SPACE_M, Scene};
+use generator::ray::SPACE_M;
+use generator::scene::{Fidelity, Scene};
 use generator::spoof::Constellation;
 use generator::stream::{Options, generate_part};
 use generator::truth;

@@ -8,12 +8,13 @@
 //! exact for air in spherical layers and a straight ray. Against traced rays, which bend, the delay is 3 %
 //! high at −1°, 7 % at −2° and 12 % at −3° for users at 5 km and 10 km, and within 1 % at and above the
 //! horizon. Where the Earth stands in the way the lowest point stays near the ground, for the scene's mask
-//! decides what is received. Limits: above 44.3 km the pressure of the standard atmosphere, and so the zenith
-//! delay, is zero; GPT3's fades there.
+//! decides what is received. A user in space sees only satellites whose rays pass above the atmosphere: there
+//! the delay is zero. Limits: above 44.3 km the pressure of the standard atmosphere, and so the zenith delay,
+//! is zero; GPT3's fades there.
 
 use crate::effect::ionosphere::smooth;
 use crate::effect::mapping::{Mapping, season_day};
-use crate::ray::{Effect, Ray, Sight};
+use crate::ray::{Effect, Ray, SPACE_M, Sight};
 use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use gnss::signal::Signal;
 use gnss::time::Epoch;
@@ -25,13 +26,15 @@ const PRESSURE_EXPONENT: f64 = 5.2568;
 const TEMPERATURE_LAPSE_KPM: f64 = 6.5e-3;
 const TROPOPAUSE_M: f64 = 11_000.0;
 const CELSIUS_K: f64 = 273.15;
-/// Heights between which what GPT3 states fades away, in metres: its own decay leaves 0.4 % of the delay
-/// there.
+/// Height in metres above which what GPT3 states fades away: its own decay leaves 0.4 % of the delay there.
 const FADE_M: f64 = 40e3;
-const TOP_M: f64 = 50e3;
+/// Height in metres above which there is no neutral atmosphere: a user in space sees what passes above it.
+pub const TOP_M: f64 = 50e3;
 /// Mean radius of the Earth, and by how much air bends a ray that grazes the ground: half a degree.
 const EARTH_RADIUS_M: f64 = 6_371e3;
 const BENT_RAD: f64 = 8.7e-3;
+/// Depth below the ground that bounds the angle of a ray from higher up, in metres.
+const DEPTH_M: f64 = 2e3;
 
 /// Weather at a height, from which that at every other height follows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,7 +125,11 @@ impl Troposphere {
     }
 
     /// Slant delay in metres. `elevation_rad` is the elevation of the straight line, also below the horizon.
+    /// Zero from [`SPACE_M`] on.
     pub fn delay_m(&self, user: Geodetic, elevation_rad: f64, at: Epoch) -> f64 {
+        if user.height_m >= SPACE_M {
+            return 0.0;
+        }
         if elevation_rad >= 0.0 {
             return self.upward_m(user, elevation_rad, at);
         }
@@ -142,12 +149,16 @@ impl Troposphere {
 }
 
 /// Bounded angle below the horizon and height of the lowest point, for a ray from below the horizon. Beyond
-/// the ray that grazes the ground the angle stays within [`BENT_RAD`].
+/// the ray that grazes the ground the angle stays within [`BENT_RAD`], and less from a height whence this
+/// would lead deeper than [`DEPTH_M`].
 fn lowest_point(height_m: f64, below_rad: f64) -> (f64, f64) {
     let radius_m = EARTH_RADIUS_M + height_m;
     let grazing_rad = libm::acos((EARTH_RADIUS_M / radius_m).min(1.0));
-    let beyond = ((below_rad - grazing_rad) / BENT_RAD).max(0.0);
-    let angle_rad = below_rad.min(grazing_rad) + BENT_RAD * (1.0 - libm::exp(-beyond));
+    // Depth that each radian beyond the grazing ray adds.
+    let slope_m = radius_m * libm::sin(grazing_rad);
+    let bent_rad = 1.0 / libm::hypot(1.0 / BENT_RAD, slope_m / DEPTH_M);
+    let beyond = ((below_rad - grazing_rad) / bent_rad).max(0.0);
+    let angle_rad = below_rad.min(grazing_rad) + bent_rad * (1.0 - libm::exp(-beyond));
     let half_sine = libm::sin(angle_rad / 2.0);
     (angle_rad, height_m - 2.0 * radius_m * half_sine * half_sine)
 }
@@ -213,13 +224,31 @@ mod tests {
             before = now;
         }
         assert_eq!(before, 0.0);
-        for height_m in [-400.0, 0.0, 100.0, 3e3, 1.1e4, 3e4, 5e4] {
+        for height_m in [-400.0, 0.0, 100.0, 3e3, 1.1e4, 3e4, 5e4, 9.9e4] {
             let mut before = f64::INFINITY;
             for elevation in [-90.0, -10.0, -5.0, -3.0, -1.0, -0.1, 0.0, 0.1, 1.0, 2.0, 5.0, 10.0, 45.0, 90.0] {
                 let now = delay(height_m, elevation);
                 assert!(now >= 0.0 && now <= before && now < 400.0, "{height_m} {elevation}: {now}");
                 before = now;
             }
+        }
+    }
+
+    #[test]
+    fn a_user_in_space_has_no_delay_and_below_that_no_ray_leads_deep_into_the_ground() {
+        let model = Troposphere { air: Air::Weather(Weather::STANDARD), mapping: Mapping::Niell };
+        let at = Epoch::from_week(1590, 0.0);
+        for height_m in [SPACE_M, 2.02e7, 5.4e8] {
+            for elevation in [-90.0, -89.35, -76.0, -8.0, 0.0, 30.0] {
+                let user = Geodetic::from_degrees(26.5, 80.2, height_m);
+                assert_eq!(model.delay_m(user, f64::to_radians(elevation), at), 0.0, "{height_m} {elevation}");
+            }
+        }
+        for height_m in [0.0, 100.0, 5e3, 3e4, 9.9e4] {
+            let (_, lowest_m) = lowest_point(height_m, std::f64::consts::FRAC_PI_2);
+            // What the angle's bound adds to the depth: R/2 of its square.
+            let depth_m = DEPTH_M + 0.5 * EARTH_RADIUS_M * BENT_RAD * BENT_RAD;
+            assert!((-depth_m..0.0).contains(&lowest_m), "{height_m}: {lowest_m}");
         }
     }
 
