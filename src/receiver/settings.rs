@@ -205,8 +205,9 @@ impl Settings {
     /// Settings of a table, or all that is wrong with it. A key that is refused is left out, so that the rest
     /// is checked against its default.
     fn checked(mut table: Table, origin: &str) -> Result<Self, Vec<SettingsError>> {
-        let mut faults = without_unknown(&mut table, &known(), "", origin);
-        faults.extend(without_mistyped(&mut table, origin));
+        let known = known();
+        let mut faults = without_unknown(&mut table, &known, "", origin);
+        faults.extend(without_mistyped(&mut table, &known, origin));
         loop {
             let settings: Self = match table.clone().try_into() {
                 Ok(settings) => settings,
@@ -390,11 +391,11 @@ fn without_unknown(table: &mut Table, known: &Table, path: &str, origin: &str) -
 }
 
 /// Takes the values of a wrong type out of a table, and returns their errors.
-fn without_mistyped(table: &mut Table, origin: &str) -> Vec<SettingsError> {
+fn without_mistyped(table: &mut Table, known: &Table, origin: &str) -> Vec<SettingsError> {
     let mut faults = Vec::new();
     let mut keep = |key: String, value: &Value, alone: Table| {
         let Err(error) = alone.try_into::<Settings>() else { return true };
-        let expected = reference::of_type(&key, &error);
+        let expected = reference::of_type(known, &key, &error);
         faults.push(SettingsError::Type { origin: origin.to_owned(), key, value: value.to_string(), expected });
         false
     };

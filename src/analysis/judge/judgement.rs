@@ -119,6 +119,9 @@ pub struct Judgement {
     pub why: Vec<String>,
 }
 
+/// Margin, relative to the limit, beyond which a figure of it says nothing.
+const FAR: f64 = 10.0;
+
 impl Judgement {
     /// Holds a value against a bound; a value that is missing or not finite fails.
     pub fn new(figure: &str, value: Value, unit: &str, bound: Bound, marginal_share: f64, source: &str) -> Self {
@@ -158,6 +161,7 @@ impl Judgement {
     pub fn margin_text(&self) -> String {
         match (self.margin, &self.bound, self.value.as_f64()) {
             _ if self.value.is_null() => "no figure".to_owned(),
+            (Some(margin), ..) if margin >= FAR => format!("over {:.0} % left", 100.0 * FAR),
             (Some(margin), ..) if margin >= 0.0 => format!("{:.0} % left", 100.0 * margin),
             (Some(margin), ..) => format!("{:.0} % beyond", -100.0 * margin),
             (None, Bound::Max(limit) | Bound::Min(limit), Some(value)) if value != *limit => {
@@ -237,6 +241,15 @@ mod tests {
         assert_eq!(status(1, Bound::Equals(1.0.into())).0, Status::Pass);
         let missing = Judgement::new("x", Value::Null, "m", Bound::Max(1.0), 0.1, "test");
         assert_eq!(missing.margin_text(), "no figure");
+    }
+
+    #[test]
+    fn a_margin_of_many_limits_is_not_written_as_a_figure() {
+        let text = |value: f64| Judgement::new("x", value.into(), "s", Bound::Min(2.0), 0.1, "test").margin_text();
+        assert_eq!(
+            [1.0, 2.5, 21.9, 22.0, 2e4].map(text),
+            ["50 % beyond", "25 % left", "995 % left", "over 1000 % left", "over 1000 % left"]
+        );
     }
 
     #[test]

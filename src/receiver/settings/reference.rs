@@ -52,8 +52,7 @@ pub fn tables() -> Vec<(String, Vec<Described>)> {
 }
 
 /// Values that a key of a table, `section.name`, accepts where serde refused the type of one.
-pub(super) fn of_type(key: &str, error: &toml::de::Error) -> String {
-    let defaults = Table::try_from(Settings::default()).unwrap_or_default();
+pub(super) fn of_type(defaults: &Table, key: &str, error: &toml::de::Error) -> String {
     let default = key.split_once('.').and_then(|(section, name)| {
         let default = defaults.get(section)?.get(name)?;
         // The range of a number; serde itself names the words of a choice.

@@ -4,8 +4,9 @@ use super::StudyError;
 use super::draw::Picture;
 use super::plan::{self, Plan};
 use super::publish::{self, Rows};
-use super::result::{Compared, Results};
+use super::result::{Compared, Results, THEORY};
 use super::spec::Level;
+use super::words;
 use analysis::JudgeError;
 use analysis::show::document::{Forms, Item, Report, Side, Table, Tone};
 
@@ -41,19 +42,19 @@ pub(super) fn report(plan: &Plan, results: &Results, pictures: &[Picture]) -> Re
     for agreement in &agreements {
         let beyond: Vec<&Compared> = agreement.cells.iter().filter(|cell| !cell.holds()).collect();
         let broken = beyond.iter().any(|cell| cell.in_region());
-        let tone = if broken { Tone::Bad } else { Tone::Good };
-        report.add(Item::Banner(
-            if broken { "beyond theory in its region" } else { "within theory in its region" }.to_owned(),
-            tone,
-        ));
+        let (found, tone) = if broken { ("beyond", Tone::Bad) } else { ("within", Tone::Good) };
+        let figure = results.figures.get(agreement.figure).map_or("", |figure| figure.name.as_str());
+        report.add(Item::Banner(format!("{}: {found} theory in its region", words::of_figure(figure)), tone));
         report.text(publish::in_words(results, agreement) + ".");
         if !beyond.is_empty() {
-            report.table(table("Cells beyond their bar of theory", publish::beyond_theory(results, &beyond)));
+            let rows = worded(results, publish::beyond_theory(results, &beyond));
+            report.table(table("Cells beyond their bar of theory", rows));
         }
     }
     if let Some(rows) = results.ensembles_in_short() {
         report.heading("All cases together");
-        report.table(table("Distribution over the cases", narrow(rows, study.ensemble.iter().flatten().count() + 1)));
+        let fixed = study.ensemble.iter().flatten().count() + 1;
+        report.table(table("Distribution over the cases", narrow(worded(results, rows), fixed)));
     }
     report.heading("Pictures");
     for picture in pictures {
@@ -63,11 +64,16 @@ pub(super) fn report(plan: &Plan, results: &Results, pictures: &[Picture]) -> Re
         }
     }
     report.heading("Base and axes");
-    report.table(table("Axes, the slowest first", publish::axes(results)));
-    report.add(Item::Listing(publish::base(plan, results)));
+    let (heads, mut rows) = publish::axes(results);
+    for (row, axis) in rows.iter_mut().zip(&study.axes) {
+        row[0] = format!("{}: {}", axis.words(), row[0].replace('`', ""));
+    }
+    report.table(table("Axes, the slowest first", (heads, rows)));
+    report.add(Item::Listing(publish::base(plan, results).replace('`', "")));
     if let Some(rows) = publish::cells(results) {
         report.heading("Cells");
-        report.table(table("Figures with their intervals of 95 %", narrow(rows, study.axes.len())));
+        let rows = narrow(worded(results, rows), study.axes.len());
+        report.table(table("Figures with their intervals of 95 %", rows));
     }
     Ok(report)
 }
@@ -87,6 +93,19 @@ pub(super) fn write(plan: &Plan, report: &Report, forms: Forms) -> Result<(), St
         plan::write(&plan.directory.join("report.html"), report.html().as_bytes())?;
     }
     Ok(())
+}
+
+/// Table whose heads are axes and figures in words in place of their keys.
+fn worded(results: &Results, (heads, rows): Rows) -> Rows {
+    let word = |head: String| {
+        if let Some(axis) = results.study.axes.iter().find(|axis| axis.label() == head) {
+            return axis.words();
+        }
+        let theory = if head.starts_with(THEORY) { "theory of " } else { "" };
+        let known = results.figures.iter().any(|figure| figure.name == head);
+        if known { format!("{theory}{}", words::of_figure(&head)) } else { head }
+    };
+    (heads.into_iter().map(word).collect(), rows)
 }
 
 /// Largest number of columns that a page holds without breaking words.

@@ -126,8 +126,8 @@ impl Verdict {
                 } else {
                     match expected.four_by_s {
                         Some(four_s) => format!(
-                            "four satellites can be used from {four_s:.1} s on, and the ionosphere's page comes \
-                             after {duration_s} s"
+                            "four satellites are certain to be usable by {four_s:.1} s, the ionosphere's page not \
+                             within {duration_s} s"
                         ),
                         None => format!(
                             "within {duration_s} s no four satellites that must be held are placed well and have \

@@ -132,15 +132,20 @@ fn satellites(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeError
     let columns = [
         ("satellite", Side::Left),
         ("elevation (°)", Side::Right),
-        ("C/N0 at the antenna, expected, measured (dB-Hz)", Side::Right),
+        ("C/N0 (dB-Hz)", Side::Right),
+        ("expected", Side::Right),
+        ("measured", Side::Right),
         ("code mean, σ (m)", Side::Right),
         ("carrier σ (cycles)", Side::Right),
         ("Doppler σ (Hz)", Side::Right),
         ("losses", Side::Right),
         ("values", Side::Right),
     ];
-    let mut table =
-        Table::new("By satellite: mean elevation and C/N0; errors of its observations, the clock's included.", columns);
+    let mut table = Table::new(
+        "By satellite: mean elevation; mean C/N0 at the antenna, as it was to be measured, and as it was; \
+                    errors of its observations, the clock's included.",
+        columns,
+    );
     for link in judged.errors.signals.keys() {
         let [mut elevation, mut truth, mut expected, mut measured] = [Sum::default(); 4];
         judged.run.seen(link.sv, |row| elevation.add(row.elevation_deg))?;
@@ -159,7 +164,9 @@ fn satellites(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeError
         table.row([
             judged.run.name(link),
             fixed(elevation.mean(), 1),
-            [truth, expected, measured].map(|values| fixed(values.mean(), 1)).join(" / "),
+            fixed(truth.mean(), 1),
+            fixed(expected.mean(), 1),
+            fixed(measured.mean(), 1),
             format!("{} / {}", fixed(code.mean()?, 2), fixed(std(&code)?, 2)),
             fixed(std(&carrier)?, 4),
             fixed(std(&doppler)?, 3),
