@@ -26,10 +26,6 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 CHAPTER = "book/src/extending.md"
 PATCHES = "tests/recipes"
-# Recipes that no patch follows yet, each with the reason.
-WITHOUT = {
-    "signal": "its patch, QZSS L1 C/B, does not pass tests/extremes yet: the skies there have no satellite that sends it",
-}
 # Steps that change the program; a recipe of one list has no such line.
 STEPS = "In the program itself:"
 ROOTS = "src|tests|benches|examples|scenarios|studies|assets|python|book|packaging"
@@ -136,30 +132,29 @@ def bare(root):
     return {**os.environ, "GIT_CEILING_DIRECTORIES": str(root.parent)}
 
 
-def check(root, without):
+def check(root):
     """Findings about all recipes, and the lines of a table."""
     opening, all_recipes = recipes(root)
     found, table = [], []
     for recipe in all_recipes:
         path = root / PATCHES / f"{recipe.name}.patch"
         if not path.exists():
-            if recipe.name not in without:
-                found.append(f"{CHAPTER}:{recipe.line}: {recipe.name}: no patch {PATCHES}/{recipe.name}.patch follows it: make one")
+            found.append(f"{CHAPTER}:{recipe.line}: {recipe.name}: no patch {PATCHES}/{recipe.name}.patch follows it: make one")
             found += missing(root, recipe, [])
-            table.append(f"{recipe.name:15} no patch: {without.get(recipe.name, 'expected one')}")
+            table.append(f"{recipe.name:15} no patch")
             continue
         patch = Patch(path)
         found += check_one(root, opening, recipe, patch)
         table.append(f"{recipe.name:15} {len(patch.files):5} {patch.added:+6} {-patch.removed:+6}")
     known = {recipe.name for recipe in all_recipes}
     for path in sorted((root / PATCHES).glob("*.patch")):
-        if path.stem not in known or path.stem in without:
+        if path.stem not in known:
             found.append(f"{path.relative_to(root)}: follows no recipe of {CHAPTER}: name it as its heading, or remove it")
     return found, table, all_recipes
 
 
 def report_check(root):
-    found, table, all_recipes = check(root, WITHOUT)
+    found, table, all_recipes = check(root)
     print(f"{'recipe':15} {'files':>5} {'lines':>6}")
     print("\n".join(table))
     print("\n".join(found), end="\n" if found else "")
@@ -201,8 +196,8 @@ def follow(names):
         if names and recipe.name not in names:
             continue
         if not path.exists():
-            lines.append(f"{recipe.name:15} no patch: {WITHOUT.get(recipe.name, 'expected one')}")
-            failed |= recipe.name not in WITHOUT
+            lines.append(f"{recipe.name:15} no patch")
+            failed = True
             continue
         copy_tree(tree)
         begun = time.monotonic()
