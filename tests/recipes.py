@@ -291,7 +291,7 @@ def self_test():
             for name, text in {**files, "REFERENCE.md": ""}.items():
                 (root / name).parent.mkdir(parents=True, exist_ok=True)
                 (root / name).write_text(text)
-            found = check(root, {})[0]
+            found = check(root)[0]
         is_right = not found if expected is None else any(expected in text for text in found)
         if not is_right:
             wrong.append(f"{what}: expected {expected!r}, found {found}")
