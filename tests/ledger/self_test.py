@@ -1,5 +1,6 @@
 """Faults planted in a small repository with a ledger of its own: each must be found, with its file, its line and its cure."""
 
+import subprocess
 import tempfile
 from pathlib import Path
 
@@ -135,7 +136,7 @@ def run():
             elif expected and not any(text.startswith(expected) or expected in text for text in found):
                 missed.append(f"{what}: expected {expected!r} in {found}")
     missed += write_mends_what_it_can() + a_stale_page_says_so() + a_page_is_confirmed_by_its_digits()
-    print("\n".join(missed) or f"evidence: {len(FAULTS) + 3} planted faults, all found")
+    print("\n".join(missed) or f"evidence: {len(FAULTS) + len(COMPARED) + 9} planted faults, all found")
     return bool(missed)
 
 
@@ -171,21 +172,107 @@ def a_stale_page_says_so():
         return [] if good else [f"a stale page: {silent} {warnings} {told}"]
 
 
+CELLS = [{"bandwidth_hz": "8", "error_m": "2.5", "error_m.low": "2", "error_m.high": "3", "error_m.count": "2", "theory.error_m": "2"}]
+CASES = [{"case": str(k), "seed": "7", "repetition": str(k), "bandwidth_hz": "8", "error_m": value, "theory.error_m": "2"}
+         for k, value in enumerate(("2", "3"))]
+# What is changed of a case (the last one) and of the cell, whether the cell is whole then, and what its difference must say.
+COMPARED = [
+    ("nothing", {}, {}, 1, None),
+    ("a digit", {"error_m": "3.0000001"}, {}, 1, "error_m at bandwidth_hz = 8: 2.5, now 2.5"),
+    ("a figure of theory", {"theory.error_m": "3"}, {}, 1, "theory.error_m at bandwidth_hz = 8: 2, now 2.5"),
+    ("a case too few", {"bandwidth_hz": "9"}, {}, 0, None),
+    ("a value too few", {"error_m": ""}, {}, 1, "error_m at bandwidth_hz = 8: of 2 values, now of 1"),
+    ("a value more", {}, {"error_m": "2", "error_m.count": "1"}, 1, "error_m at bandwidth_hz = 8: of 1 values, now of 2"),
+    ("no value on the page", {}, {"error_m": "", "error_m.count": ""}, 1, "error_m at bandwidth_hz = 8: empty, now 2.5"),
+    ("no theory on the page", {}, {"theory.error_m": ""}, 1, "theory.error_m at bandwidth_hz = 8: empty, now 2.0"),
+    ("a word on the page", {}, {"error_m": "none"}, 1, "error_m at bandwidth_hz = 8: none, now 2.5"),
+    ("another axis value on the page", {}, {"bandwidth_hz": "9"}, 1, "the cell at bandwidth_hz = 8: 2 cases of 2, not on the page"),
+    ("a column of today", {"sigma_m": "1"}, {}, 0, "columns of the page or of today alone: sigma_m"),
+    ("a column of the page", {}, {"sigma_m": "1", "sigma_m.count": "2"}, 0, "columns of the page or of today alone: sigma_m"),
+]
+
+
 def a_page_is_confirmed_by_its_digits():
-    """A cell counts where all of its repetitions are there; another digit, or another count of values, is a difference."""
-    cells = [{"bandwidth_hz": "8", "error_m": "2.5", "error_m.low": "2", "error_m.count": "2"}]
-    cases = [{"case": str(k), "bandwidth_hz": "8", "error_m": value} for k, value in enumerate(("2", "3"))]
-    other = [cases[0], {**cases[1], "error_m": "3.0000001"}]
-    absent = [cases[0], {**cases[1], "bandwidth_hz": "9"}]
-    found = [confirm.compared(some, cells) for some in (cases, other, absent)]
-    good = found[0] == (1, []) and found[1][0] == 1 and "error_m at bandwidth_hz = 8: 2.5, now 2.5" in found[1][1][0] and found[2] == (0, [])
-    shards = [confirm.chosen(*some) for some in ((90, 5), (200, 1), (3, 1), (2, 5))]
-    good = good and shards == [[0, 1, 2, 3, 4, 85, 86, 87, 88, 89], [0, 50, 100, 149, 199], [0, 1, 2], [0, 1]]
+    """A cell counts where all of its repetitions are there, with values or without; each difference has a name."""
+    missed = []
+    for what, of_case, of_cell, whole, expected in COMPARED:
+        cases = [{**CASES[0], **{key: "1" for key in of_case if key not in CASES[0]}}, {**CASES[1], **of_case}]
+        found = confirm.compared(cases, [{**CELLS[0], **of_cell}], ["bandwidth_hz"], 2)
+        told = [text for text in found[1] if expected and text.startswith(expected)]
+        if found[0] != whole or len(found[1]) != bool(expected) or bool(told) != bool(expected):
+            missed.append(f"a page confirmed, {what}: {found}")
+    empty = [{**case, "error_m": ""} for case in CASES]
+    for what, cells, expected in [
+        ("no values today", CELLS, "error_m at bandwidth_hz = 8: of 2 values, now of 0"),
+        ("no values on either side", [{**CELLS[0], "error_m": "", "error_m.count": "0"}], None),
+        ("a mean of no values", [{**CELLS[0], "error_m.count": "0"}], "error_m at bandwidth_hz = 8: 2.5, now empty"),
+    ]:
+        found = confirm.compared(empty, cells, ["bandwidth_hz"], 2)
+        if found != (1, [expected] if expected else []):
+            missed.append(f"a page confirmed, {what}: {found}")
+    found = confirm.compared(CASES + CASES[:1], CELLS, ["bandwidth_hz"], 2)
+    if found != (1, ["the cell at bandwidth_hz = 8: 3 cases of 2, on the page"]):
+        missed.append(f"a page confirmed, a repetition twice: {found}")
+    return missed + shards_hold_cells() + a_page_says_by_what_it_was_confirmed()
+
+
+def plan(signals, repetitions, receivers, shard_size):
+    """A manifest of a study with an axis of the signal and one of the receiver."""
+    axes = [(["scene", "cn0"], [list(range(signals))] * 2), (["repetition"], [list(range(repetitions))]), (["hz"], [list(range(receivers))])]
+    named = [{"keys": keys, "values": values} for keys, values in axes]
+    return {"axes": named, "n_cases": signals * repetitions * receivers, "shard_size": shard_size}
+
+
+def shards_hold_cells():
+    """Shards that are made again hold the cells of whole signals, by the plan's order; a plan of another form is refused."""
+    missed = []
+    for arguments, expected in [
+        ((18, 5, 1, 1), [0, 1, 2, 3, 4, 85, 86, 87, 88, 89]),
+        ((200, 1, 1, 1), [0, 50, 100, 149, 199]),
+        ((3, 1, 4, 4), [0, 1, 2]),
+        # The cases of a signal begin and end within shards.
+        ((10, 5, 3, 7), [0, 1, 2, 19, 20, 21]),
+        # A shard holds the cells of a signal.
+        ((20, 5, 1, 5), [0, 5, 10, 14, 19]),
+        ((4, 2, 3, 100), [0]),
+        ((1, 2, 3, 2), [0, 1, 2]),
+    ]:
+        grid = confirm.Grid(plan(*arguments))
+        if (grid.chosen(), grid.axes, grid.repetitions) != (expected, ["scene", "cn0", "hz"], arguments[1]):
+            missed.append(f"shards of {arguments}: {grid.chosen()}, expected {expected}")
+    whole = plan(3, 2, 1, 1)
+    for what, bad in [
+        ("without repetitions", {**whole, "axes": whole["axes"][:1]}),
+        ("of other cases", {**whole, "n_cases": 7}),
+        ("without axes", {"n_cases": 6, "shard_size": 1}),
+    ]:
+        try:
+            missed.append(f"a plan {what} is taken: {confirm.Grid(bad).chosen()}")
+        except make.NotMade as error:
+            if "manifest" not in str(error):
+                missed.append(f"a plan {what}: {error}")
+    return missed
+
+
+def a_page_says_by_what_it_was_confirmed():
+    """The line is one, names the code's commit, and has the plus of code that differs from it."""
     with tempfile.TemporaryDirectory() as root:
-        place = Place(root)
+        place, before = Place(root), make.ROOT
         page = place.root / "reports/page.md"
-        for whole in (3, 7):
-            confirm.write_line(page, whole)
-        text = page.read_text(encoding="utf8")
-        good = good and text.count("Confirmed at") == 1 and "7 cells made again" in text and not place.found()[0]
-        return [] if good else [f"a confirmed page: {found} {shards} {text}"]
+        git = ["git", "-C", root, "-c", "user.name=a", "-c", "user.email=a@example.com"]
+        for command in (["init", "--quiet"], ["add", "."], ["commit", "--quiet", "--message", "all"]):
+            subprocess.run([*git, *command], check=True)
+        make.ROOT, texts = place.root, []
+        try:
+            head = make.head_commit()
+            for whole, path in ((3, "reports/page.md"), (7, "src/room/lib.rs"), (9, "README.md"), (2, None)):
+                confirm.write_line(page, whole)
+                texts.append(page.read_text(encoding="utf8"))
+                if path:
+                    place.put(path, (place.root / path).read_text(encoding="utf8") + "\n")
+        finally:
+            make.ROOT = before
+        good = all(text.count("Confirmed at") == 1 for text in texts) and not place.found()[0]
+        for text, whole, mark in zip(texts, (3, 7, 9, 2), ("", "", "+", "+")):
+            good = good and f"Confirmed at commit {head}{mark} on" in text and f": {whole} cells made again" in text
+        return [] if good else [f"a confirmed page: {head} {texts}"]
