@@ -11,9 +11,10 @@ export async function report(file, { title, shots }) {
   const url = pathToFileURL(resolve(file)).href;
   const it = { file, url, shots, ...(await open(shots)) };
   const { page, faults, shot } = it;
-  // Views of all plots but the sky; `linked` ones share the axis of time.
+  // Views of all plots but the sky; `linked` ones share the axis of time, `most` is the number of points of the longest curve.
   it.views = () => page.evaluate(() => [...document.querySelectorAll(".plot")].filter((root) => root.plot.view)
-    .map(({ plot }) => ({ title: plot.chart.title, linked: plot.linked, x: [...plot.view.x], y: [...plot.view.y] })));
+    .map(({ plot }) => ({ title: plot.chart.title, linked: plot.linked, x: [...plot.view.x], y: [...plot.view.y],
+      most: Math.max(0, ...plot.series.map((one) => one.x.length)) })));
   it.settled = () => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
   const begun = performance.now();
   await page.goto(url);
@@ -30,16 +31,56 @@ export async function report(file, { title, shots }) {
   return it;
 }
 
-// Every plot has something in colour on it; how many there are.
+// Evaluated in the page: names of a plot's curves, clouds, bars, tiles or tracks that have something within the frame, and of those
+// among them whose drawing alone leaves the canvas as it is without them.
+function undrawn(root) {
+  const { plot } = root, key = plot.tracks ? "tracks" : "series", kept = plot[key];
+  const pixels = (some) => {
+    plot[key] = some;
+    plot.draw();
+    return plot.base.getContext("2d").getImageData(0, 0, plot.base.width, plot.base.height).data;
+  };
+  const size = (values) => Math.max(...values) - Math.min(...values);
+  const isShown = ({ mark, x, y }) => {
+    const { box } = plot, points = [...x].map((value, n) => [plot.toX(value), plot.toY(y[n])]).filter((point) => point.every(Number.isFinite));
+    const [across, up] = [points.map(([px]) => px), points.map(([, py]) => py)];
+    const inside = points.filter(([px, py]) => px >= box.x && px <= box.x + box.w && py >= box.y && py <= box.y + box.h);
+    if (inside.length === 0) return false;
+    // A line that does not leave its first point, a band of no width and a bar of no height are nothing.
+    if (mark.line) return Math.max(size(across), size(up)) >= 1;
+    if (mark.band) return Math.min(size(across), size(up)) >= 2;
+    if (mark.bars) return inside.some(([, py]) => Math.abs(py - plot.toY(0)) >= 1);
+    return true;
+  };
+  // The frame stays that of the whole plot: a plot of nothing says so in words.
+  const none = plot.tracks ? [] : kept.map((one) => ({ ...one, x: [plot.view.x[0] - 9 * size(plot.view.x)], y: [plot.view.y[0]] }));
+  const shown = plot.tracks ? kept : plot.visible().filter(isShown), without = pixels(none);
+  const lost = shown.filter((one) => {
+    const alone = pixels(plot.tracks ? [one] : [...none, one]);
+    return alone.every((value, n) => value === without[n]);
+  });
+  plot[key] = kept;
+  plot.draw();
+  const name = (one) => one.sv ?? (one.name || JSON.stringify(one.mark));
+  return { shown: shown.map(name), lost: lost.map(name) };
+}
+
+// Every plot has axes, and draws all that it has within them; a run without fixes or without noise may have none. How many plots there are.
 export async function drawn({ page, settled }) {
   const count = await page.locator(".plot").count();
+  let all_shown = 0;
   for (let at = 0; at < count; at += 1) {
-    await page.locator(".plot").nth(at).scrollIntoViewIfNeeded();
+    const plot = page.locator(".plot").nth(at);
+    await plot.scrollIntoViewIfNeeded();
     await settled();
-    const { coloured, other, all } = await page.locator(".plot canvas.base").nth(at).evaluate(inked);
-    const name = await page.locator(".plot .plot-title").nth(at).textContent();
-    assert.ok(other > 0.005 * all && coloured > 30, `${name}: ${other} of ${all} pixels drawn, ${coloured} coloured`);
+    const { other, all } = await plot.locator("canvas.base").evaluate(inked);
+    const name = await plot.locator(".plot-title").textContent();
+    assert.ok(other > 0.005 * all, `${name}: ${other} of ${all} pixels drawn`);
+    const { shown, lost } = await plot.evaluate(undrawn);
+    assert.deepEqual(lost, [], `${name}: not drawn, of ${shown.length}`);
+    all_shown += shown.length;
   }
+  assert.ok(all_shown > 0, "no plot has data");
   return count;
 }
 
