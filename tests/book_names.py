@@ -2,12 +2,14 @@
 """Names in the book: links and their headings, files, and in the recipes the items of the code, must exist. So must what other
 pages of the repository link to, and what they show.
 
-usage: tests/book_names.py
-exit:  0 every name exists; 1 one does not, each with its chapter and line.
+usage: tests/book_names.py               checks every page
+       tests/book_names.py --self-test   plants names that do not exist; each must be reported
+exit:  0 every name exists, or every planted one is found; 1 not, each with its chapter and line; 2 a wrong command line.
 """
 
 import re
 import sys
+import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -21,6 +23,8 @@ PAGES = ("*.md", "book/src/*.md", "python/*.md", "reports/**/*.md")
 RECIPES = "extending"
 # Files of the repository; a run writes its own into directories of `reports`.
 ROOTS = "src|tests|benches|examples|scenarios|studies|assets|python|book|packaging|\\.ci"
+# A link in a sentence, with a title or without, and the definition of one by reference.
+LINK = re.compile(r"\]\(\s*<?([^)\s>]+)>?(?:\s+\"[^\"]*\")?\s*\)|^\[[^\]]+\]:\s*<?([^\s>]+)", re.M)
 FILE = re.compile(rf"reports/(?:studies/)?[\w.]+|(?:{ROOTS})/[\w./-]*[\w/]|[\w/]+\.rs")
 ITEM = re.compile(r"[A-Za-z_]\w*(?:::[A-Za-z_]\w*)*")
 # Names that a reader gives, and words of Rust and of the shell.
@@ -42,8 +46,8 @@ def spans(text):
 
 
 def links(page, text):
-    for found in re.finditer(r"\]\(([^)\s]+)\)", text):
-        target, _, heading = found[1].partition("#")
+    for found in LINK.finditer(text):
+        target, _, heading = (found[1] or found[2]).partition("#")
         line = text.count("\n", 0, found.start()) + 1
         if re.match(r"\w+:", target):
             continue
@@ -90,4 +94,45 @@ def main():
     return faults > 0
 
 
-sys.exit(main())
+CHAPTER = "# First\n\n## A heading, with `code`\n\n```\n# no heading\n```\n"
+# A text below the chapter's seven lines, and the fault that it must have in its line, if any.
+PLANTED = [
+    ("[a](second.md)", None),
+    ("[a](second.md#second-page)", None),
+    ("[a](#a-heading-with-code)", None),
+    ("[a](https://example.com/none.md)", None),
+    ("[a](third.md)", "no file third.md"),
+    ("[a](second.md \"title\") and [b](third.md \"title\")", "no file third.md"),
+    ("![a](picture.png)", "no file picture.png"),
+    ("[a]: third.md", "no file third.md"),
+    ("[a](second.md#third-page)", "second.md has no heading #third-page"),
+    ("[a](#no-heading)", "first.md has no heading #no-heading"),
+    ("Read `src/gnss/lib.rs`, `gnss/lib.rs` and `src/*/lib.rs`.", "no file gnss/lib.rs"),
+    ("Call `known_item(2)`, `Room::known_item` and `unknown_item`.", "no item unknown_item in the code"),
+]
+
+
+def self_test():
+    """Plants each name alone; returns whether one was missed."""
+    missed = []
+    with tempfile.TemporaryDirectory() as place:
+        page = Path(place, "first.md")
+        Path(place, "second.md").write_text("# Second page\n", encoding="utf8")
+        for text, expected in PLANTED:
+            text = f"{CHAPTER}{text}\n"
+            page.write_text(text, encoding="utf8")
+            named = "fn known_item() {} // code"
+            found = [*links(page, text), *files("first", text)] + ([*items(text, named)] if "Call" in text else [])
+            if found != ([(8, expected)] if expected else []):
+                missed.append(f"{text.splitlines()[-1]!r}: {found}, expected {expected!r} in line 8")
+    print("\n".join(missed) or f"book: {len(PLANTED)} planted names, all judged right")
+    return bool(missed)
+
+
+match sys.argv[1:]:
+    case []:
+        sys.exit(main())
+    case ["--self-test"]:
+        sys.exit(self_test())
+print(__doc__, file=sys.stderr)
+sys.exit(2)
