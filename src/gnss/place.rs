@@ -96,4 +96,17 @@ mod tests {
         assert_eq!(keys.holding(text.find('3').unwrap()), Some("b.d.e"));
         assert_eq!(Keys::new("x", "= 1").place_of("a"), "x");
     }
+
+    #[test]
+    fn a_word_is_near_above_a_likeness_of_three_quarters_whatever_its_case() {
+        // Three of five letters are in place: Jaro's likeness is (3/5 + 3/5 + 3/3)/3 = 0.733. Winkler adds a
+        // tenth of what is missing to 1 for each letter that both begin with: 0.760 with one of them.
+        let of = |word: &str| nearest(word, &["seed", "noise", "motion"]);
+        assert_eq!(of("nxixe").as_deref(), Some("noise"));
+        assert_eq!(of("NXIXE").as_deref(), Some("noise"));
+        assert_eq!(of("xoixe"), None);
+        assert_eq!(nearest("noise", &[]), None);
+        // The most similar one of two.
+        assert_eq!(nearest("moise", &["noise", "moises"]).as_deref(), Some("moises"));
+    }
 }

@@ -209,3 +209,37 @@ fn line(f: &mut fmt::Formatter<'_>, name: &str, spread: Option<Spread>) -> fmt::
 fn number(value: Option<f64>, decimals: usize) -> String {
     value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::judge::judgement::{Bound, Judgement, MARGINAL_SHARE};
+
+    #[test]
+    fn a_hint_stands_once_below_the_first_figure_that_it_explains_and_evidence_below_each() {
+        let failed = |figure: &str, why: &[&str]| {
+            let mut row = Judgement::new(figure, 9.0.into(), "m", Bound::Max(1.0), MARGINAL_SHARE, "test");
+            row.why = why.iter().map(|line| (*line).to_owned()).collect();
+            row
+        };
+        let both = ["G07 from 3 s to 8 s", "hint: give the scene [troposphere]", "hint: set --start"];
+        let rows =
+            vec![failed("mean error", &both[..2]), failed("horizontal error", &both), failed("vertical error", &both)];
+        let text = Verdict::default().with_user(rows).to_string();
+        let lines: Vec<&str> = text.lines().skip(1).map(str::trim).collect();
+        let expected = [
+            ("FAIL", "mean"),
+            ("G07", "8 s"),
+            ("hint", "[troposphere]"),
+            ("FAIL", "horizontal"),
+            ("G07", "8 s"),
+            ("hint", "--start"),
+            ("FAIL", "vertical"),
+            ("G07", "8 s"),
+        ];
+        assert_eq!(lines.len(), expected.len(), "{text}");
+        for (line, (begin, word)) in lines.iter().zip(expected) {
+            assert!(line.starts_with(begin) && line.contains(word), "{line:?}: {begin} … {word}\n{text}");
+        }
+    }
+}

@@ -25,6 +25,8 @@ mod peak;
 mod shape;
 #[cfg(any(test, feature = "planted"))]
 pub mod synthetic;
+#[cfg(test)]
+mod table_tests;
 mod tone;
 
 pub use peak::PeakTable;
