@@ -201,7 +201,8 @@ mod fields {
         AcquisitionRow { sample, sv, signal, acquired, statistic, threshold, doppler_hz, code_phase_chips, cn0_dbhz }
         LineRow { sample, frequency_hz, jn0_dbhz, js_db, statistic, threshold, lines, resolution_hz }
         TrackingRow { sample, sv, signal, prompt_i, prompt_q, dll_discriminator_chips, pll_discriminator_cycles,
-            fll_discriminator_hz, cn0_dbhz, phase_lock, integration_s }
+            fll_discriminator_hz, cn0_dbhz, phase_lock, integration_s, early_i, early_q, late_i, late_q,
+            tap_spacing_chips }
         NavigationRow { sv, issue, parameter, raw, message }
         EventRow { sample, sv, signal, event }
         FrontEnd { front_end }

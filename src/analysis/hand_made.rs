@@ -247,6 +247,11 @@ pub(crate) fn write_channels(rx: &Path, draw: &mut Draw) {
             cn0_dbhz: 45.0,
             phase_lock: 0.98,
             integration_s: 0.02,
+            early_i: None,
+            early_q: None,
+            late_i: None,
+            late_q: None,
+            tap_spacing_chips: None,
         });
     }
     write(&rx.join("tracking.csv"), &tracking);

@@ -459,6 +459,17 @@ pub struct TrackingRow {
     pub phase_lock: f64,
     /// Time between updates of the loops, in seconds.
     pub integration_s: f64,
+    /// In-phase early correlator, in units of the prompt's noise; `None` in files of receivers that
+    /// record the prompt alone.
+    pub early_i: Option<f64>,
+    /// Quadrature early correlator.
+    pub early_q: Option<f64>,
+    /// In-phase late correlator.
+    pub late_i: Option<f64>,
+    /// Quadrature late correlator.
+    pub late_q: Option<f64>,
+    /// Distance from early to late, in chips.
+    pub tap_spacing_chips: Option<f64>,
 }
 
 /// Parameter of a navigation message as its raw integer: `navigation.csv`, from generator and receiver.

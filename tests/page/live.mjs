@@ -26,11 +26,19 @@ assert.equal(await page.evaluate(() => document.scripts.length), 3, "no element 
 if (receives) await page.waitForFunction(() => document.querySelector("#channel").options.length > 3, null, { timeout: 60_000 });
 await more(5);
 const drawn = await page.evaluate(() => [...document.querySelectorAll(".plot")].map((root) => root.plot.base.width));
-assert.equal(drawn.length, 10, "ten plots");
+assert.equal(drawn.length, 11, "eleven plots");
 const names = receives ? ["sky", "strengths", "spectrum", "loops"] : ["sky", "strengths", "spectrum"];
 for (const name of names) {
   const { coloured } = await page.locator(`#figure-${name} canvas.base`).first().evaluate(inked);
   assert.ok(coloured > 30, `${name}: ${coloured} coloured pixels`);
+}
+if (receives) {
+  // The mean of many rows is a peak about the prompt, whose sides are half a spacing away.
+  await page.waitForFunction(() => document.querySelectorAll("#figure-loops .plot")[1].plot.series[0].y.length === 3, null, { timeout: 30_000 });
+  await more(20);
+  const { x, y: [late, prompt, early] } = await page.evaluate(() => document.querySelectorAll("#figure-loops .plot")[1].plot.series[0]);
+  assert.ok(x[0] < 0 && x[0] === -x[2] && x[1] === 0, `taps at ${x}`);
+  assert.ok(prompt > 1.1 * Math.max(early, late) && Math.abs(early - late) < 0.3 * prompt, `taps ${late}, ${prompt}, ${early}`);
 }
 assert.ok((await page.locator("#waterfall").evaluate(inked)).coloured > 5000, "a waterfall");
 assert.ok(await page.evaluate(() => document.querySelector("#figure-sky .plot").plot.tracks.length) > 4, "satellites in the sky");
@@ -82,4 +90,4 @@ const origin = new URL(url).origin;
 assert.deepEqual([...new Set(requests)].filter((one) => new URL(one).origin !== origin), [], "no request leaves the server");
 const count = await frames();
 await close();
-console.log(`live page: ${count} frames drawn, 10 plots, ${requests.length} requests`);
+console.log(`live page: ${count} frames drawn, 11 plots, ${requests.length} requests`);

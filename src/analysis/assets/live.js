@@ -7,9 +7,9 @@
   const MOST = 3000, WINDOW_S = 60, ROWS = 150;
   const plots = (name) => [...document.querySelectorAll(`#figure-${name} .plot`)].map((root) => root.plot);
   const [sky] = plots("sky"), [map] = plots("map"), [strengths] = plots("strengths"), [spectrum] = plots("spectrum");
-  const [prompt, ...loops] = plots("loops"), [ages, counts] = plots("stream");
+  const [prompt, taps, ...loops] = plots("loops"), [ages, counts] = plots("stream");
   const linked = [...loops, ages, counts], Plot = ages.constructor;
-  const all = [sky, map, strengths, spectrum, prompt, ...linked];
+  const all = [sky, map, strengths, spectrum, prompt, taps, ...linked];
   let frame = null, channel = "", histories = new Map(), tail = "", asked = false;
 
   function element(name, properties = {}, ...children) {
@@ -77,9 +77,9 @@
 
   // ---- Histories ----
 
-  // The history of a channel: times and the seven values of its rows.
+  // The history of a channel: times and the twelve values of its rows.
   function historyOf(name) {
-    if (!histories.has(name)) histories.set(name, { t: [], values: Array.from({ length: 7 }, () => []) });
+    if (!histories.has(name)) histories.set(name, { t: [], values: Array.from({ length: 12 }, () => []) });
     return histories.get(name);
   }
 
@@ -233,19 +233,35 @@
       chooser.replaceChildren(...names.map((name) => element("option", { value: name }, name)));
     }
     chooser.value = channel;
-    const { t, values } = channel ? historyOf(channel) : { t: [], values: [[], [], [], [], [], [], []] };
+    const { t, values } = channel ? historyOf(channel) : { t: [], values: Array.from({ length: 12 }, () => []) };
     const recent = (list) => list.slice(-300);
     prompt.series[0].x = recent(values[1]);
     prompt.series[0].y = recent(values[2]);
     const reach = 1.1 * Math.max(5, ...[...prompt.series[0].x, ...prompt.series[0].y].filter(Number.isFinite).map(Math.abs));
     range(prompt, "x", [-reach, reach]);
     range(prompt, "y", [-reach, reach]);
+    drawTaps(values.map(recent));
     [4, 3, 5].forEach((column, n) => {
       const plot = loops[n];
       plot.series[0].x = t;
       plot.series[0].y = values[column];
       range(plot, "y", around(recent(values[column]), [0.02, 0.02, 1][n]));
     });
+  }
+
+  // Magnitudes of late, prompt and early over how far their replicas are ahead of the prompt's.
+  function drawTaps(values) {
+    const [mean, last] = taps.series, count = values[11].length;
+    const rows = Array.from({ length: count }, (_, n) => values.map((column) => column[n])).filter((row) => row.slice(7).every(Number.isFinite));
+    const magnitudes = rows.map((row) => [[9, 10], [1, 2], [7, 8]].map(([i, q]) => Math.hypot(row[i], row[q])));
+    const spacing = rows.length > 0 ? rows[rows.length - 1][11] : 0;
+    // A channel that changes its spacing begins again.
+    const alike = magnitudes.filter((_, n) => rows[n][11] === spacing);
+    mean.x = last.x = alike.length > 0 ? [-spacing / 2, 0, spacing / 2] : [];
+    last.y = alike[alike.length - 1] ?? [];
+    mean.y = alike.length > 0 ? [0, 1, 2].map((tap) => alike.reduce((sum, row) => sum + row[tap], 0) / alike.length) : [];
+    range(taps, "x", [-Math.max(spacing, 0.1), Math.max(spacing, 0.1)]);
+    range(taps, "y", [0, 1.2 * Math.max(5, ...mean.y, ...last.y)]);
   }
 
   function drawAll() {
@@ -266,7 +282,7 @@
     const places = ["x", "y"].map((axis) => around(map.series.flatMap((series) => series[axis]), 10));
     range(map, "x", places[0]);
     range(map, "y", places[1]);
-    for (const plot of [map, prompt, ...linked]) plot.draw();
+    for (const plot of [map, prompt, taps, ...linked]) plot.draw();
     drawSky();
     drawStrengths();
     drawSpectrum();

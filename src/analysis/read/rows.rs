@@ -54,6 +54,12 @@ impl SpillRow<Link> for TrackingRow {
             cn0_dbhz: words.number(),
             phase_lock: words.number(),
             integration_s: words.number(),
+            // No rule reads them.
+            early_i: None,
+            early_q: None,
+            late_i: None,
+            late_q: None,
+            tap_spacing_chips: None,
         }
     }
 }
@@ -189,6 +195,11 @@ mod tests {
             cn0_dbhz: 6.0,
             phase_lock: 7.0,
             integration_s: 8.0,
+            early_i: None,
+            early_q: None,
+            late_i: None,
+            late_q: None,
+            tap_spacing_chips: None,
         };
         let sky = SkyRow {
             sample: 4,
@@ -236,5 +247,20 @@ mod tests {
             clock_drift: 8.0,
         };
         back((), &place_row, place);
+    }
+
+    #[test]
+    fn a_tracking_table_without_early_and_late_is_read() {
+        let head = "sample,sv,signal,prompt_i,prompt_q,dll_discriminator_chips,pll_discriminator_cycles,\
+                    fll_discriminator_hz,cn0_dbhz,phase_lock,integration_s";
+        let with = format!("{head},early_i,early_q,late_i,late_q,tap_spacing_chips\n");
+        let row = "3,G07,GPS L1 C/A,1,2,3,4,5,6,7,8";
+        let read = |text: String| -> TrackingRow {
+            csv::Reader::from_reader(text.as_bytes()).deserialize().next().unwrap().unwrap()
+        };
+        let (old, new) = (read(format!("{head}\n{row}\n")), read(format!("{with}{row},1,2,3,4,0.5\n")));
+        assert_eq!((old.integration_s, old.early_i, old.tap_spacing_chips), (8.0, None, None));
+        assert_eq!((new.early_i, new.late_q, new.tap_spacing_chips), (Some(1.0), Some(4.0), Some(0.5)));
+        assert_eq!(read(format!("{with}{row},,,,,\n")).late_i, None);
     }
 }

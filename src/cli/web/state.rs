@@ -146,6 +146,11 @@ impl State {
                     "pll_discriminator_cycles",
                     "fll_discriminator_hz",
                     "phase_lock",
+                    "early_i",
+                    "early_q",
+                    "late_i",
+                    "late_q",
+                    "tap_spacing_chips",
                 ];
                 let values: Vec<Value> = keys.iter().map(|key| json!(number(row, key))).collect();
                 put(&mut self.channels, name(row, &["sv", "signal"]), json!(values));

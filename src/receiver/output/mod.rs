@@ -230,7 +230,7 @@ const CLOCKS: [&str; 4] = ["sample", "time_scale", "clock_bias_s", "sigma_clock_
 const IONOSPHERE: [&str; 4] = ["sample", "sv", "delay_m", "sigma_m"];
 const ACQUISITION: [&str; 9] =
     ["sample", "sv", "signal", "acquired", "statistic", "threshold", "doppler_hz", "code_phase_chips", "cn0_dbhz"];
-const TRACKING: [&str; 11] = [
+const TRACKING: [&str; 16] = [
     "sample",
     "sv",
     "signal",
@@ -242,6 +242,11 @@ const TRACKING: [&str; 11] = [
     "cn0_dbhz",
     "phase_lock",
     "integration_s",
+    "early_i",
+    "early_q",
+    "late_i",
+    "late_q",
+    "tap_spacing_chips",
 ];
 const NAVIGATION: [&str; 5] = ["sv", "issue", "parameter", "raw", "message"];
 const EVENTS: [&str; 4] = ["sample", "sv", "signal", "event"];
@@ -401,7 +406,7 @@ mod tests {
         assert_eq!(header(&fix), FIXES.join(","));
         let row: AcquisitionRow = from_csv(&ACQUISITION, &format!("0,G03,{},true,{}", L1_CA.name, zero(5)));
         assert_eq!(header(&row), ACQUISITION.join(","));
-        let row: TrackingRow = from_csv(&TRACKING, &format!("0,G03,{},{}", L1_CA.name, zero(8)));
+        let row: TrackingRow = from_csv(&TRACKING, &format!("0,G03,{},{}", L1_CA.name, zero(13)));
         assert_eq!(header(&row), TRACKING.join(","));
         let row = NavigationRow { sv, issue: 1, parameter: "x".into(), raw: 0, message: "LNAV".into() };
         assert_eq!(header(&row), NAVIGATION.join(","));

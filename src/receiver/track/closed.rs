@@ -35,6 +35,8 @@ impl Mode {
 pub struct Update {
     /// Prompt sum, scaled to noise of the variance of one code period's.
     pub prompt: Complex64,
+    /// Early and late sums, scaled as the prompt.
+    pub sides: [Complex64; 2],
     /// Time of the integration.
     pub integration_s: f64,
     /// Code discriminator.
@@ -128,8 +130,10 @@ impl Loops {
         t_s: f64,
         cn0_hz: Option<f64>,
     ) -> Update {
-        let mut update = Update { prompt, integration_s: t_s, ..Update::default() };
-        update.prompt /= f64::from(periods).sqrt();
+        let mut update = Update { prompt, sides: [early, late], integration_s: t_s, ..Update::default() };
+        let scale = f64::from(periods).sqrt();
+        update.prompt /= scale;
+        update.sides.iter_mut().for_each(|side| *side /= scale);
         if let Some(before) = before {
             // Two quadrants do not mind a symbol in between.
             update.fll_hz = if self.has_symbols || mode == Mode::Phase {

@@ -30,6 +30,8 @@ mod signals_tests;
 mod stream_tests;
 mod sync;
 #[cfg(test)]
+mod taps_tests;
+#[cfg(test)]
 mod tests;
 #[cfg(test)]
 mod weak_tests;

@@ -102,19 +102,24 @@ fn loops() -> Result<Figure, Failure> {
     let x = Axis::new("in phase (noise σ)", (-10.0, 10.0));
     let mut prompt = Chart::new("Prompt correlator", x, reach, vec![empty("prompt", BLUE, Mark::Dots)]);
     prompt.equal = true;
+    let ahead = Axis::new("replica ahead of prompt (chips)", (-0.5, 0.5));
+    let magnitude = Axis::new("magnitude (noise σ)", (0.0, 10.0));
+    let one = [empty("mean of the last rows", ORANGE, Mark::Line), empty("last row", BLUE, Mark::Balls)];
+    let taps = Chart::new("Correlation taps: late, prompt, early", ahead, magnitude, one.to_vec());
     let over_time = |title: &str, label: &str, colour| {
         let series = vec![empty("", colour, Mark::Dots)];
         Chart::new(title, Axis::new("time (s)", (0.0, 1.0)), Axis::new(label, (-1.0, 1.0)), series)
     };
     let charts = vec![
         prompt,
+        taps,
         over_time("Carrier phase discriminator", "phase (cycles)", ORANGE),
         over_time("Code discriminator", "code (chips)", GREEN),
         over_time("Carrier frequency discriminator", "frequency (Hz)", BLUE),
     ];
-    let caption = "Correlator and discriminators of the chosen channel: the last row of each frame. The receiver's \
-                   records have the prompt tap alone; early and late taps cannot be shown.";
-    figure("loops", 2, charts, Vec::new(), caption)
+    let caption = "Correlators and discriminators of the chosen channel: the last row of each frame. Records of the \
+                   prompt alone show no taps.";
+    figure("loops", 2, charts, one.to_vec(), caption)
 }
 
 fn stream() -> Result<Figure, Failure> {

@@ -31,6 +31,7 @@ impl Channel {
             locked_s: lock.locked_since().map_or(0.0, seconds_since),
             locked: lock.is_locked(),
         });
+        let [early, late] = self.last.sides;
         report.rows.push(TrackingRow {
             sample: tick,
             sv: self.sv(),
@@ -43,6 +44,11 @@ impl Channel {
             cn0_dbhz,
             phase_lock: self.stage.lock_value(),
             integration_s: self.last.integration_s,
+            early_i: Some(early.re),
+            early_q: Some(early.im),
+            late_i: Some(late.re),
+            late_q: Some(late.im),
+            tap_spacing_chips: Some(units_to_chips(self.accumulator.taps[0] - self.accumulator.taps[2])),
         });
     }
 }
