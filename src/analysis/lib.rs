@@ -51,7 +51,7 @@ use show::{plot, tables};
 ///
 /// Reads `truth/{observations,sky,trajectory,navigation}.csv`, `truth/scene.json`,
 /// `rx/{observations,fixes,acquisition,tracking,navigation,events}.csv`, and where they exist
-/// `rx/receiver.json`, `psd.csv`, `speed.json`, `scenario.toml`, `truth/interference.csv` and
+/// `rx/receiver.json`, `psd.csv`, `peaks.csv`, `speed.json`, `scenario.toml`, `truth/interference.csv` and
 /// `truth/claimed.csv`.
 ///
 /// # Errors

@@ -11,6 +11,7 @@ mod check;
 mod collection;
 mod error;
 mod generate;
+mod glimpse;
 mod interrupt;
 mod lines;
 mod live;

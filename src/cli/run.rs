@@ -1,7 +1,7 @@
 //! `run`: generator and receiver side by side with samples passed in memory, then the judge.
 //!
 //! All front ends of a scene are received in one reception. The loop itself is [`twin::feed`]; here are the
-//! files, the spectrum of the samples and the times.
+//! files, the spectrum of the samples, the peaks of its signals and the times.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -14,6 +14,7 @@ use serde_json::json;
 use crate::cli::args;
 use crate::cli::check::Gate;
 use crate::cli::error::CliError;
+use crate::cli::glimpse::Moment;
 use crate::cli::printed;
 use crate::cli::progress::Progress;
 use crate::cli::scenario;
@@ -22,7 +23,7 @@ use crate::cli::staging::Staging;
 use analysis::expect::welch::{self, Looks};
 use analysis::judge::schema::SUMMARY;
 use analysis::measure::psd::Psd;
-use analysis::read::psd_name;
+use analysis::read::{PeakRow, psd_name};
 use analysis::show::tables;
 use analysis::{self, JudgeError};
 use generator::fidelity::Grade;
@@ -89,14 +90,15 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     if keep && !is_sampled {
         return Err(generator_error(GenerateError::NoSamples));
     }
-    let tap = |scene: &Scene| Tap::new(scene, run, (keep, changing), scenes.len());
+    let mut moment = Moment::of(scene);
+    let tap = |scene: &Scene| Tap::new(scene, run, (keep, changing), (scenes.len(), moment.samples(scene)));
     let mut taps: Vec<Tap> = scenes.iter().filter(|_| is_sampled).map(tap).collect::<Result<_, _>>()?;
     let mut sentences = sentences(&rx_in)?;
     let mut tracks = Tracks::create(&rx_in, &scene.name).map_err(output_error)?;
     let outputs = &mut (&mut output, &mut (&mut files, &mut (&mut sentences, &mut tracks)));
     let with_progress = arguments.printed.in_words();
     let both = if is_sampled {
-        both(&scenes, &settings, &mut truth, outputs, (&mut taps, with_progress))?
+        both(&scenes, &settings, &mut (&mut truth, &mut moment), outputs, (&mut taps, with_progress))?
     } else {
         by_correlations(&scenes, &settings, (&mut truth, outputs), with_progress)?
     };
@@ -104,6 +106,9 @@ pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
         let later = Some(tap.name.as_str()).filter(|_| place > 0);
         tables::write_psd(&run.join(psd_name(later)), &tap.psd).map_err(judge_error)?;
     }
+    let of = |(tap, own): (&Tap, &Scene)| moment.peaks(scene, own, &tap.glimpsed);
+    let peaks: Vec<PeakRow> = taps.iter().zip(&scenes).flat_map(of).collect();
+    tables::write_peaks(&run.join("peaks.csv"), &peaks).map_err(judge_error)?;
     taps.into_iter().try_for_each(|tap| tap.finish(run))?;
     drop((truth, output, files, sentences, tracks));
 
@@ -223,7 +228,7 @@ fn timed<T>(busy: &mut Duration, work: impl FnOnce() -> T) -> T {
 }
 
 /// Looks at the samples on their way: estimates the spectrum of the first part, or of pieces all over a scene
-/// whose spectrum changes, and keeps all samples if asked to.
+/// whose spectrum changes, and keeps a glimpse of them, or all if asked to.
 struct Tap {
     metadata: IfMetadata,
     signals: Vec<&'static Signal>,
@@ -234,14 +239,22 @@ struct Tap {
     stride: u64,
     i: Vec<f32>,
     q: Vec<f32>,
+    /// Bytes of the glimpse, by their number in the stream and as far as they came.
+    glimpse: Range<u64>,
+    glimpsed: Vec<u8>,
     /// Name of its files, and the samples.
     name: String,
     kept: Option<BufWriter<File>>,
 }
 
 impl Tap {
-    /// A tap for one of `front_ends` front ends.
-    fn new(scene: &Scene, run: &Path, (keep, changing): (bool, bool), front_ends: usize) -> Result<Self, CliError> {
+    /// A tap for one of `front_ends` front ends, which keeps those samples.
+    fn new(
+        scene: &Scene,
+        run: &Path,
+        (keep, changing): (bool, bool),
+        (front_ends, glimpse): (usize, Range<u64>),
+    ) -> Result<Self, CliError> {
         let own = scene.front_end_name.as_ref().filter(|_| front_ends > 1);
         let name = own.map_or_else(|| "if".to_owned(), Clone::clone);
         let kept = if keep {
@@ -265,6 +278,8 @@ impl Tap {
             stride,
             i: Vec::new(),
             q: Vec::new(),
+            glimpse: glimpse.start * sample_bytes..glimpse.end * sample_bytes,
+            glimpsed: Vec::new(),
             name,
             kept,
         })
@@ -273,14 +288,16 @@ impl Tap {
     fn see(&mut self, bytes: &[u8]) -> io::Result<()> {
         let begin = self.seen;
         self.seen += bytes.len() as u64;
-        while self.piece.start < self.seen {
-            let place = |at: u64| (at.clamp(begin, self.seen) - begin) as usize;
+        let seen = self.seen;
+        let place = |at: u64| (at.clamp(begin, seen) - begin) as usize;
+        self.glimpsed.extend(bytes.get(place(self.glimpse.start)..place(self.glimpse.end)).unwrap_or(&[]));
+        while self.piece.start < seen {
             let inside = bytes.get(place(self.piece.start)..place(self.piece.end)).unwrap_or(&[]);
             for part in inside.chunks(SEEN_BYTES) {
                 self.metadata.format.unpack(part, &mut self.i, &mut self.q);
                 self.psd.add(&self.i, &self.q);
             }
-            if self.piece.end > self.seen {
+            if self.piece.end > seen {
                 break;
             }
             self.psd.cut();

@@ -142,7 +142,10 @@ impl Bench {
                 good("run tiny.toml --out r", &before);
                 for entry in fs::read_dir(at("r")).unwrap().flatten() {
                     let name = entry.file_name();
-                    if !["truth", "rx", "psd.csv", "speed.json", "scenario.toml"].iter().any(|kept| name == *kept) {
+                    if !["truth", "rx", "psd.csv", "peaks.csv", "speed.json", "scenario.toml"]
+                        .iter()
+                        .any(|kept| name == *kept)
+                    {
                         fs::remove_file(entry.path()).unwrap();
                     }
                 }

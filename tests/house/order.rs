@@ -133,7 +133,7 @@ pub const ORDER: Order<'static> = &[
     (
         "analysis/measure",
         &[
-            &["allan", "errors", "independent", "ionosphere", "lines", "psd", "spectrum", "spoofing"],
+            &["allan", "errors", "independent", "ionosphere", "lines", "peaks", "psd", "spectrum", "spoofing"],
             &["clock", "consistency", "elevation", "jitter"],
             &["slips"],
         ],
@@ -178,7 +178,7 @@ pub const ORDER: Order<'static> = &[
             &["dome"],
             &["sketch"],
             &["judged"],
-            &["clock", "consistency", "delays", "foreign", "jitter", "position", "signals", "sky", "spectrum"],
+            &["clock", "consistency", "delays", "foreign", "jitter", "peaks", "position", "signals", "sky", "spectrum"],
             &["elevation", "multipath"],
         ],
     ),

@@ -43,6 +43,7 @@ const SHORT: &str = "witness::reduced::elements_in_short_of_the_embedded_file_ar
 const DELAYS: &str = "witness::printed::clocks_of_single_signals_are_behind_by_the_group_delays_that_documents_print";
 const SBAS_SETS: &str =
     "witness::sbas::shipped_sets_are_whole_steps_of_the_fields_and_are_read_again_from_any_symbol_and_either_way_up";
+const PEAK: &str = "judge::a_correlation_peak_lies_at_the_delay_of_its_ray";
 const SBAS_MASK: &str = "witness::sbas::blocks_of_a_mask_and_of_ageing_are_the_printed_ones";
 const SBAS_GRID: &str = "witness::sbas::points_of_printed_masks_of_the_grid_lie_where_the_bands_have_them";
 const QZSS_CODES: &str = "witness::codes::all_chips_of_all_codes_are_those_of_another_program";
@@ -359,6 +360,8 @@ pub const FAULTS: &[Fault] = &[
     fault("analysis.summary.horizontal", "the horizontal error forgets north", JPOS),
     fault("analysis.summary.navigation", "no navigation parameter is ever wrong", JDAM),
     fault("analysis.summary.false_satellites", "no satellite is ever false", JDAM),
+    fault("analysis.peaks.delay", "correlation peaks are mirrored about the true delay", PEAK),
+    fault("analysis.peaks.half", "correlation peaks are half a sample late", PEAK),
     fault("analysis.verdict.limit", "limits are a hundred times as wide", JDAM),
     fault("analysis.multiple_access.others", "other satellites count ten times", JOBS),
     fault("analysis.samples.floor", "the noise under a spectrum is 0.13 dB too high", JSPEC),

@@ -240,3 +240,39 @@ fn deviations_of_a_clock_are_those_that_sp_1065_prints() {
         assert!((found / printed - 1.0).abs() < 1e-6, "{} {m}: {found}, printed {printed}", deviation.name());
     }
 }
+
+#[test]
+fn a_correlation_peak_lies_at_the_delay_of_its_ray() {
+    use analysis::measure::peaks::Glimpse;
+    use gnss::gps::l1ca::L1_CA;
+    use gnss::record::Observation;
+    use gnss::samples::{Format, IfMetadata};
+    use gnss::satellite::Sv;
+    use gnss::time::Rate;
+
+    // Four samples a chip, so that half of one is five steps of the delay; the ray is 0.4 chips late.
+    let (rate, carrier_hz) = (Rate::from_hz(4.1e6).unwrap(), L1_CA.carrier_hz(Sv { system: L1_CA.system, number: 5 }));
+    let truth = Observation {
+        sample: 0,
+        sv: Sv { system: L1_CA.system, number: 5 },
+        signal: &L1_CA,
+        sent_s: 1_300_000_000,
+        sent_fraction_s: 0.000_3,
+        pseudorange_m: 2.1e7,
+        carrier_cycles: 0.0,
+        doppler_hz: 0.0,
+        cn0_dbhz: 45.0,
+        locked_s: 1.0,
+    };
+    let code = L1_CA.code(5).unwrap();
+    let chip = |n: i32| {
+        let chips = (0.000_3 + f64::from(n) / rate.hz()) * 1.023e6 - 0.4;
+        f32::from(code[chips as usize % 1023])
+    };
+    let metadata = IfMetadata { format: Format::Cf32Le, rate, center_hz: carrier_hz, inverted: false, start: None };
+    let i: Vec<f32> = (0..40_000).map(chip).collect();
+    let q = vec![0.0; i.len()];
+    let rows = Glimpse { metadata, doppler_hz: 0.0, later_s: 0.0, i, q }.peaks(std::slice::from_ref(&truth));
+    let top = rows.iter().max_by(|a, b| a.in_phase.total_cmp(&b.in_phase)).unwrap();
+    assert!((top.delay_chips - 0.4).abs() < 0.026, "{top:?}");
+}

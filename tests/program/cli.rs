@@ -233,6 +233,7 @@ fn the_same_scene_and_seed_give_the_same_bytes_on_any_threads_and_processor() {
             "rx/tracking.csv",
             "rx/events.csv",
             "rx/interference.csv",
+            "peaks.csv",
         ];
         runs.push(files.map(|file| fs::read(here.path().join(name).join(file)).unwrap()));
     }

@@ -28,5 +28,5 @@ pub use fault::Fault;
 pub(crate) use files::each;
 pub use fixes::Fixes;
 pub use numbers::Numbers;
-pub use run::{PsdRow, Run, Speed, psd_name};
+pub use run::{PeakRow, PsdRow, Run, Speed, psd_name};
 pub use table::Table;

@@ -27,7 +27,7 @@ use gnss::record::{
 };
 use gnss::satellite::Sv;
 use gnss::signal::described::registered;
-use gnss::signal::{Link, Signal, all};
+use gnss::signal::{Link, Signal, all, by_name};
 
 /// Speed of the stages: `speed.json`, and the section of the summary.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -57,6 +57,31 @@ pub struct PsdRow {
     pub frequency_hz: f64,
     /// Decibels of LSB²/Hz.
     pub density_db: f64,
+}
+
+/// Correlation of a signal in the samples with its code at one delay: a row of `peaks.csv`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PeakRow {
+    /// Number of the sample, of the first front end, from which on the samples were looked at.
+    pub sample: u64,
+    /// The satellite.
+    pub sv: Sv,
+    /// Signal of the satellite.
+    #[serde(with = "by_name")]
+    pub signal: &'static Signal,
+    /// Delay of the code against the true one, in chips.
+    pub delay_chips: f64,
+    /// Part in phase with the prompt, against the largest magnitude of all delays.
+    pub in_phase: f64,
+    /// Part a quarter of a cycle ahead of the prompt, in the same measure.
+    pub quadrature: f64,
+}
+
+impl PeakRow {
+    /// Satellite and signal of the row.
+    pub fn link(&self) -> Link {
+        Link { sv: self.sv, signal: self.signal }
+    }
 }
 
 /// A run as read.
@@ -134,6 +159,8 @@ pub struct Run {
     pub psd: Vec<PsdRow>,
     /// Spectra of the second and later front ends by their indices, as far as they were estimated.
     pub other_psds: BTreeMap<usize, Vec<PsdRow>>,
+    /// Correlation peaks of the samples; empty where none were computed.
+    pub peaks: Vec<PeakRow>,
     /// Speed of the stages.
     pub speed: Speed,
 }
@@ -157,8 +184,8 @@ const TRUTH: &str = "the generator writes it: make the run again with `gnss-twin
 const RECEIVER: &str = "the receiver writes it: `gnss-twin receive FILE --out RUN/rx`, or make the run again";
 
 impl Run {
-    /// Reads a run's directory. `psd.csv`, `speed.json`, `scenario.toml` and `rx/receiver.json` may be
-    /// missing. Tables that are too long for memory spill to an unnamed file there.
+    /// Reads a run's directory. `psd.csv`, `peaks.csv`, `speed.json`, `scenario.toml` and `rx/receiver.json`
+    /// may be missing. Tables that are too long for memory spill to an unnamed file there.
     pub fn read(run: &Path) -> Result<Self, JudgeError> {
         Self::read_parts(run, &run.join("truth"), &run.join("rx"))
     }
@@ -223,6 +250,7 @@ impl Run {
             let rows = optional(&run.join(psd_name(front_end.name.as_deref())))?;
             read.other_psds.insert(place, rows);
         }
+        read.peaks = optional(&run.join("peaks.csv"))?;
         read.speed = json(&run.join("speed.json"))?.unwrap_or_default();
         Ok(read)
     }
@@ -331,6 +359,7 @@ impl Run {
             receiver: Value::Null,
             psd: Vec::new(),
             other_psds: BTreeMap::new(),
+            peaks: Vec::new(),
             speed: Speed::default(),
         })
     }

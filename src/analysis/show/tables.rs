@@ -14,6 +14,7 @@ use crate::measure::errors::PositionError;
 use crate::measure::jitter::Jitter;
 use crate::measure::psd::Psd;
 use crate::measure::slips::{COLUMNS, Slips};
+use crate::read::PeakRow;
 use crate::show::plot::Judged;
 use crate::show::plot::jitter::{Histogram, loops};
 use crate::show::write::{Table, write_read_rows, write_rows, write_whole};
@@ -88,6 +89,14 @@ struct TheoryRow {
 pub fn write_psd(path: &Path, psd: &Psd) -> Result<(), JudgeError> {
     let Some(rows) = psd.rows() else { return Ok(()) };
     write_rows(path, rows.into_iter())
+}
+
+/// Writes `peaks.csv` under that name, which a run without peaks has not.
+///
+/// # Errors
+/// The file that cannot be written.
+pub fn write_peaks(path: &Path, peaks: &[PeakRow]) -> Result<(), JudgeError> {
+    if peaks.is_empty() { Ok(()) } else { write_rows(path, peaks.iter()) }
 }
 
 /// Writes the tables of a run's measurements, all but those of [`write()`].

@@ -3,8 +3,8 @@
 //! [`canvas`] wraps the drawing library and [`drawing`] what becomes of its SVG; every other file here says
 //! what is drawn, as a sketch that holds all it needs: a run's rows are gone before the first picture is
 //! drawn. A picture with nothing to show is drawn with empty axes, so that a script finds the files it
-//! expects; only `psd.png` depends on `psd.csv` being there, `spoofing.png` on a spoofer and `multipath.png`
-//! on `truth/rays.csv`.
+//! expects; only `psd.png` and `peaks.png` depend on `psd.csv` and `peaks.csv` being there, `spoofing.png` on
+//! a spoofer and `multipath.png` on `truth/rays.csv`.
 
 pub mod canvas;
 pub mod chart;
@@ -20,6 +20,7 @@ pub(crate) mod jitter;
 mod judged;
 mod marks;
 mod multipath;
+mod peaks;
 mod position;
 mod series;
 mod signals;
@@ -52,7 +53,7 @@ pub(crate) struct Picture {
 }
 
 /// The pictures in the order of the report, where a tall one and a low one share a page.
-pub(crate) const PICTURES: [Picture; 17] = [
+pub(crate) const PICTURES: [Picture; 18] = [
     Picture {
         name: "sky",
         caption: "Sky at the antenna. Each track ends in a dot at its last place, coloured by the mean C/N0 that the \
@@ -75,6 +76,14 @@ pub(crate) const PICTURES: [Picture; 17] = [
                   slopes that theory does not have.",
         numbers: &["psd.csv", "psd_theory.csv"],
         sketch: spectrum::psd,
+    },
+    Picture {
+        name: "peaks",
+        caption: "Correlation of up to 40 ms of the samples, in the middle of the run, with each satellite's code \
+                  about its true delay, in phase with the prompt. A rounded peak shows the front end's band, a second \
+                  one or a bent flank a reflection or a spoofer.",
+        numbers: &["peaks.csv"],
+        sketch: peaks::peaks,
     },
     Picture {
         name: "cn0",

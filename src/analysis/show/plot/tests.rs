@@ -7,7 +7,10 @@ use super::*;
 use crate::hand_made::{Draw, RATE_HZ, planted};
 use crate::judge;
 use crate::measure::psd::Psd;
+use crate::read::PeakRow;
 use crate::show::tables;
+use gnss::gps::l1ca::L1_CA;
+use gnss::satellite::Sv;
 
 #[test]
 fn every_picture_is_a_png_that_is_not_blank_and_its_numbers_are_in_a_table() {
@@ -17,6 +20,17 @@ fn every_picture_is_a_png_that_is_not_blank_and_its_numbers_are_in_a_table() {
     let mut block = || (0..20_000).map(|_| draw.normal() as f32).collect::<Vec<f32>>();
     psd.add(&block(), &block());
     tables::write_psd(&run.path().join("psd.csv"), &psd).unwrap();
+    let signal = &L1_CA;
+    let at = |number: u8, k: i32| PeakRow {
+        sample: 0,
+        sv: Sv { system: signal.system, number },
+        signal,
+        delay_chips: 0.1 * f64::from(k),
+        in_phase: 1.0 - 0.1 * f64::from(k.abs()),
+        quadrature: 0.0,
+    };
+    let peaks: Vec<PeakRow> = [3, 7].into_iter().flat_map(|sv| (-9..=9).map(move |k| at(sv, k))).collect();
+    tables::write_peaks(&run.path().join("peaks.csv"), &peaks).unwrap();
     judge(run.path()).unwrap();
     let only_elsewhere = ["multipath", "spoofing"];
     for picture in PICTURES.iter().filter(|picture| !only_elsewhere.contains(&picture.name)) {
