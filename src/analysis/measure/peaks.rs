@@ -6,7 +6,7 @@
 //! between them).
 //!
 //! Limits: one component of a signal, the strongest whose code repeats within 20 ms; no more samples than
-//! [`MOST_SAMPLES`], but one period at least. A signal below some 25 dB-Hz is aligned to its noise.
+//! 200 000, but one period at least. A signal below some 25 dB-Hz is aligned to its noise.
 
 use num_complex::Complex64;
 use rayon::prelude::*;
