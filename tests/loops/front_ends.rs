@@ -134,11 +134,12 @@ fn a_run_receives_all_front_ends_or_the_one_that_is_chosen() {
     // Of the signal in both the first one's samples have the peaks.
     let peaks: Vec<PeakRow> =
         csv::Reader::from_path(here.path().join("both/peaks.csv")).unwrap().deserialize().map(Result::unwrap).collect();
-    let links: BTreeSet<Link> = peaks.iter().map(PeakRow::link).collect();
+    let link = |row: &PeakRow| Link { sv: row.sv, signal: row.signal };
+    let links: BTreeSet<Link> = peaks.iter().map(link).collect();
     assert!(links.len() >= 6 && peaks.len() == 121 * links.len(), "{} rows of {links:?}", peaks.len());
     assert!(peaks.iter().all(|row| row.in_phase.abs() <= 1.0 && row.quadrature.abs() <= 1.0));
-    for link in links {
-        let own = peaks.iter().filter(|row| row.link() == link);
+    for one in links {
+        let own = peaks.iter().filter(|row| link(row) == one);
         let top = own.max_by(|a, b| a.in_phase.total_cmp(&b.in_phase)).unwrap();
         // A tenth of a chip away a peak that samples of a quarter of a chip round is 0.1²/0.25 = 0.04 lower.
         // Noise of 45 dB-Hz over 40 ms has σ = 0.02, of which two delays so near differ by 0.02·√0.2 = 0.009.

@@ -38,6 +38,14 @@ for (const { x, y, value, across, up } of tiles) {
 }
 await shot("map_hover");
 
+// ---- Heads of tables and what theory says are words, not keys ----
+
+const heads = await page.locator("th").allTextContents();
+assert.ok(heads.length > 5, "tables have heads");
+for (const head of heads) assert.doesNotMatch(head, /`|\w_\w|^(receiver|signal)\./, "a head in words");
+const said = (await page.locator(".banner").allTextContents()).filter((text) => /theory in its region/.test(text));
+assert.ok(said.length > 0 && said.every((text) => /\w+.*: (within|beyond) theory/.test(text)), `a figure is named: ${said}`);
+
 // ---- A legend's scale is no button; curves go and come back ----
 
 assert.equal(await page.evaluate(() => [...document.querySelectorAll("button[data-keys]")]

@@ -77,13 +77,6 @@ pub struct PeakRow {
     pub quadrature: f64,
 }
 
-impl PeakRow {
-    /// Satellite and signal of the row.
-    pub fn link(&self) -> Link {
-        Link { sv: self.sv, signal: self.signal }
-    }
-}
-
 /// A run as read.
 pub struct Run {
     /// Facts of the scene.

@@ -27,15 +27,16 @@ pub fn peaks(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         for row in rows.iter().filter(|row| row.signal == *signal) {
             x.add(row.delay_chips);
             y.add(row.in_phase);
-            let place = satellites.binary_search(&row.sv).unwrap_or(0);
-            series.iter_mut().skip(place).take(1).for_each(|one| one.points.push((row.delay_chips, row.in_phase)));
+            let own = satellites.binary_search(&row.sv).ok().and_then(|place| series.get_mut(place));
+            own.into_iter().for_each(|one| one.points.push((row.delay_chips, row.in_phase)));
         }
+        let (from, to) = x.values().fold((0.0_f64, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
         let curve = ideal(signal).into_iter().flat_map(|(shape, chip_s)| {
-            (-300..=300).map(|k| f64::from(k) / 200.0).map(move |chips| (chips, shape.correlation(chips * chip_s)))
+            let delays = (0..=600).map(move |k| from + (to - from) * f64::from(k) / 600.0);
+            delays.map(move |chips| (chips, shape.correlation(chips * chip_s)))
         });
         series.insert(0, Series { points: curve.collect(), ..own.clone() });
         y.add(1.0);
-        let (from, to) = x.values().fold((0.0_f64, 0.0_f64), |(low, high), x| (low.min(x), high.max(x)));
         let y = Axis::around("correlation (of the largest)", y.values(), 1.0);
         Chart::new(signal.name, Axis::new("code delay (chips)", (from, to)), y, series)
     };

@@ -142,8 +142,8 @@ fn satellites(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeError
         ("values", Side::Right),
     ];
     let mut table = Table::new(
-        "By satellite: mean elevation; mean C/N0 at the antenna, as it was to be measured, and as it was; \
-                    errors of its observations, the clock's included.",
+        "By satellite: mean elevation; mean C/N0 at the antenna, expected and measured; errors of its observations, \
+         the clock's included.",
         columns,
     );
     for link in judged.errors.signals.keys() {
