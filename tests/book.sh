@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # The book's commands, run as they stand there: every chapter in an empty directory with an empty environment, its output compared.
 # In a `console` block a line that begins with "$ " is a command, "> " continues it, and what follows is its output, both streams
-# together; "…" stands for any text within a line, and alone in a line for any lines.
+# together; "…" stands for any text within a line, and alone in a line for any lines. The chapter "readme" is the first command of the
+# README and the block of text that it says the command ends with.
 #
-# usage: tests/book.sh [GNSS_TWIN_BINARY [CHAPTER…]]     (default: target/release/gnss-twin, and all chapters)
+# usage: tests/book.sh [GNSS_TWIN_BINARY [CHAPTER…]]     (default: target/release/gnss-twin, all chapters and the README)
 #        BOOK_PYTHON names a Python that has the module gnss_twin; without it a wheel is built for the chapter that wants one.
 # exit:  0 every command ends with 0 and prints what the book says; 1 one does not; 75 the Python module could not be built.
 set -euo pipefail
@@ -17,7 +18,7 @@ ln -s "$twin" "$work/bin/gnss-twin"
 
 chapters=("$@")
 if [ ${#chapters[@]} -eq 0 ]; then
-    mapfile -t chapters < <(sed -n 's/.*](\([a-z_]*\)\.md).*/\1/p' "$root/book/src/SUMMARY.md")
+    mapfile -t chapters < <(echo readme; sed -n 's/.*](\([a-z_]*\)\.md).*/\1/p' "$root/book/src/SUMMARY.md")
 fi
 if [[ " ${chapters[*]} " == *" python "* ]]; then
     if [ -z "${BOOK_PYTHON:-}" ]; then
@@ -64,6 +65,14 @@ def commands(text):
         yield from found
 
 
+def of_readme(text):
+    """The program without arguments, which the README's first command is, and the output that the README prints."""
+    first = re.search(r"^```\ncargo run --release +#.*?^```text\n(.*?)^```$", text, re.M | re.S)
+    if not first:
+        sys.exit("book: README.md: expected a block with `cargo run --release` and a block ```text of its output")
+    yield text.count("\n", 0, first.start(1)), ["gnss-twin"], first[1].splitlines()
+
+
 def pattern(rows):
     parts = []
     for row in rows:
@@ -75,7 +84,8 @@ failed = count = 0
 for chapter in sys.argv[3:]:
     place = work / chapter
     place.mkdir()
-    for line, words, expected in commands((book / f"{chapter}.md").read_text()):
+    page = book.parent.parent / "README.md" if chapter == "readme" else book / f"{chapter}.md"
+    for line, words, expected in (of_readme if chapter == "readme" else commands)(page.read_text()):
         count += 1
         done = subprocess.run(["bash", "-c", "\n".join(words)], cwd=place, env=environment, stdin=subprocess.DEVNULL,
                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=900)
@@ -88,7 +98,7 @@ for chapter in sys.argv[3:]:
         printed = "".join(row + "\n" for row in rows)
         if done.returncode != 0 or not pattern(expected).fullmatch(printed):
             failed += 1
-            print(f"book: {chapter}.md, line {line}: $ {words[0]} (exit code {done.returncode})")
+            print(f"book: {page.name}, line {line}: $ {words[0]} (exit code {done.returncode})")
             print("\n".join(difflib.unified_diff(expected, rows, "the book", "the program", lineterm="")))
 print(f"book: {count} commands of {len(sys.argv) - 3} chapters, {failed} of them not as printed")
 sys.exit(failed > 0 or count == 0)

@@ -153,7 +153,7 @@ def check(root, figures):
     ]
     # The first page that a stranger reads shows nothing that is older than the code.
     old = {name for names in stale.values() for name in names}
-    return found + of_prose(root, table) + old_in_readme(root, old), warnings
+    return found + of_prose(root, table) + old_in_readme(root, old) + printed_in_readme(root, table), warnings
 
 
 def faults_of_row(row, figure):
@@ -195,12 +195,52 @@ def of_prose(root, table):
                 found.append(f"{place}: {marker['id']} is shown as {marker['text']!r}, the ledger has {right!r}; fill it by: --write")
     for path in pages(root, PROSE):
         text, name = path.read_text(encoding="utf8"), path.relative_to(root)
+        for start in prose.of_a_page(text):
+            found.append(f"{name}:{prose.line_of(text, start)}: all numbers of a page are declared constants; declare sections or paragraphs")
         for start, figure in prose.without_source(text):
             found.append(
                 f"{name}:{prose.line_of(text, start)}: {figure!r} has no source; show a row of the ledger, "
                 "or put <!--const--> into the paragraph where it is a definition, a setting or an example"
             )
     return found
+
+
+# Lines of the README's output, and the rows of the ledger that have their numbers. `tests/book.sh` runs the command (`.ci/long`).
+PRINTED = [
+    (r"^first fix +([\d.]+) s, (\d+) fixes$", ("first_fix_s", "fixes")),
+    (r"^position east \(m\) +(-?[\d.]+) ", ("east_m",)),
+    (r"^position north \(m\) +(-?[\d.]+) ", ("north_m",)),
+    (r"^position up \(m\) +(-?[\d.]+) +[\d.]+ +([\d.]+)$", ("up_m", "vertical_p95_m")),
+    (r"^(\d+) losses of lock, (\d+) cycle slips$", ("losses", "slips")),
+]
+
+
+def printed_in_readme(root, table):
+    """Numbers of the README's block of output that are not those of the ledger."""
+    text = (root / "README.md").read_text(encoding="utf8")
+    block = re.search(r"^```text\n(\w+) · .*?^```$", text, re.M | re.S)
+    if not block:
+        return []
+    found = []
+    for pattern, names in PRINTED:
+        line = re.search(pattern, block[0], re.M)
+        if not line:
+            found.append(f"README.md:{prose.line_of(text, block.start())}: the output has no line like {pattern}")
+            continue
+        for group, name in enumerate(names, 1):
+            row = table.get(f"accuracy.{block[1]}.{name}")
+            place = f"README.md:{prose.line_of(text, block.start() + line.start())}"
+            if row is None:
+                found.append(f"{place}: no figure accuracy.{block[1]}.{name} in {LEDGER}")
+            elif not agrees(line[group], row["value"]):
+                found.append(f"{place}: the output has {line[group]}, {row['id']} is {row['value']}; run the command again and put in what it prints")
+    return found
+
+
+def agrees(shown, value):
+    """Whether two decimal numbers are one, to half a step of the coarser one."""
+    step = max(10.0 ** -len(number.partition(".")[2]) for number in (shown, value))
+    return abs(float(shown) - float(value)) <= 0.5001 * step
 
 
 def old_in_readme(root, old):

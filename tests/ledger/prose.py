@@ -2,7 +2,8 @@
 
 `<!--=id-->0.31 m<!--/-->` shows a row of the ledger with its unit, `<!--#id-->0.31<!--/-->` the number alone. `<!--const-->` in a
 paragraph or table, or on a line of its own before it, says that its numbers are definitions, settings or examples;
-`<!--const section-->` says so of all text up to the next heading of the same level.
+`<!--const section-->` below a heading of level 2 or deeper says so of all text up to the next heading of that level. A page as a whole
+cannot be declared so.
 """
 
 import re
@@ -79,11 +80,22 @@ def declared(text):
             level = len(heading[1])
             if open_level is not None and level <= open_level:
                 open_level = None
-        if CONST_SECTION.search(block):
+        if CONST_SECTION.search(block) and level > 1:
             open_level = level
         if open_level is not None or CONST.search(block) or KEYS.match(re.sub(r"\A\s*<!--.*?-->\n", "", block)):
             spans.append((begun, begun + len(block)))
     return spans
+
+
+def of_a_page(text):
+    """Places where all numbers of a page are declared to be constants."""
+    level = 0
+    for begun, block in paragraphs(re.sub(r"(?ms)^[ >]*(`{3,}).*?^[ >]*\1[ \t]*$", lambda found: re.sub(r"[^\n]", "x", found[0]), text)):
+        heading = re.match(r"(#{1,6}) ", block)
+        level = len(heading[1]) if heading else level
+        found = CONST_SECTION.search(block)
+        if found and level < 2 and "`" not in block[: found.start()][-1:]:
+            yield begun + found.start()
 
 
 def without_source(text):
@@ -92,10 +104,12 @@ def without_source(text):
     spans = declared(re.sub(r"(?ms)^[ >]*(`{3,}).*?^[ >]*\1[ \t]*$", lambda found: re.sub(r"[^\n]", "x", found[0]), text))
     constant = [found.span() for pattern in CONSTANTS for found in pattern.finditer(shown)]
     for found in FIGURE.finditer(re.sub(r"<!--.*?-->", lambda c: " " * len(c[0]), shown, flags=re.S)):
+        # Not the blank before it: a number may begin its paragraph.
         start, end = found.span()
+        start += len(found[0]) - len(found[0].lstrip())
         inside = any(a <= start < b for a, b in spans)
         if not inside and not any(a < end and start < b for a, b in constant):
-            yield start + len(found[0]) - len(found[0].lstrip()), found[0].strip()
+            yield start, found[0].strip()
 
 
 def line_of(text, place):

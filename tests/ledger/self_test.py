@@ -104,6 +104,11 @@ FAULTS = [
     ("a figure typed by hand", [("README.md", "an epoch is 100 ms long.\n<!--const-->", "the error is 0.2 m.")], "README.md:5: '0.2 m' has no source"),
     ("a figure in the book", [("book/src/first.md", "Nothing", "12 of 12 cells fit. Nothing")], "book/src/first.md:3: '12 of 12' has no source"),
     ("a figure in a table of results", [("README.md", "| key |", "| error |")], "README.md:14: '90 °' has no source"),
+    ("a page declared as a whole", [("book/src/first.md", "# First\n", "# First\n\n<!--const section-->\n\n12 m.\n")],
+     "book/src/first.md:3: all numbers of a page are declared constants; declare sections or paragraphs"),
+    ("a figure of such a page", [("book/src/first.md", "# First\n", "# First\n\n<!--const section-->\n\n12 m.\n")],
+     "book/src/first.md:5: '12 m' has no source"),
+    ("a section declared", [("book/src/first.md", "# First\n", "# First\n\n## A\n\n<!--const section-->\n\n12 m.\n")], None),
     ("a marker without an end", [("README.md", "0.31 m<!--/-->", "0.31 m")], "README.md:3: "),
     ("a marker that begins a line", [("README.md", "The error is <", "<")], "README.md:3: a marker begins the line; put a word before it"),
     ("code", [("src/room/lib.rs", "458.0", "459.0")], "reports/evidence.csv:2: stale: a.bias_m, a.error_m: of src/room, made at 1234567; make again by: --make a."),
@@ -135,9 +140,41 @@ def run():
                 missed.append(f"{what}: reported though it is no fault: {found}")
             elif expected and not any(text.startswith(expected) or expected in text for text in found):
                 missed.append(f"{what}: expected {expected!r} in {found}")
-    missed += write_mends_what_it_can() + a_stale_page_says_so() + a_page_is_confirmed_by_its_digits()
-    print("\n".join(missed) or f"evidence: {len(FAULTS) + len(COMPARED) + 9} planted faults, all found")
+    missed += write_mends_what_it_can() + the_readme_prints_the_ledger() + a_stale_page_says_so() + a_page_is_confirmed_by_its_digits()
+    print("\n".join(missed) or f"evidence: {len(FAULTS) + len(COMPARED) + 12} planted faults, all found")
     return bool(missed)
+
+
+OUTPUT = '''```text
+sky · 60 s at 6.5 Msps · seed 1
+first fix     27.1 s, 329 fixes
+position east (m)              -0.0125      0.0087      0.0258
+position north (m)              0.0612      0.0200      0.0932
+position up (m)                -0.0915      0.1582      0.2441
+0 losses of lock, 0 cycle slips
+```
+'''
+
+
+def the_readme_prints_the_ledger():
+    """Numbers of the README's output against rows of the ledger: sound, a digit too large, a line too few, a row too few."""
+    values = {"first_fix_s": "27.1", "fixes": "329", "east_m": "-0.013", "north_m": "0.061", "up_m": "-0.092",
+              "vertical_p95_m": "0.24", "losses": "0", "slips": "0"}
+    table = {f"accuracy.sky.{name}": {"id": f"accuracy.sky.{name}", "value": value} for name, value in values.items()}
+    missed = []
+    with tempfile.TemporaryDirectory() as root:
+        place = Place(root)
+        for change, rows, expected in [
+            (("0.2441", "0.2441"), table, None),
+            (("0.2441", "0.2541"), table, "README.md:6: the output has 0.2541, accuracy.sky.vertical_p95_m is 0.24"),
+            (("0 losses of lock", "1 loss of lock"), table, "README.md:1: the output has no line like"),
+            (("329", "329"), {name: row for name, row in table.items() if "fixes" not in name}, "README.md:3: no figure accuracy.sky.fixes"),
+        ]:
+            place.put("README.md", OUTPUT.replace(*change))
+            found = check.printed_in_readme(place.root, rows)
+            if bool(found) != bool(expected) or (expected and not found[0].startswith(expected)):
+                missed.append(f"the README's output with {change}: expected {expected!r} in {found}")
+    return missed
 
 
 def write_mends_what_it_can():
