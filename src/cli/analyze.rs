@@ -14,6 +14,7 @@ use analysis::judge::foreign::{self, Files};
 use analysis::judge::schema::SUMMARY;
 use analysis::judge::verdict::Verdict;
 use analysis::show;
+use gnss::renamed::{self, Class};
 
 /// Judges the run in a directory, against a user's limits if there are any, or a receiver against a truth.
 pub fn execute(arguments: &args::Analyze) -> Result<(), CliError> {
@@ -25,6 +26,7 @@ pub fn execute(arguments: &args::Analyze) -> Result<(), CliError> {
         return Err(CliError::usage("analyze: expected a run's directory, or --truth"));
     };
     let gate = Gate::read(arguments.check.as_ref(), &SUMMARY)?;
+    earlier_files(run).iter().for_each(|warning| scenario::warn(warning));
     let summary = analysis::judge_into(run, gate.limits(), arguments.report.forms()).map_err(judge_error)?;
     let verdict = &summary.details.verdict;
     arguments.printed.results(
@@ -32,6 +34,15 @@ pub fn execute(arguments: &args::Analyze) -> Result<(), CliError> {
         || json!({ "results": run, "summary": summary, "verdict": printed::verdict(verdict) }),
     )?;
     gate.enforce(verdict, arguments.printed)
+}
+
+/// Warnings about files of results that an earlier version wrote under other names.
+fn earlier_files(run: &Path) -> Vec<String> {
+    let files = renamed::NAMES.iter().filter(|(class, earlier, _)| *class == Class::File && run.join(earlier).exists());
+    let warning = |(_, earlier, now): &(Class, &str, &str)| {
+        format!("{}: an earlier version wrote it; it is called {now} now", run.join(earlier).display())
+    };
+    files.map(warning).collect()
 }
 
 fn another_receiver(truth: &Path, arguments: &args::Analyze) -> Result<(), CliError> {
@@ -55,4 +66,26 @@ fn another_receiver(truth: &Path, arguments: &args::Analyze) -> Result<(), CliEr
         || json!({ "results": out, "summary": judgement.summary, "verdict": printed::verdict(&verdict) }),
     )?;
     gate.enforce(&verdict, arguments.printed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_of_an_earlier_version_is_told_with_its_name_now() {
+        let run = tempfile::tempdir().unwrap();
+        std::fs::write(run.path().join("consistency.csv"), "").unwrap();
+        assert!(earlier_files(run.path()).is_empty());
+        std::fs::write(run.path().join("honesty.csv"), "").unwrap();
+        let told = earlier_files(run.path());
+        assert!(
+            told.len() == 1
+                && told[0].ends_with(
+                    "honesty.csv: an earlier version wrote it; it is called \
+                                                     consistency.csv now"
+                ),
+            "{told:?}"
+        );
+    }
 }

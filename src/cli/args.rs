@@ -3,6 +3,7 @@
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
+use clap::builder::UnknownArgumentValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::cli::address::listen_address;
@@ -453,6 +454,10 @@ pub struct Receive {
     /// Sample rate of a raw file or stream
     #[arg(long, value_name = "HZ")]
     pub rate_hz: Option<f64>,
+    /// Name that other programs have for --rate-hz: refused with that one
+    #[arg(long = "sample-rate", hide = true, value_name = "HZ",
+          value_parser = UnknownArgumentValueParser::suggest_arg("--rate-hz"))]
+    pub sample_rate: Option<String>,
     /// Frequency of GPS L1 (1575.42 MHz) within a raw file's samples. It is positive if 0 Hz of the samples
     /// is
     /// 1575.42 MHz − HZ, and negative if 0 Hz lies above 1575.42 MHz. With --inverted it is the frequency as

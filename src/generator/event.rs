@@ -14,6 +14,7 @@ use thiserror::Error;
 use crate::scene::Scene;
 use crate::switches::{MOST, Source};
 use crate::vehicle::file::{Fault, FileError};
+use gnss::renamed::{self, Class};
 use gnss::satellite::Sv;
 
 /// Decibels that a power may be changed by.
@@ -94,8 +95,10 @@ impl FromStr for Event {
                 "power" => Source::Satellite(satellite()?),
                 "jammer" => Source::Jammer(name.parse().map_err(|_| unknown())?),
                 "spoofer" => Source::Spoofer(name.parse().map_err(|_| unknown())?),
-                "astray" => return Err(EventError::Renamed("astray", "range_error")),
-                _ => return Err(unknown()),
+                other => {
+                    let renamed = renamed::find(Class::Event, other);
+                    return Err(renamed.map_or_else(unknown, |(earlier, now)| EventError::Renamed(earlier, now)));
+                }
             };
             Self::Power(
                 source,

@@ -62,6 +62,7 @@ use crate::fast_phase::scintillation::Strength;
 use crate::fidelity::allowed_m;
 use crate::vehicle::attitude::Attitude;
 use gnss::facts::Expect;
+use gnss::place::hint;
 use gnss::satellite::Sv;
 use gnss::signal::Signal;
 use gnss::time::Epoch;
@@ -85,8 +86,7 @@ pub enum ScenarioError {
         message: String,
     },
     /// A key that no table has.
-    #[error("{place}: unknown key '{key}'{}; known here: \
-             {known}", nearest.as_ref().map_or(String::new(), |n| format!(": did you mean '{n}'?")))]
+    #[error("{place}: unknown key '{key}'{}; known here: {known}", hint(key, nearest.as_deref()))]
     UnknownKey {
         /// Position in the text.
         place: Place,

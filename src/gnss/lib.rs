@@ -56,6 +56,7 @@ pub mod place;
 pub mod qzss;
 pub mod record;
 pub mod recording;
+pub mod renamed;
 pub mod rinex;
 pub mod samples;
 pub mod satellite;

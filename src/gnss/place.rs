@@ -8,6 +8,8 @@ use std::ops::Range;
 
 use toml::de::{DeTable, DeValue};
 
+use crate::renamed::{self, Class};
+
 /// The keys of a text.
 pub struct Keys<'t> {
     origin: &'t str,
@@ -69,16 +71,40 @@ impl<'t> Keys<'t> {
     }
 }
 
-/// Candidate most similar to `word`, if any is similar: likeness by Jaro and Winkler above 0.75, whatever the
-/// case.
+/// Candidate most similar to `word`, if any is similar: the name now of a key of earlier versions, else
+/// likeness by Jaro and Winkler above 0.75. Case, blanks, slashes, hyphens and underscores do not count.
 pub fn nearest(word: &str, candidates: &[&str]) -> Option<String> {
-    let lower = word.to_lowercase();
+    let now = renamed::find(Class::Key, word).map(|(_, now)| now);
+    if let Some(now) = now.filter(|now| candidates.contains(now)) {
+        return Some(now.to_owned());
+    }
+    let bare = bare(word);
     candidates
         .iter()
-        .map(|candidate| (strsim::jaro_winkler(&lower, &candidate.to_lowercase()), *candidate))
+        .map(|candidate| (strsim::jaro_winkler(&bare, &self::bare(candidate)), *candidate))
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .filter(|(likeness, _)| *likeness > 0.75)
         .map(|(_, candidate)| candidate.to_owned())
+}
+
+/// A word in lower case without blanks, slashes, hyphens and underscores.
+pub fn bare(word: &str) -> String {
+    word.to_lowercase().chars().filter(|c| !c.is_whitespace() && !"/-_".contains(*c)).collect()
+}
+
+/// A count and its noun, in the plural unless it is one.
+pub fn counted(count: usize, noun: &str) -> String {
+    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
+}
+
+/// End of a message about an unknown key: its name now, or the nearest known key. `key` may have its tables.
+pub fn hint(key: &str, nearest: Option<&str>) -> String {
+    let now = renamed::find(Class::Key, key.rsplit('.').next().unwrap_or(key)).map(|(_, now)| now);
+    match nearest {
+        Some(near) if now == Some(near) => format!(": it is called '{near}' now"),
+        Some(near) => format!(": did you mean '{near}'?"),
+        None => String::new(),
+    }
 }
 
 #[cfg(test)]
@@ -106,7 +132,26 @@ mod tests {
         assert_eq!(of("NXIXE").as_deref(), Some("noise"));
         assert_eq!(of("xoixe"), None);
         assert_eq!(nearest("noise", &[]), None);
+        // Signs between words are none of them.
+        assert_eq!(nearest("GPS-L1CA", &["GPS L5", "GPS L1 C/A", "GPS L1C"]).as_deref(), Some("GPS L1 C/A"));
+        assert_eq!(nearest("ci16le", &["ci8", "ri16_le", "ci16_le"]).as_deref(), Some("ci16_le"));
         // The most similar one of two.
         assert_eq!(nearest("moise", &["noise", "moises"]).as_deref(), Some("moises"));
+    }
+
+    #[test]
+    fn a_noun_is_plural_unless_there_is_one() {
+        let of = |count| counted(count, "satellite");
+        assert_eq!([of(0), of(1), of(12)], ["0 satellites", "1 satellite", "12 satellites"]);
+    }
+
+    #[test]
+    fn a_key_of_earlier_versions_is_told_with_its_name_now_where_that_is_known() {
+        let known = ["overlap", "secondary_code"];
+        assert_eq!(nearest("overlay", &known).as_deref(), Some("secondary_code"));
+        assert_eq!(hint("component[1].overlay", Some("secondary_code")), ": it is called 'secondary_code' now");
+        assert_eq!(nearest("overlay", &["overlap"]).as_deref(), Some("overlap"));
+        assert_eq!(hint("overlay", Some("overlap")), ": did you mean 'overlap'?");
+        assert_eq!(hint("overlay", None), "");
     }
 }

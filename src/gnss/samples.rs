@@ -10,6 +10,7 @@ use std::str::FromStr;
 use num_complex::Complex;
 use thiserror::Error;
 
+use crate::place::nearest;
 use crate::time::{Epoch, Rate};
 
 /// Encoding of one sample.
@@ -31,10 +32,18 @@ pub enum Format {
 
 /// Error for a text that is not the name of a format.
 #[derive(Debug, Error, PartialEq)]
-#[error("unknown sample format '{0}': expected one of ci8, cu8, ci16, cf32, ri8, ri16")]
+#[error("unknown sample format '{name}'{hint}: expected one of ci8, cu8, ci16, cf32, ri8, ri16",
+        name = .0, hint = Format::suggestion(.0))]
 pub struct FormatError(String);
 
 impl Format {
+    /// Suggestion for a name that is no format's, for an error message; empty if none is similar.
+    pub fn suggestion(name: &str) -> String {
+        let known = Self::NAMES.map(|(_, name)| name);
+        let near = nearest(name, &known).map(|near| near.trim_end_matches("_le").to_owned());
+        near.map_or_else(String::new, |near| format!(" (did you mean {near}?)"))
+    }
+
     /// Every format with its SigMF name.
     pub const NAMES: [(Self, &'static str); 6] = [
         (Self::Ci8, "ci8"),
@@ -271,5 +280,7 @@ mod tests {
         }
         assert_eq!("CI16".parse(), Ok(Format::Ci16Le));
         assert!("ci12".parse::<Format>().is_err());
+        let error = "ci16le".parse::<Format>().unwrap_err().to_string();
+        assert!(error.contains("'ci16le' (did you mean ci16?): expected one of "), "{error}");
     }
 }

@@ -14,7 +14,7 @@ use crate::acquire::{AcquireError, AcquisitionSettings};
 use crate::described::described;
 use crate::position::PositionSettings;
 use crate::track::{TrackingSettings, TrackingSettingsError};
-use gnss::place::{Keys, nearest};
+use gnss::place::{Keys, hint, nearest};
 use gnss::time::{Epoch, TimeError};
 
 /// All choices of the receiver.
@@ -83,8 +83,7 @@ pub enum SettingsError {
         message: String,
     },
     /// A key that there is not.
-    #[error("{origin}: unknown key '{}'{}; known here: {known}", key.escape_debug(),
-            nearest.as_ref().map_or(String::new(), |near| format!(": did you mean '{near}'?")))]
+    #[error("{origin}: unknown key '{}'{}; known here: {known}", key.escape_debug(), hint(key, nearest.as_deref()))]
     UnknownKey {
         /// Name of the file, with line and column where they are known.
         origin: String,
@@ -108,10 +107,12 @@ pub enum SettingsError {
         expected: String,
     },
     /// A value out of its range.
-    #[error("{origin}: {key} = {value}: expected {expected}")]
+    #[error("{origin}: {above}{key} = {value}: expected {expected}")]
     Range {
         /// Name of the file, with line and column where they are known.
         origin: String,
+        /// Tables above the settings, with a dot behind each.
+        above: String,
         /// The key with its tables.
         key: &'static str,
         /// The value.
@@ -120,26 +121,32 @@ pub enum SettingsError {
         expected: String,
     },
     /// A setting of the search.
-    #[error("{origin}: {source}")]
+    #[error("{origin}: {above}{source}")]
     Acquisition {
         /// Name of the file, with line and column where they are known.
         origin: String,
+        /// Tables above the settings, with a dot behind each.
+        above: String,
         /// Error of the acquisition settings.
         source: AcquireError,
     },
     /// A setting of the channels.
-    #[error("{origin}: {source}")]
+    #[error("{origin}: {above}{source}")]
     Tracking {
         /// Name of the file, with line and column where they are known.
         origin: String,
+        /// Tables above the settings, with a dot behind each.
+        above: String,
         /// Error of the tracking settings.
         source: TrackingSettingsError,
     },
     /// A week reference that is no time.
-    #[error("{origin}: operation.week_reference: {source}")]
+    #[error("{origin}: {above}operation.week_reference: {source}")]
     Week {
         /// Name of the file, with line and column where they are known.
         origin: String,
+        /// Tables above the settings, with a dot behind each.
+        above: String,
         /// Error of the week's reference time.
         source: TimeError,
     },
@@ -235,11 +242,17 @@ impl Settings {
     /// # Errors
     /// The first value out of its range.
     pub fn validate(&self, origin: &str) -> Result<(), SettingsError> {
-        self.acquisition
-            .validate()
-            .map_err(|source| SettingsError::Acquisition { origin: origin.to_owned(), source })?;
+        self.acquisition.validate().map_err(|source| SettingsError::Acquisition {
+            origin: origin.to_owned(),
+            above: String::new(),
+            source,
+        })?;
         // Longer codes have settings that are fitted to them.
-        self.tracking.validate(1e-3).map_err(|source| SettingsError::Tracking { origin: origin.to_owned(), source })?;
+        self.tracking.validate(1e-3).map_err(|source| SettingsError::Tracking {
+            origin: origin.to_owned(),
+            above: String::new(),
+            source,
+        })?;
         let (position, operation) = (&self.position, &self.operation);
         let measurement_ms = f64::from(operation.measurement_interval_ms);
         #[rustfmt::skip]
@@ -262,6 +275,7 @@ impl Settings {
                 let expected = format!("{low} to {high}");
                 return Err(SettingsError::Range {
                     origin: origin.to_owned(),
+                    above: String::new(),
                     key,
                     value: value.to_string(),
                     expected,
@@ -271,12 +285,14 @@ impl Settings {
         if !operation.measurement_interval_ms.is_multiple_of(operation.tracking_interval_ms) {
             return Err(SettingsError::Range {
                 origin: origin.to_owned(),
+                above: String::new(),
                 key: "operation.tracking_interval_ms",
                 value: operation.tracking_interval_ms.to_string(),
                 expected: format!("a divisor of measurement_interval_ms, {}", operation.measurement_interval_ms),
             });
         }
-        self.week_reference().map_err(|source| SettingsError::Week { origin: origin.to_owned(), source })?;
+        let refuse = |source| SettingsError::Week { origin: origin.to_owned(), above: String::new(), source };
+        self.week_reference().map_err(refuse)?;
         Ok(())
     }
 
@@ -341,10 +357,13 @@ impl SettingsError {
             Self::UnknownKey { origin, key, .. } | Self::Type { origin, key, .. } => {
                 (*origin, *key) = (keys.place_of(&whole), whole.clone());
             }
-            Self::Range { origin, .. }
-            | Self::Acquisition { origin, .. }
-            | Self::Tracking { origin, .. }
-            | Self::Week { origin, .. } => *origin = keys.place_of(&whole),
+            Self::Range { origin, above: tables, .. }
+            | Self::Acquisition { origin, above: tables, .. }
+            | Self::Tracking { origin, above: tables, .. }
+            | Self::Week { origin, above: tables, .. } => {
+                *origin = keys.place_of(&whole);
+                *tables = if above.is_empty() { String::new() } else { format!("{above}.") };
+            }
             Self::Toml { .. } | Self::Several(_) => {}
         }
         (keys.start_of(&whole).unwrap_or_default(), self)
@@ -448,7 +467,11 @@ mod tests {
     fn settings_in_a_scenario_are_refused_at_their_line_there() {
         let text = |line: &str| format!("name = \"x\"\n[receiver.tracking]\n{line}\n");
         for (line, expected) in [
-            ("pll_order = 7", "s.toml:3:1: tracking.pll_order = 7: expected 2 or 3"),
+            ("pll_order = 7", "s.toml:3:1: receiver.tracking.pll_order = 7: expected 2 or 3"),
+            ("dll_bandwidth_hz = -1", "s.toml:3:1: receiver.tracking.dll_bandwidth_hz = -1: expected above 0"),
+            ("[receiver.position]\nmask_deg = 91", "s.toml:4:1: receiver.position.mask_deg = 91: expected 0 to 90"),
+            ("[receiver.acquisition]\nsignals = ['x']", "s.toml:4:1: receiver.acquisition.signals names 'x'"),
+            ("[receiver.operation]\nweek_reference = 'x'", "s.toml:4:1: receiver.operation.week_reference: "),
             ("pll_order = \"x\"", "s.toml:3:1: receiver.tracking.pll_order = \"x\": expected 2 or 3"),
             ("pll_ordr = 3", "s.toml:3:1: unknown key 'receiver.tracking.pll_ordr'"),
         ] {

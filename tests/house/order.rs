@@ -11,7 +11,7 @@ pub const ORDER: Order<'static> = &[
     (
         "gnss",
         &[
-            &["plant"],
+            &["plant", "renamed"],
             &["time", "earth", "geoid", "satellite", "crc", "fec", "inflate", "place", "weil"],
             &["bits", "bdgim", "klobuchar", "nequick", "ionex", "samples", "vienna"],
             &["ionosphere"],

@@ -17,6 +17,7 @@ use toml::{Table, Value as Toml};
 use crate::judge::judgement::{Bound, Judgement, MARGINAL_SHARE};
 use crate::judge::schema::{self, Figures};
 use gnss::place::Keys;
+use gnss::renamed::{self, Class};
 
 /// Error of a file of limits. `name` is the file's, with line and column where they are known.
 #[derive(Debug, Error, PartialEq)]
@@ -30,7 +31,7 @@ pub enum LimitsError {
         message: String,
     },
     /// A path that the file of figures does not have.
-    #[error("{name}: {} is not in {file}; the nearest path is {nearest} (all: {listed})", path.escape_debug())]
+    #[error("{name}: {} is not in {file}; {} {nearest} (all: {listed})", path.escape_debug(), instead(path))]
     Path {
         /// Name of the file of limits.
         name: String,
@@ -55,7 +56,7 @@ pub enum LimitsError {
         /// The value as written.
         value: String,
         /// Expected value, in words.
-        expected: &'static str,
+        expected: String,
     },
     /// A path without a limit.
     #[error("{name}: {path} has no limit; expected {{ min = … }}, {{ max = … }}, both, or {{ equals = … }}")]
@@ -138,7 +139,7 @@ impl Limits {
                     path: "the file".to_owned(),
                     key: "marginal_share".to_owned(),
                     value: value.to_string(),
-                    expected: "a number from 0 to below 1",
+                    expected: "a number from 0 to below 1".to_owned(),
                 })?
             }
         };
@@ -188,7 +189,13 @@ impl Limits {
                 }
                 ("equals", Some(number), _) => Bound::Equals(number.into()),
                 ("equals", None, _) => match value {
-                    Toml::String(text) => Bound::Equals(text.clone().into()),
+                    Toml::String(text) => {
+                        let earlier = renamed::find(Class::Word, text).filter(|_| path.ends_with("_verdict"));
+                        if let Some((_, now)) = earlier {
+                            return Err(self.wrong(path, key, value, &format!("\"{now}\", as it is called now")));
+                        }
+                        Bound::Equals(text.clone().into())
+                    }
                     Toml::Boolean(truth) => Bound::Equals((*truth).into()),
                     _ => return Err(self.wrong(path, key, value, "a finite number, a text or a truth value")),
                 },
@@ -212,9 +219,10 @@ impl Limits {
         Ok(())
     }
 
-    fn wrong(&self, path: &str, key: &str, value: &Toml, expected: &'static str) -> LimitsError {
+    fn wrong(&self, path: &str, key: &str, value: &Toml, expected: &str) -> LimitsError {
         let (name, key) = (self.name.clone(), if key.is_empty() { "limit" } else { key }.to_owned());
-        LimitsError::Value { name, path: path.to_owned(), key, value: value.to_string(), expected }
+        let (path, value, expected) = (path.to_owned(), value.to_string(), expected.to_owned());
+        LimitsError::Value { name, path, key, value, expected }
     }
 
     /// Holds the figures against every limit.
@@ -228,6 +236,11 @@ impl Limits {
         };
         self.entries.iter().map(one).collect()
     }
+}
+
+/// Words before the path that is told instead of an unknown one.
+fn instead(path: &str) -> &'static str {
+    if renamed::figure(path).is_some() { "it is called now" } else { "the nearest path is" }
 }
 
 /// A path with the first keys below it, so that a misspelt table is compared by what it holds.
@@ -296,7 +309,15 @@ mod tests {
             message.contains("position.horizontal_p59_m") && message.contains("position.horizontal_p95_m"),
             "{message}"
         );
-        assert!(refused("[positoin]\nfixes.min = 1").contains("position"));
+        assert!(refused("[positoin]\nfixes.min = 1").contains("the nearest path is position"));
+        // Names of earlier versions are told with their names now.
+        for text in ["\"honesty.nees\" = { max = 4 }", "[honesty]\nnees_mean.max = 4"] {
+            let message = refused(text);
+            assert!(message.contains("is not in summary.json; it is called now position.nees_mean ("), "{message}");
+        }
+        let message = refused("position.nees_verdict = { equals = \"honest\" }");
+        assert!(message.contains("equals = \"honest\", expected \"consistent\", as it is called now"), "{message}");
+        Limits::parse("scene = { equals = \"honest\" }", "l.toml").unwrap();
         assert!(refused("position.fixes = 3").contains("max = 1.5"));
         assert!(refused("position.fixes = { most = 3 }").contains("min, max or equals"));
         assert!(refused("position.fixes = { max = \"3\" }").contains("finite number"));

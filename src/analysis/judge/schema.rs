@@ -7,6 +7,8 @@
 use serde_json::{Map, Value};
 use std::sync::OnceLock;
 
+use gnss::renamed;
+
 /// The schema's text.
 pub static TEXT: &str = include_str!("../assets/summary.schema.json");
 
@@ -100,10 +102,13 @@ impl Figures {
         (self.leaves)().iter().any(|leaf| leaf.path.split('.').count() > keys && covers(&begin(leaf), path))
     }
 
-    /// The path most like another.
+    /// The path most like another: of an earlier version's, that of its name now.
     pub fn nearest(&self, path: &str) -> String {
+        let now = renamed::figure(path);
+        let (leaves, path) = ((self.leaves)(), now.as_deref().unwrap_or(path));
+        let longer = leaves.iter().find(|leaf| now.is_some() && leaf.path.starts_with(path));
         let distance = |leaf: &&Leaf| strsim::damerau_levenshtein(&leaf.path, path);
-        (self.leaves)().iter().min_by_key(distance).map(|leaf| leaf.path.clone()).unwrap_or_default()
+        longer.or_else(|| leaves.iter().min_by_key(distance)).map(|leaf| leaf.path.clone()).unwrap_or_default()
     }
 }
 

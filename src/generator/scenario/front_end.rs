@@ -249,7 +249,10 @@ impl Reader<'_, '_> {
 
 fn format(table: &Table<'_>) -> Result<Format, ScenarioError> {
     match table.text("format")? {
-        Some(text) => text.parse().map_err(|_| table.bad("format", "one of ci8, cu8, ci16, cf32, ri8, ri16")),
+        Some(text) => text.parse().map_err(|_| {
+            let expected = format!("one of ci8, cu8, ci16, cf32, ri8, ri16{}", Format::suggestion(text));
+            table.bad("format", expected)
+        }),
         None => Ok(Format::Ci8),
     }
 }

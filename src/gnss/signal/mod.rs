@@ -15,6 +15,7 @@ use thiserror::Error;
 
 use crate::earth::SPEED_OF_LIGHT_MPS;
 use crate::message::Message;
+use crate::place::{bare, nearest};
 use crate::satellite::{Sv, System};
 use crate::time::{Epoch, TimeScale};
 use crate::{beidou, galileo, glonass, gps, navic, qzss, sbas};
@@ -233,11 +234,23 @@ impl Signal {
     }
 
     /// Suggestion for a name that [`Signal::find`] does not know, for an error message. It lists the signals
-    /// whose names contain the text, regardless of case. It is empty if there are none.
+    /// whose names contain the text, or else the most similar one. Case, blanks and slashes do not count. It
+    /// is empty if there are none.
     pub fn suggestion(name: &str) -> String {
-        let lower = name.to_lowercase();
-        let alike = all().into_iter().filter(|signal| !name.is_empty() && signal.name.to_lowercase().contains(&lower));
-        let names: Vec<String> = alike.map(|signal| format!("\"{}\"", signal.name)).collect();
+        let text = bare(name);
+        let all: Vec<&str> = all().into_iter().map(|signal| signal.name).collect();
+        let mut alike: Vec<&str> = all.iter().copied().filter(|known| bare(known).contains(&text)).collect();
+        if text.is_empty() {
+            return String::new();
+        }
+        // A whole name that others begin with is none of them.
+        if let Some(whole) = alike.iter().copied().find(|known| bare(known) == text) {
+            alike = vec![whole];
+        }
+        let names: Vec<String> = match nearest(name, &all) {
+            Some(near) if alike.is_empty() => vec![format!("\"{near}\"")],
+            _ => alike.into_iter().map(|known| format!("\"{known}\"")).collect(),
+        };
         if names.is_empty() { String::new() } else { format!(" (did you mean {}?)", names.join(" or ")) }
     }
 
@@ -571,6 +584,10 @@ mod tests {
         let meant = Signal::suggestion("gps l1");
         assert!(meant.contains("\"GPS L1 C/A\" or \"GPS L1C\"") && !meant.contains("QZSS"), "{meant}");
         assert_eq!(Signal::suggestion("E6"), " (did you mean \"Galileo E6\"?)");
+        assert_eq!(Signal::suggestion("GPS L1CA"), " (did you mean \"GPS L1 C/A\"?)");
+        assert_eq!(Signal::suggestion("GPS-L1C"), " (did you mean \"GPS L1C\"?)");
+        assert!(Signal::suggestion("L1CA").contains("\"GPS L1 C/A\" or "), "{}", Signal::suggestion("L1CA"));
+        assert!(Signal::suggestion("Galileo E7").starts_with(" (did you mean \"Galileo E"));
         assert_eq!((Signal::suggestion("Transit"), Signal::suggestion("")), (String::new(), String::new()));
     }
 

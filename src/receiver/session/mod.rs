@@ -52,9 +52,11 @@ impl Session {
     /// A cold start. Every signal is received in the first front end whose band holds its main lobes, or else
     /// its carrier.
     pub fn new(metadata: &[IfMetadata], settings: &Settings) -> Result<Self, ReceiveError> {
-        let week_reference = settings
-            .week_reference()
-            .map_err(|source| SettingsError::Week { origin: "settings".to_owned(), source })?;
+        let week_reference = settings.week_reference().map_err(|source| SettingsError::Week {
+            origin: "settings".to_owned(),
+            above: String::new(),
+            source,
+        })?;
         let Some(first) = metadata.first() else { return Err(ReceiveError::NoFrontEnd) };
         let assigned = suited::assigned(metadata, &settings.acquisition.signals());
         let all = assigned.iter().flatten();

@@ -38,6 +38,11 @@ fn every_fault_of_a_file_is_refused_at_its_place() {
     let line = "signal_file = \"own.signal\"\nsignals = [\"faulty\"]";
     let good = || good().replace("filed", "faulty");
     for (from, to, refusals) in [
+        (
+            "power_share = 1\n",
+            "power_share = 1\noverlay = \"01\"\n",
+            vec!["unknown key 'component[1].overlay': it is called 'secondary_code' now; known here: "],
+        ),
         ("rinex", "rinx", vec!["own.signal:2:1: unknown key 'rinx': did you mean 'rinex'?"]),
         (
             "GPS L1 C/A",
