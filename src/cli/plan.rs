@@ -13,12 +13,16 @@ use generator::dynamics::{LineOfSight, lines_of_sight};
 use generator::plan::{Plan, Together};
 use generator::scenario::Overrides;
 use generator::scene::Scene;
-use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::place::counted;
 use receiver::followed::Followed;
+use receiver::position::{IonosphereChoice, PositionSettings, TroposphereChoice};
 use receiver::settings::Settings;
 use receiver::track::TrackingSettings;
 use study::demand::{self, Answer, Demand};
 
+/// Height above which a receiver corrects for no troposphere.
+const AIR_M: f64 = 50e3;
 /// Standard gravity, for accelerations in g.
 const G_MPS2: f64 = 9.806_65;
 
@@ -31,6 +35,12 @@ pub fn execute(arguments: &args::Plan) -> Result<(), CliError> {
     for warning in warnings {
         scenario::warn(&warning);
     }
+    uncalled(&scenes, &settings.position).iter().for_each(|warning| scenario::warn(warning));
+    let note = |text: &str| {
+        if !arguments.printed.quiet {
+            scenario::note(text)
+        }
+    };
     let (mut plans, mut texts, mut objects) = (Vec::new(), Vec::new(), Vec::new());
     for scene in &scenes {
         let plan = Plan::of(scene).map_err(generator_error)?;
@@ -40,16 +50,40 @@ pub fn execute(arguments: &args::Plan) -> Result<(), CliError> {
         loops.warning().iter().for_each(|warning| scenario::warn(&format!("{of_it}{warning}")));
         texts.push(format!("{plan}\n{}", loops.text()));
         objects.push(json!({ "plan": plan, "loops": loops.object() }));
-        scenario::note(&format!("{of_it}{}", plan.speed()));
+        note(&format!("{of_it}{}", plan.speed()));
         plans.push(plan);
     }
     let mut together = String::new();
     if plans.len() > 1 {
         let all = Together(&plans);
-        scenario::note(&all.speed());
+        note(&all.speed());
         together = format!("{all}\n");
     }
     arguments.printed.results(&(together + &texts.join("\n")), || json!({ "front_ends": objects }))
+}
+
+/// Warnings about an atmosphere that the receiver corrects for and that the scene does not have.
+fn uncalled(scenes: &[Scene], settings: &PositionSettings) -> Vec<String> {
+    let Some(scene) = scenes.first() else { return Vec::new() };
+    let lacks = |name: &str| !scene.effects.iter().any(|effect| effect.name() == name);
+    let carriers_hz = scenes.iter().flat_map(|scene| &scene.signals).map(|signal| signal.centre_hz());
+    let several = carriers_hz.clone().any(|hz| carriers_hz.clone().next() != Some(hz));
+    // Two carriers measure that there is none.
+    let measured = settings.ionosphere == IonosphereChoice::Combined && several;
+    let ionosphere = settings.ionosphere != IonosphereChoice::None && !measured;
+    let on_ground = Geodetic::from_ecef(&scene.trajectory.at(0.0).position_m).height_m < AIR_M;
+    let troposphere = settings.troposphere != TroposphereChoice::None && on_ground;
+    let corrected = [("ionosphere", ionosphere), ("troposphere", troposphere)].into_iter();
+    corrected
+        .filter(|(name, corrected)| *corrected && lacks(name))
+        .map(|(name, _)| {
+            format!(
+                "the receiver corrects for {} {name} that the scene does not have: give the scene [{name}], or set \
+                 [receiver.position] {name} = \"none\"",
+                if name == "ionosphere" { "an" } else { "a" }
+            )
+        })
+        .collect()
 }
 
 /// The carrier loop of the scene's settings on every line of sight.
@@ -145,10 +179,10 @@ impl<'s> Loops<'s> {
             None => "no bandwidth up to 100 Hz does".to_owned(),
         };
         Some(format!(
-            "the carrier loop does not follow the motion on {count} of {} satellites: {} accelerates by up to \
+            "the carrier loop does not follow the motion on {count} of {}: {} accelerates by up to \
              {:.1} g, {:.1} g/s (at {:.1} s), a stress of {:.1} deg where {:.1} deg are left: expect cycle slips or \
              a lost lock; {remedy}",
-            self.rows.len(),
+            counted(self.rows.len(), "satellite"),
             line.sv,
             line.acceleration_mps2 / G_MPS2,
             line.jerk_mps3 / G_MPS2,
@@ -185,6 +219,28 @@ mod tests {
         let warned = warning(rocket, Some(TrackingSettings::default())).unwrap();
         assert!(warned.contains("[receiver.tracking] pll_bandwidth_hz = 35, integration = 2 would"), "{warned}");
         assert!(warned.contains("20.") && warned.contains("expect cycle slips"), "{warned}");
+    }
+
+    #[test]
+    fn an_atmosphere_that_only_the_receiver_has_is_warned_of() {
+        let bare = include_str!("../../scenarios/noise_free.toml");
+        let warned = |text: &str| {
+            let scenario = Scenario::parse(text, "plan").unwrap();
+            let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+            let (scenes, _) = scenario.compose_all(&directory, &Overrides::default()).unwrap();
+            uncalled(&scenes, &Settings::of_scenario(text, "plan").unwrap().position)
+        };
+        assert!(warned(bare).is_empty());
+        let two = warned(&bare.replace("ionosphere = \"none\"", "").replace("troposphere = \"none\"", ""));
+        assert_eq!(two.len(), 2, "{two:?}");
+        assert!(
+            two[0].contains("corrects for an ionosphere that the scene does not have: give the scene [ionosphere]")
+        );
+        assert!(two[1].ends_with("or set [receiver.position] troposphere = \"none\""), "{two:?}");
+        // A scene with both is not warned of, nor one in space of the troposphere.
+        assert!(warned(include_str!("../../scenarios/static.toml")).is_empty());
+        let high = warned(include_str!("../../scenarios/extremes/geo.toml"));
+        assert!(high.len() == 1 && high[0].contains("an ionosphere"), "{high:?}");
     }
 
     #[test]

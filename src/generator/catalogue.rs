@@ -379,7 +379,7 @@ fn leave_out_rogues(sets: &mut Vec<Ephemeris>, warnings: &mut Vec<String>) {
             if *blamed && !(any_odd && plausible(set)) {
                 *kept = false;
                 warnings.push(format!(
-                    "{}: left out the ephemeris of {} (IODE {}): its neighbours contradict it",
+                    "{}: left out the ephemeris of {} (IODE {}): those before and after it give another orbit or clock",
                     set.sv, set.toe, set.iode
                 ));
             }

@@ -343,7 +343,8 @@ pub fn choices(chosen: Fidelity, rate_hz: f64, noise: bool, signals: &[&Signal])
     found
 }
 
-/// Ratio of the kernels' time per sample with one value of a knob to that with another, over all signals.
+/// Ratio of the kernels' time per sample with one value of a knob to that with another, over all signals
+/// whose cost was measured. Without any the cost is unknown.
 fn multiple(
     edges: [CodeEdge; 2],
     arithmetics: [Arithmetic; 2],
@@ -355,7 +356,8 @@ fn multiple(
         let of = |signal: &&Signal| kernel_ns(signal, rate_hz, *edges.get(at)?, *arithmetics.get(at)?);
         signals.iter().filter_map(of).sum::<f64>()
     };
-    format!("{:.1} x {other}", all_ns(0) / all_ns(1))
+    let ratio = all_ns(0) / all_ns(1);
+    if ratio.is_finite() { format!("{ratio:.1} x {other}") } else { "unknown: not measured".to_owned() }
 }
 
 /// Knob of the layers: the power that is left out of a component, and the ratio by which fewer sequences are

@@ -19,12 +19,11 @@ use crate::error::GenerateError;
 use crate::fidelity::{self, Choice, Grade};
 use crate::levels::{Levels, Span};
 use crate::presence::{Presence, presence};
-use crate::ray::SPACE_M;
 use crate::ray::{Ray, Sight};
 use crate::scene::Scene;
 use crate::stream::Kept;
 use gnss::broadcast::OrbitError;
-use gnss::earth::Geodetic;
+use gnss::place::counted;
 use gnss::record::PassEnd;
 use gnss::satellite::Sv;
 use gnss::time::Epoch;
@@ -151,7 +150,7 @@ impl Plan {
             duration_s,
             signals: scene.signals.iter().map(|signal| signal.name).collect(),
             mask_deg: scene.mask_rad.to_degrees(),
-            in_space: Geodetic::from_ecef(&scene.trajectory.at(0.0).position_m).height_m >= SPACE_M,
+            in_space: scene.begins_in_space(),
             speed_mps: extremes.speed_mps,
             acceleration_mps2: extremes.acceleration_mps2,
             models: models(scene, &levels.kept),
@@ -315,16 +314,18 @@ impl fmt::Display for Plan {
         writeln!(f, "samples    {}: {} samples, {}", self.sampling, self.samples, size(self.bytes))?;
         writeln!(f, "motion     up to {:.2} m/s and {:.2} m/s2", self.speed_mps, self.acceleration_mps2)?;
         let Machinery { knot_spacing_s, longest_knot_spacing_s, knot_reason, .. } = &self.machinery;
-        if knot_spacing_s == longest_knot_spacing_s {
+        if *longest_knot_spacing_s == 0.0 {
+            writeln!(f, "knots      none: {knot_reason}")?;
+        } else if knot_spacing_s == longest_knot_spacing_s {
             writeln!(f, "knots      every {knot_spacing_s:.4} s: {knot_reason}")?;
         } else {
             writeln!(f, "knots      every {knot_spacing_s:.4} to {longest_knot_spacing_s:.4} s: {knot_reason}")?;
         }
         writeln!(f, "needs      {} of memory", size(self.memory_bytes))?;
         if self.in_space {
-            writeln!(f, "\n{} satellites not behind the Earth", self.satellites.len())?;
+            writeln!(f, "\n{} not behind the Earth", counted(self.satellites.len(), "satellite"))?;
         } else {
-            writeln!(f, "\n{} satellites above {:.1} deg", self.satellites.len(), self.mask_deg)?;
+            writeln!(f, "\n{} above {:.1} deg", counted(self.satellites.len(), "satellite"), self.mask_deg)?;
         }
         if !self.silent.is_empty() {
             let names: Vec<String> = self.silent.iter().map(Sv::to_string).collect();

@@ -21,6 +21,7 @@ use nalgebra::Vector3;
 
 use gnss::broadcast::{ClockState, State};
 use gnss::earth::{EARTH_ROTATION_RADPS, GPS_MU_M3PS2, SPEED_OF_LIGHT_MPS};
+use gnss::place::counted;
 use gnss::satellite::Sv;
 use gnss::sp3::{Precise, Sample};
 use gnss::time::Epoch;
@@ -87,7 +88,8 @@ impl Orbits {
             (least, most) if least == most => format!("antennas {least} m below the centres of mass"),
             (least, most) => format!("antennas {least} to {most} m below the centres of mass"),
         };
-        format!("precise orbits and clocks of {} satellites every {} s, {antenna}", self.satellites.len(), self.step_s)
+        let satellites = counted(self.satellites.len(), "satellite");
+        format!("precise orbits and clocks of {satellites} every {} s, {antenna}", self.step_s)
     }
 
     /// True if positions and clocks exist for all times from `from` to `to`.

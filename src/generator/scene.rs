@@ -24,7 +24,7 @@ use crate::stage::noise::Thermal;
 use crate::stage::playback::Playback;
 use crate::switches::{Switched, Switches};
 use crate::vehicle::Trajectory;
-use gnss::earth::{FLATTENING, SEMI_MAJOR_AXIS_M};
+use gnss::earth::{FLATTENING, Geodetic, SEMI_MAJOR_AXIS_M};
 use gnss::facts::{Expect, Fault};
 use gnss::samples::IfMetadata;
 use gnss::satellite::Sv;
@@ -103,6 +103,11 @@ impl Scene {
             visit(&Thermal { seed: self.noise_seed(), sigma_lsb: self.noise_lsb, arithmetic: self.fidelity.noise });
         }
         self.front_end.iter().for_each(|stage| visit(stage.as_ref()));
+    }
+
+    /// True if the scene begins so high that the Earth's limb replaces the elevation mask.
+    pub(crate) fn begins_in_space(&self) -> bool {
+        Geodetic::from_ecef(&self.trajectory.at(0.0).position_m).height_m >= SPACE_M
     }
 
     /// Seed of the random numbers of one front end. It is a function of the front end's name, and not of its

@@ -33,6 +33,7 @@ pub use crate::error::GenerateError;
 use crate::scene::Scene;
 use crate::synth::isa::Level;
 use crate::truth::{Record, Sink};
+use gnss::place::counted;
 use gnss::record::{NavigationRow, PassRow};
 use gnss::satellite::Sv;
 
@@ -78,7 +79,7 @@ impl Generated {
 
     fn sent(&self) -> String {
         let names: Vec<String> = self.satellites.iter().map(Sv::to_string).collect();
-        format!("{} satellites ({})", names.len(), names.join(" "))
+        format!("{} ({})", counted(names.len(), "satellite"), names.join(" "))
     }
 
     fn accuracy(&self) -> String {

@@ -58,10 +58,14 @@ pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
     Ok(Machinery {
         knot_spacing_s: rate.elapsed_s(shortest),
         longest_knot_spacing_s: rate.elapsed_s(longest),
-        knot_reason: format!(
-            "the longest on which a cubic stays within {:e} cycles of the motion; {worst_cycles:.1e} met",
-            scene.fidelity.knot_tolerance_cycles
-        ),
+        knot_reason: if longest == 0 {
+            "no satellite is in view at the start".to_owned()
+        } else {
+            format!(
+                "the longest on which a cubic stays within {:e} cycles of the motion; {worst_cycles:.1e} met",
+                scene.fidelity.knot_tolerance_cycles
+            )
+        },
         block_bytes: batch.min(scene.samples) * scene.metadata.format.bytes() as u64,
         knots_s,
     })

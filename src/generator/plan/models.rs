@@ -3,6 +3,7 @@
 use super::Model;
 use crate::scene::{CodeEdge, Scene, is_outside};
 use crate::stream::Kept;
+use gnss::place::counted;
 use gnss::signal::SIGNALS;
 
 /// Everything that a scenario can switch on, and whether this one does.
@@ -47,10 +48,8 @@ pub(super) fn models(scene: &Scene, kept: &Kept) -> Vec<Model> {
     }
     let fading = scene.scintillation.as_ref().map(|fading| {
         let strength = &fading.strength;
-        let who = strength
-            .satellites
-            .as_ref()
-            .map_or("all satellites".to_owned(), |list| format!("{} satellites", list.len()));
+        let who =
+            strength.satellites.as_ref().map_or("all satellites".to_owned(), |list| counted(list.len(), "satellite"));
         format!("S4 {} on L1, as f^-1.5 on others, decorrelation {} s, {who}", strength.s4, strength.decorrelation_s)
     });
     let absent = || "the scenario has no [scintillation]".to_owned();

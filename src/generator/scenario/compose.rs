@@ -27,6 +27,7 @@ use crate::switches::Switches;
 use crate::vehicle::Trajectory;
 use gnss::broadcast::OrbitError;
 use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::place::counted;
 use gnss::samples::{Format, IfMetadata};
 use gnss::satellite::Sv;
 use gnss::signal::Signal;
@@ -119,7 +120,8 @@ impl Scenario {
         let idle = |signal: &&Signal| !bands.iter().any(|band| band.signals.contains(signal));
         if bands.len() > 1 {
             let unheard = self.signals.iter().copied().filter(idle);
-            warnings.extend(unheard.map(|signal| format!("{signal}: no front end is for it: it is not computed")));
+            warnings
+                .extend(unheard.map(|signal| format!("{signal}: no front end receives it, and it is not computed")));
         }
         let world = self.world(&bands, &files, &mut warnings)?;
         let mut scenes = Vec::with_capacity(bands.len());
@@ -138,10 +140,16 @@ impl Scenario {
             most = most.max(self.look(scene)?);
         }
         if most < 4 {
-            let mask_deg = self.mask_rad.to_degrees();
+            let (satellites, [send, are]) =
+                (counted(most, "satellite"), if most == 1 { ["sends", "is"] } else { ["send", "are"] });
+            let in_space = scenes.first().is_some_and(|scene| scene.begins_in_space());
+            let place = if in_space {
+                "in view past the Earth".to_owned()
+            } else {
+                format!("above satellites.mask_deg = {}", self.mask_rad.to_degrees())
+            };
             warnings.push(format!(
-                "{most} satellites that send one of the scene's signals are above satellites.mask_deg = {mask_deg}, \
-                 or from space not behind the Earth, at the start: a position needs 4"
+                "{satellites} that {send} one of the scene's signals {are} {place} at the start: a position needs 4"
             ));
         }
         if let Some(first) = scenes.first() {

@@ -11,6 +11,7 @@ use crate::effect::transmit::{self, Block};
 use crate::ray::{Effect, Ray, Sight};
 use crate::vehicle::Trajectory;
 use gnss::gps::l1ca::L1_CA;
+use gnss::place::counted;
 use gnss::satellite::Sv;
 use gnss::signal::Signal;
 
@@ -252,7 +253,8 @@ impl Effect for ListedCn0 {
     }
 
     fn describe(&self) -> String {
-        format!("{} dB-Hz, {} satellites by name", self.default.cn0_dbhz, self.satellites.len())
+        let named = counted(self.satellites.len(), "satellite");
+        format!("{} dB-Hz, {named} by name", self.default.cn0_dbhz)
     }
 
     fn act(&self, sight: &Sight, signal: &Signal, rays: &mut Vec<Ray>) {

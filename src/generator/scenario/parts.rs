@@ -136,6 +136,15 @@ fn systems(scenario: &Scenario) -> impl Iterator<Item = System> {
     scenario.signals.iter().map(|signal| signal.system)
 }
 
+/// Reason for which a satellite without an ephemeris at the start is not in the scene.
+pub(super) fn absence(scenario: &Scenario, sv: Sv) -> String {
+    if systems(scenario).any(|system| system == sv.system) {
+        "it has no ephemeris at the scene's start".to_owned()
+    } else {
+        format!("the scene sends no signal of {}", sv.system)
+    }
+}
+
 /// The embedded file of the scene's day: the one with both systems where it reaches to the start.
 fn embedded(scenario: &Scenario) -> Result<Navigation, ScenarioError> {
     let refuse = |e: rinex::NavigationError| scenario.conflict("navigation.file", e.to_string());
@@ -176,7 +185,7 @@ pub(super) fn sky(
     let only = scenario.only.as_deref();
     for (key, named) in [("only", only.unwrap_or_default()), ("exclude", &scenario.excluded)] {
         for sv in named.iter().filter(|sv| catalogue.sent_at(**sv, start).is_none()) {
-            warnings.push(format!("satellites.{key} names {sv}, which has no ephemeris then"));
+            warnings.push(format!("satellites.{key} names {sv}: {}", absence(scenario, *sv)));
         }
     }
     let mut excluded = scenario.excluded.clone();

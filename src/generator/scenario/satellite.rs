@@ -8,6 +8,7 @@ use super::files::Files;
 use super::hardware::power_law;
 use super::interference::times;
 use super::keys::satellites::parameters;
+use super::parts::absence;
 use super::read::Table;
 use super::{Scenario, ScenarioError, satellite_list};
 use crate::catalogue::Catalogue;
@@ -402,5 +403,5 @@ pub(super) fn strangers(scenario: &Scenario, catalogue: &Catalogue) -> Vec<Strin
     let of_messages = scenario.message_faults.iter().filter_map(|fault| fault.satellites.as_ref());
     let named: BTreeSet<Sv> = of_satellites.chain(of_messages).flatten().copied().collect();
     let unknown = named.into_iter().filter(|sv| catalogue.sent_at(*sv, scenario.start).is_none());
-    unknown.map(|sv| format!("a fault names {sv}, which has no ephemeris then")).collect()
+    unknown.map(|sv| format!("a fault names {sv}: {}", absence(scenario, sv))).collect()
 }

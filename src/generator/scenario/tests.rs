@@ -365,7 +365,25 @@ fn what_looks_wrong_but_can_be_computed_is_warned_of() {
     let base = format!("{MINIMAL}{STATIC}");
     let warned = warnings(&format!("{base}[satellites]\nmask_deg = 80\nexclude = [\"G99\"]\n")).unwrap();
     assert!(warned.iter().any(|w| w.contains("a position needs 4")), "{warned:?}");
-    assert!(warned.iter().any(|w| w.contains("exclude names G99")), "{warned:?}");
+    let absent = "satellites.exclude names G99: it has no ephemeris at the scene's start";
+    assert!(warned.iter().any(|w| w == absent), "{warned:?}");
+    let warned = warnings(&format!("{base}[satellites]\nexclude = [\"E01\"]\n")).unwrap();
+    assert!(
+        warned.iter().any(|w| w == "satellites.exclude names E01: the scene sends no signal of Galileo"),
+        "{warned:?}"
+    );
+    let warned = warnings(&format!("{base}[satellites]\nonly = [\"G23\"]\n")).unwrap();
+    assert!(
+        warned.iter().any(|w| w.starts_with("1 satellite that sends one of the scene's signals is above ")),
+        "{warned:?}"
+    );
+    let space = include_str!("../../../scenarios/extremes/geo.toml")
+        .replace("[motion]", "[satellites]\nonly = [\"G23\"]\n[motion]");
+    let warned = warnings(&space).unwrap();
+    assert!(
+        warned.iter().any(|w| w.contains(" in view past the Earth at the start: a position needs 4")),
+        "{warned:?}"
+    );
     let warned = warnings(&format!("{base}[front_end]\nsample_rate_hz = 1.5e6\n")).unwrap();
     assert!(warned.iter().any(|w| w.contains("-1.023 to 1.023 MHz")), "{warned:?}");
     // Those of the file itself: a rogue record, and unhealthy satellites.

@@ -1,6 +1,7 @@
 //! The plans of the shipped scenes.
 
-use std::path::Path;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use crate::levels::Levels;
 use crate::plan::*;
@@ -57,6 +58,31 @@ fn a_satellite_without_a_signal_of_the_scene_is_no_satellite_of_the_plan() {
     let (scene, warnings) = scenario.compose(Path::new("."), &Overrides::default()).unwrap();
     assert!(crate::dynamics::lines_of_sight(&scene).unwrap().is_empty());
     assert!(warnings.iter().any(|warning| warning.starts_with("0 satellites that send")), "{warnings:?}");
+}
+
+#[test]
+fn every_figure_of_the_plan_of_a_shipped_scene_is_a_number_or_said_to_be_unknown() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenarios");
+    let files =
+        |folder: &Path| fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect::<Vec<PathBuf>>();
+    let all = [files(&root), files(&root.join("extremes"))].concat();
+    let is_scene = |path: &&PathBuf| {
+        path.extension().is_some_and(|end| end == "toml") && fs::read_to_string(path).unwrap().contains("[motion]")
+    };
+    let scenes: Vec<&PathBuf> = all.iter().filter(is_scene).collect();
+    assert!(scenes.len() > 40, "{scenes:?}");
+    for path in scenes {
+        let mut scenario = Scenario::open(path).unwrap();
+        scenario.duration_s = scenario.duration_s.min(0.1);
+        let (scenes, _) = scenario.compose_all(path.parent().unwrap(), &Overrides::default()).unwrap();
+        for scene in scenes {
+            let text = Plan::of(&scene).unwrap().to_string();
+            let odd = text.split(|c: char| !c.is_alphanumeric()).find(|word| ["NaN", "inf"].contains(word));
+            assert!(odd.is_none() && !text.contains("\n1 satellites"), "{}: {text}", path.display());
+            let signal = scene.signals.iter().any(|signal| signal.name == "own L1 BOC");
+            assert_eq!(text.contains("unknown: not measured"), signal, "{text}");
+        }
+    }
 }
 
 #[test]
