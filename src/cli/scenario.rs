@@ -5,6 +5,7 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 use crate::cli::error::{CliError, escaped, shown};
+use crate::cli::scenes;
 use generator::scenario::{Overrides, Scenario, ScenarioError, described_signal};
 use generator::scene::Scene;
 use receiver::settings::{Settings, SettingsError};
@@ -44,7 +45,10 @@ pub fn read(path: Option<&Path>, allow_outside: bool) -> Result<Named, CliError>
         let scenario = Scenario::parse(EMBEDDED, &name).map_err(CliError::bug)?;
         return Ok(Named { scenario, text: EMBEDDED.to_owned(), name, directory: PathBuf::from(".") });
     };
-    let (name, text) = text(path)?;
+    let (name, text) = text(path).map_err(|error| {
+        let hint = if path.exists() { None } else { scenes::hint(path) };
+        hint.map_or(error, |hint| CliError::input(format!("{}: no such file: {hint}", shown(path))))
+    })?;
     let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let scenario = Scenario::parse_in(&text, &name, directory, allow_outside).map_err(|error| {
         if matches!(error, ScenarioError::Read { .. }) {

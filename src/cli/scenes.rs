@@ -45,6 +45,25 @@ pub fn execute(arguments: &args::Scenes) -> Result<(), CliError> {
     write_all(&arguments.out, copies, arguments.force)
 }
 
+/// Bundled scene that a path without a file may mean, in words: the one of that name, or the most similar
+/// one.
+pub fn hint(path: &Path) -> Option<String> {
+    let scenes = scenes();
+    let names: Vec<&str> = scenes.keys().map(String::as_str).collect();
+    let file = Path::new(path.file_name()?);
+    let name = file.to_str()?.trim_end_matches(".toml");
+    // A scene of a directory below is called by both names.
+    let last = |whole: &&&str| whole.rsplit('/').next() == Some(name);
+    let scene = names.iter().find(last).map(|whole| (*whole).to_owned()).or_else(|| nearest(name, &names))?;
+    let own = scene.rsplit('/').next().unwrap_or(&scene);
+    let copies = format!("`gnss-twin scenes {scene}` copies it to {own}.toml");
+    Some(if own == name {
+        format!("the program brings a scene of that name, and {copies}")
+    } else {
+        format!("did you mean the bundled scene {scene}? {copies}")
+    })
+}
+
 /// Writes the commented scene, and the schema beside it.
 pub fn init(arguments: &args::Init) -> Result<(), CliError> {
     let name = arguments.path.file_name().map(PathBuf::from);
@@ -162,6 +181,17 @@ mod tests {
         assert!(format!("{again:?}").contains("--force"), "{again:?}");
         let unknown = copied(&["jamed"], &out).unwrap_err();
         assert!(format!("{unknown:?}").contains("did you mean jammed?"), "{unknown:?}");
+    }
+
+    #[test]
+    fn a_path_without_a_file_is_told_with_the_bundled_scene_that_was_meant() {
+        let of = |path: &str| hint(Path::new(path));
+        let own = "the program brings a scene of that name, and `gnss-twin scenes static` copies it to static.toml";
+        assert_eq!((of("static").as_deref(), of("scenarios/static.toml").as_deref()), (Some(own), Some(own)));
+        let near = of("scenarios/statc.toml").unwrap();
+        assert!(near.starts_with("did you mean the bundled scene static? `gnss-twin scenes static` copies"), "{near}");
+        assert!(of("mine/leo.toml").unwrap().contains("`gnss-twin scenes extremes/leo` copies it to leo.toml"));
+        assert_eq!((of("xyzzy.toml"), of("")), (None, None));
     }
 
     #[test]

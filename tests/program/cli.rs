@@ -65,6 +65,15 @@ fn usage_errors_exit_with_two() {
     let missing = twin(&["receive", "nosuch.bin", "--out", "x"], here.path());
     assert_eq!(code(&missing), 65);
     assert!(stderr(&missing).contains("nosuch.bin: No such file"), "{}", stderr(&missing));
+    // A flag of other programs, and a bundled scene by its name, are told with what was meant.
+    let other = twin(&["receive", "x.bin", "--sample-rate", "2.6e6", "--out", "x"], here.path());
+    assert!(code(&other) == 2 && stderr(&other).contains("'--rate-hz'"), "{}", stderr(&other));
+    for (scene, meant) in
+        [("static", "`gnss-twin scenes static` copies it"), ("statc.toml", "did you mean the bundled")]
+    {
+        let absent = twin(&["run", scene], here.path());
+        assert!(code(&absent) == 65 && stderr(&absent).contains(meant), "{}", stderr(&absent));
+    }
 }
 
 /// Checks the signals that `receive` searches for. The flag selects them, and an unknown name is refused as
@@ -619,13 +628,16 @@ fn results_are_words_or_one_object_or_nothing_as_the_flags_say() {
     ] {
         let output = twin(arguments, at);
         assert_eq!((code(&output), output.stdout.len()), (0, 0), "{arguments:?}: {}", stderr(&output));
+        let told = stderr(&output);
+        assert!(told.lines().all(|line| line.starts_with("warning: ")), "{arguments:?}: {told}");
     }
     let quiet = twin(&["receive", "if.sigmf-data", "--out", "rx", "--quiet"], at);
     assert_eq!((code(&quiet), quiet.stdout.len()), (3, 0));
     assert_eq!(stderr(&quiet).lines().count(), 1, "{}", stderr(&quiet));
     // An object is a result that a script asked for: it is printed, and nothing else is.
     let both = twin(&["plan", "short.toml", "--quiet", "--json"], at);
-    assert_eq!(code(&both), 0, "{}", stderr(&both));
+    assert_eq!((code(&both), stderr(&both).contains("this machine")), (0, false), "{}", stderr(&both));
+    assert!(stderr(&twin(&["plan", "short.toml"], at)).contains("this machine needs about "));
     assert!(serde_json::from_slice::<serde_json::Value>(&both.stdout).unwrap()["front_ends"].is_array());
     for arguments in [
         &["generate", "short.toml", "--out", "-", "--json"][..],
