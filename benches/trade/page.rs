@@ -112,7 +112,7 @@ fn signals(text: &mut String, rows: &[SignalRow], dopplers: &[DopplerRow]) {
          Cost is the time of one core for one sample of one satellite in the kernels, code strips included: median of \
          {ROUNDS} \
          interleaved runs of six satellites, with the 95 % interval of the median by ranks. The error is that of the \
-         code at rest on the sampling grid, root mean square over up to {JUDGED} satellites and 2 to 16 places, of the \
+         code at rest on the sampling grid, root mean square over up to {JUDGED} satellites and 2 to 16 phases, of the \
          component that errs most. Its truth is not the `reference` level but the spectral lines of the code, computed \
          from chips and waveform alone (`tests/common/lines.rs`). The table has each signal at the \
          lowest measured rate \

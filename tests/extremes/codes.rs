@@ -193,7 +193,7 @@ fn after_a_month_at_65_msps_every_signal_has_its_carrier_its_codes_and_its_sub_c
         // No knots here: the fraction of a second, the delay and their difference, and the step's own 2^-48.
         let figure = format!("every sequence after {days} d: codes, BOC, CBOC, TMBOC, AltBOC's eighths");
         the.at_most(&figure, sequences_m, 1e-7, "m");
-        the.all(&format!("signals with three places and more after {days} d"), looked, SIGNALS.len());
+        the.all(&format!("signals with three phases and more after {days} d"), looked, SIGNALS.len());
     }
     let model = rinex::embedded().unwrap().klobuchar;
     let of: Vec<Errors> = SIGNALS.par_iter().map(|signal| errors(signal, 1, model)).collect();

@@ -199,7 +199,7 @@ fn write(rows: &BTreeMap<Place, Row>) {
     let mut text = String::from(
         "# Stability at the edges\n\nEach case with the signals that it ran on and the figure that its test measured \
          beside its bar; where a figure is the worst of many, \"at\" is the input that makes it. \"none\" are cases of \
-         places, orbits, loops and sums, which know no signal. Filled by\n\n\
+         positions, orbits, loops and sums, which know no signal. Filled by\n\n\
          ```\nGNSS_TWIN_WRITE_STABILITY=$PWD/reports/stability.md cargo test --test extremes\n```\n\n\
          in one run; `bash .ci/long` does the same with a thousand random scenes (`GNSS_TWIN_LONG=1`). A figure that \
          misses its bar fails its test.\n",

@@ -54,7 +54,7 @@ fn at_the_poles_every_longitude_is_the_same_place() {
         }
     }
     the.at_most("latitude there and back", worst_rad, 1e-12, "rad");
-    the.at_most("place and height there and back", worst_m, 1e-6, "m");
+    the.at_most("position and height there and back", worst_m, 1e-6, "m");
     the.all("local axes finite and right-handed", finite, of);
 }
 
@@ -331,7 +331,7 @@ fn five_satellites_of_two_systems_are_enough_and_of_four_are_not() {
         }
     }
     // Coordinates of 2.7e7 m resolve 3.7e-9 m, ranges as much, times a dilution of some tens.
-    the.at_most("two systems: place and clocks of exact ranges", worst_m, 1e-6, "m");
+    the.at_most("two systems: position and clocks of exact ranges", worst_m, 1e-6, "m");
     // One, and that 1e-6 m in 1e-3 m.
     the.at_most("two systems: error by 1 mm over the largest dilution", moved, 1.001, "");
     // A satellite that is its system's only one says nothing but its clock.
@@ -340,7 +340,7 @@ fn five_satellites_of_two_systems_are_enough_and_of_four_are_not() {
     far[4].pseudorange_m += 1e6;
     let apart_m = (position(&far, place, &BARE).unwrap().position_m - four.position_m).norm();
     the.at_most(
-        "a system's only satellite, 1000 km off: moves the place",
+        "a system's only satellite, 1000 km off: moves the position",
         (apart_m, "systems [0, 0, 0, 0, 1]"),
         1e-6,
         "m",

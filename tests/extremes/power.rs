@@ -106,7 +106,7 @@ fn what_a_strong_satellite_puts_into_others_is_not_taken_for_them() {
             // decibel.
             let share = found as f64 / f64::from(of);
             the.at_least(
-                &format!("{apart_db} dB: weak one found at its place"),
+                &format!("{apart_db} dB: weak one found at its delay"),
                 (share, format!("{of} seeds")),
                 0.9,
                 "of them",

@@ -138,7 +138,7 @@ fn where_the_rate_meets_the_chips_nearest_edges_are_metres_off_and_band_limited_
     let the = case(29, "fs = k · 1.023 MHz at zero Doppler", CA);
     let filter = Filter::new(0.45);
     for rate_khz in [2046, 4092, 10_230] {
-        let name = |edge: &str| format!("{:.3} Msps, {edge} edges: rms over places", rate_khz as f64 / 1e3);
+        let name = |edge: &str| format!("{:.3} Msps, {edge} edges: rms over phases", rate_khz as f64 / 1e3);
         // All edges move by one part of a sample, uniform over it: rms 1/√12 of a sample.
         let sample_m = 299_792.458 / rate_khz as f64;
         the.near(
@@ -164,7 +164,7 @@ fn where_the_rate_meets_the_chips_nearest_edges_are_metres_off_and_band_limited_
         let replica = settings.tracking.replica;
         let bias_m = received_bias_m(rate_khz, edge, replica);
         let told_m = correlate::standing_bias_m(replica, 1e3 * rate_khz as f64, &L1_CA.components[0]);
-        let name = format!("{:.3} Msps, generated and received by default: rms over places", rate_khz as f64 / 1e3);
+        let name = format!("{:.3} Msps, generated and received by default: rms over phases", rate_khz as f64 / 1e3);
         // The law that warns errs to the safe side; where places drift apart nothing stands still, and a
         // decimetre and a half is what one of them has.
         the.at_most(&name, (bias_m, "PRN 7"), told_m.max(0.15), "m");
@@ -213,7 +213,7 @@ fn on_a_boundary_of_chips_the_index_is_inside_and_to_the_right() {
         of += 1;
         held += usize::from(exact.phase() == 0 && exact.period == second * 1000);
     }
-    the.all("places in 0 ≤ phase < 1023, whole seconds at 0", held, of);
+    the.all("phases in 0 ≤ phase < 1023, whole seconds at 0", held, of);
 }
 
 #[test]
@@ -245,7 +245,7 @@ fn on_a_boundary_of_steps_every_sequence_of_every_signal_is_inside() {
             }
         }
     }
-    the.all("places of every sequence in its period", inside, of[0]);
+    the.all("phases of every sequence in its period", inside, of[0]);
     the.all("whole seconds of every system at their own step", exact, of[1]);
 }
 

@@ -148,7 +148,7 @@ fn write(rows: &Rows) {
     all.extend(rows.clone());
     let mut text = String::from(
         "# Robustness\n\nCases of damaged input and of a failing machine, and what became of them: refused with the \
-         place and the reason; accepted with a part left out and named; accepted as it legally stands. A failure is \
+         position and the reason; accepted with a part left out and named; accepted as it legally stands. A failure is \
          a panic, an end after more than two seconds of work (a process: thirty seconds), a result that is not what \
          the input says, or a wrong exit code. `bash .ci/long` fills this table.\n",
     );

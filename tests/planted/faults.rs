@@ -11,8 +11,8 @@ pub struct Fault {
 
 const CODES: &str = "witness::codes::all_chips_of_all_codes_are_those_of_another_program";
 const PARITY: &str = "witness::printed::a_word_s_parity_is_the_printed_one_and_one_wrong_bit_breaks_it";
-const FIELDS: &str = "witness::printed::every_field_of_the_message_has_the_printed_place_sign_and_scale";
-const INAV: &str = "witness::printed::every_field_of_i_nav_has_the_printed_place_sign_and_scale";
+const FIELDS: &str = "witness::printed::every_field_of_the_message_has_the_printed_position_sign_and_scale";
+const INAV: &str = "witness::printed::every_field_of_i_nav_has_the_printed_position_sign_and_scale";
 const CODED: &str = "witness::printed::pages_of_i_nav_are_checked_coded_interleaved_and_timed_as_printed";
 const BEIDOU: &str = "witness::beidou::real_subframes_keep_their_parities_and_come_back_through_our_interleaving";
 const BEIDOU_CODES: &str = "witness::beidou::all_chips_of_all_codes_are_those_of_another_program";
@@ -22,7 +22,7 @@ const BEIDOU_DELAY: &str = "witness::beidou::delays_by_geographic_latitude_are_t
 const GLONASS_CODE: &str =
     "witness::glonass::all_chips_of_the_code_are_those_of_another_program_and_all_satellites_have_it";
 const GLONASS_CHANNELS: &str = "witness::glonass::carriers_are_the_printed_ones_and_channels_those_of_real_records";
-const GLONASS_FIELDS: &str = "witness::glonass::every_field_of_the_strings_has_the_printed_place_sign_and_scale";
+const GLONASS_FIELDS: &str = "witness::glonass::every_field_of_the_strings_has_the_printed_position_sign_and_scale";
 const GLONASS_STRINGS: &str =
     "witness::glonass::real_strings_keep_their_checks_through_our_coding_and_no_wrong_bit_passes";
 const GLONASS_SETS: &str = "witness::glonass::real_sets_are_the_records_of_a_converter_and_say_their_time_and_sender";
@@ -37,12 +37,12 @@ const NAVIC_L1_COUNT: &str =
     "witness::navic_l1::frames_are_counted_to_their_end_from_1_to_400_in_the_two_hours_in_which_they_begin";
 const NAVIC_L1_CARRIED: &str =
     "witness::navic_l1::a_set_of_the_older_message_carried_to_l1_nav_is_the_same_orbit_and_clock_to_its_steps";
-const NAVIC_READ: &str = "witness::navic::a_stream_is_read_from_any_symbol_and_either_way_up_to_what_was_sent";
+const NAVIC_READ: &str = "witness::navic::a_stream_is_read_from_any_symbol_inverted_or_not_to_what_was_sent";
 const REDUNDANT: &str = "witness::redundancy::real_words_17_to_20_are_the_redundancy_of_the_real_words_1_to_4";
 const SHORT: &str = "witness::reduced::elements_in_short_of_the_embedded_file_are_as_good_as_real_ones";
 const DELAYS: &str = "witness::printed::clocks_of_single_signals_are_behind_by_the_group_delays_that_documents_print";
 const SBAS_SETS: &str =
-    "witness::sbas::shipped_sets_are_whole_steps_of_the_fields_and_are_read_again_from_any_symbol_and_either_way_up";
+    "witness::sbas::shipped_sets_are_whole_steps_of_the_fields_and_are_read_again_from_any_symbol_inverted_or_not";
 const PEAK: &str = "judge::a_correlation_peak_lies_at_the_delay_of_its_ray";
 const SBAS_MASK: &str = "witness::sbas::blocks_of_a_mask_and_of_ageing_are_the_printed_ones";
 const SBAS_GRID: &str = "witness::sbas::points_of_printed_masks_of_the_grid_lie_where_the_bands_have_them";
@@ -56,13 +56,13 @@ const QZSS_CNAV: &str =
     "witness::qzss::every_real_message_of_l5_and_l2c_is_read_and_sent_again_and_its_sets_are_the_records_of_the_hour";
 const B1C_CODES: &str =
     "witness::bcnav1::all_chips_of_all_codes_and_secondary_codes_of_b1c_are_those_of_another_program";
-const FRAMES_B1C: &str = "witness::bcnav1::frames_are_read_from_any_symbol_and_either_way_up_to_what_was_sent";
-const BDGIM: &str = "witness::bdgim::places_and_contents_are_those_of_the_authors_program";
-const BDGIM_FIELDS: &str = "witness::bdgim::coefficients_have_their_places_signs_and_steps_in_all_three_messages";
+const FRAMES_B1C: &str = "witness::bcnav1::frames_are_read_from_any_symbol_inverted_or_not_to_what_was_sent";
+const BDGIM: &str = "witness::bdgim::positions_and_contents_are_those_of_the_authors_program";
+const BDGIM_FIELDS: &str = "witness::bdgim::coefficients_have_their_positions_signs_and_steps_in_all_three_messages";
 const FIELD_64: &str = "witness::bcnav1::elements_of_six_bits_are_those_of_the_printed_field";
 const B2_CODES: &str =
     "witness::bcnav2::all_chips_of_all_codes_and_secondary_codes_of_b2a_and_b2b_are_those_of_another_program";
-const MESSAGES_B2: &str = "witness::bcnav2::messages_are_read_from_any_symbol_and_either_way_up_to_what_was_sent";
+const MESSAGES_B2: &str = "witness::bcnav2::messages_are_read_from_any_symbol_inverted_or_not_to_what_was_sent";
 const PRINTED_B2: &str =
     "witness::bcnav2::messages_that_a_receiver_printed_are_what_it_decoded_and_are_framed_by_us_as_it_printed_them";
 const MIXED_B2: &str =
@@ -74,7 +74,7 @@ const UTC_B2: &str =
 const L1C_CODES: &str =
     "witness::codes::all_chips_of_all_codes_and_secondary_codes_of_l1c_are_those_of_another_program";
 const FRAMES_L1C: &str =
-    "witness::cnav2::shipped_frames_are_coded_again_symbol_by_symbol_read_either_way_up_and_sent_again";
+    "witness::cnav2::shipped_frames_are_coded_again_symbol_by_symbol_read_inverted_or_not_and_sent_again";
 const CIVIL: &str = "witness::cnav::shipped_messages_of_l5_and_l2c_hold_and_are_sent_by_us_bit_by_bit";
 const WRITTEN: &str = "witness::cnav::shipped_sets_are_written_in_the_numbers_of_another_converter";
 const CARRIED: &str = "witness::cnav::a_set_of_lnav_carried_to_cnav_is_the_same_orbit_and_clock_to_its_steps";
@@ -89,8 +89,8 @@ const E6_TIME: &str =
     "witness::galileo_e6::pages_of_e6_are_read_from_any_symbol_and_another_signal_tells_which_second_they_are_of";
 const E5_CODES: &str = "witness::codes::all_chips_of_all_codes_and_secondary_codes_of_e5_are_those_of_another_program";
 const TWO_BANDS: &str =
-    "laws::two_bands_show_the_ionosphere_without_the_group_delays_of_the_message_and_give_a_place_without_it";
-const CLOCKS: &str = "laws::two_systems_whose_times_differ_give_one_place_and_a_clock_of_each";
+    "laws::two_bands_show_the_ionosphere_without_the_group_delays_of_the_message_and_give_a_position_without_it";
+const CLOCKS: &str = "laws::two_systems_whose_times_differ_give_one_position_and_a_clock_of_each";
 const SUMS: &str = "laws::running_sums_give_what_every_sample_by_itself_does";
 const LAYERS: &str = "bands::composite_chips_have_a_tenth_as_much_power_in_the_quick_layer_as_in_the_slow_one";
 const NO_L1: &str = "bands::two_bands_neither_of_which_is_l1_show_the_ionosphere_on_l1_and_how_well";
@@ -99,19 +99,19 @@ const COMBINED: &str =
 const SHARE: &str = "bands::half_of_the_power_is_as_noisy_as_a_signal_of_half_the_power";
 const WRITTEN_OBS: &str = "bands::observation_files_count_satellites_flag_slips_and_name_channels";
 const FDMA: &str = "channels::codes_of_glonass_are_aided_by_the_carriers_of_their_own_channels";
-const OFFSET: &str = "laws::with_the_broadcast_offset_any_four_satellites_of_two_systems_give_place_and_time";
+const OFFSET: &str = "laws::with_the_broadcast_offset_any_four_satellites_of_two_systems_give_position_and_time";
 const PAGES: &str =
     "witness::printed::the_page_with_the_ionosphere_and_the_count_of_the_handover_are_where_they_are_printed";
 const TIMES: &str = "witness::printed::weeks_begin_on_sunday_and_leap_seconds_are_those_of_the_bulletins";
-const PACKED: &str = "witness::packed::codes_and_their_places_are_those_that_makers_print";
+const PACKED: &str = "witness::packed::codes_and_their_positions_are_those_that_makers_print";
 const BANDS: &str = "witness::packed::bands_of_one_oscillator_have_its_frequency_at_zero";
-const PLACES: &str = "witness::printed::places_and_directions_are_the_published_ones";
+const PLACES: &str = "witness::printed::positions_and_directions_are_the_published_ones";
 const ORBITS: &str = "witness::orbit::broadcast_orbits_of_2010_meet_the_igs_final_ones";
 const STATIONS: &str = "witness::pseudorange::two_japanese_stations_fit_the_model";
 const KLOB: &str = "witness::atmosphere::klobuchar_gives_the_worked_value_of_rtklib";
 const SAAS: &str = "witness::atmosphere::saastamoinen_gives_the_worked_value_of_rtklib";
 pub const LOOP: &str = "loops::a_short_ride_under_an_open_sky_keeps_every_limit";
-const EXACT: &str = "laws::exact_ranges_give_the_exact_place_velocity_and_clock";
+const EXACT: &str = "laws::exact_ranges_give_the_exact_position_velocity_and_clock";
 const COV: &str = "laws::the_covariance_is_the_inverse_of_the_weighted_geometry";
 const RAIM: &str = "laws::a_range_that_is_wrong_by_twenty_metres_is_excluded_and_no_other";
 const SMOOTH: &str = "laws::smoothing_leaves_the_variance_that_it_states";
@@ -141,7 +141,7 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.code.g2_delay", "the code of PRN 32 is a chip late", CODES),
     fault("gnss.code.chips_beyond_512", "every code is wrong from its 513th chip on", CODES),
     fault("gnss.lnav.parity_mask", "D7 is missing in all parity equations", PARITY),
-    fault("gnss.lnav.parity_star", "D29* and D30* change places in the parity", PARITY),
+    fault("gnss.lnav.parity_star", "D29* and D30* are exchanged in the parity", PARITY),
     fault("gnss.lnav.parity_unchecked", "words with wrong parity are accepted", PARITY),
     fault("gnss.lnav.scale_crs", "the scale of C_rs is 2^-4, sent and read", FIELDS),
     fault("gnss.lnav.scale_af1", "the scale of a_f1 is 2^-42, sent and read", FIELDS),
@@ -157,7 +157,7 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.inav.reduced_begin", "elements in short refer to the second before the sub-frame, sent and \
                                       read", SHORT),
     fault("gnss.beidou.g2_output", "the code of PRN 7 has another output", BEIDOU_CODES),
-    fault("gnss.beidou.g1_reset", "the first register of B3I begins anew a chip late", BEIDOU_CODES),
+    fault("gnss.beidou.g1_reset", "the first register of B3I begins again a chip late", BEIDOU_CODES),
     fault("gnss.beidou.neuman_hofman", "the last chip of the Neuman-Hofman code is wrong, sent and read", BEIDOU_SETS),
     fault("gnss.beidou.bch", "the parity has another polynomial, sent and read", BEIDOU),
     fault("gnss.beidou.second_sent", "subframes say the second of the next one", BEIDOU_SETS),
@@ -171,13 +171,13 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.navic.time_sent", "a subframe counts itself and not the next one", NAVIC),
     fault("gnss.navic.time_read", "a subframe is read as the one after it", NAVIC_READ),
     fault("gnss.fec.field", "the field of the Reed-Solomon code has another polynomial, sent and read", REDUNDANT),
-    fault("gnss.fec.interleaver", "neighbouring symbols change places", CODED),
+    fault("gnss.fec.interleaver", "neighbouring symbols are exchanged", CODED),
     fault("gnss.crc.polynomial", "the check has another polynomial, sent and read", CODED),
     fault("gnss.glonass.output", "the code comes from the ninth stage", GLONASS_CODE),
     fault("gnss.signal.channel", "channels count downwards", GLONASS_CHANNELS),
     fault("gnss.bits.magnitude", "a magnitude with a sign is read as if less than its most", GLONASS_FIELDS),
     fault("gnss.glonass.hamming", "a check is missing, sent and read", GLONASS_STRINGS),
-    fault("gnss.glonass.mark", "what comes upside down is taken for upright", GLONASS_SETS),
+    fault("gnss.glonass.mark", "an inverted stream is taken for a normal one", GLONASS_SETS),
     fault("gnss.glonass.frame_sent", "frames say the time of the next one", GLONASS_SENT),
     fault("gnss.glonass.frame_read", "frames are read as the ones after them", GLONASS_SETS),
     fault("gnss.glonass.day", "days of four years count from 0", GLONASS_SETS),
@@ -282,7 +282,7 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.delay.square", "group delays go with 1/f to other carriers", DELAYS),
     fault("gnss.l5.advance", "XB of L5 is a chip early", L5_CODES),
     fault("gnss.l2c.register", "the register of L2C feeds back into another stage", L2C_CODES),
-    fault("gnss.l2c.turn", "CL has the first place, and CM the second", L2C_CODES),
+    fault("gnss.l2c.turn", "CL is sent first, and CM second", L2C_CODES),
     fault("gnss.sbas.codes", "the code of PRN 131 is a chip late", QZSS_CODES),
     fault("gnss.sbas.place", "x of augmentation systems has the steps of z", SBAS_SETS),
     fault("gnss.sbas.accuracy", "satellites that range count as such that do not", SBAS_SETS),
@@ -319,7 +319,7 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.cnav2.isc", "L1C is corrected as its data are", DELAYS),
     fault("gnss.exchange.accuracy", "accuracies in records of CNAV have no sign", WRITTEN),
     fault("gnss.cnav.l2c_order", "messages of CNAV on L2C last as long as those of L5", CIVIL),
-    fault("gnss.cnav.order", "messages of CNAV come one place early", CIVIL),
+    fault("gnss.cnav.order", "messages of CNAV come one position early", CIVIL),
     fault("gnss.cnav.count", "the count of a message is taken for its own beginning", CIVIL),
     fault("gnss.cnav.isc", "corrections between signals have the wrong sign", CARRIED),
     fault("gnss.altboc.odd_chips", "the sub-carrier of E5 is upright on every chip", ALTBOC),
@@ -332,7 +332,7 @@ pub const FAULTS: &[Fault] = &[
     fault("receiver.decode.dated", "a page that is given its second is taken for the one after it", E6_TIME),
     fault("gnss.e5.registers", "the second registers of E5 give the other bit", E5_CODES),
     fault("gnss.fnav.clock", "the clock of F/NAV is on the other side of that of I/NAV", E5_PAGES),
-    fault("gnss.fnav.page_order", "pages of F/NAV come one place early", E5_PAGES),
+    fault("gnss.fnav.page_order", "pages of F/NAV come one position early", E5_PAGES),
     fault("gnss.inav.word_order_e5b", "words on E5b come one page early", E5_PAGES),
     fault("receiver.position.dispersion", "the ionosphere is weighted as on the other carrier", TWO_BANDS),
     fault("receiver.position.dispersion_delay", "group delays enter the ionosphere with the wrong sign", TWO_BANDS),
@@ -356,7 +356,7 @@ pub const FAULTS: &[Fault] = &[
     fault("analysis.errors.slip_size", "slips below two cycles are not seen", JDAM),
     fault("analysis.statistics.percentile", "a percentile is taken at the wrong rank", STAT),
     fault("analysis.statistics.deviation", "a standard deviation has the wrong divisor", STAT),
-    fault("analysis.consistency.axes", "sigmas of east and up change places", JPOS),
+    fault("analysis.consistency.axes", "sigmas of east and up are exchanged", JPOS),
     fault("analysis.summary.horizontal", "the horizontal error forgets north", JPOS),
     fault("analysis.summary.navigation", "no navigation parameter is ever wrong", JDAM),
     fault("analysis.summary.false_satellites", "no satellite is ever false", JDAM),

@@ -162,7 +162,7 @@ static OTHER: Signal =
     Signal { name: "other", time: &TimeScale { name: "other", behind_gpst_s: 0, has_leap_seconds: false }, ..L1_CA };
 
 #[test]
-fn two_systems_whose_times_differ_give_one_place_and_a_clock_of_each() {
+fn two_systems_whose_times_differ_give_one_position_and_a_clock_of_each() {
     let ideal = Ideal::new();
     let observations = ideal.of_two_systems();
     let noises = vec![(&L1_CA, noise()), (&OTHER, noise())];
@@ -186,7 +186,7 @@ fn two_systems_whose_times_differ_give_one_place_and_a_clock_of_each() {
 static BAND: Signal = Signal { name: "other band", carrier: Carrier::Common(1_176.45e6), ..L1_CA };
 
 #[test]
-fn two_bands_show_the_ionosphere_without_the_group_delays_of_the_message_and_give_a_place_without_it() {
+fn two_bands_show_the_ionosphere_without_the_group_delays_of_the_message_and_give_a_position_without_it() {
     let ideal = Ideal::new();
     let local = ideal.clock.epoch(SAMPLE);
     let mut true_m: Vec<(Sv, f64)> = Vec::new();
@@ -221,7 +221,7 @@ fn two_bands_show_the_ionosphere_without_the_group_delays_of_the_message_and_giv
 }
 
 #[test]
-fn with_the_broadcast_offset_any_four_satellites_of_two_systems_give_place_and_time() {
+fn with_the_broadcast_offset_any_four_satellites_of_two_systems_give_position_and_time() {
     let ideal = Ideal::new();
     let observations = ideal.of_two_systems();
     let settings = PositionSettings { system_clocks: SystemClocks::Broadcast, ..PositionSettings::default() };
@@ -277,7 +277,7 @@ pub fn noise() -> CodeNoise {
 }
 
 #[test]
-fn exact_ranges_give_the_exact_place_velocity_and_clock() {
+fn exact_ranges_give_the_exact_position_velocity_and_clock() {
     let ideal = Ideal::new();
     let observations = ideal.observations(SAMPLE);
     assert!(observations.len() >= 10);

@@ -29,10 +29,10 @@ fn before_the_page() -> Vec<Kind> {
     const FLAT: [&str; 3] = ["horizontal error, mean", "horizontal error, 95 %", "horizontal error, largest"];
     const UP: [&str; 3] = ["vertical error, mean", "vertical error, 95 %", "vertical error, largest"];
     vec![
-        kind!("places east, ionosphere unknown", "m", Some(0.3), 10.0, &FLAT, Early, |rx, m| {
+        kind!("positions east, ionosphere unknown", "m", Some(0.3), 10.0, &FLAT, Early, |rx, m| {
             crate::fixes::move_by(rx, [m, 0.0, 0.0]);
         }),
-        kind!("places up, ionosphere unknown", "m", Some(0.3), 20.0, &UP, Early, |rx, m| {
+        kind!("positions up, ionosphere unknown", "m", Some(0.3), 20.0, &UP, Early, |rx, m| {
             crate::fixes::move_by(rx, [0.0, 0.0, m]);
         }),
         kind!(
@@ -49,7 +49,7 @@ fn before_the_page() -> Vec<Kind> {
 
 fn frozen() -> Vec<Kind> {
     vec![
-        kind!("place frozen", "rows", None, 30.0, &REPEATED, AtRest, |rx, rows| {
+        kind!("position frozen", "rows", None, 30.0, &REPEATED, AtRest, |rx, rows| {
             for column in ["x_m", "y_m", "z_m"] {
                 freeze(rx.table("fixes"), column, 100, rows as usize);
             }

@@ -13,11 +13,11 @@ fn columns() -> Vec<Kind> {
     const PLACE: [&str; 1] = ["fixes whose latitude, longitude and height are another position than x, y and z"];
     const TIME: [&str; 1] = ["UTC of fixes against GPS time, largest difference"];
     vec![
-        kind!("latitude beside a right place", "°", Some(1e-7), 1.0, &PLACE, AtRest, |rx, by| {
+        kind!("latitude beside a right position", "°", Some(1e-7), 1.0, &PLACE, AtRest, |rx, by| {
             rx.table("fixes").map("latitude_deg", |_, value| value + by);
         }),
         kind!(
-            "longitude of every tenth fix beside a right place",
+            "longitude of every tenth fix beside a right position",
             "°",
             Some(1e-7),
             -0.001,

@@ -173,13 +173,13 @@ fn places() -> Vec<Kind> {
                 add(rx, PLACE, |_, _| Vector3::z() * (-53.0 * share));
             }
         ),
-        kind!("places of another epoch", "epochs", Some(0.05), 1.0, &FLAT, InMotion, |rx, epochs| lag(
+        kind!("positions of another epoch", "epochs", Some(0.05), 1.0, &FLAT, InMotion, |rx, epochs| lag(
             rx, PLACE, epochs
         )),
         kind!("Earth's rotation left out by this share", "of 33 m", Some(0.005), 0.05, &FLAT, AtRest, |rx, share| {
             add(rx, PLACE, |_, _| Vector3::x() * (33.0 * share));
         }),
-        kind!("places scaled from the Earth's centre", "", Some(3e-8), 4e-7, &UP, AtRest, |rx, part| scale(
+        kind!("positions scaled from the Earth's centre", "", Some(3e-8), 4e-7, &UP, AtRest, |rx, part| scale(
             rx,
             &PLACE,
             1.0 + part
@@ -434,7 +434,7 @@ fn rows() -> Vec<Kind> {
                 table.put(row, "sample", sample);
             }
         }),
-        kind!("places frozen, all else alive", "epochs", None, 60.0, &FLAT, InMotion, |rx, count| {
+        kind!("positions frozen, all else alive", "epochs", None, 60.0, &FLAT, InMotion, |rx, count| {
             let table = rx.table("fixes");
             for row in 150..150 + count as usize {
                 PLACE.iter().for_each(|column| {

@@ -268,7 +268,7 @@ fn rows() -> Vec<Kind> {
             one,
             |_, value| value + s
         )),
-        kind!("lock time that begins anew without an event", "s left", None, 0.1, &LOCK, AtRest, |rx, left| {
+        kind!("lock time that begins again without an event", "s left", None, 0.1, &LOCK, AtRest, |rx, left| {
             let table = rx.table("observations");
             let rows = table.of(ONE);
             let from = table.get(rows[300], "locked_s");

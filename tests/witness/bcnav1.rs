@@ -54,7 +54,7 @@ pub fn sets() -> Vec<Ephemeris> {
 }
 
 #[test]
-fn frames_are_read_from_any_symbol_and_either_way_up_to_what_was_sent() {
+fn frames_are_read_from_any_symbol_inverted_or_not_to_what_was_sent() {
     let sets = sets();
     let set = sets.iter().find(|set| set.sv.number > 20).unwrap();
     let sender = (B_CNAV1.sender)(&Common::default()).unwrap();

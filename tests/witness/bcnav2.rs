@@ -66,7 +66,7 @@ fn decoded(news: &[Read]) -> impl Iterator<Item = &Ephemeris> {
 }
 
 #[test]
-fn messages_are_read_from_any_symbol_and_either_way_up_to_what_was_sent() {
+fn messages_are_read_from_any_symbol_inverted_or_not_to_what_was_sent() {
     let sets = sets();
     let set = sets.iter().find(|set| set.sv.number > 20).unwrap();
     for (message, _) in BOTH {

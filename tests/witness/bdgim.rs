@@ -34,7 +34,7 @@ fn vertical_tecu(model: &Bdgim, pierce: &Pierce, at: Epoch) -> f64 {
 }
 
 #[test]
-fn places_and_contents_are_those_of_the_authors_program() {
+fn positions_and_contents_are_those_of_the_authors_program() {
     let (mut rows, mut raised) = (0, 0);
     for line in AUTHORS.lines().skip(1) {
         let column: Vec<f64> = line.split(',').map(|word| word.parse().unwrap()).collect();
@@ -146,7 +146,7 @@ fn read(message: &Message, set: &Ephemeris, units: &[Vec<bool>]) -> Vec<Read> {
 }
 
 #[test]
-fn coefficients_have_their_places_signs_and_steps_in_all_three_messages() {
+fn coefficients_have_their_positions_signs_and_steps_in_all_three_messages() {
     // Eighths of a TECU in fields of 10 and 8 bits, of which the second and the last four have a sign; the
     // fifth has none and is taken below zero (BDS-SIS-ICD-B1C 1.0, 7.8; figures of B2a's and B2b's messages
     // 30).

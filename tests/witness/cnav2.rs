@@ -106,7 +106,7 @@ fn is_sent(set: &Ephemeris, start: Epoch, two: &[bool]) {
 }
 
 #[test]
-fn shipped_frames_are_coded_again_symbol_by_symbol_read_either_way_up_and_sent_again() {
+fn shipped_frames_are_coded_again_symbol_by_symbol_read_inverted_or_not_and_sent_again() {
     let all = shipped();
     let frames: Vec<Frame> = all.iter().map(holds).collect();
     // Two are the last of their two hours: the count is that of the next, the interval their own.

@@ -115,7 +115,7 @@ const PRINTED: [(u8, &str, u16, u8, bool, i32); 22] = [
 ];
 
 #[test]
-fn every_field_of_the_strings_has_the_printed_place_sign_and_scale() {
+fn every_field_of_the_strings_has_the_printed_position_sign_and_scale() {
     let tables = gnav::tables();
     assert_eq!(tables.iter().map(|(_, fields)| fields.len()).sum::<usize>(), PRINTED.len());
     for (number, name, highest, length, signed, exponent) in PRINTED {

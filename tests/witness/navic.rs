@@ -238,7 +238,7 @@ fn subframes_are_coded_interleaved_and_timed_as_printed() {
 }
 
 #[test]
-fn a_stream_is_read_from_any_symbol_and_either_way_up_to_what_was_sent() {
+fn a_stream_is_read_from_any_symbol_inverted_or_not_to_what_was_sent() {
     let toe = Epoch::from_week(2409, 86_736.0);
     let at = |a: f64, b: f64, c: f64, d: f64| [a, b, c, d];
     let klobuchar = Klobuchar { alpha: at(2.98e-8, 3.87e-7, -2.56e-6, -7.51e-6), beta: at(2e5, 4e5, -1e6, 8e6) };

@@ -266,7 +266,7 @@ fn frames_are_counted_to_their_end_from_1_to_400_in_the_two_hours_in_which_they_
 }
 
 #[test]
-fn a_stream_is_read_from_any_symbol_and_either_way_up_to_what_was_sent() {
+fn a_stream_is_read_from_any_symbol_inverted_or_not_to_what_was_sent() {
     let (set, klobuchar) = printed();
     let common = Common { klobuchar_navic: Some(klobuchar), ..Common::default() };
     let sender = (L1_NAV.sender)(&common).unwrap();

@@ -32,7 +32,7 @@ fn values(of: Interleaved, bytes: &[u8]) -> Vec<i8> {
 /// MAX2769 data sheet, "Output Data Format": two bits of sign and magnitude, unsigned and two's complement
 /// for 3, 1, −1 and −3. The order of samples and of I and Q is that of the two recordings below.
 #[test]
-fn codes_and_their_places_are_those_that_makers_print() {
+fn codes_and_their_positions_are_those_that_makers_print() {
     for (encoding, codes) in [
         (Encoding::SignMagnitude, [0b01, 0b00, 0b10, 0b11]),
         (Encoding::Offset, [0b11, 0b10, 0b01, 0b00]),

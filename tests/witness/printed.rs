@@ -137,7 +137,7 @@ fn printed_row<'a>(rows: &'a [Row], page: &str, name: &str) -> &'a Row {
 }
 
 #[test]
-fn every_field_of_the_message_has_the_printed_place_sign_and_scale() {
+fn every_field_of_the_message_has_the_printed_position_sign_and_scale() {
     let mut met = 0;
     let data_bits = (1..=300_u16).filter(|number| (number - 1) % 30 < 24);
     let ones: Vec<(u16, [u32; 10])> = data_bits
@@ -267,7 +267,7 @@ const INAV_FIELDS: [Row; 104] = [
 ];
 
 #[test]
-fn every_field_of_i_nav_has_the_printed_place_sign_and_scale() {
+fn every_field_of_i_nav_has_the_printed_position_sign_and_scale() {
     let ones: Vec<(u16, u128)> = (0..128_u16).map(|number| (number, 1 << (127 - number))).collect();
     let mut met = 0;
     for (page, fields) in inav::tables() {
@@ -352,11 +352,12 @@ fn weeks_begin_on_sunday_and_leap_seconds_are_those_of_the_bulletins() {
 }
 
 #[test]
-fn places_and_directions_are_the_published_ones() {
+fn positions_and_directions_are_the_published_ones() {
     // EPSG Guidance Note 7-2, geographic to geocentric: 53°48'33.820"N 2°07'46.380"E 73.0 m.
-    let place = Geodetic::from_degrees(53.0 + 48.0 / 60.0 + 33.820 / 3600.0, 2.0 + 7.0 / 60.0 + 46.380 / 3600.0, 73.0);
+    let position =
+        Geodetic::from_degrees(53.0 + 48.0 / 60.0 + 33.820 / 3600.0, 2.0 + 7.0 / 60.0 + 46.380 / 3600.0, 73.0);
     let printed = Vector3::new(3_771_793.968, 140_253.342, 5_124_304.349);
-    assert!((place.to_ecef() - printed).norm() < 1e-3);
+    assert!((position.to_ecef() - printed).norm() < 1e-3);
     assert!((Geodetic::from_ecef(&printed).height_m - 73.0).abs() < 1e-3);
     // From 0° N 0° E, 1 km to the east is along y and one to the north along z.
     let here = Geodetic::from_degrees(0.0, 0.0, 0.0);

@@ -43,7 +43,7 @@ fn is_whole_steps(set: &Ephemeris) {
 }
 
 #[test]
-fn shipped_sets_are_whole_steps_of_the_fields_and_are_read_again_from_any_symbol_and_either_way_up() {
+fn shipped_sets_are_whole_steps_of_the_fields_and_are_read_again_from_any_symbol_inverted_or_not() {
     let own = of_sbas(rinex::read(SHIPPED, "shipped").unwrap().ephemerides);
     assert_eq!(own.len(), 12);
     let sender = (SBAS.sender)(&Common::default()).unwrap();
