@@ -1,4 +1,8 @@
-"""The ledger, and what must hold between it, the code, the pages and the prose."""
+"""The ledger, and what must hold between it, the code, the pages and the prose.
+
+A row has the commit and the date at which its figure was measured. Counts and bounds that tests assert have neither: every check reads
+them in the sources again, so that they are today's or a finding.
+"""
 
 import csv
 import difflib
@@ -162,6 +166,8 @@ def faults_of_row(row, figure):
     again = f"make it again by: --make {name}"
     declared = {"what": figure.what, "unit": figure.unit, "command": source.command, "rooms": " ".join(figure.rooms)}
     faults = [f"{name}: {key} is {row[key]!r}, declared {text!r}; {again}" for key, text in declared.items() if row[key] != text]
+    if not row["commit"] and not isinstance(source, (make.Count, make.Asserted)):
+        faults.append(f"{name}: a measured figure without the commit of its code; {again}")
     if row["met"] != met(row["value"], row["bar"]):
         faults.append(f"{name}: met says {row['met']} of {row['value']} against {row['bar']}; {again}")
     if isinstance(source, (make.Count, make.Asserted, make.Page)):

@@ -4,6 +4,8 @@ A figure is declared here and measured nowhere else; `reports/evidence.csv` has 
 allows: whatever in them changes makes the figure stale.
 """
 
+import re
+
 import make
 import witness
 from figure import Figure
@@ -185,6 +187,10 @@ def counts():
     ]
     for name, what, pattern, files in rows:
         yield Figure(f"counts.{name}", what, "", make.Count(pattern, files))
+    for page in ("README.md", *(f"book/src/{name}.md" for name in ("first_run", "concepts", "cookbook", "signals"))):
+        name = page.rpartition("/")[2].removesuffix(".md").lower()
+        source = make.Text("python3 tests/readability.py", rf"readability of {re.escape(page)}: ([\d.]+)", text_of=page)
+        yield Figure(f"readability.{name}", f"Flesch's reading ease of {page}", "", source, (), "≥ 45")
     rows = [
         ("planted", "planted faults that a test catches", r"^(\d+ of \d+) faults are caught", "reports/planted.md",
          "planted", ("tests/planted",)),

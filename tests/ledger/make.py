@@ -1,6 +1,7 @@
 """How a figure is made: a source gives its value, and with what it was made."""
 
 import csv
+import datetime
 import functools
 import io
 import json
@@ -110,6 +111,17 @@ class Script:
         if not found:
             raise NotMade(f"{self.command} printed nothing like {self.pattern}")
         return Made(found.expand(self.text), bar=f"≤ {found[2]}" if found.re.groups > 1 and self.text == r"\1" else None)
+
+
+@dataclass(frozen=True)
+class Text(Script):
+    """A figure of a page's text. It has the commit at which it was made and is never stale: `.ci/long` holds the text of the day."""
+
+    text_of: str = ""
+
+    def make(self):
+        today = str(datetime.datetime.now(datetime.timezone.utc).date())
+        return Made(super().make().value, commit=head_commit((self.text_of,)), date=today)
 
 
 @functools.cache

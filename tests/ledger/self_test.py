@@ -121,6 +121,8 @@ FAULTS = [
     ("a page made again", [("reports/page.md", "1234567", "7654321")], "a.cells is of 1234567, its page of 7654321"),
     ("a page without its commit", [("reports/page.md", "Measured at commit 1234567 on", "Of")], "does not say at which commit it was measured"),
     ("a missed bar that is called met", [("reports/evidence.csv", "≤ 0.5", "≤ 0.2")], "reports/evidence.csv:4: a.error_m: met says yes of 0.31 against ≤ 0.2"),
+    ("a row without its commit", [("reports/evidence.csv", "≤ 0.5,yes,measure,1234567", "≤ 0.5,yes,measure,")],
+     "a.error_m: a measured figure without the commit of its code; make it again by: --make a.error_m"),
     ("words of a row", [("reports/evidence.csv", "an error", "a tiny error")], "a.error_m: what is 'a tiny error', declared 'an error'"),
     ("a row that nobody declared", [("reports/evidence.csv", "a.bias_m", "a.bios_m")], "a.bios_m is not declared in tests/ledger/figures.py"),
     ("a row too few", [("reports/evidence.csv", "a.bias_m", "a.bios_m")], "reports/evidence.csv:1: a.bias_m: declared without a row; make by: --make a."),
