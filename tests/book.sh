@@ -66,11 +66,11 @@ def commands(text):
 
 
 def of_readme(text):
-    """The program without arguments, which the README's first command is, and the output that the README prints."""
+    """The program without arguments, which the README's first command is, and the lines with which the README says that it ends."""
     first = re.search(r"^```\ncargo run --release +#.*?^```text\n(.*?)^```$", text, re.M | re.S)
     if not first:
         sys.exit("book: README.md: expected a block with `cargo run --release` and a block ```text of its output")
-    yield text.count("\n", 0, first.start(1)), ["gnss-twin"], first[1].splitlines()
+    yield text.count("\n", 0, first.start(1)), ["gnss-twin"], ["…", *first[1].splitlines()]
 
 
 def pattern(rows):
