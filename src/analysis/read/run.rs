@@ -188,7 +188,6 @@ impl Run {
     pub fn read_parts(run: &Path, truth: &Path, rx: &Path) -> Result<Self, JudgeError> {
         let mut read = Self::read_truth_by(truth, run)?;
         read.rx = Some(rx.to_owned());
-        read.scene_json = json(&truth.join("scene.json"))?.unwrap_or(Value::Null);
         read.scenario = text(&run.join("scenario.toml"))?;
         read.truth_navigation = rows(&truth.join("navigation.csv"), TRUTH)?;
         read.observations = observations(&rx.join("observations.csv"), RECEIVER, run, |_| Ok(()))?;
@@ -318,7 +317,7 @@ impl Run {
         each_of_any(&truth.join("claimed.csv"), |_, row: TrajectoryRow| claimed.push(row))?;
         Ok(Self {
             scene,
-            scene_json: Value::Null,
+            scene_json: json(&truth.join("scene.json"))?.unwrap_or(Value::Null),
             scenario: None,
             expected: emission::means(&observed)?,
             signals: observed.keys().map(|link| link.signal).collect(),

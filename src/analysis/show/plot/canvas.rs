@@ -103,6 +103,7 @@ pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
         widen(&mut x, per_pixel * f64::from(across_px));
         widen(&mut y, per_pixel * f64::from(up_px));
     }
+    let is_empty = chart.series.iter().all(|series| series.points.is_empty());
     let (across, across_label_px) = ticks_across(area, &x, (left_px + EDGE_PX, across_px, width_px))?;
     let (up, up_label_px) = ticks_up(&y, up_px);
     let mut context = ChartBuilder::on(area)
@@ -129,17 +130,19 @@ pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
         let (pixel_x, pixel_y) = context.plotting_area().map_coordinate(&point);
         (pixel_x - from_left, pixel_y - from_top)
     };
-    for Tick { at: place, label } in &across.ticks {
-        let (foot, head) = (at((*place, y.from)), at((*place, y.to)));
+    // Of nothing there is no size, so that its axes have no numbers.
+    let ticks = |ticks: &Ticks| if is_empty { Vec::new() } else { ticks.ticks.clone() };
+    for Tick { at: place, label } in ticks(&across) {
+        let (foot, head) = (at((place, y.from)), at((place, y.to)));
         tick(area, [foot, head], (0, tick_px(&x)))?;
         let style = anchored(across_label_px, HPos::Center, VPos::Top);
-        area.draw(&Text::new(label.clone(), (foot.0, foot.1 + 8 * FINE), style))?;
+        area.draw(&Text::new(label, (foot.0, foot.1 + 8 * FINE), style))?;
     }
-    for Tick { at: place, label } in &up.ticks {
-        let (foot, head) = (at((x.from, *place)), at((x.to, *place)));
+    for Tick { at: place, label } in ticks(&up) {
+        let (foot, head) = (at((x.from, place)), at((x.to, place)));
         tick(area, [foot, head], (-tick_px(&y), 0))?;
         let style = anchored(up_label_px, HPos::Right, VPos::Center);
-        area.draw(&Text::new(label.clone(), (foot.0 - 8 * FINE, foot.1), style))?;
+        area.draw(&Text::new(label, (foot.0 - 8 * FINE, foot.1), style))?;
     }
     let corners = [(x.from, y.to), (x.from, y.from), (x.to, y.from)].map(at);
     area.draw(&PathElement::new(corners, GREY.stroke_width(FINE as u32)))?;
@@ -159,7 +162,7 @@ pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
     for (place, label) in labels {
         area.draw(&Text::new(label.to_owned(), place, anchored(11, HPos::Left, VPos::Center)))?;
     }
-    if chart.series.iter().all(|series| series.points.is_empty()) {
+    if is_empty {
         let style = anchored(13, HPos::Center, VPos::Center).color(&GREY);
         area.draw(&Text::new("no data", middle, style))?;
     }

@@ -68,7 +68,12 @@ fn scale_of(tracks: &[Track]) -> (f64, f64) {
     let strengths = || tracks.iter().filter_map(|track| track.cn0_dbhz);
     let low = strengths().fold(f64::INFINITY, f64::min).floor();
     let high = strengths().fold(f64::NEG_INFINITY, f64::max).ceil();
-    if low < high { (low, high) } else { (30.0, 50.0) }
+    match low < high {
+        true => (low, high),
+        // All alike: a decibel on either side.
+        false if low.is_finite() => (low - 1.0, high + 1.0),
+        false => (30.0, 50.0),
+    }
 }
 
 fn tracked(area: &Area<'_>, dome: Dome, tracks: &[Track], skyline_deg: &[[f64; 2]]) -> Result<(), Failure> {
@@ -78,7 +83,7 @@ fn tracked(area: &Area<'_>, dome: Dome, tracks: &[Track], skyline_deg: &[[f64; 2
     systems.dedup();
     obstructed(area, dome, skyline_deg)?;
     frame(area, dome)?;
-    if let Some(corner_px) = dome.scale_px {
+    if let Some(corner_px) = dome.scale_px.filter(|_| tracks.iter().any(|track| track.cn0_dbhz.is_some())) {
         scale(area, corner_px, low, high)?;
     }
     let mut ends = Vec::new();
@@ -90,7 +95,7 @@ fn tracked(area: &Area<'_>, dome: Dome, tracks: &[Track], skyline_deg: &[[f64; 2
         dot(area, end, systems.iter().position(|system| *system == sv.system).unwrap_or(0), (inside, colour))?;
         ends.push((*sv, end));
     }
-    for ((sv, end), spot) in ends.iter().zip(names(tracks)) {
+    for ((sv, end), spot) in ends.iter().zip(names(dome, tracks)) {
         if spot.is_far() {
             area.draw(&PathElement::new([*end, spot.middle], GREY.stroke_width(FINE as u32)))?;
             area.draw(&Rectangle::new(spot.corners(), WHITE.filled()))?;
@@ -159,9 +164,11 @@ struct Spot {
 const NAME_PX: (i32, i32) = (14, 8);
 const DOT_PX: (i32, i32) = (9, 9);
 const POINT_PX: (i32, i32) = (2, 2);
+/// Half width and half height of a word of the compass or of an elevation.
+const WORD_PX: (i32, i32) = (15, 8);
 /// Positions of a name beside its dot, in the order in which they are tried, and how many times as far.
 const SIDES_PX: [(i32, i32); 8] = [(26, 0), (-26, 0), (0, -18), (0, 18), (24, -15), (-24, -15), (24, 15), (-24, 15)];
-const RINGS: [i32; 3] = [1, 2, 3];
+const RINGS: [i32; 4] = [1, 2, 3, 4];
 
 impl Spot {
     /// True if a line has to lead to the dot.
@@ -185,18 +192,21 @@ impl Spot {
     }
 }
 
-/// Positions of the names of tracks that have one: clear of dots, tracks and each other, or as clear as can
-/// be.
-fn names(tracks: &[Track]) -> Vec<Spot> {
+/// Positions of the names of tracks that have one: within the picture, clear of the compass' words, dots,
+/// tracks and each other, or as clear as can be.
+fn names(dome: Dome, tracks: &[Track]) -> Vec<Spot> {
     let dots: Vec<(i32, i32)> = tracks.iter().filter_map(|track| track.places.last().copied()).collect();
     let points = || tracks.iter().flat_map(|track| track.places.iter().copied());
+    let words: Vec<(i32, i32)> = dome.words().map(|(_, middle)| middle).collect();
     let mut spots: Vec<Spot> = Vec::with_capacity(dots.len());
     for &dot in &dots {
         let clearance = |spot: &Spot| {
             let from_names = spots.iter().map(|other| spot.clearance(other.middle, NAME_PX));
             let from_dots = dots.iter().map(|other| spot.clearance(*other, DOT_PX));
             let from_points = points().map(|point| spot.clearance(point, POINT_PX));
-            from_names.chain(from_dots).chain(from_points).min().unwrap_or(0)
+            let from_words = words.iter().map(|word| spot.clearance(*word, WORD_PX));
+            let from_edge = std::iter::once(dome.room(spot.corners()));
+            from_names.chain(from_dots).chain(from_points).chain(from_words).chain(from_edge).min().unwrap_or(0)
         };
         let at =
             |far: i32, (dx, dy): (i32, i32)| Spot { middle: (dot.0 + far * dx * FINE, dot.1 + far * dy * FINE), dot };
@@ -212,6 +222,33 @@ impl Dome {
     /// Zenith, in virtual pixels.
     fn centre(self) -> (i32, i32) {
         (self.centre_px.0 * FINE, self.centre_px.1 * FINE)
+    }
+
+    /// Words around the horizon and at the circles of elevation, with their middles in virtual pixels.
+    fn words(self) -> impl Iterator<Item = (String, (i32, i32))> {
+        // Names stand so many pixels beyond the horizon.
+        let outside_deg = -90.0 * 17.0 / f64::from(self.radius_px);
+        let compass = (0..360).step_by(30).map(move |azimuth_deg| {
+            let name = match azimuth_deg {
+                0 => "N".to_owned(),
+                90 => "E".to_owned(),
+                180 => "S".to_owned(),
+                270 => "W".to_owned(),
+                other => format!("{other}°"),
+            };
+            (name, self.place(f64::from(azimuth_deg), outside_deg))
+        });
+        let circles = [30, 60].into_iter().map(move |elevation_deg| {
+            let (x, y) = self.place(0.0, f64::from(elevation_deg));
+            (format!("{elevation_deg}°"), (x + 16 * FINE, y - 9 * FINE))
+        });
+        compass.chain(circles)
+    }
+
+    /// Distance from a rectangle to the picture's edge in virtual pixels; negative beyond it.
+    fn room(self, [(left, top), (right, bottom)]: [(i32, i32); 2]) -> i32 {
+        let (width, height) = (self.size_px.0 * FINE, self.size_px.1 * FINE);
+        left.min(top).min(width - right).min(height - bottom)
     }
 
     /// Direction in virtual pixels.
@@ -235,27 +272,16 @@ fn frame(area: &Area<'_>, dome: Dome) -> Result<(), Failure> {
     area.draw(&Text::new("Satellites above the horizon", (centre.0, 16 * FINE), title))?;
     let line = RGBColor(205, 205, 205).stroke_width(FINE as u32);
     for elevation_deg in [0.0, 30.0, 60.0_f64] {
-        let (x, y) = dome.place(0.0, elevation_deg);
+        let (_, y) = dome.place(0.0, elevation_deg);
         area.draw(&Circle::new(centre, centre.1 - y, line))?;
-        if elevation_deg == 0.0 {
-            continue;
-        }
-        let style = anchored(12, HPos::Left, VPos::Bottom).color(&GREY);
-        area.draw(&Text::new(format!("{elevation_deg:.0}°"), (x + 4 * FINE, y - 2 * FINE), style))?;
     }
-    // Names stand so many pixels beyond the horizon.
-    let outside_deg = -90.0 * 17.0 / f64::from(dome.radius_px);
     for azimuth_deg in (0..360).step_by(30) {
-        let azimuth_deg = f64::from(azimuth_deg);
-        area.draw(&PathElement::new([centre, dome.place(azimuth_deg, 0.0)], line))?;
-        let name = match azimuth_deg as i32 {
-            0 => "N".to_owned(),
-            90 => "E".to_owned(),
-            180 => "S".to_owned(),
-            270 => "W".to_owned(),
-            other => format!("{other}°"),
-        };
-        area.draw(&Text::new(name, dome.place(azimuth_deg, outside_deg), anchored(13, HPos::Center, VPos::Center)))?;
+        area.draw(&PathElement::new([centre, dome.place(f64::from(azimuth_deg), 0.0)], line))?;
+    }
+    for (place, (word, middle)) in dome.words().enumerate() {
+        let style = anchored(if place < 12 { 13 } else { 12 }, HPos::Center, VPos::Center);
+        let style = if place < 12 { style } else { style.color(&GREY) };
+        area.draw(&Text::new(word, middle, style))?;
     }
     Ok(())
 }
@@ -285,13 +311,14 @@ mod tests {
     use super::*;
     use crate::hand_made::Draw;
 
-    /// Skies of sixteen satellites with three pairs of neighbours whose dots overlap.
+    /// Skies of thirteen satellites with three pairs of neighbours whose dots overlap, on both pictures.
     #[test]
-    fn names_of_neighbours_do_not_overlap() {
+    fn names_overlap_neither_each_other_nor_the_words_of_the_compass() {
         let mut draw = Draw(3);
-        for _ in 0..200 {
-            let mut place =
-                || ((100.0 + 60.0 * draw.normal()) as i32 * FINE, (100.0 + 60.0 * draw.normal()) as i32 * FINE);
+        for turn in 0..200 {
+            let dome = [WIDE, NARROW][turn % 2];
+            // From the zenith to the horizon, many near it.
+            let mut place = || dome.place(360.0 * draw.normal(), (30.0 * draw.normal()).abs().min(90.0));
             let mut ends: Vec<(i32, i32)> = (0..10).map(|_| place()).collect();
             ends.extend_from_within(..3);
             ends.iter_mut().skip(10).for_each(|end| end.0 += 6 * FINE);
@@ -302,13 +329,34 @@ mod tests {
                 observed: true,
             };
             let tracks: Vec<Track> = ends.iter().map(track).collect();
-            let spots = names(&tracks);
+            let spots = names(dome, &tracks);
             assert_eq!(spots.len(), ends.len());
             for (at, spot) in spots.iter().enumerate() {
                 for other in &spots[..at] {
                     assert!(spot.clearance(other.middle, NAME_PX) >= 0, "{spot:?} {other:?}");
                 }
+                for (word, middle) in dome.words() {
+                    assert!(spot.clearance(middle, WORD_PX) >= 0, "{spot:?} on {word}");
+                }
+                assert!(dome.room(spot.corners()) >= 0, "{spot:?} is cut");
             }
         }
+    }
+
+    #[test]
+    fn a_satellite_at_an_end_of_the_compass_leaves_its_word_alone() {
+        for azimuth_deg in [0.0, 90.0, 180.0, 240.0, 270.0] {
+            let places = vec![NARROW.place(azimuth_deg, 12.0), NARROW.place(azimuth_deg, 3.0)];
+            let track = Track { sv: Sv::gps(7), places, cn0_dbhz: None, observed: true };
+            let spots = names(NARROW, &[track]);
+            assert!(NARROW.words().all(|(_, middle)| spots[0].clearance(middle, WORD_PX) >= 0), "{azimuth_deg}");
+        }
+    }
+
+    #[test]
+    fn the_scale_of_equal_strengths_is_about_them() {
+        let track = |cn0_dbhz| Track { sv: Sv::gps(7), places: Vec::new(), cn0_dbhz, observed: true };
+        assert_eq!(scale_of(&[track(Some(45.0)), track(Some(45.0))]), (44.0, 46.0));
+        assert_eq!(scale_of(&[track(Some(44.2)), track(Some(46.9))]), (44.0, 47.0));
     }
 }

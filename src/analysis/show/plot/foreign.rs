@@ -6,22 +6,24 @@ use std::path::Path;
 use crate::error::JudgeError;
 use crate::judge::foreign::Judged;
 use crate::judge::foreign::measured::ObservationError;
-use crate::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREEN, GREY, Mark, ORANGE, Series, WIDTH_PX};
+use crate::read::Run;
+use crate::show::plot::canvas::{Axis, BLUE, Chart, GREEN, Mark, ORANGE, Series, WIDTH_PX};
+use crate::show::plot::dome::NARROW;
 use crate::show::plot::drawing::{Failure, PNG_SCALE};
+use crate::show::plot::position::{Plan, chart_of, narrow_of};
 use crate::show::plot::sketch::{Figure, Sketch};
+use crate::show::plot::sky::sketch_of;
 use crate::statistics::{mean, percentile};
 
 type Points = Vec<(f64, f64)>;
 
 /// Draws what there is to draw into a directory.
 pub(crate) fn all(directory: &Path, judged: &Judged) -> Result<Vec<Figure>, JudgeError> {
-    let sketches = [
-        ("foreign_observables", OBSERVABLES, judged.observables.as_ref().map(|_| observables(judged))),
-        ("foreign_position", POSITION, judged.places.as_ref().map(|_| position(judged))),
-    ];
+    let sketches =
+        [("foreign_observables", OBSERVABLES, observables(judged)), ("foreign_position", POSITION, position(judged)?)];
     let mut figures = Vec::new();
     for (name, caption, sketch) in sketches {
-        let Some(sketch) = sketch.flatten() else { continue };
+        let Some(sketch) = sketch else { continue };
         let path = directory.join(name).with_extension("png");
         let failed = |error: Failure| JudgeError::Plot { path: path.clone(), reason: error.to_string() };
         let figure = Figure::new(name, sketch, caption).map_err(failed)?;
@@ -90,8 +92,17 @@ fn observables(judged: &Judged) -> Option<Sketch> {
     Some(Sketch::charts((WIDTH_PX, 900), 1, charts, legend))
 }
 
-fn position(judged: &Judged) -> Option<Sketch> {
-    let places = judged.places.as_ref()?;
+/// Sky with the satellites that the file observes, and horizontal errors, for the report's first page.
+pub(crate) fn front(run: &Run, judged: &Judged) -> Result<[Sketch; 2], JudgeError> {
+    let rows = judged.observables.iter().flat_map(|measured| &measured.rows);
+    let observed = rows.map(|row| row.link.sv).collect();
+    let places = judged.places.iter().flat_map(|places| &places.rows);
+    let errors = narrow_of(places.map(|row| (row.east_m, row.north_m)))?;
+    Ok([sketch_of(run, &observed, NARROW)?, errors])
+}
+
+fn position(judged: &Judged) -> Result<Option<Sketch>, JudgeError> {
+    let Some(places) = &judged.places else { return Ok(None) };
     let over = |of: fn(&crate::judge::foreign::place::FixError) -> f64| -> Points {
         places.rows.iter().map(|row| (row.label_s, of(row))).collect()
     };
@@ -100,16 +111,7 @@ fn position(judged: &Judged) -> Option<Sketch> {
         Series::new("north", ORANGE, Mark::Dots, over(|row| row.north_m)),
         Series::new("up", GREEN, Mark::Dots, over(|row| row.up_m)),
     ];
-    let points: Points = places.rows.iter().map(|row| (row.east_m, row.north_m)).collect();
-    let bias = places.bias_enu_m.map(|[east, north, _]| (east.value, north.value));
-    let axis = |label, of: fn(&(f64, f64)) -> f64| Axis::around(label, points.iter().map(of).chain([0.0]), 0.01);
-    let (x, y) = (axis("east (m)", |p| p.0), axis("north (m)", |p| p.1));
-    let plan = vec![
-        Series::new("fixes", GREY, Mark::Dots, points),
-        Series::new("mean", COLOURS[3], Mark::Cross, bias.into_iter().collect()),
-        Series::new("truth", COLOURS[6], Mark::Cross, vec![(0.0, 0.0)]),
-    ];
-    let legend = [errors.clone(), plan.clone()].concat();
-    let scatter = Chart { equal: true, ..Chart::new("Horizontal error", x, y, plan) };
-    Some(Sketch::charts((WIDTH_PX, 340), 2, [over_time("Position error", "error (m)", 0.5, errors), scatter], legend))
+    let Plan { chart, legend, .. } = chart_of(places.rows.iter().map(|row| (row.east_m, row.north_m)))?;
+    let legend = [errors.clone(), legend].concat();
+    Ok(Some(Sketch::charts((WIDTH_PX, 340), 2, [over_time("Position error", "error (m)", 0.5, errors), chart], legend)))
 }

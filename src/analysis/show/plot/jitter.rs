@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::error::JudgeError;
-use crate::judge::judgement::digits;
+use crate::judge::judgement::number;
 use crate::judge::summary::{DLL_CHIPS, FLL_HZ, PLL_DEG};
 use crate::read::Numbers;
 use crate::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREY, Mark, ORANGE, Series, WIDTH_PX};
@@ -15,24 +15,26 @@ pub(crate) struct Loop {
     pub name: &'static str,
     pub unit: &'static str,
     pub errors: Numbers,
+    /// What the summary says of them.
+    pub sigma: Option<f64>,
     pub threshold: f64,
 }
 
 /// DLL, PLL and FLL, made one after the other.
 pub(crate) fn loops<'a>(judged: &'a Judged<'_>) -> impl Iterator<Item = Result<Loop, JudgeError>> + 'a {
-    let limits = &judged.summary.details.thresholds;
+    let (limits, tracking) = (&judged.summary.details.thresholds, &judged.summary.tracking);
     let all = [
-        ("DLL", "chips", DLL_CHIPS, limits.dll_chips),
-        ("PLL", "degrees", PLL_DEG, limits.pll_deg),
-        ("FLL", "Hz", FLL_HZ, limits.fll_hz),
+        ("DLL", "chips", DLL_CHIPS, tracking.dll_sigma_chips, limits.dll_chips),
+        ("PLL", "degrees", PLL_DEG, tracking.pll_sigma_deg, limits.pll_deg),
+        ("FLL", "Hz", FLL_HZ, tracking.fll_sigma_hz, limits.fll_hz),
     ];
-    all.into_iter().map(|(name, unit, of, threshold)| {
+    all.into_iter().map(|(name, unit, of, sigma, threshold)| {
         let mut errors = Numbers::new(judged.errors.signals.directory());
         judged.errors.settled(None, of, |group| {
             let middle = group.mean()?.unwrap_or(0.0);
             group.try_each(|value| errors.push(value - middle))
         })?;
-        Ok(Loop { name, unit, errors, threshold })
+        Ok(Loop { name, unit, errors, sigma, threshold })
     })
 }
 
@@ -93,8 +95,21 @@ pub fn jitter(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     Ok(Some(Sketch::charts((WIDTH_PX, 270), 3, charts, legend)))
 }
 
+/// The loop and its σ in words.
+fn titled(of: &Loop) -> String {
+    let name = match of.name {
+        "DLL" => "Code loop (DLL)",
+        "PLL" => "Phase loop (PLL)",
+        _ => "Frequency loop (FLL)",
+    };
+    match of.sigma {
+        Some(sigma) => format!("{name}: σ {} {}", number(sigma), of.unit),
+        None => format!("{name}: no errors"),
+    }
+}
+
 fn histogram(of: &Loop) -> Result<Chart, JudgeError> {
-    let Loop { name, unit, threshold, .. } = of;
+    let Loop { unit, threshold, .. } = of;
     let histogram = Histogram::new(of)?;
     let Histogram { sigma, half, width, .. } = histogram;
     let bars: Vec<(f64, f64)> = (0..BINS).map(|bin| (histogram.middle(bin), histogram.share(bin))).collect();
@@ -114,6 +129,36 @@ fn histogram(of: &Loop) -> Result<Chart, JudgeError> {
         }
     }
     let x = Axis::new(&format!("error ({unit})"), (-half, half));
-    let title = format!("{name}: σ {}, threshold {}", digits(sigma, 3), digits(*threshold, 3));
-    Ok(Chart::new(title, x, Axis::new("observations (%)", (0.0, top)), series))
+    let chart = Chart::new(titled(of), x, Axis::new("observations (%)", (0.0, top)), series);
+    let mut words = vec!["threshold".to_owned(), format!("{} {unit}", number(*threshold))];
+    if *threshold >= half {
+        words.push("(outside)".to_owned());
+    }
+    // Beside the bell.
+    let corner = (-0.97 * half, 0.96 * top);
+    let labels = (0..).zip(words).map(|(line, word)| (corner, word, -13 * line));
+    Ok(Chart { labels: labels.collect(), ..chart })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_title_has_the_summary_s_sigma_in_words_with_its_unit_and_a_far_threshold_is_said_to_be_outside() {
+        let directory = tempfile::tempdir().unwrap();
+        let of = |threshold: f64| {
+            let mut errors = Numbers::new(directory.path());
+            (0..400).for_each(|n| errors.push(0.003 * libm::sin(f64::from(n))).unwrap());
+            Loop { name: "DLL", unit: "chips", errors, sigma: Some(0.002_986), threshold }
+        };
+        let texts = |chart: &Chart| chart.labels.iter().map(|(_, text, _)| text.clone()).collect::<Vec<_>>();
+        let far = histogram(&of(0.083_333_3)).unwrap();
+        assert_eq!(far.title, "Code loop (DLL): σ 0.002986 chips");
+        assert_eq!(texts(&far), ["threshold", "0.08333 chips", "(outside)"]);
+        let orange = |chart: &Chart| chart.series.iter().filter(|one| one.colour == ORANGE).count();
+        assert_eq!(orange(&far), 0);
+        let near = histogram(&of(0.008)).unwrap();
+        assert_eq!((texts(&near), orange(&near)), (vec!["threshold".to_owned(), "0.008 chips".to_owned()], 2));
+    }
 }

@@ -46,6 +46,8 @@ type Sketcher = fn(&Judged<'_>) -> Result<Option<Sketch>, JudgeError>;
 pub(crate) struct Picture {
     /// The PNG's, without its ending.
     pub name: &'static str,
+    /// What it shows, in a few words.
+    pub title: &'static str,
     pub caption: &'static str,
     /// Relative to the run's directory.
     pub numbers: &'static [&'static str],
@@ -56,6 +58,7 @@ pub(crate) struct Picture {
 pub(crate) const PICTURES: [Picture; 18] = [
     Picture {
         name: "sky",
+        title: "sky",
         caption: "Sky at the antenna. Each track ends in a dot at its last place, coloured by the mean C/N0 that the \
                   scene sets; a hollow dot was never observed by the receiver.",
         numbers: &["truth/sky.csv", "truth/observations.csv"],
@@ -63,6 +66,7 @@ pub(crate) const PICTURES: [Picture; 18] = [
     },
     Picture {
         name: "acquisition",
+        title: "search for satellites",
         caption: "Largest statistic of the search for every code with the threshold of the designed false-alarm \
                   probability. A cross marks what the scene has: a bar above the threshold without a cross is a false \
                   acquisition, a cross over a short bar a miss.",
@@ -71,6 +75,7 @@ pub(crate) const PICTURES: [Picture; 18] = [
     },
     Picture {
         name: "psd",
+        title: "spectrum of the samples",
         caption: "Power spectral density of the samples (Welch, Hann window, half overlap) with the theory of this \
                   scene: main spectra of the codes over their aliases, noise floor, interference. Look for lines or \
                   slopes that theory does not have.",
@@ -79,6 +84,7 @@ pub(crate) const PICTURES: [Picture; 18] = [
     },
     Picture {
         name: "peaks",
+        title: "correlation peaks",
         caption: "Correlation of up to 40 ms of the samples, in the middle of the run, with each satellite's code \
                   about its true delay, in phase with the prompt. A rounded peak shows the front end's band, a second \
                   one or a bent flank a reflection or a spoofer.",
@@ -87,6 +93,7 @@ pub(crate) const PICTURES: [Picture; 18] = [
     },
     Picture {
         name: "cn0",
+        title: "C/N0",
         caption: "C/N0 as the receiver estimates it against what the scene sets. Below, the difference: the codes of \
                   the other satellites cost about 1 dB, quantisation up to 1.96 dB with one bit.",
         numbers: &["errors.csv"],
@@ -94,6 +101,7 @@ pub(crate) const PICTURES: [Picture; 18] = [
     },
     Picture {
         name: "discriminators",
+        title: "discriminators of the loops",
         caption: "Raw discriminator outputs of the three loops while they track, before any filter. They scatter \
                   more than the loops' errors by the root of the loop's bandwidth; a mean off zero shows dynamic \
                   stress.",
@@ -102,6 +110,7 @@ pub(crate) const PICTURES: [Picture; 18] = [
     },
     Picture {
         name: "jitter",
+        title: "errors of the loops",
         caption: "Errors of the closed loops, replica minus truth, each satellite about its mean and without the \
                   pull-in, with the normal curve of the same mean and σ. The rules of thumb (d/6, 15°, 1/(12T)) are \
                   bounds for σ, and are drawn where they come near. Satellites of different C/N0 together are more \
@@ -111,6 +120,7 @@ pub(crate) const PICTURES: [Picture; 18] = [
     },
     Picture {
         name: "observables",
+        title: "errors of the observables",
         caption: "Errors of the observables against the truth. Code and carrier share the delays that the receiver \
                   cannot see; what all satellites share is the clock's and harmless to the position.",
         numbers: &["errors.csv"],
@@ -118,6 +128,7 @@ pub(crate) const PICTURES: [Picture; 18] = [
     },
     Picture {
         name: "elevation",
+        title: "errors over elevation",
         caption: "Errors of the observables over elevation, and the multipath combination over time: code that errs \
                   more low down, or a combination that swings, is multipath or atmosphere.",
         numbers: &["satellites.csv", "elevation.csv"],
@@ -125,6 +136,7 @@ pub(crate) const PICTURES: [Picture; 18] = [
     },
     Picture {
         name: "position_scatter",
+        title: "horizontal errors",
         caption: "Horizontal errors of the fixes about the truth with the ellipses that would hold 50 % and 95 % of \
                   a normal scatter of the same covariance, and how errors are distributed. A cloud off the cross is \
                   a bias.",
@@ -133,12 +145,14 @@ pub(crate) const PICTURES: [Picture; 18] = [
     },
     Picture {
         name: "position_time",
+        title: "position errors over time",
         caption: "Errors of the fixes over time between the bounds that the receiver's own covariance sets (±1.96 σ).",
         numbers: &["position.csv"],
         sketch: position::time,
     },
     Picture {
         name: "position_consistency",
+        title: "position errors beside stated sigmas",
         caption: "Errors between the receiver's own ±2σ, and the normalised error squared (NEES), \
                   whose mean should lie in the band that so many independent fixes allow. Above it the receiver is \
                   optimistic, below pessimistic.",
@@ -147,12 +161,14 @@ pub(crate) const PICTURES: [Picture; 18] = [
     },
     Picture {
         name: "trajectory",
+        title: "track and height",
         caption: "The horizontal track and the height over time, true and as the receiver found them.",
         numbers: &["truth/trajectory.csv", "rx/fixes.csv"],
         sketch: position::trajectory,
     },
     Picture {
         name: "clock_bias",
+        title: "receiver's clock",
         caption: "The receiver's clock: its bias as estimated and as it was with the straight line of least squares, \
                   the difference, and both without their lines.",
         numbers: &["clock.csv"],
@@ -160,12 +176,14 @@ pub(crate) const PICTURES: [Picture; 18] = [
     },
     Picture {
         name: "delays",
+        title: "delays of the atmosphere",
         caption: "What ionosphere and troposphere truly add to the code of each satellite.",
         numbers: &["truth/sky.csv"],
         sketch: delays::delays,
     },
     Picture {
         name: "allan",
+        title: "stability of the clock",
         caption: "Stability of the clock with intervals of 95 %: its estimate, the truth, the error, and what white \
                   noise of code or carrier alone would give.",
         numbers: &["allan.csv"],
@@ -173,6 +191,7 @@ pub(crate) const PICTURES: [Picture; 18] = [
     },
     Picture {
         name: "multipath",
+        title: "multipath",
         caption: "Code errors beside the fading that reflected rays cause: a code error that follows the fading is \
                   multipath.",
         numbers: &["errors.csv", "truth/rays.csv"],
@@ -180,11 +199,17 @@ pub(crate) const PICTURES: [Picture; 18] = [
     },
     Picture {
         name: "spoofing",
+        title: "positions under spoofing",
         caption: "Where the fixes went between the truth and what the spoofer claims.",
         numbers: &["position.csv", "truth/claimed.csv"],
         sketch: position::spoofing,
     },
 ];
+
+/// What the picture of a name shows, in a few words.
+pub(crate) fn title(name: &str) -> &str {
+    PICTURES.iter().find(|picture| picture.name == name).map_or(name, |picture| picture.title)
+}
 
 /// Sky and horizontal errors half as wide as a page's text, for its first page.
 pub(crate) fn front(judged: &Judged<'_>) -> Result<[Sketch; 2], JudgeError> {

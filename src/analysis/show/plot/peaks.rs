@@ -38,7 +38,7 @@ pub fn peaks(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         series.insert(0, Series { points: curve.collect(), ..own.clone() });
         y.add(1.0);
         let y = Axis::around("correlation (of the largest)", y.values(), 1.0);
-        Chart::new(signal.name, Axis::new("code delay (chips)", (from, to)), y, series)
+        Chart::new(format!("Correlation with {}", signal.name), Axis::new("code delay (chips)", (from, to)), y, series)
     };
     let charts: Vec<Chart> = signals.iter().map(chart).collect();
     let columns = charts.len().min(2);

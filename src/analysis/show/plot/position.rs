@@ -17,15 +17,19 @@ use gnss::record::Fix;
 type Points = Vec<(f64, f64)>;
 
 /// East and north errors with the ellipses of 50 % and 95 %.
-struct Plan {
-    chart: Chart,
-    legend: Vec<Series>,
+pub(super) struct Plan {
+    pub chart: Chart,
+    pub legend: Vec<Series>,
     /// The errors themselves.
     flat: Vec<Vector2<f64>>,
 }
 
 fn plan(judged: &Judged<'_>) -> Result<Plan, JudgeError> {
-    let flat: Vec<Vector2<f64>> = judged.errors.positions.map(|error| error.enu_m.xy())?;
+    about_truth(judged.errors.positions.map(|error| error.enu_m.xy())?)
+}
+
+/// Horizontal errors as they are drawn.
+fn about_truth(flat: Vec<Vector2<f64>>) -> Result<Plan, JudgeError> {
     let fixes = Shown::of(Mark::Dots, |see| {
         flat.iter().for_each(|at| see(at.x, at.y));
         Ok::<_, JudgeError>(())
@@ -37,10 +41,11 @@ fn plan(judged: &Judged<'_>) -> Result<Plan, JudgeError> {
         }
         series.push(Series::new("mean", COLOURS[3], Mark::Cross, vec![(spread.mean.x, spread.mean.y)]));
     }
-    series.push(Series::new("truth", COLOURS[6], Mark::Cross, vec![(0.0, 0.0)]));
+    // Without fixes there is no size, and nothing about the truth.
+    let truth = if flat.is_empty() { Vec::new() } else { vec![(0.0, 0.0)] };
+    series.push(Series::new("truth", COLOURS[6], Mark::Cross, truth));
     let ends = || series.iter().flat_map(|one| one.points.iter()).flat_map(|&(x, y)| [x.abs(), y.abs()]);
     let far = fixes.x.values().chain(fixes.y.values()).map(f64::abs);
-    // Without fixes there is no size.
     let least = if flat.is_empty() { 1.0 } else { 0.0 };
     let reach = 1.1 * ends().chain(far).fold(least, f64::max);
     let axis = |label| Axis::new(label, (-reach, reach));
@@ -52,8 +57,23 @@ fn plan(judged: &Judged<'_>) -> Result<Plan, JudgeError> {
 
 /// The horizontal errors alone, half as wide as a page's text.
 pub fn narrow(judged: &Judged<'_>) -> Result<Sketch, JudgeError> {
-    let Plan { chart, legend, .. } = plan(judged)?;
-    Ok(Sketch::charts((WIDTH_PX / 2, WIDTH_PX / 2), 1, [chart], legend))
+    Ok(plan(judged)?.narrow())
+}
+
+/// Horizontal errors of a receiver under test, half as wide as a page's text.
+pub(super) fn narrow_of(east_north_m: impl Iterator<Item = (f64, f64)>) -> Result<Sketch, JudgeError> {
+    Ok(chart_of(east_north_m)?.narrow())
+}
+
+/// Their chart with its legend.
+pub(super) fn chart_of(east_north_m: impl Iterator<Item = (f64, f64)>) -> Result<Plan, JudgeError> {
+    about_truth(east_north_m.map(|(east_m, north_m)| Vector2::new(east_m, north_m)).collect())
+}
+
+impl Plan {
+    fn narrow(self) -> Sketch {
+        Sketch::charts((WIDTH_PX / 2, WIDTH_PX / 2), 1, [self.chart], self.legend)
+    }
 }
 
 /// Horizontal errors about the truth, and the distribution of horizontal and vertical errors.

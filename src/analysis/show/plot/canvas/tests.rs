@@ -238,4 +238,8 @@ fn empty_axes_say_so() {
     let axis = || Axis::new("m", (0.0, 1.0));
     let svg = compose((300, 200), 1, &[Chart::new("", axis(), axis(), Vec::new())], &[]).unwrap().svg;
     assert!(svg.contains("no data"));
+    let with = vec![Series::new("", BLUE, Mark::Dots, vec![(0.5, 0.5)])];
+    let full = compose((300, 200), 1, &[Chart::new("", axis(), axis(), with)], &[]).unwrap().svg;
+    // Numbers of axes of nothing would be a size.
+    assert!(full.matches("<text").count() > svg.matches("<text").count());
 }
