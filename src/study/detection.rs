@@ -335,7 +335,7 @@ fn doppler_step_hz(settings: &AcquisitionSettings) -> f64 {
 /// # Errors
 /// [`JudgeError`] with the file that could not be written.
 pub fn write(directory: &Path, rows: &[DetectionRow], settings: &AcquisitionSettings) -> Result<(), JudgeError> {
-    write_rows(&directory.join("acquisition.csv"), rows.iter())?;
+    write_rows(&directory.join("acquisition.csv"), "", rows.iter())?;
     let held = rows.iter().filter(|row| row.holds()).count();
     let joint = Joint::of(rows);
     let mut text = format!(

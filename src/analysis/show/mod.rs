@@ -6,6 +6,7 @@
 //! writes what came of a foreign receiver, [`trade`] the comparison of speed and accuracy that a benchmark
 //! fills.
 
+mod columns;
 pub mod document;
 pub mod foreign;
 pub mod page;

@@ -15,9 +15,10 @@ use crate::measure::jitter::Jitter;
 use crate::measure::psd::Psd;
 use crate::measure::slips::{COLUMNS, Slips};
 use crate::read::PeakRow;
+use crate::show::columns;
 use crate::show::plot::Judged;
 use crate::show::plot::jitter::{Histogram, loops};
-use crate::show::write::{Table, write_read_rows, write_rows, write_whole};
+use crate::show::write::{Table, write_read_rows, write_rows};
 use gnss::record::Fix;
 use gnss::satellite::Sv;
 use gnss::signal::Link;
@@ -88,7 +89,7 @@ struct TheoryRow {
 /// The file that cannot be written.
 pub fn write_psd(path: &Path, psd: &Psd) -> Result<(), JudgeError> {
     let Some(rows) = psd.rows() else { return Ok(()) };
-    write_rows(path, rows.into_iter())
+    write_rows(path, "", rows.into_iter())
 }
 
 /// Writes `peaks.csv` under that name, which a run without peaks has not.
@@ -96,7 +97,7 @@ pub fn write_psd(path: &Path, psd: &Psd) -> Result<(), JudgeError> {
 /// # Errors
 /// The file that cannot be written.
 pub fn write_peaks(path: &Path, peaks: &[PeakRow]) -> Result<(), JudgeError> {
-    if peaks.is_empty() { Ok(()) } else { write_rows(path, peaks.iter()) }
+    if peaks.is_empty() { Ok(()) } else { write_rows(path, "", peaks.iter()) }
 }
 
 /// Writes the tables of a run's measurements, all but those of [`write()`].
@@ -107,25 +108,24 @@ pub(crate) fn write_measured(
     slips: &Slips,
     jitter: &Jitter,
 ) -> Result<(), JudgeError> {
-    write_read_rows(&directory.join("clock.csv"), judged.clock.rows.cursor())?;
-    write_rows(&directory.join("allan.csv"), judged.clock.stability())?;
-    write_read_rows(&directory.join("consistency.csv"), judged.consistency.rows.cursor())?;
-    write_rows(&directory.join("satellites.csv"), elevations.satellites.iter())?;
-    write_rows(&directory.join("elevation.csv"), elevations.bands.iter())?;
+    write_read_rows(&directory.join("clock.csv"), columns::CLOCK, judged.clock.rows.cursor())?;
+    write_rows(&directory.join("allan.csv"), columns::ALLAN, judged.clock.stability())?;
+    write_read_rows(&directory.join("consistency.csv"), columns::CONSISTENCY, judged.consistency.rows.cursor())?;
+    write_rows(&directory.join("satellites.csv"), columns::SATELLITES, elevations.satellites.iter())?;
+    write_rows(&directory.join("elevation.csv"), columns::ELEVATION, elevations.bands.iter())?;
     write_slips(directory, slips)?;
-    write_rows(&directory.join("jitter.csv"), jitter.rows.iter())
+    write_rows(&directory.join("jitter.csv"), columns::JITTER, jitter.rows.iter())
 }
 
-/// Writes `slips.csv`, whose header is there without rows too.
+/// Writes `slips.csv`.
 pub(crate) fn write_slips(directory: &Path, slips: &Slips) -> Result<(), JudgeError> {
-    let path = directory.join("slips.csv");
-    if slips.rows.is_empty() { write_whole(&path, COLUMNS.as_bytes()) } else { write_rows(&path, slips.rows.iter()) }
+    write_rows(&directory.join("slips.csv"), COLUMNS, slips.rows.iter())
 }
 
 /// Writes `errors.csv`, `position.csv`, `histograms.csv`, `psd_theory.csv` and `verdict.csv` into a run's
 /// directory.
 pub(crate) fn write(directory: &Path, judged: &Judged<'_>) -> Result<(), JudgeError> {
-    let mut errors = Table::create(&directory.join("errors.csv"))?;
+    let mut errors = Table::create(&directory.join("errors.csv"), columns::ERRORS)?;
     for link in judged.errors.signals.keys() {
         let Link { sv, signal } = link;
         for row in judged.errors.signals.cursor(link) {
@@ -149,8 +149,8 @@ pub(crate) fn write(directory: &Path, judged: &Judged<'_>) -> Result<(), JudgeEr
     let mut fixes = judged.run.fixes.finder()?;
     let rows = judged.errors.positions.cursor();
     let rows = rows.map(|error| error.map(|error| position(&error, fixes.get(error.sample).as_ref())));
-    write_read_rows(&directory.join("position.csv"), rows)?;
-    let mut histograms = Table::create(&directory.join("histograms.csv"))?;
+    write_read_rows(&directory.join("position.csv"), columns::POSITION, rows)?;
+    let mut histograms = Table::create(&directory.join("histograms.csv"), "")?;
     for one in loops(judged) {
         let one = one?;
         let histogram = Histogram::new(&one)?;
@@ -173,9 +173,9 @@ pub(crate) fn write(directory: &Path, judged: &Judged<'_>) -> Result<(), JudgeEr
     if !theory.is_empty() {
         let rows = judged.run.psd.iter().zip(theory);
         let rows = rows.map(|(row, &density_db)| TheoryRow { frequency_hz: row.frequency_hz, density_db });
-        write_rows(&directory.join("psd_theory.csv"), rows)?;
+        write_rows(&directory.join("psd_theory.csv"), "", rows)?;
     }
-    write_rows(&directory.join("verdict.csv"), judged.summary.details.verdict.csv_rows())
+    write_rows(&directory.join("verdict.csv"), "", judged.summary.details.verdict.csv_rows())
 }
 
 fn position(error: &PositionError, fix: Option<&Fix>) -> PositionRow {

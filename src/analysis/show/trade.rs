@@ -126,7 +126,7 @@ impl fmt::Display for Width {
 /// # Errors
 /// [`JudgeError`] with the file that could not be written.
 pub fn write_widths(directory: &Path, rows: &[Width], machine: &str) -> Result<(), JudgeError> {
-    write_rows(&directory.join("widths.csv"), rows.iter())?;
+    write_rows(&directory.join("widths.csv"), "", rows.iter())?;
     let mut text = format!(
         "# Width of samples and quality of noise\n\n\
          The static scene at 2.6 Msps, `balanced`. Time is that of the whole generator on one core for a sample of \
@@ -161,7 +161,7 @@ pub fn dominated(rows: &[TradeRow], index: usize) -> bool {
 /// # Errors
 /// [`JudgeError`] with the file that could not be written.
 pub fn write(directory: &Path, rows: &[TradeRow]) -> Result<(), JudgeError> {
-    write_rows(&directory.join("trade.csv"), rows.iter())?;
+    write_rows(&directory.join("trade.csv"), "", rows.iter())?;
     draw(&directory.join("trade.png"), rows)
 }
 
