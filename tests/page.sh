@@ -24,8 +24,10 @@ sed -e 's/^duration_s = .*/duration_s = 45/' -e 's/^#:schema.*//' "$root/scenari
 "$twin" run scene.toml --out run --quiet --report none
 sed -i "s|\"two_systems\"|\"$name\"|" run/truth/scene.json
 printf '# </pre></script><script>alert(2)</script><img src=x onerror=alert(3)>\n' >>run/scenario.toml
+# A report of an older verdict does not stay beside the new one.
+printf '%%PDF-1.7 gnss-twin 0.0.0\n' >run/report.pdf
 "$twin" analyze run --quiet --report html
-[ ! -e run/report.pdf ] || { echo "page: --report html wrote a PDF" >&2; exit 1; }
+[ ! -e run/report.pdf ] || { echo "page: --report html wrote or left a PDF" >&2; exit 1; }
 node page.mjs run/report.html --title "$name" ${SHOTS:+--shots "$SHOTS"}
 
 limit=1500000
@@ -36,9 +38,18 @@ size=$(stat -c %s run/report.html)
 sed 's/^duration_s = .*/duration_s = 10/' scene.toml >short.toml
 "$twin" run short.toml --out short --quiet --report html
 node page.mjs short/report.html
+left=$(grep -o 'Left out, because this run has no data for them: [^<]*' short/report.html) ||
+  { echo "page: no plot of nothing is left out" >&2; exit 1; }
+! grep -qE '_|allan' <<<"$left" || { echo "page: names of files in place of words: $left" >&2; exit 1; }
+grep -q 'class="banner strong">Passed: .*; no fix in 10 s, position not judged<' short/report.html ||
+  grep -q 'class="banner \(bad\|caution\)">.*; no fix in 10 s, position not judged<' short/report.html ||
+  { echo "page: the banner of a run without a fix says nothing of it, or is green" >&2; exit 1; }
 
 # The run's own records, judged as another receiver's.
 "$twin" analyze --truth run/truth --rinex-obs run/rx/observations.rnx --nmea run/rx/fixes.nmea --out foreign --quiet
+for words in 'GPS time' 'figure-front-sky' 'what was judged' 'horizontal error, 95 %'; do
+  grep -q "$words" foreign/foreign_report.html || { echo "page: nothing of \"$words\" on a foreign receiver's page" >&2; exit 1; }
+done
 node page.mjs foreign/foreign_report.html ${SHOTS:+--shots "$SHOTS/foreign"}
 
 # A study in words that are scripts: a map of 21 cells, curves beside theory and a crossing.

@@ -26,8 +26,9 @@ pub fn kinds() -> Vec<Kind> {
 }
 
 fn before_the_page() -> Vec<Kind> {
-    const FLAT: [&str; 3] = ["horizontal error, mean", "horizontal error, 95 %", "horizontal error, largest"];
-    const UP: [&str; 3] = ["vertical error, mean", "vertical error, 95 %", "vertical error, largest"];
+    const FLAT: [&str; 3] =
+        ["horizontal error, mean", "horizontal error, 95 %", "horizontal error, largest against its limit"];
+    const UP: [&str; 3] = ["vertical error, mean", "vertical error, 95 %", "vertical error, largest against its limit"];
     vec![
         kind!("positions east, ionosphere unknown", "m", Some(0.3), 10.0, &FLAT, Early, |rx, m| {
             crate::fixes::move_by(rx, [m, 0.0, 0.0]);
@@ -74,7 +75,7 @@ fn dispersion() -> Vec<Kind> {
     const ERROR: [&str; 3] = [
         "ionosphere by two bands, error, mean",
         "ionosphere by two bands, error, 95 %",
-        "ionosphere by two bands, error, largest",
+        "ionosphere by two bands, error, largest against its limit",
     ];
     vec![
         kind!("ionosphere by two bands", "m", Some(0.1), 3.0, &ERROR, TwoBands, |rx, m| {

@@ -153,7 +153,7 @@ fn scales() -> Vec<Kind> {
             "m",
             Some(0.05),
             1.0,
-            &["GST offset error, mean", "GST offset error, largest"],
+            &["GST offset error, mean", "GST offset error, largest against its limit"],
             TwoSystems,
             ahead
         ),

@@ -9,12 +9,15 @@ use crate::table::{Table, normal};
 
 const PLACE: [&str; 3] = ["x_m", "y_m", "z_m"];
 const SPEED: [&str; 3] = ["vx_mps", "vy_mps", "vz_mps"];
-const FLAT: [&str; 3] = ["horizontal error, mean", "horizontal error, 95 %", "horizontal error, largest"];
-const UP: [&str; 3] = ["vertical error, mean", "vertical error, 95 %", "vertical error, largest"];
+const FLAT: [&str; 3] =
+    ["horizontal error, mean", "horizontal error, 95 %", "horizontal error, largest against its limit"];
+const UP: [&str; 3] = ["vertical error, mean", "vertical error, 95 %", "vertical error, largest against its limit"];
 const BOUNDED: [&str; 1] = ["position error that the scene bounds, largest"];
-const VELOCITY: [&str; 3] = ["velocity error, mean", "velocity error, 95 %", "velocity error, largest"];
-const CLOCK: [&str; 3] = ["clock error, mean", "clock error, 95 %", "clock error, largest"];
-const DRIFT: [&str; 3] = ["clock drift error, mean", "clock drift error, 95 %", "clock drift error, largest"];
+const VELOCITY: [&str; 3] =
+    ["velocity error, mean", "velocity error, 95 %", "velocity error, largest against its limit"];
+const CLOCK: [&str; 3] = ["clock error, mean", "clock error, 95 %", "clock error, largest against its limit"];
+const DRIFT: [&str; 3] =
+    ["clock drift error, mean", "clock drift error, 95 %", "clock drift error, largest against its limit"];
 
 fn vector(table: &Table, row: usize, columns: [&str; 3]) -> Vector3<f64> {
     Vector3::from(columns.map(|column| table.get(row, column)))
@@ -455,7 +458,7 @@ fn rows() -> Vec<Kind> {
             "epochs",
             None,
             1.0,
-            &["fixes without a truth", "clock error, mean", "horizontal error, largest"],
+            &["fixes without a truth", "clock error, mean", "horizontal error, largest against its limit"],
             InMotion,
             |rx, epochs| {
                 let step = epochs * 0.1 * rx.rate_hz();

@@ -117,6 +117,8 @@ pub struct Judgement {
     pub source: String,
     /// Evidence behind the figure: satellites and times, hints.
     pub why: Vec<String>,
+    /// What is taken out of the measured figure before it is judged; empty where the figure itself is judged.
+    pub without: String,
 }
 
 /// Margin, relative to the limit, beyond which a figure of it says nothing.
@@ -144,7 +146,24 @@ impl Judgement {
         };
         let (figure, unit, source) = (figure.to_owned(), unit.to_owned(), source.to_owned());
         let group = Group::default();
-        Self { figure, path: None, value, unit, bound, margin, status, group, source, why: Vec::new() }
+        Self {
+            figure,
+            path: None,
+            value,
+            unit,
+            bound,
+            margin,
+            status,
+            group,
+            source,
+            why: Vec::new(),
+            without: String::new(),
+        }
+    }
+
+    /// Origin of the limit, and what is taken out of the figure.
+    pub fn origin(&self) -> String {
+        if self.without.is_empty() { self.source.clone() } else { format!("{}; without {}", self.source, self.without) }
     }
 
     pub(super) fn at(mut self, path: &str) -> Self {
@@ -180,7 +199,8 @@ fn same(value: &Value, expected: &Value) -> bool {
     }
 }
 
-fn shown(value: &Value) -> String {
+/// A value in words.
+pub(crate) fn shown(value: &Value) -> String {
     match value {
         Value::Null => "none".to_owned(),
         Value::Number(one) => one.as_f64().map_or_else(|| one.to_string(), number),

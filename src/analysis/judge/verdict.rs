@@ -92,6 +92,13 @@ impl Verdict {
         }
     }
 
+    /// Says what was taken out of the figure that was judged last.
+    pub(super) fn without(&mut self, what: &str) {
+        if let Some(row) = self.rows.last_mut() {
+            what.clone_into(&mut row.without);
+        }
+    }
+
     /// Says what is behind the row that was judged last.
     pub(super) fn explain(&mut self, why: Vec<String>) {
         if let Some(row) = self.rows.last_mut() {

@@ -9,6 +9,7 @@ use super::spec::Level;
 use super::words;
 use analysis::JudgeError;
 use analysis::show::document::{Forms, Item, Report, Side, Table, Tone};
+use analysis::show::write::retire;
 
 /// The report; it follows from plan and results alone.
 ///
@@ -83,6 +84,11 @@ pub(super) fn report(plan: &Plan, results: &Results, pictures: &[Picture]) -> Re
 /// # Errors
 /// A report that cannot be made or written.
 pub(super) fn write(plan: &Plan, report: &Report, forms: Forms) -> Result<(), StudyError> {
+    for (asked, name) in [(forms.pdf, "report.pdf"), (forms.html, "report.html")] {
+        if !asked {
+            retire(&plan.directory.join(name)).map_err(StudyError::Judge)?;
+        }
+    }
     #[cfg(feature = "pdf")]
     if forms.pdf {
         let path = plan.directory.join("report.pdf");

@@ -105,6 +105,7 @@ impl Verdict {
             // Errors last longer than most runs: each satellite counts once.
             independent: found.satellites.max(1) as f64,
             must_scatter: false,
+            without: String::new(),
             of: &value,
         };
         self.kind(&kind, &found.cases)?;

@@ -1,5 +1,5 @@
 //! One kind of error in three rows: its mean, its 95th percentile, and the largest against the limit of its
-//! own epoch; in a fourth, whether it has the noise that nobody can avoid; and a stated sigma in two.
+//! own epoch, which may be smaller than errors of epochs with wider limits; in a fourth, whether it has the noise that nobody can avoid; and a stated sigma in two.
 //!
 //! Limits are quantiles of theory's σ for a stated probability of a false alarm, widened by what theory
 //! itself may err, with known biases taken out.
@@ -35,6 +35,8 @@ pub(super) struct Kind<'a, C> {
     pub independent: f64,
     /// True if the error has noise that must be there: an error smaller than theory was not measured.
     pub must_scatter: bool,
+    /// What the values are without; empty where they are the measured errors.
+    pub without: String,
     /// Value of a row, where it counts.
     pub of: &'a dyn Fn(&C) -> Option<Value>,
 }
@@ -62,7 +64,7 @@ impl Verdict {
     where
         C: SpillRow<()> + Clone,
     {
-        let Kind { name, path, unit, axes, .. } = *kind;
+        let Kind { name, path, unit, axes, ref without, .. } = *kind;
         let (mut lengths, mut limits) = (Numbers::new(cases.directory()), Numbers::new(cases.directory()));
         let mut sum: Vector3<f64> = Vector3::zeros();
         // As sums of iterators begin.
@@ -84,6 +86,7 @@ impl Verdict {
         let limit = largest(axes, 1) * THEORY * (squares / count / kind.independent).sqrt() + allowed / count;
         let source = format!("theory of C/N0, geometry and loops; {:.0} independent", kind.independent);
         self.judge(&format!("{name} error, mean"), "", sum.norm() / count, unit, Bound::Max(limit), &source);
+        self.without(without);
         if kind.must_scatter && kind.independent >= ENOUGH {
             let least = (mean_square(kind.independent).0 * squares / count).sqrt() / THEORY;
             let value = lengths.rms()?;
@@ -99,6 +102,7 @@ impl Verdict {
         if let Some(limit) = limits.percentile(0.95)? {
             let (value, source) = (lengths.percentile(0.95)?, "theory of C/N0, geometry and loops");
             self.judge(&format!("{name} error, 95 %"), path, value, unit, Bound::Max(limit), source);
+            self.without(without);
         }
         let factor = largest(axes, lengths.len());
         let over = |value: &Value| value.error.norm() / value.limit(factor);
@@ -114,7 +118,15 @@ impl Verdict {
             let source =
                 format!("theory at {:.1} s, where it is nearest to its limit or farthest beyond", worst.time_s);
             let bound = Bound::Max(worst.limit(factor));
-            self.judge(&format!("{name} error, largest"), "", worst.error.norm(), unit, bound, &source);
+            self.judge(
+                &format!("{name} error, largest against its limit"),
+                "",
+                worst.error.norm(),
+                unit,
+                bound,
+                &source,
+            );
+            self.without(without);
         }
         Ok(())
     }

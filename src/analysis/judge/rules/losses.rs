@@ -62,6 +62,9 @@ impl Verdict {
                 lines.push(format!("and {} more (slips.csv)", wrong.len() - NAMED));
             }
             self.judge(figure, path, wrong.len(), "", Bound::Max(0.0), &source);
+            if excused > 0 {
+                self.without(&format!("{excused} with a reason: {}", reasons(&own)));
+            }
             self.explain(lines);
         }
         Ok(())

@@ -152,10 +152,10 @@ impl Verdict {
                 bounded.holds(time_s).then_some(Value { time_s, error, sigma: case.sigma_m, allowed: case.allowed_m })
             };
             let name = format!("{scale} offset");
-            self.kind(
-                &Kind { name: &name, path: "", unit: "m", axes: 1, independent, must_scatter: false, of: &value },
-                cases,
-            )?;
+            let (axes, without) = (1, String::new());
+            let kind =
+                Kind { name: &name, path: "", unit: "m", axes, independent, must_scatter: false, without, of: &value };
+            self.kind(&kind, cases)?;
             let mut ends: Option<(f64, f64)> = None;
             cases.each(|case| {
                 if let Some(ratio) = case.sigma_ratio {

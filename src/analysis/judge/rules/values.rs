@@ -19,7 +19,7 @@ use crate::expect::loops::Theory;
 use crate::expect::quantile::mean_square;
 use crate::judge::forecast::ranges::{Choices, Scene};
 use crate::judge::forecast::solution::Expected;
-use crate::judge::judgement::Bound;
+use crate::judge::judgement::{Bound, number};
 use crate::judge::summary::Summary;
 use crate::judge::verdict::Verdict;
 use crate::measure::errors::Errors;
@@ -88,7 +88,7 @@ impl Verdict {
         if slipping > 0 {
             self.not_judged.push(format!("velocity of {slipping} fixes right before a loop says that it slips"));
         }
-        let slow = self.kinds(&scene, &cases, &breaks)?;
+        let slow = self.kinds(&scene, &cases, &breaks, all.len())?;
         self.scales(run, &scales, &bounded, slow)?;
         // What is stated follows from C/N0 and directions, whatever the errors are.
         self.sigmas(&all)?;
@@ -243,14 +243,25 @@ impl Verdict {
         Ok(())
     }
 
-    /// The five kinds of error; gives the number of independent fixes.
-    fn kinds(&mut self, scene: &Scene<'_>, cases: &Table<Case>, breaks: &Breaks) -> Result<f64, JudgeError> {
+    /// The five kinds of error among `cases` of `fixes`; gives the number of independent fixes.
+    fn kinds(
+        &mut self,
+        scene: &Scene<'_>,
+        cases: &Table<Case>,
+        breaks: &Breaks,
+        fixes: usize,
+    ) -> Result<f64, JudgeError> {
         let (run, choices) = (scene.run, &scene.choices);
         let motion = Motion::new(run, choices)?;
         let allowed_mps = motion.allowed_mps();
         let oscillator_mps = oscillator_mps(run, choices);
         let (mut memory_s, mut before_s, mut steps) = (0.0_f64, None, Vec::new());
+        let (mut biases_m, mut no_rate) = ([0.0_f64; 3], 0);
         cases.each(|case| {
+            let bias = &case.expected.bias;
+            let new = [libm::hypot(bias.x, bias.y), bias.z.abs(), bias.w.abs()];
+            biases_m.iter_mut().zip(new).for_each(|(most, new)| *most = most.max(new));
+            no_rate += usize::from(case.expected.fading || breaks.follow(case.sample));
             memory_s = memory_s.max(case.expected.memory_s);
             steps.extend(before_s.replace(case.error.time_s).map(|before_s| case.error.time_s - before_s));
         })?;
@@ -292,13 +303,26 @@ impl Verdict {
             value(case, error, libm::hypot(e.rate_noise.m44.sqrt(), oscillator_mps), allowed)
         };
         let must_scatter = run.scene.noise;
-        let metres =
-            |name, path, axes, of| Kind { name, path, unit: "m", axes, independent: slow, must_scatter: false, of };
-        let rate = |name, path, axes, of| Kind { name, path, unit: "m/s", axes, independent: fast, must_scatter, of };
+        let excused = fixes - cases.len();
+        let metres = |name, path, axes, bias_m: f64, of| {
+            let without = without(bias_m, excused, fixes);
+            Kind { name, path, unit: "m", axes, independent: slow, must_scatter: false, without, of }
+        };
+        let rate = |name, path, axes, of| {
+            let without = without(0.0, excused + no_rate, fixes);
+            Kind { name, path, unit: "m/s", axes, independent: fast, must_scatter, without, of }
+        };
+        let [flat_m, up_m, clock_m] = biases_m;
         let all: [Kind<'_, Case>; 5] = [
-            metres("horizontal", "position.horizontal_p95_m", 2, &horizontal as &dyn Fn(&Case) -> Option<Value>),
-            metres("vertical", "position.vertical_p95_m", 1, &vertical),
-            metres("clock", "", 1, &clock),
+            metres(
+                "horizontal",
+                "position.horizontal_p95_m",
+                2,
+                flat_m,
+                &horizontal as &dyn Fn(&Case) -> Option<Value>,
+            ),
+            metres("vertical", "position.vertical_p95_m", 1, up_m, &vertical),
+            metres("clock", "", 1, clock_m, &clock),
             rate("velocity", "position.velocity_p95_mps", 3, &velocity as &dyn Fn(&Case) -> Option<Value>),
             rate("clock drift", "", 1, &drift),
         ];
@@ -306,6 +330,14 @@ impl Verdict {
         motion.sound()?;
         Ok(slow)
     }
+}
+
+/// What errors of fixes are judged without: a bias that is expected, and fixes whose errors may have any size.
+fn without(bias_m: f64, left_out: usize, fixes: usize) -> String {
+    // Below a tenth of a millimetre nothing that is printed changes.
+    let bias = (bias_m >= 1e-4).then(|| format!("the expected bias of up to {} m", number(bias_m)));
+    let fixes = (left_out > 0).then(|| format!("{left_out} of {fixes} fixes, whose errors may have any size"));
+    bias.into_iter().chain(fixes).collect::<Vec<_>>().join(" and ")
 }
 
 /// Slips and losses that the receiver declares. A loop that lets go has a wrong rate before it knows.

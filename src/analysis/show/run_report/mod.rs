@@ -13,12 +13,15 @@ use serde_json::Value;
 
 use crate::error::JudgeError;
 use crate::judge::judgement::{Status, number};
+use crate::judge::schema;
 use crate::judge::verdict::Verdict;
+use crate::read::Run;
 use crate::show::document::{Cell, Forms, Item, Report, Side, Table, Tone};
 use crate::show::plot::canvas::Failure;
 use crate::show::plot::sketch::{Figure, Sketch};
 use crate::show::plot::{self, Judged};
-use crate::show::write::write_whole;
+use crate::show::write::{retire, write_whole};
+use crate::statistics::larger;
 
 /// A run's report, complete but for its pictures.
 pub(crate) struct RunReport {
@@ -35,14 +38,16 @@ impl RunReport {
         let summary = judged.summary;
         let head = format!("receiver against truth · seed {}", summary.seed);
         let mut report = Report::new(summary.scene.clone(), front::place_and_time(judged.run), head);
-        front::banner(&mut report, &summary.details.verdict);
-        front::failures(&mut report, &summary.details.verdict);
-        report.add(Item::Facts(facts(judged)));
+        let verdict_of = &summary.details.verdict;
+        front::banner(&mut report, verdict_of, front::lacking(judged.run, summary).as_deref());
+        front::failures(&mut report, verdict_of);
+        report.add(Item::Facts(facts(judged)?));
         let front = (plot::front(judged)?, report.items.len());
-        front::figures(&mut report, summary);
-        front::groups(&mut report, &summary.details.verdict);
+        let values = serde_json::to_value(summary).unwrap_or(Value::Null);
+        front::figures(&mut report, verdict_of, &values, &front::FIGURES, &schema::SUMMARY);
+        front::groups(&mut report, verdict_of);
         report.add(Item::NewPage).heading("Verdict");
-        verdict(&mut report, &summary.details.verdict);
+        verdict(&mut report, verdict_of);
         report.add(Item::NewPage);
         tables::add(&mut report, judged)?;
         report.add(Item::NewPage).heading("Figures");
@@ -64,7 +69,7 @@ impl RunReport {
         // A run that was too short for a fix has nothing to show in half of its pictures.
         let (figures, empty): (Vec<Figure>, Vec<Figure>) =
             figures.into_iter().partition(|figure| figure.sketch.has_data());
-        let names: Vec<&str> = empty.iter().map(|figure| figure.name.as_str()).collect();
+        let names: Vec<&str> = empty.iter().map(|figure| plot::title(&figure.name)).collect();
         let note = (!names.is_empty())
             .then(|| Item::Note(format!("Left out, because this run has no data for them: {}.", names.join(", "))));
         self.report.items.splice(self.figures..self.figures, figures.into_iter().map(Item::Figure).chain(note));
@@ -77,8 +82,14 @@ fn not_drawn(path: &Path, error: &dyn Display) -> JudgeError {
     JudgeError::Plot { path: path.to_owned(), reason: error.to_string() }
 }
 
-/// Writes a report in the forms that are asked for, each under the name with its ending.
+/// Writes a report in the forms that are asked for, each under the name with its ending. A form that is not
+/// asked for would be that of an older verdict, and is removed.
 pub(crate) fn publish(report: &Report, name: &Path, forms: Forms) -> Result<(), JudgeError> {
+    for (asked, ending) in [(forms.pdf, "pdf"), (forms.html, "html")] {
+        if !asked {
+            retire(&name.with_extension(ending))?;
+        }
+    }
     #[cfg(feature = "pdf")]
     if forms.pdf {
         let path = name.with_extension("pdf");
@@ -133,7 +144,7 @@ fn verdict(report: &mut Report, verdict: &Verdict) {
             bound(row.bound.to_string()),
             bound(row.margin_text()),
             Cell::toned(row.status.word(), tone(row.status)),
-            Cell::toned(row.source.clone(), Tone::Faint),
+            Cell::toned(row.origin(), Tone::Faint),
         ]);
     }
     report.table(table);
@@ -147,7 +158,7 @@ fn verdict(report: &mut Report, verdict: &Verdict) {
     report.add(Item::Note(notes));
 }
 
-fn facts(judged: &Judged<'_>) -> Vec<(String, String)> {
+fn facts(judged: &Judged<'_>) -> Result<Vec<(String, String)>, JudgeError> {
     let (scene, summary) = (&judged.run.scene, judged.summary);
     let file = &judged.run.scene_json;
     let text = |key: &str| match file.get(key) {
@@ -201,7 +212,16 @@ fn facts(judged: &Judged<'_>) -> Vec<(String, String)> {
         |first_s| format!("{}, the first after {} s", summary.position.fixes, number(first_s)),
     );
     facts.push(("fixes", Some(fixes)));
-    facts.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?))).collect()
+    facts.push(("motion", motion(judged.run)?));
+    facts.push(("receiver", front::receiver(&judged.run.receiver)));
+    Ok(facts.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?))).collect())
+}
+
+/// The antenna's motion in words.
+fn motion(run: &Run) -> Result<Option<String>, JudgeError> {
+    let mut fastest_mps = None;
+    run.trajectory.each(|row| fastest_mps = larger(fastest_mps, row.velocity_mps().norm()))?;
+    Ok(fastest_mps.map(|mps| if mps < 1e-3 { "at rest".to_owned() } else { format!("up to {} m/s", number(mps)) }))
 }
 
 /// The scene as it was written, or as it was understood, and the receiver's settings.

@@ -167,7 +167,7 @@ fn satellites(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeError
             fixed(truth.mean(), 1),
             fixed(expected.mean(), 1),
             fixed(measured.mean(), 1),
-            format!("{} / {}", fixed(code.mean()?, 2), fixed(std(&code)?, 2)),
+            format!("{}\u{a0}/\u{a0}{}", fixed(code.mean()?, 2), fixed(std(&code)?, 2)),
             fixed(std(&carrier)?, 4),
             fixed(std(&doppler)?, 3),
             losses(judged, &link).to_string(),

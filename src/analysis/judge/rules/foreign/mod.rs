@@ -24,7 +24,7 @@ use crate::expect::due::receiver::Receiver;
 use crate::judge::foreign::measured::{Measured, ObservationError, Slip};
 use crate::judge::foreign::place::Places;
 use crate::judge::foreign::{ForeignSummary, Judgement};
-use crate::judge::judgement::Bound;
+use crate::judge::judgement::{Bound, Group};
 use crate::judge::verdict::Verdict;
 use crate::read::Run;
 use crate::statistics::median;
@@ -61,16 +61,16 @@ impl Verdict {
         let begin = Begin::of(&scene, &expected, &labels);
         let mut verdict = Self::default();
         if let Some(measured) = measured {
-            verdict.observations(&scene, measured, summary);
-            verdict.span("observations", &scene, &observed_s, begin.observation_s);
-            verdict.stated_interval(measured.stated_interval_s, &observed_s);
+            verdict.about(Group::Tables).observations(&scene, measured, summary);
+            verdict.about(Group::Availability).span("observations", &scene, &observed_s, begin.observation_s);
+            verdict.about(Group::Tables).stated_interval(measured.stated_interval_s, &observed_s);
             let signals: BTreeSet<&str> = labels.of_links.keys().map(|link| link.signal.name).collect();
             let others: BTreeSet<&str> = expected.satellites.keys().map(|link| link.signal.name).collect();
             for name in others.difference(&signals) {
                 verdict.not_judged.push(format!("{name}: the receiver observes none of it"));
             }
             expected.satellites.retain(|link, _| signals.contains(link.signal.name));
-            verdict.observed(&expected, |link, _| {
+            verdict.about(Group::Availability).observed(&expected, |link, _| {
                 let seen = labels.of_links.contains_key(link);
                 if seen { "lost, or late" } else { "never observed" }.to_owned()
             });
@@ -82,14 +82,14 @@ impl Verdict {
                 let why = "a receiver that writes none before their orbits may find them later than the file ends";
                 verdict.not_judged.push(format!("satellites never observed ({}): {why}", absent.join(", ")));
             }
-            verdict.observables(&scene, measured, summary, &expected);
+            verdict.about(Group::Tracking).observables(&scene, measured, summary, &expected);
         }
         if let Some(places) = places {
-            verdict.positions(run, places, judged.labels_late_s);
+            verdict.about(Group::Tables).positions(run, places, judged.labels_late_s);
             verdict.weeks_of_positions(run, summary.join.positions_week_offset);
             let fixes: Vec<f64> = places.rows.iter().map(|row| row.label_s).collect();
             let labels = Labels::new(run, &fixes, BTreeMap::new(), judged.truth_interval_s)?;
-            verdict.span("positions", &scene, &fixes, begin.fix_s);
+            verdict.about(Group::Availability).span("positions", &scene, &fixes, begin.fix_s);
             expected.receiver.interval_s = labels.interval_s;
             if let Some(last_s) = fixes.last() {
                 expected.epochs.retain(|due| due.time_s <= scene.time_s(*last_s));
@@ -98,13 +98,13 @@ impl Verdict {
             let came = Came { samples: labels.near(&fixes), first_s: first.map(|sample| run.time_s(sample)) };
             expected.first_fix_s = begin.fix_s.map(|due_s| due_s.max(came.first_s.unwrap_or(due_s)));
             verdict.coming(run.scene.duration_s, &run.scene.expect, &expected, &came);
-            verdict.repeated(places, &scene);
+            verdict.about(Group::Position).repeated(places, &scene);
             verdict.places(&scene, places, &labels, &expected)?;
             let timed =
                 places.rows.iter().filter_map(|row| Some((run.time_s(labels.sample_at(row.label_s)?), row.length_m())));
             verdict.within(&run.scene.expect, timed);
         }
-        verdict.excused_foreign(&scene, measured, places);
+        verdict.about(Group::Tracking).excused_foreign(&scene, measured, places);
         Ok(verdict)
     }
 
