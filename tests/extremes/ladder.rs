@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use analysis::show::plot::canvas::{Axis, BLUE, Chart, GREEN, Mark, ORANGE, Series, figure};
+use analysis::show::plot::canvas::{Axis, BLUE, COLOURS, Chart, GREEN, Mark, ORANGE, Series, figure};
 use generator::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade};
 use generator::scene::Scene;
 use generator::synth::band::Filter;
@@ -113,16 +113,48 @@ fn table(column: &str, curves: &Curves) -> String {
     text + "\n\n"
 }
 
+/// Names of the legend with their looks, for levels and for sums. Curves lie on each other, so that each has a
+/// shape of its own: rings about what a line hides.
+fn looks(curves: &Curves) -> Vec<Series> {
+    let look = |(name, _): &(&str, Vec<(f64, f64)>)| {
+        let (words, colour, mark) = match *name {
+            "fast" => ("level fast", ORANGE, Mark::Rings),
+            "balanced" => ("level balanced", BLUE, Mark::Line),
+            "reference" => ("level reference", GREEN, Mark::Dashes(6, 4)),
+            "f32" => ("sums in f32", COLOURS[3], Mark::Line),
+            "f64" => ("sums in f64", COLOURS[4], Mark::Dashes(6, 4)),
+            _ => ("sums in f32, a mean of 10 σ", COLOURS[6], Mark::Rings),
+        };
+        Series::new(words, colour, mark, Vec::new())
+    };
+    curves.iter().map(look).collect()
+}
+
 fn chart(title: &str, x_label: &str, y_label: &str, curves: &Curves) -> Chart {
     let place = |x: f64, y: f64| (libm::log10(x.max(1e-3)), libm::log10(y.max(1e-18)));
     let points = || curves.iter().flat_map(|(_, points)| points.iter().map(|(x, y)| place(*x, *y)));
     let x = Axis::around(x_label, points().map(|p| p.0), 1.0).logarithmic();
     let y = Axis::around(y_label, points().map(|p| p.1), 2.0).logarithmic();
-    let colours = [ORANGE, BLUE, GREEN];
-    let series = curves.iter().zip(colours).map(|((name, points), colour)| {
-        Series::new(*name, colour, Mark::Line, points.iter().map(|(x, y)| place(*x, *y)).collect())
-    });
-    Chart::new(title, x, y, series.collect())
+    let series = curves
+        .iter()
+        .zip(looks(curves))
+        .map(|((_, points), look)| Series { points: points.iter().map(|(x, y)| place(*x, *y)).collect(), ..look });
+    let mut series: Vec<Series> = series.collect();
+    // Rings come last, over lines.
+    series.sort_by_key(|one| one.mark == Mark::Rings);
+    Chart::new(title, x, y, series)
+}
+
+#[test]
+fn every_curve_of_the_ladder_has_a_look_of_its_own_in_the_legend() {
+    let of = |names: &[&'static str]| looks(&names.iter().map(|name| (*name, Vec::new())).collect());
+    let levels: Vec<&'static str> = LEVELS.iter().map(|grade| grade.name()).collect();
+    let all = [of(&levels), of(&["f32", "f32, DC 10 σ", "f64"])].concat();
+    for (at, one) in all.iter().enumerate() {
+        let is_same = |other: &Series| other.name == one.name || (other.colour, other.mark) == (one.colour, one.mark);
+        assert!(!all[..at].iter().any(is_same), "{}", one.name);
+    }
+    assert_eq!(all.len(), 6);
 }
 
 #[test]
@@ -210,17 +242,14 @@ fn no_level_s_error_grows_with_time_rate_or_the_length_of_sums() {
     over_length.push(("f64", curve));
     assert_eq!(Fidelity::of(Grade::Reference).carrier, Arithmetic::F64);
     if let Some(path) = figures::report() {
+        let error = "carrier error, rms (cycles)";
         let charts = [
-            chart("Carrier over time", "seconds since the first sample", "cycles rms", &over_time),
-            chart("Carrier over sample rate", "Msps", "cycles rms", &over_rate),
-            chart("Carrier over dynamics", "g at 1 Hz", "cycles rms", &over_dynamics),
-            chart("Sums over their length (f32, f32 with DC, f64)", "samples", "error over noise", &over_length),
+            chart("Carrier over time", "time since the first sample (s)", error, &over_time),
+            chart("Carrier over sample rate", "sample rate (million samples a second)", error, &over_rate),
+            chart("Carrier over dynamics", "acceleration, shaken at 1 Hz (g)", error, &over_dynamics),
+            chart("Sums over their length", "samples in a sum", "error (of the noise)", &over_length),
         ];
-        let legend: Vec<Series> = LEVELS
-            .iter()
-            .zip([ORANGE, BLUE, GREEN])
-            .map(|(grade, c)| Series::new(grade.name(), c, Mark::Line, Vec::new()))
-            .collect();
+        let legend = [looks(&over_time), looks(&over_length)].concat();
         figure(&path.with_extension("png"), (1280, 900), 2, &charts, &legend).unwrap();
         let name = path.with_extension("png").file_name().unwrap().to_string_lossy().into_owned();
         let text = format!(
