@@ -113,8 +113,8 @@ fn table(column: &str, curves: &Curves) -> String {
     text + "\n\n"
 }
 
-/// Names of the legend with their looks, for levels and for sums. Curves lie on each other, so that each has a
-/// shape of its own: rings about what a line hides.
+/// Names of the legend with their looks, for levels and for sums. Curves lie on each other, so that each has
+/// a shape of its own: rings about what a line hides.
 fn looks(curves: &Curves) -> Vec<Series> {
     let look = |(name, _): &(&str, Vec<(f64, f64)>)| {
         let (words, colour, mark) = match *name {

@@ -159,7 +159,7 @@ pub const ORDER: Order<'static> = &[
     (
         "analysis/show",
         &[
-            &["report", "staged"],
+            &["columns", "report", "staged"],
             &["write"],
             &["plot"],
             &["document", "tables", "trade"],
@@ -178,8 +178,8 @@ pub const ORDER: Order<'static> = &[
             &["dome"],
             &["sketch"],
             &["judged"],
-            &["clock", "consistency", "delays", "foreign", "jitter", "peaks", "position", "signals", "sky", "spectrum"],
-            &["elevation", "multipath"],
+            &["clock", "consistency", "delays", "jitter", "peaks", "position", "signals", "sky", "spectrum"],
+            &["elevation", "foreign", "multipath"],
         ],
     ),
     (

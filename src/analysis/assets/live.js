@@ -25,6 +25,8 @@
   }
 
   const fixed = (value, digits = 1) => (typeof value === "number" ? value.toFixed(digits).replace("-", "−") : "–");
+  // A number with its unit; without a number there is no unit.
+  const measured = (value, unit, digits = 1) => (typeof value === "number" ? `${fixed(value, digits)} ${unit}`.trim() : "–");
 
   // ---- Elements that are not plots ----
 
@@ -50,11 +52,11 @@
       ["time", `${fixed(t_s)} s`],
       ["origin of map", origin ? `${fixed(origin[0], 5)}°, ${fixed(origin[1], 5)}°, ${fixed(origin[2], 0)} m` : "–"],
       ["underruns", status ? `${status.underruns}, stalls ${status.stalls}` : "–"],
-      ["latency", status ? `median ${fixed(status.age_ms.p50)} ms, largest ${fixed(status.age_ms.max)} ms` : "–"],
+      ["latency", status ? `median ${measured(status.age_ms.p50, "ms")}, largest ${measured(status.age_ms.max, "ms")}` : "–"],
       ["motion", ticks ? `${ticks.fresh} fresh ticks, ${ticks.extrapolated} extrapolated, ${ticks.snap} snaps` : "–"],
       ["receiver", receiver || "none"],
       ["fixes", errors.fixes ? `${errors.fixes}, ${fix?.satellites ?? "–"} satellites, HDOP ${fixed(fix?.hdop)}` : "none"],
-      ["page", `${page.browsers} browsers, ${page.dropped} frames dropped`],
+      ["page", `${page.browsers} ${page.browsers === 1 ? "browser" : "browsers"}, ${page.dropped} ${page.dropped === 1 ? "frame" : "frames"} dropped`],
       ["refused", refused.map(([name, count]) => `${name} ${count}`).join(", ") || "nothing"],
     ];
     facts.replaceChildren(...pairs.map(([name, value]) =>
@@ -65,7 +67,7 @@
     const line = (name, value, limit, unit, digits) => {
       const known = typeof value === "number" && typeof limit === "number", good = known && value <= limit;
       const words = known ? (good ? "pass" : "fail") : "no data";
-      return element("tr", {}, element("td", {}, name), element("td", {}, `${fixed(value, digits)} ${unit}`),
+      return element("tr", {}, element("td", {}, name), element("td", {}, measured(value, unit, digits)),
         element("td", {}, known ? `${fixed(limit, digits)} ${unit}` : "–"),
         element("td", { className: known ? (good ? "good" : "bad") : "faint" }, words));
     };

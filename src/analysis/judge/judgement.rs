@@ -117,7 +117,8 @@ pub struct Judgement {
     pub source: String,
     /// Evidence behind the figure: satellites and times, hints.
     pub why: Vec<String>,
-    /// What is taken out of the measured figure before it is judged; empty where the figure itself is judged.
+    /// Part that is taken out of the measured figure before it is judged; empty where the figure itself is
+    /// judged.
     pub without: String,
 }
 

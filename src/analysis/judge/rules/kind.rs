@@ -1,5 +1,6 @@
 //! One kind of error in three rows: its mean, its 95th percentile, and the largest against the limit of its
-//! own epoch, which may be smaller than errors of epochs with wider limits; in a fourth, whether it has the noise that nobody can avoid; and a stated sigma in two.
+//! own epoch, which may be smaller than errors of epochs with wider limits; in a fourth, whether it has the
+//! noise that nobody can avoid; and a stated sigma in two.
 //!
 //! Limits are quantiles of theory's σ for a stated probability of a false alarm, widened by what theory
 //! itself may err, with known biases taken out.
@@ -35,7 +36,7 @@ pub(super) struct Kind<'a, C> {
     pub independent: f64,
     /// True if the error has noise that must be there: an error smaller than theory was not measured.
     pub must_scatter: bool,
-    /// What the values are without; empty where they are the measured errors.
+    /// Words for what the values are without; empty where they are the measured errors.
     pub without: String,
     /// Value of a row, where it counts.
     pub of: &'a dyn Fn(&C) -> Option<Value>,

@@ -332,7 +332,8 @@ impl Verdict {
     }
 }
 
-/// What errors of fixes are judged without: a bias that is expected, and fixes whose errors may have any size.
+/// Words for what errors of fixes are judged without: a bias that is expected, and fixes whose errors may
+/// have any size.
 fn without(bias_m: f64, left_out: usize, fixes: usize) -> String {
     // Below a tenth of a millimetre nothing that is printed changes.
     let bias = (bias_m >= 1e-4).then(|| format!("the expected bias of up to {} m", number(bias_m)));

@@ -15,7 +15,7 @@ pub(crate) struct Loop {
     pub name: &'static str,
     pub unit: &'static str,
     pub errors: Numbers,
-    /// What the summary says of them.
+    /// Standard deviation in the summary.
     pub sigma: Option<f64>,
     pub threshold: f64,
 }

@@ -46,7 +46,7 @@ type Sketcher = fn(&Judged<'_>) -> Result<Option<Sketch>, JudgeError>;
 pub(crate) struct Picture {
     /// The PNG's, without its ending.
     pub name: &'static str,
-    /// What it shows, in a few words.
+    /// A few words for its content.
     pub title: &'static str,
     pub caption: &'static str,
     /// Relative to the run's directory.
@@ -206,7 +206,7 @@ pub(crate) const PICTURES: [Picture; 18] = [
     },
 ];
 
-/// What the picture of a name shows, in a few words.
+/// Title of the picture of a name.
 pub(crate) fn title(name: &str) -> &str {
     PICTURES.iter().find(|picture| picture.name == name).map_or(name, |picture| picture.title)
 }

@@ -65,7 +65,7 @@ pub(super) fn narrow_of(east_north_m: impl Iterator<Item = (f64, f64)>) -> Resul
     Ok(chart_of(east_north_m)?.narrow())
 }
 
-/// Their chart with its legend.
+/// Chart of such errors with its legend.
 pub(super) fn chart_of(east_north_m: impl Iterator<Item = (f64, f64)>) -> Result<Plan, JudgeError> {
     about_truth(east_north_m.map(|(east_m, north_m)| Vector2::new(east_m, north_m)).collect())
 }

@@ -40,7 +40,9 @@ fn shown_figures(rows: Vec<Judgement>, summary: &Value) -> (Vec<Vec<String>>, St
 fn a_figure_is_what_was_measured_and_what_is_judged_of_it_stands_beside_it() {
     // The spoofed scene: fixes go with the spoofer, and only those before it are judged.
     let summary = json!({
-        "position": { "first_fix_s": 31.5, "horizontal_p95_m": 173.02, "vertical_p95_m": 1.25, "velocity_p95_mps": null },
+        "position": {
+            "first_fix_s": 31.5, "horizontal_p95_m": 173.02, "vertical_p95_m": 1.25, "velocity_p95_mps": null
+        },
         "tracking": { "cycle_slips": 3 },
     });
     let mut horizontal = row("horizontal error, 95 %", "position.horizontal_p95_m", 0.2502, "m", 0.7);
