@@ -57,21 +57,25 @@ pub(super) fn place_and_time(run: &Run) -> String {
     parts.join(" · ")
 }
 
-/// The receiver's settings on which errors depend most, in words.
-pub(super) fn receiver(file: &Value) -> Option<String> {
+/// The receiver's settings on which errors depend most, in words: of its loops, and of its positions.
+pub(super) fn receiver(file: &Value) -> [Option<String>; 2] {
     let settings = file.get("settings").unwrap_or(file);
     let number_at = |path: &str| settings.pointer(path).and_then(Value::as_f64).map(number);
     let text_at = |path: &str| settings.pointer(path).and_then(Value::as_str).map(|text| text.replace('_', " "));
-    let parts = [
-        number_at("/tracking/pll_bandwidth_hz").map(|hz| format!("phase loop {hz} Hz")),
-        number_at("/tracking/dll_bandwidth_hz").map(|hz| format!("code loop {hz} Hz")),
+    let loops = [
+        number_at("/tracking/pll_bandwidth_hz").map(|hz| format!("phase {hz} Hz")),
+        number_at("/tracking/dll_bandwidth_hz").map(|hz| format!("code {hz} Hz")),
         number_at("/tracking/spacing_chips").map(|chips| format!("early to late {chips} chips")),
+    ];
+    let positions = [
         number_at("/position/smoothing_s").map(|s| format!("smoothing {s} s")),
         text_at("/position/ionosphere").map(|model| format!("ionosphere {model}")),
         text_at("/position/troposphere").map(|model| format!("troposphere {model}")),
     ];
-    let words = parts.into_iter().flatten().collect::<Vec<_>>().join(", ");
-    (!words.is_empty()).then_some(words)
+    [loops, positions].map(|parts| {
+        let words = parts.into_iter().flatten().collect::<Vec<_>>().join(", ");
+        (!words.is_empty()).then_some(words)
+    })
 }
 
 /// The verdict in one bar; `lacking` says what it says nothing of.
@@ -133,7 +137,8 @@ pub(super) fn figures(report: &mut Report, verdict: &Verdict, summary: &Value, f
         ("verdict", Side::Left),
     ];
     let mut table = Table::new("", columns.into_iter().filter(|(title, _)| !(are_equal && *title == "judged")));
-    let mut notes = Vec::new();
+    // Names of figures that are judged without the same.
+    let mut notes: Vec<(&str, Vec<String>)> = Vec::new();
     for (figure, row) in rows {
         let mut cells = vec![Cell::from(figure.named(row)), Cell::from(measured(figure, row))];
         if !are_equal {
@@ -144,7 +149,11 @@ pub(super) fn figures(report: &mut Report, verdict: &Verdict, summary: &Value, f
                 cells.push(Cell::from(with_unit(&row.bound.to_string(), &row.unit)));
                 cells.push(Cell::toned(row.status.word(), tone(row.status)));
                 if differs(figure, row) && !row.without.is_empty() {
-                    notes.push(format!("{} without {}", figure.named(Some(row)), row.without));
+                    let name = figure.named(Some(row));
+                    match notes.iter_mut().find(|(without, _)| *without == row.without) {
+                        Some((_, names)) => names.push(name),
+                        None => notes.push((&row.without, vec![name])),
+                    }
                 }
             }
             None => cells.extend(["–", "not judged"].map(Cell::from)),
@@ -153,7 +162,8 @@ pub(super) fn figures(report: &mut Report, verdict: &Verdict, summary: &Value, f
     }
     report.table(table);
     if !notes.is_empty() {
-        report.add(Item::Note(format!("Judged: {}.", notes.join("; "))));
+        let words = notes.iter().map(|(without, names)| format!("{} without {without}", names.join(" and ")));
+        report.add(Item::Note(format!("Judged: {}.", words.collect::<Vec<_>>().join("; "))));
     }
 }
 

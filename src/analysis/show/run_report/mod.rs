@@ -213,7 +213,8 @@ fn facts(judged: &Judged<'_>) -> Result<Vec<(String, String)>, JudgeError> {
     );
     facts.push(("fixes", Some(fixes)));
     facts.push(("motion", motion(judged.run)?));
-    facts.push(("receiver", front::receiver(&judged.run.receiver)));
+    let [loops, positions] = front::receiver(&judged.run.receiver);
+    facts.extend([("loops", loops), ("positions", positions)]);
     Ok(facts.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?))).collect())
 }
 
