@@ -223,17 +223,27 @@ def counts():
                      make.Page("reports/robustness.md", faults, summed=column), rooms, "= 0" if name == "failures" else "")
 
 
+# Figures of loops as the pages of studies name them.
+JITTER = {
+    "phase_sigma_deg": "phase jitter, 1 σ (degrees)",
+    "code_sigma_m": "code jitter, 1 σ (m)",
+    "code_sigma_chips": "code jitter, 1 σ (chips)",
+    "tracking.pll_sigma_deg": "tracking PLL jitter, 1 σ (degrees)",
+    "tracking.dll_sigma_chips": "tracking DLL jitter, 1 σ (chips)",
+}
+
+
 def studies():
     page = "reports/studies/starts/report.md"
     command = ".ci/reports starts"
     for name, row, unit, what in [
-        ("first_fix_s", "position.first_fix_s", "s", "first fix"),
-        ("first_horizontal_m", "first.horizontal_m", "m", "horizontal error of the first fix"),
-        ("first_vertical_m", "first.vertical_m", "m", "vertical error of the first fix"),
-        ("nominal_horizontal_m", "nominal.horizontal_p95_m", "m", "horizontal 95 % of a run before the ionosphere's page"),
-        ("horizontal_m", "broadcast.horizontal_p95_m", "m", "horizontal 95 % of a run after the ionosphere's page"),
-        ("vertical_m", "broadcast.vertical_p95_m", "m", "vertical 95 % of a run after the ionosphere's page"),
-        ("velocity_mps", "broadcast.velocity_p95_mps", "m/s", "velocity 95 % of a run after the ionosphere's page"),
+        ("first_fix_s", "time to first fix", "s", "first fix"),
+        ("first_horizontal_m", "first horizontal", "m", "horizontal error of the first fix"),
+        ("first_vertical_m", "first vertical", "m", "vertical error of the first fix"),
+        ("nominal_horizontal_m", "nominal horizontal error, 95 %", "m", "horizontal 95 % of a run before the ionosphere's page"),
+        ("horizontal_m", "broadcast horizontal error, 95 %", "m", "horizontal 95 % of a run after the ionosphere's page"),
+        ("vertical_m", "broadcast vertical error, 95 %", "m", "vertical 95 % of a run after the ionosphere's page"),
+        ("velocity_mps", "broadcast velocity error, 95 %", "m/s", "velocity 95 % of a run after the ionosphere's page"),
     ]:
         for column, words in [("median", "median"), ("95 %", "95 %"), ("largest", "largest")]:
             short = {"median": "median", "95 %": "p95", "largest": "largest"}[column]
@@ -241,25 +251,25 @@ def studies():
                          make.Page(page, command, row=row, column=column, runs="200"),
                          (*ALL_SAMPLES, "studies/starts.toml"), "", 3 if unit == "s" else 2)
     yield Figure("studies.starts.velocity_all_mps.largest", "velocity 95 % of a run, also before the ionosphere's page, largest of 200 starts",
-                 "m/s", make.Page(page, command, row="position.velocity_p95_mps", column="largest", runs="200"),
+                 "m/s", make.Page(page, command, row="position velocity error, 95 %", column="largest", runs="200"),
                  (*ALL_SAMPLES, "studies/starts.toml"), "", 2)
     for scene in ("static", "moderate", "high_dynamics"):
         for name, what, unit, column in [
-            ("horizontal_p95_m", "horizontal error, 95 %", "m", "position.horizontal_p95_m"),
-            ("vertical_p95_m", "vertical error, 95 %", "m", "position.vertical_p95_m"),
-            ("velocity_p95_mps", "velocity error, 95 %", "m/s", "position.velocity_p95_mps"),
-            ("pseudorange_rms_m", "pseudorange error, rms", "m", "observables.pseudorange_rms_m"),
+            ("horizontal_p95_m", "horizontal error, 95 %", "m", "position horizontal error, 95 % (m)"),
+            ("vertical_p95_m", "vertical error, 95 %", "m", "position vertical error, 95 % (m)"),
+            ("velocity_p95_mps", "velocity error, 95 %", "m/s", "position velocity error, 95 % (m/s)"),
+            ("pseudorange_rms_m", "pseudorange error, rms", "m", "observables pseudorange error, rms (m)"),
         ]:
             yield Figure(f"studies.motions.{scene}.{name}", f"{what}, mean of five noises: {SCENES[scene]}", unit,
                          make.Page("reports/studies/motions/report.md", ".ci/reports motions", row=scene,
                                    column=column, runs="5"), (*ALL_SAMPLES, "studies/motions.toml", f"scenarios/{scene}.toml"), "", 2)
     yield Figure("studies.starts.slips_per_hour.mean", "cycle slips an hour, mean of 200 starts", "",
-                 make.Page(page, command, row="tracking.slips_per_hour", column="mean", runs="200"), (*ALL_SAMPLES, "studies/starts.toml"), "", 2)
+                 make.Page(page, command, row="tracking slips", column="mean", runs="200"), (*ALL_SAMPLES, "studies/starts.toml"), "", 2)
     for column in ("mean", "low", "high"):
         words = {"mean": "mean of 40 starts", "low": "lower end of its 95 % interval", "high": "upper end of its 95 % interval"}[column]
         yield Figure(f"studies.starts_thermal.nees.{column}", f"normalised error squared of a run's last fix, {words}", "",
                      make.Page("reports/studies/starts_thermal/report.md", ".ci/reports starts_thermal",
-                               row="broadcast.last_nees", column=column, runs="40"), (*ALL_SAMPLES, "studies/starts_thermal.toml"), "", 3)
+                               row="NEES of the last fix with broadcast ionosphere", column=column, runs="40"), (*ALL_SAMPLES, "studies/starts_thermal.toml"), "", 3)
     for study, figure, name in [
         ("pll_jitter", "phase_sigma_deg", ""), ("dll_jitter", "code_sigma_m", ""), ("pll_jitter_e1", "phase_sigma_deg", ""),
         ("dll_jitter_e1", "code_sigma_m", ""), ("jitter_maps", "phase_sigma_deg", "phase_"), ("jitter_maps", "code_sigma_m", "code_"),
@@ -270,7 +280,7 @@ def studies():
     ]:
         sampled = study == "pll_samples"
         rooms = (*(ALL_SAMPLES if sampled else ("src/receiver/track", "src/study")), f"studies/{study}.toml")
-        pattern = rf"^{figure}: (\d+ of \d+) cells.*?\(ratios ([\d.]+ to [\d.]+)"
+        pattern = rf"^{re.escape(JITTER[figure])}: (\d+ of \d+) cells.*?\(ratios ([\d.]+ to [\d.]+)"
         report, command = f"reports/studies/{study}/report.md", f".ci/reports {study}"
         for part, group, words in [("cells", 1, "cells within 5 % of theory"), ("ratio", 2, "measured to theory, least to most")]:
             yield Figure(f"study.{study}.{name}{part}", f"study {study}, {figure}, T·C/N0 ≥ 10: {words}", "",

@@ -90,7 +90,7 @@ fn theory_has_no_value_under_a_jerk() {
     let theory: Vec<&str> = cells.lines().skip(1).map(|line| line.split(',').nth(column).unwrap()).collect();
     assert!(matches!(theory[..], [at_rest, ""] if !at_rest.is_empty()), "{theory:?}");
     let report = fs::read_to_string(directory.path().join("out/report.md")).unwrap();
-    assert!(report.contains("phase_sigma_deg: 1 of 1 cells"), "{report}");
+    assert!(report.contains("phase jitter, 1 σ (degrees): 1 of 1 cells"), "{report}");
     assert!(!report.contains("\nBeyond:"), "{report}");
 }
 

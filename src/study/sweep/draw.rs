@@ -86,6 +86,8 @@ pub fn pictures(results: &Results) -> Vec<Picture> {
 
 /// Name of bands in the legend.
 const BAND: &str = "95 % of the mean";
+/// Name of the band about where a curve crosses a level.
+const CROSSING_BAND: &str = "95 % interval";
 /// Columns of a heat map up to which its values have three digits.
 const MOST_COLUMNS: usize = 10;
 /// Bands reach beyond the curves by this part of their span at most, unless most bands do: the interval of a
@@ -322,6 +324,10 @@ impl View<'_> {
                 .map(|at| (warmth(at), short(back(low + at * (high - low)))))
                 .map(|(colour, name)| Series::new(name, colour, Mark::Tile(1.0, 1.0), Vec::new()))
                 .collect();
+            // The first entry says what the numbers are.
+            if let Some(first) = picture.legend.first_mut() {
+                first.name = format!("{}: {}", self.figure_words(), first.name);
+            }
         }
         let ticks = |axis: usize| -> Vec<(f64, String)> {
             let of =
@@ -393,6 +399,9 @@ impl View<'_> {
             ));
             series.push(Series { colour, ..line });
             series.push(balls);
+        }
+        if first && self.results.study.grid.repetitions > 1 {
+            picture.legend.push(Series::new(CROSSING_BAND, GREY, Mark::Band, Vec::new()));
         }
         let label =
             |key: &str| self.results.axis(key).and_then(|n| self.axis(n)).map_or(key.to_owned(), StudyAxis::words);

@@ -8,6 +8,7 @@ use super::StudyError;
 use super::estimate::Estimate;
 use super::publish::{Rows, short};
 use super::result::Results;
+use super::words;
 use analysis::statistics::{median, percentile};
 
 /// Distribution of one figure.
@@ -81,7 +82,7 @@ impl Collector {
 
 impl Results {
     /// A row a figure and ensemble: values of the axes named, and the distribution.
-    fn ensemble_rows(&self, text: impl Fn(f64) -> String) -> Rows {
+    fn ensemble_rows(&self, name: impl Fn(&str) -> String, text: impl Fn(f64) -> String) -> Rows {
         let named = || self.study.ensemble.iter().flatten();
         let labels = named().filter_map(|&axis| self.study.axes.get(axis)).map(|axis| axis.label().to_owned());
         let rest = ["figure", "unit", "cases", "with it", "median", "95 %", "largest", "mean", "low", "high"];
@@ -92,7 +93,7 @@ impl Results {
                 let axes =
                     named().zip(&ensemble.at).filter_map(|(&axis, &rank)| Some((self.study.axes.get(axis)?, rank)));
                 let mut row: Vec<String> = axes.map(|(axis, rank)| axis.words_of(rank)).collect();
-                row.extend([figure.name.clone(), figure.unit.clone(), ensemble.cases.to_string()]);
+                row.extend([name(&figure.name), figure.unit.clone(), ensemble.cases.to_string()]);
                 let Some(spread) = spread else {
                     row.extend(["0", "", "", "", "", "", ""].map(str::to_owned));
                     rows.push(row);
@@ -117,7 +118,7 @@ impl Results {
 
     /// The ensembles for a report; none where the study asks for none.
     pub fn ensembles_in_short(&self) -> Option<Rows> {
-        self.study.ensemble.as_ref().map(|_| self.ensemble_rows(short))
+        self.study.ensemble.as_ref().map(|_| self.ensemble_rows(words::without_unit, short))
     }
 
     /// The ensembles as CSV; none where the study asks for none.
@@ -129,7 +130,7 @@ impl Results {
             return Ok(None);
         }
         let bug = |e: csv::Error| StudyError::Bug(e.to_string());
-        let (heads, rows) = self.ensemble_rows(|value| value.to_string());
+        let (heads, rows) = self.ensemble_rows(str::to_owned, |value| value.to_string());
         let mut table = csv::Writer::from_writer(Vec::new());
         table.write_record(&heads).map_err(bug)?;
         for row in &rows {

@@ -4,7 +4,7 @@ use super::StudyError;
 use super::draw::Picture;
 use super::plan::{self, Plan};
 use super::publish::{self, Rows};
-use super::result::{Compared, Results, THEORY};
+use super::result::{Compared, Results};
 use super::spec::Level;
 use super::words;
 use analysis::JudgeError;
@@ -48,14 +48,14 @@ pub(super) fn report(plan: &Plan, results: &Results, pictures: &[Picture]) -> Re
         report.add(Item::Banner(format!("{}: {found} theory in its region", words::of_figure(figure)), tone));
         report.text(publish::in_words(results, agreement) + ".");
         if !beyond.is_empty() {
-            let rows = worded(results, publish::beyond_theory(results, &beyond));
+            let rows = publish::beyond_theory(results, &beyond);
             report.table(table("Cells beyond their bar of theory", rows));
         }
     }
     if let Some(rows) = results.ensembles_in_short() {
         report.heading("All cases together");
         let fixed = study.ensemble.iter().flatten().count() + 1;
-        report.table(table("Distribution over the cases", narrow(worded(results, rows), fixed)));
+        report.table(table("Distribution over the cases", narrow(publish::worded(results, rows), fixed)));
     }
     report.heading("Pictures");
     for picture in pictures {
@@ -66,14 +66,14 @@ pub(super) fn report(plan: &Plan, results: &Results, pictures: &[Picture]) -> Re
     }
     report.heading("Base and axes");
     let (heads, mut rows) = publish::axes(results);
-    for (row, axis) in rows.iter_mut().zip(&study.axes) {
-        row[0] = format!("{}: {}", axis.words(), row[0].replace('`', ""));
+    for cell in rows.iter_mut().filter_map(|row| row.first_mut()) {
+        *cell = cell.replace('`', "");
     }
     report.table(table("Axes, the slowest first", (heads, rows)));
     report.add(Item::Listing(publish::base(plan, results).replace('`', "")));
     if let Some(rows) = publish::cells(results) {
         report.heading("Cells");
-        let rows = narrow(worded(results, rows), study.axes.len());
+        let rows = narrow(rows, study.axes.len());
         report.table(table("Figures with their intervals of 95 %", rows));
     }
     Ok(report)
@@ -99,19 +99,6 @@ pub(super) fn write(plan: &Plan, report: &Report, forms: Forms) -> Result<(), St
         plan::write(&plan.directory.join("report.html"), report.html().as_bytes())?;
     }
     Ok(())
-}
-
-/// Table whose heads are axes and figures in words in place of their keys.
-fn worded(results: &Results, (heads, rows): Rows) -> Rows {
-    let word = |head: String| {
-        if let Some(axis) = results.study.axes.iter().find(|axis| axis.label() == head) {
-            return axis.words();
-        }
-        let theory = if head.starts_with(THEORY) { "theory of " } else { "" };
-        let known = results.figures.iter().any(|figure| figure.name == head);
-        if known { format!("{theory}{}", words::of_figure(&head)) } else { head }
-    };
-    (heads.into_iter().map(word).collect(), rows)
 }
 
 /// Largest number of columns that a page holds without breaking words.

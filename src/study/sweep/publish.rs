@@ -10,7 +10,7 @@ use super::draw::{self, Picture};
 use super::plan::Plan;
 use super::result::{self, Agreement, Compared, Results, THEORY};
 use super::spec::Level;
-use super::{StudyError, axis, plan};
+use super::{StudyError, axis, plan, words};
 use crate::proof::LEAST_SNR;
 use analysis::show::document::Forms;
 
@@ -47,7 +47,7 @@ pub fn in_short(results: &Results) -> String {
 }
 
 pub(super) fn in_words(results: &Results, agreement: &Agreement) -> String {
-    let name = results.figures.get(agreement.figure).map_or("", |figure| figure.name.as_str());
+    let name = results.figures.get(agreement.figure).map_or_else(String::new, |figure| words::of_figure(&figure.name));
     let (region, outside): (Vec<&Compared>, Vec<&Compared>) = agreement.cells.iter().partition(|cell| cell.in_region());
     let good = |cells: &[&Compared]| cells.iter().filter(|cell| cell.holds()).count();
     let ratios = || region.iter().map(|cell| cell.ratio);
@@ -91,7 +91,7 @@ fn text(plan: &Plan, results: &Results, pictures: &[Picture]) -> String {
     );
     if let Some(rows) = results.ensembles_in_short() {
         text += "\n## All cases together\n";
-        text += &markdown(&rows);
+        text += &markdown(&worded(results, rows));
     }
     for picture in pictures {
         let _ = write!(text, "\n## {}\n\n![{}]({}.png)\n", picture.title, picture.title, picture.stem);
@@ -157,7 +157,20 @@ pub(super) fn beyond_theory(results: &Results, beyond: &[&Compared]) -> Rows {
         let snr = compared.snr.map_or_else(|| "–".to_owned(), short);
         Some(values.chain([snr, format!("{:.3}", compared.ratio), format!("± {:.3}", compared.bar)]).collect())
     };
-    (heads, beyond.iter().filter_map(row).collect())
+    worded(results, (heads, beyond.iter().filter_map(row).collect()))
+}
+
+/// Table whose heads are axes and figures in words in place of their keys.
+pub(super) fn worded(results: &Results, (heads, rows): Rows) -> Rows {
+    let word = |head: String| {
+        if let Some(axis) = results.study.axes.iter().find(|axis| axis.label() == head) {
+            return axis.words();
+        }
+        let theory = if head.starts_with(THEORY) { "theory of " } else { "" };
+        let known = results.figures.iter().any(|figure| figure.name == head);
+        if known { format!("{theory}{}", words::of_figure(&head)) } else { head }
+    };
+    (heads.into_iter().map(word).collect(), rows)
 }
 
 /// Axes and their values.
@@ -169,7 +182,7 @@ pub(super) fn axes(results: &Results) -> Rows {
         };
         let values: Vec<String> = axis.values.iter().take(shown).map(axis::text_of).collect();
         let zipped = axis.zip.as_ref().map_or(String::new(), |word| format!(" (steps with others of `{word}`)"));
-        vec![format!("`{}`{zipped}", axis.key), values.join(", ") + &more]
+        vec![format!("{}: `{}`{zipped}", axis.words(), axis.key), values.join(", ") + &more]
     };
     (vec!["axis".to_owned(), "values".to_owned()], results.study.axes.iter().map(row).collect())
 }
@@ -194,7 +207,7 @@ pub(super) fn cells(results: &Results) -> Option<Rows> {
         });
         values.chain(figures).collect()
     };
-    Some((heads, results.cells.iter().map(row).collect()))
+    Some(worded(results, (heads, results.cells.iter().map(row).collect())))
 }
 
 /// The level in words.

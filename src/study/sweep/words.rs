@@ -87,6 +87,14 @@ pub fn of_figure(name: &str) -> String {
     with_unit(words, name)
 }
 
+/// A figure in words, beside a column with its unit.
+pub fn without_unit(name: &str) -> String {
+    let (theory, figure) = name.strip_prefix("theory.").map_or(("", name), |figure| ("theory of ", figure));
+    let words = of_figure(figure);
+    let unit = printed(figure).map(|unit| format!(" ({unit})")).unwrap_or_default();
+    format!("{theory}{}", words.strip_suffix(&unit).unwrap_or(&words))
+}
+
 /// A key of the base in words, with its unit.
 pub fn of_key(key: &str) -> String {
     // The table's name says where it is written, not what it is.
@@ -142,6 +150,7 @@ mod tests {
         assert_eq!(of_figure("phase_peak_deg"), "largest phase error (degrees)");
         assert_eq!(of_figure("theory.phase_sigma_deg"), "phase jitter, 1 σ (degrees)");
         assert_eq!(of_figure("position.horizontal_p95_m"), "position horizontal error, 95 % (m)");
+        assert_eq!(without_unit("position.first_fix_s"), "time to first fix");
         assert_eq!(of_key("receiver.tracking.pll_bandwidth_hz"), "PLL bandwidth (Hz)");
         assert_eq!(of_key("motion.jerk_mps3"), "jerk (m/s³)");
         assert_eq!(of_key("motion.acceleration_mps2"), "acceleration (m/s²)");
