@@ -116,7 +116,7 @@ pub struct Slip {
 
 /// The first line of `slips.csv`, which is there without slips too.
 pub(crate) const COLUMNS: &str = "sample,time_s,sv,signal,kind,declared,size_cycles,remainder_cycles,\
-     cause,cn0_dbhz,interference_db,motion_deg,noise_3sigma_deg";
+     cause,cn0_dbhz,interference_db,motion_deg,noise_3sigma_deg\n";
 
 /// All slips and losses of a run.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -119,7 +119,7 @@ pub(crate) fn write_measured(
 
 /// Writes `slips.csv`.
 pub(crate) fn write_slips(directory: &Path, slips: &Slips) -> Result<(), JudgeError> {
-    write_rows(&directory.join("slips.csv"), COLUMNS, slips.rows.iter())
+    write_rows(&directory.join("slips.csv"), COLUMNS.trim_end(), slips.rows.iter())
 }
 
 /// Writes `errors.csv`, `position.csv`, `histograms.csv`, `psd_theory.csv` and `verdict.csv` into a run's
