@@ -128,16 +128,9 @@ fn histogram(of: &Loop) -> Result<Chart, JudgeError> {
             series.push(Series::new("", ORANGE, Mark::Line, vec![(sign * threshold, 0.0), (sign * threshold, top)]));
         }
     }
-    let x = Axis::new(&format!("error ({unit})"), (-half, half));
-    let chart = Chart::new(titled(of), x, Axis::new("observations (%)", (0.0, top)), series);
-    let mut words = vec!["threshold".to_owned(), format!("{} {unit}", number(*threshold))];
-    if *threshold >= half {
-        words.push("(outside)".to_owned());
-    }
-    // Beside the bell.
-    let corner = (-0.97 * half, 0.96 * top);
-    let labels = (0..).zip(words).map(|(line, word)| (corner, word, -13 * line));
-    Ok(Chart { labels: labels.collect(), ..chart })
+    // Within the axes the words would lie on bars and lines. Most thresholds are outside of them.
+    let x = Axis::new(&format!("error ({unit}); threshold {}", number(*threshold)), (-half, half));
+    Ok(Chart::new(titled(of), x, Axis::new("observations (%)", (0.0, top)), series))
 }
 
 #[cfg(test)]
@@ -145,20 +138,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_title_has_the_summary_s_sigma_in_words_with_its_unit_and_a_far_threshold_is_said_to_be_outside() {
+    fn a_title_has_the_summary_s_sigma_in_words_with_its_unit_and_a_far_threshold_is_said_below() {
         let directory = tempfile::tempdir().unwrap();
         let of = |threshold: f64| {
             let mut errors = Numbers::new(directory.path());
             (0..400).for_each(|n| errors.push(0.003 * libm::sin(f64::from(n))).unwrap());
             Loop { name: "DLL", unit: "chips", errors, sigma: Some(0.002_986), threshold }
         };
-        let texts = |chart: &Chart| chart.labels.iter().map(|(_, text, _)| text.clone()).collect::<Vec<_>>();
+        let below = |chart: &Chart| (chart.x.label.clone(), chart.labels.len());
         let far = histogram(&of(0.083_333_3)).unwrap();
         assert_eq!(far.title, "Code loop (DLL): σ 0.002986 chips");
-        assert_eq!(texts(&far), ["threshold", "0.08333 chips", "(outside)"]);
+        assert_eq!(below(&far), ("error (chips); threshold 0.08333".to_owned(), 0));
         let orange = |chart: &Chart| chart.series.iter().filter(|one| one.colour == ORANGE).count();
         assert_eq!(orange(&far), 0);
         let near = histogram(&of(0.008)).unwrap();
-        assert_eq!((texts(&near), orange(&near)), (vec!["threshold".to_owned(), "0.008 chips".to_owned()], 2));
+        assert_eq!((below(&near), orange(&near)), (("error (chips); threshold 0.008".to_owned(), 0), 2));
     }
 }
