@@ -10,6 +10,7 @@ use crate::cli::error::CliError;
 use crate::cli::run::generator_error;
 use crate::cli::scenario;
 use generator::dynamics::{LineOfSight, lines_of_sight};
+use generator::effect::troposphere::TOP_M;
 use generator::plan::{Plan, Together};
 use generator::scenario::Overrides;
 use generator::scene::Scene;
@@ -21,8 +22,6 @@ use receiver::settings::Settings;
 use receiver::track::TrackingSettings;
 use study::demand::{self, Answer, Demand};
 
-/// Height above which a receiver corrects for no troposphere.
-const AIR_M: f64 = 50e3;
 /// Standard gravity, for accelerations in g.
 const G_MPS2: f64 = 9.806_65;
 
@@ -71,7 +70,7 @@ fn uncalled(scenes: &[Scene], settings: &PositionSettings) -> Vec<String> {
     // Two carriers measure that there is none.
     let measured = settings.ionosphere == IonosphereChoice::Combined && several;
     let ionosphere = settings.ionosphere != IonosphereChoice::None && !measured;
-    let on_ground = Geodetic::from_ecef(&scene.trajectory.at(0.0).position_m).height_m < AIR_M;
+    let on_ground = Geodetic::from_ecef(&scene.trajectory.at(0.0).position_m).height_m < TOP_M;
     let troposphere = settings.troposphere != TroposphereChoice::None && on_ground;
     let corrected = [("ionosphere", ionosphere), ("troposphere", troposphere)].into_iter();
     corrected
