@@ -31,7 +31,6 @@ fn handle() -> std::io::Result<()> {
     let received = RECEIVED.get_or_init(Default::default);
     let second = Arc::new(AtomicBool::new(false));
     let (bell, ear) = platform::bell()?;
-    thread::Builder::new().name("signals".to_owned()).stack_size(STACK_BYTES).spawn(move || wait(ear))?;
     for signal in platform::signals() {
         // Order matters: the shutdown sees the flag that an earlier signal has set, and who is woken finds
         // its number.
@@ -40,6 +39,8 @@ fn handle() -> std::io::Result<()> {
         signal_hook::flag::register_usize(signal, Arc::clone(received), signal as usize)?;
         bell.rings_for(signal)?;
     }
+    // A signal that came between two of these lines has rung no bell: the thread looks before it waits.
+    thread::Builder::new().name("signals".to_owned()).stack_size(STACK_BYTES).spawn(move || wait(ear))?;
     Ok(())
 }
 
@@ -53,10 +54,10 @@ fn received() -> Option<i32> {
 
 fn wait(mut ear: Ear) {
     let signal = loop {
-        ear.wait();
         if let Some(signal) = received() {
             break signal;
         }
+        ear.wait();
     };
     if ENDS_WORK.load(Ordering::Relaxed) {
         return;

@@ -196,9 +196,11 @@ fn a_bad_value_of_any_key_of_any_text_is_refused_at_its_line_with_key_and_range(
                                 (Ok(()), Legal::Yes | Legal::Perhaps) => Ok(End::Accepted),
                                 (Ok(()), Legal::No) => Err("accepted".to_owned()),
                                 (Err(message), Legal::Yes) => Err(format!("is legal, and refused: {message}")),
-                                // Beside certain other values only: it may be these that are named.
+                                // Beside certain other values only: it may be these that are named. Of a file
+                                // that cannot be read the system's reason says it.
                                 (Err(message), Legal::Perhaps)
-                                    if message.starts_with("file:") && message.contains("expected") =>
+                                    if message.starts_with("file:")
+                                        && ["expected", "cannot be read"].iter().any(|word| message.contains(word)) =>
                                 {
                                     Ok(End::Refused)
                                 }
