@@ -145,8 +145,8 @@ pub fn legal(table: &str, key: &str, was: &str, bad: &str) -> Option<Legal> {
     if last == "equals" {
         return Some(if ["inf", "-inf", "nan", "[1979-05-27]"].contains(&bad) { No } else { Yes });
     }
-    // Another axis by that name may be what the values of this one need. The file of a signal is read with the
-    // scene that names it.
+    // Another axis by that name may be what the values of this one need. The file of a signal is read with
+    // the scene that names it.
     if ["zip", "signal_file"].contains(&last) && bad == "\"5 m\"" {
         return Some(Perhaps);
     }

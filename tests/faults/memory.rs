@@ -1,7 +1,7 @@
 //! Memory over time: what a long run holds beyond one half as long.
 //!
-//! Generator and receiver hold the same. The judge holds a few numbers an epoch. Both runs take ten minutes and
-//! more: until then the allocator's arenas and the pictures' points fill, by some 2 MiB in all.
+//! Generator and receiver hold the same. The judge holds a few numbers an epoch. Both runs take ten minutes
+//! and more: until then the allocator's arenas and the pictures' points fill, by some 2 MiB in all.
 
 use std::fs;
 use std::path::Path;
