@@ -18,7 +18,7 @@ fn peak_kib(words: &str, place: &Path) -> Result<f64, String> {
     let mut command = twin(&words, place);
     // A picture's pixels are 10 MB. Whether the judge draws two at once, and whether the allocator keeps the
     // pixels of the last one, is chance: one thread, and an allocator that gives large blocks back.
-    if words[0] == "analyze" {
+    if ["analyze", "run"].contains(&words[0].as_str()) {
         command.env("RAYON_NUM_THREADS", "1").env("MALLOC_MMAP_THRESHOLD_", "131072");
     }
     let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().map_err(|e| e.to_string())?;
@@ -34,7 +34,8 @@ fn peak_kib(words: &str, place: &Path) -> Result<f64, String> {
             // Too short for a fix.
             Some(status) if words[0] == "receive" && status.code() == Some(NO_FIX) => return Ok(peak),
             Some(status) => return Err(format!("{words:?}: {status}")),
-            None => std::thread::sleep(std::time::Duration::from_millis(5)),
+            // The peak grows slowly; a look costs 0.1 ms of the time that a case may take.
+            None => std::thread::sleep(std::time::Duration::from_millis(20)),
         }
     }
 }
