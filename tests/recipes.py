@@ -37,6 +37,10 @@ GENERATED = {
 }
 
 
+# Characters of a line that two generated files have by chance.
+SHORT = 40
+
+
 class Recipe:
     """A section of the chapter: its paths, those of its steps, and the commands of its steps."""
 
@@ -83,6 +87,8 @@ class Patch:
         self.left_out = dict(re.findall(r"(?m)^Left out: (.+?): (.+)$", self.header))
         self.commands = re.findall(r"(?m)^Run: (.+)$", self.header)
         self.made = re.findall(r"(?m)^diff --git a/(\S+) b/\S+\nnew file", body)
+        parts = zip(self.files, re.split(r"(?m)^diff --git .*\n", body)[1:])
+        self.taken = {path: [line.strip() for line in re.findall(r"(?m)^-(?!-- )(.*)", part)] for path, part in parts}
 
 
 def is_of(named, path, made):
@@ -119,6 +125,12 @@ def check_one(root, opening, recipe, patch):
     for command in recipe.commands:
         if not any(command in run for run in patch.commands) and command not in patch.left_out:
             yield f"{file}: does not run `{command}`, which a step of {recipe.name} names: add `Run: {command}`"
+    for name in GENERATED.keys() - set(patch.files):
+        lines = {line.strip() for line in (root / name).read_text().splitlines()} if (root / name).exists() else set()
+        for other in GENERATED.keys() & set(patch.files):
+            shared = next((line for line in patch.taken[other] if len(line) > SHORT and line in lines), None)
+            if shared:
+                yield f"{file}: changes a line of {other} that {name} has too ({shared[:60]}…): write {name} as the patched program prints it"
     if not re.search(r"(?m)^What: .+$", patch.header) or not patch.commands:
         yield f"{file}: expected lines `What:` and `Run:` before its first file"
     apply = subprocess.run(["git", "apply", "--check", str(patch.path)], cwd=root, capture_output=True, text=True, env=bare(root))
@@ -266,7 +278,15 @@ diff --git a/src/list.rs b/src/list.rs
 @@ -1 +1,2 @@
  air
 +leaves
+diff --git a/REFERENCE.md b/REFERENCE.md
+--- a/REFERENCE.md
++++ b/REFERENCE.md
+@@ -1 +1 @@
+-| `effect` | `air` or `water` | The effect of a ray. |
++| `effect` | one of `air`, `water`, `leaves` | The effect of a ray. |
 """
+REFERENCE = "| `effect` | `air` or `water` | The effect of a ray. |\n"
+SCHEMA = "assets/scenario.schema.json"
 # Faults by what is changed: the file, its text, what takes its place, and words of the finding.
 PLANTED = [
     ("a path that does not exist", CHAPTER, "examples/own.rs", "examples/owned.rs", "no file examples/owned.rs"),
@@ -277,6 +297,7 @@ PLANTED = [
     ("a patch that leaves out nothing of the recipe", f"{PATCHES}/effect.patch", "Run:", "Left out: src/z.rs: no\nRun:", "leaves out src/z.rs"),
     ("a patch that runs nothing", f"{PATCHES}/effect.patch", "Run:", "Ran:", "expected lines `What:` and `Run:`"),
     ("a recipe without a patch", CHAPTER, "2. `cargo test --lib`.\n", "2. `cargo test --lib`.\n\n## 2. A system\n\n1. Nothing.\n", "no patch tests/recipes/system.patch"),
+    ("a generated file that the patch leaves as it was", SCHEMA, "{}", f"{{\n  {REFERENCE}}}", f"{SCHEMA} has too"),
     ("a patch without a recipe", CHAPTER, "An effect", "An echo", "effect.patch: follows no recipe"),
 ]
 
@@ -286,9 +307,9 @@ def self_test():
     for what, changed, old, new, expected in [("no fault", CHAPTER, "", "", None), *PLANTED]:
         with tempfile.TemporaryDirectory() as directory:
             root = Path(directory).resolve()
-            files = {CHAPTER: SMALL, f"{PATCHES}/effect.patch": GOOD, "src/list.rs": "air\n", "src/other.rs": "", "examples/own.rs": ""}
+            files = {CHAPTER: SMALL, f"{PATCHES}/effect.patch": GOOD, "src/list.rs": "air\n", "src/other.rs": "", "examples/own.rs": "", SCHEMA: "{}"}
             files[changed] = files[changed].replace(old, new, 1) if old else files[changed]
-            for name, text in {**files, "REFERENCE.md": ""}.items():
+            for name, text in {**files, "REFERENCE.md": REFERENCE}.items():
                 (root / name).parent.mkdir(parents=True, exist_ok=True)
                 (root / name).write_text(text)
             found = check(root)[0]

@@ -31,15 +31,19 @@ fn handle() -> std::io::Result<()> {
     let received = RECEIVED.get_or_init(Default::default);
     let second = Arc::new(AtomicBool::new(false));
     let (bell, ear) = platform::bell()?;
-    for signal in platform::signals() {
-        // Order matters: the shutdown sees the flag that an earlier signal has set, and who is woken finds
-        // its number.
-        signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&second))?;
-        signal_hook::flag::register(signal, Arc::clone(&second))?;
-        signal_hook::flag::register_usize(signal, Arc::clone(received), signal as usize)?;
-        bell.rings_for(signal)?;
-    }
-    // A signal that came between two of these lines has rung no bell: the thread looks before it waits.
+    let signals = platform::signals();
+    // The first of the four takes a signal over: one that came before the last would be lost, or ring no bell.
+    platform::undisturbed(&signals, || {
+        for &signal in &signals {
+            // Order matters: the shutdown sees the flag that an earlier signal has set, and who is woken finds
+            // its number.
+            signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&second))?;
+            signal_hook::flag::register(signal, Arc::clone(&second))?;
+            signal_hook::flag::register_usize(signal, Arc::clone(received), signal as usize)?;
+            bell.rings_for(signal)?;
+        }
+        Ok(())
+    })?;
     thread::Builder::new().name("signals".to_owned()).stack_size(STACK_BYTES).spawn(move || wait(ear))?;
     Ok(())
 }
@@ -54,10 +58,10 @@ fn received() -> Option<i32> {
 
 fn wait(mut ear: Ear) {
     let signal = loop {
+        ear.wait();
         if let Some(signal) = received() {
             break signal;
         }
-        ear.wait();
     };
     if ENDS_WORK.load(Ordering::Relaxed) {
         return;

@@ -21,7 +21,7 @@ const BEGIN: &str = "socketpair(";
 const PATIENCE: Duration = Duration::from_secs(30);
 
 /// Errors that each call may return.
-const ERRORS: [(&str, &[&str]); 22] = [
+const ERRORS: [(&str, &[&str]); 23] = [
     ("openat", &["EACCES", "EMFILE", "EIO", "ENOMEM", "EPERM", "EINTR", "ENOSPC"]),
     ("read", &["EIO", "EINTR", "EAGAIN", "ENOMEM"]),
     ("write", &["ENOSPC", "EIO", "EDQUOT", "EFBIG", "EINTR", "EAGAIN", "EPERM"]),
@@ -41,10 +41,14 @@ const ERRORS: [(&str, &[&str]); 22] = [
     ("clone3", &["EAGAIN", "ENOMEM"]),
     ("socketpair", &["EMFILE", "ENOMEM"]),
     ("fcntl", &["EMFILE"]),
+    ("rt_sigaction", &[]),
     ("recvfrom", &["EINTR", "EIO"]),
     ("mmap", &["ENOMEM", "EAGAIN"]),
     ("mprotect", &["ENOMEM"]),
 ];
+
+/// Calls that install the handlers of signals: a fault at each of them is tried in the short run too.
+const INSTALLING: [&str; 2] = ["fcntl", "rt_sigaction"];
 
 /// Calls that remove what is in the making: where one of these fails, some of it may stay for the next run.
 const SWEEPING: [&str; 9] =
@@ -130,7 +134,9 @@ fn faults(number: usize, task: &Task, stride: usize) -> Vec<Fault> {
     }
     let first = Random::new(number as u64).below(stride);
     let count = all.len();
-    let chosen: Vec<Fault> = all.into_iter().skip(first).step_by(stride).collect();
+    let numbered = all.into_iter().enumerate();
+    let is_chosen = |(number, fault): &(usize, Fault)| number % stride == first || INSTALLING.contains(&fault.call);
+    let chosen: Vec<Fault> = numbered.filter(is_chosen).map(|(_, fault)| fault).collect();
     println!("{}: {} of {count} faults", task.name, chosen.len());
     chosen
 }
@@ -171,6 +177,8 @@ fn judge(task: &Task, place: &Path, ended: &Ended, fault: &Fault, library: bool,
     let allowed: &[i32] = match fault.what.as_str() {
         _ if library => &[70, 134],
         "signal=KILL" => &[137],
+        // So early a signal has all the work before it: it must not get lost.
+        "signal=TERM" if fault.call == "rt_sigaction" => &[143],
         "signal=TERM" => &[0, 143],
         _ => &[0, 73, 74, 75],
     };

@@ -8,12 +8,12 @@ use std::time::Duration;
 #[cfg(unix)]
 mod unix;
 #[cfg(unix)]
-pub use unix::{Ear, bell, is_fifo, own_output, signals};
+pub use unix::{Ear, bell, is_fifo, own_output, signals, undisturbed};
 
 #[cfg(windows)]
 mod windows;
 #[cfg(windows)]
-pub use windows::{Ear, bell, is_fifo, own_output, signals};
+pub use windows::{Ear, bell, is_fifo, own_output, signals, undisturbed};
 
 #[cfg(not(any(unix, windows)))]
 compile_error!("the program runs on Unix and Windows; the library alone compiles with --no-default-features");

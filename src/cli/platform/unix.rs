@@ -7,6 +7,7 @@ use std::os::unix::fs::FileTypeExt;
 use std::os::unix::net::UnixStream;
 use std::thread;
 
+use nix::sys::signal::{SigSet, SigmaskHow, Signal};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
 use crate::cli::platform::LOOK;
@@ -36,6 +37,19 @@ fn is_detached() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
     mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask & 1 == 1)
+}
+
+/// Result of `work`, which no signal of `numbers` interrupts: those that come meanwhile are delivered after it. Only
+/// the calling thread holds them back, so the others must not have begun.
+///
+/// # Errors
+/// Errors of the system, or those of `work`.
+pub fn undisturbed<T>(numbers: &[i32], work: impl FnOnce() -> io::Result<T>) -> io::Result<T> {
+    let held = numbers.iter().map(|number| Signal::try_from(*number)).collect::<Result<SigSet, _>>()?;
+    let before = held.thread_swap_mask(SigmaskHow::SIG_BLOCK)?;
+    let done = work();
+    before.thread_set_mask()?;
+    done
 }
 
 /// End that a signal's handler writes to.
