@@ -32,11 +32,12 @@ fn handle() -> std::io::Result<()> {
     let second = Arc::new(AtomicBool::new(false));
     let (bell, ear) = platform::bell()?;
     let signals = platform::signals();
-    // The first of the four takes a signal over: one that came before the last would be lost, or ring no bell.
+    // The first of the four takes a signal over: one that came before the last would be lost, or ring no
+    // bell.
     platform::undisturbed(&signals, || {
         for &signal in &signals {
-            // Order matters: the shutdown sees the flag that an earlier signal has set, and who is woken finds
-            // its number.
+            // Order matters: the shutdown sees the flag that an earlier signal has set, and who is woken
+            // finds its number.
             signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&second))?;
             signal_hook::flag::register(signal, Arc::clone(&second))?;
             signal_hook::flag::register_usize(signal, Arc::clone(received), signal as usize)?;

@@ -39,11 +39,11 @@ fn is_detached() -> bool {
     mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask & 1 == 1)
 }
 
-/// Result of `work`, which no signal of `numbers` interrupts: those that come meanwhile are delivered after it. Only
-/// the calling thread holds them back, so the others must not have begun.
+/// The result of `work`, which no signal of `numbers` interrupts: those that come meanwhile are delivered
+/// after it. The calling thread alone holds them back, so no other one may have begun.
 ///
 /// # Errors
-/// Errors of the system, or those of `work`.
+/// Errors of the system, or of `work`.
 pub fn undisturbed<T>(numbers: &[i32], work: impl FnOnce() -> io::Result<T>) -> io::Result<T> {
     let held = numbers.iter().map(|number| Signal::try_from(*number)).collect::<Result<SigSet, _>>()?;
     let before = held.thread_swap_mask(SigmaskHow::SIG_BLOCK)?;

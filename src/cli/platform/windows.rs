@@ -27,10 +27,10 @@ pub fn signals() -> Vec<i32> {
     vec![SIGINT, SIGTERM]
 }
 
-/// Result of `work`: a signal that comes meanwhile is not held back.
+/// The result of `work`: a signal that comes meanwhile is not held back.
 ///
 /// # Errors
-/// Those of `work`.
+/// Errors of `work`.
 pub fn undisturbed<T>(_: &[i32], work: impl FnOnce() -> io::Result<T>) -> io::Result<T> {
     work()
 }
