@@ -391,6 +391,17 @@ fn a_receiver_is_judged_by_what_its_files_show_and_fails_by_the_right_row() {
 }
 
 #[test]
+fn a_judged_error_of_positions_is_the_measured_one_or_says_what_it_is_without() {
+    let (_place, judgement) = judged(&PLANTED);
+    let measured = &judgement.summary.position;
+    let verdict = Verdict::of_foreign(&judgement).unwrap();
+    let row = verdict.rows.iter().find(|row| row.path.as_deref() == Some("position.error_3d_p95_m")).unwrap();
+    let (all_m, judged_m) = (measured.error_3d_p95_m.unwrap(), row.value.as_f64().unwrap());
+    let is_equal = (all_m - judged_m).abs() < 1e-12;
+    assert_eq!(row.without.is_empty(), is_equal, "{judged_m} m judged, {all_m} m measured: {}", row.without);
+}
+
+#[test]
 fn limits_of_a_user_are_paths_of_the_foreign_summary_and_replace_the_verdict_s_own() {
     let (_place, judgement) = judged(&PLANTED);
     let verdict = Verdict::of_foreign(&judgement).unwrap();

@@ -92,6 +92,13 @@ impl Verdict {
         let limits: Vec<f64> = rows.iter().map(|one| limit(one, largest(3, 20))).collect();
         if let (Some(value), Some(limit)) = (percentile(&all, 0.95), percentile(&limits, 0.95)) {
             self.judge("position error, 95 %", "position.error_3d_p95_m", value, "m", Bound::Max(limit), &source);
+            let left_out = places.rows.len() - rows.len();
+            if left_out > 0 {
+                self.without(&format!(
+                    "{left_out} of {} positions, where geometry, signals or the scene bound no error",
+                    places.rows.len()
+                ));
+            }
         }
         let factor = largest(3, rows.len());
         let over = |one: &Judged<'_>| one.row.length_m() / limit(one, factor);
