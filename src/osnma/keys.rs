@@ -51,11 +51,14 @@ pub enum KeyFault {
 }
 
 impl PublicKey {
-    /// Key of a point of P-256, compressed or not.
+    /// Key of a point of P-256 in compressed form: a sign (2 or 3) and 32 bytes of x (ICD, table 6).
     ///
     /// # Errors
     /// [`KeyFault::Point`].
     pub fn new(id: u8, point: &[u8]) -> Result<Self, KeyFault> {
+        if !matches!(point, [2 | 3, x @ ..] if x.len() == 32) {
+            return Err(KeyFault::Point);
+        }
         let key = VerifyingKey::from_sec1_bytes(point).map_err(|_| KeyFault::Point)?;
         Ok(Self { id, key })
     }
@@ -125,7 +128,8 @@ mod tests {
     #[test]
     fn bytes_that_are_no_point_are_no_key() {
         assert_eq!(PublicKey::new(1, &[]), Err(KeyFault::Point));
-        assert_eq!(PublicKey::new(1, &[4; 33]), Err(KeyFault::Point));
+        assert_eq!(PublicKey::new(1, &[5; 33]), Err(KeyFault::Point));
+        assert_eq!(PublicKey::new(1, &[2; 34]), Err(KeyFault::Point));
         assert_eq!(PublicKey::new(1, &[0xff; 33]), Err(KeyFault::Point));
     }
 }

@@ -316,3 +316,31 @@ fn pages_that_are_lost_or_out_of_order_make_no_tag_wrong() {
         assert_eq!(own.counts().keys_refused, 0, "{case}");
     }
 }
+
+#[test]
+fn random_fields_with_right_checks_authenticate_nothing() {
+    let mut random = 11_u64;
+    let mut draw = || {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        random >> 32
+    };
+    let mut own = warm();
+    feed(&mut own, &sky(&chain(), NOMINAL, 10, 20), 0.0);
+    let next = sky(&chain(), NOMINAL, 20, 60);
+    feed(&mut own, &next[..1], 0.0);
+    let before = count(own.counts(), Outcome::Authentic);
+    for sent in &next[1..] {
+        // The header stays, so that keys, tags and blocks are read.
+        let (keep, first, second) = (sent.index() == 0, draw(), draw());
+        let change = |word: &mut u128, hkroot: &mut u8, mack: &mut u32| {
+            *word = u128::from(first) << 96 | u128::from(second);
+            *hkroot = if keep { *hkroot } else { second as u8 };
+            *mack = first as u32;
+        };
+        feed(&mut own, &[forged(sent, change)], 0.0);
+    }
+    own.finish();
+    assert_eq!(count(own.counts(), Outcome::Authentic), before);
+    assert!(own.counts().keys_refused > 100);
+    assert_eq!((own.counts().kroot_verified, own.counts().pkr_verified), (1, 0));
+}
