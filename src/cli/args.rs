@@ -9,6 +9,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use crate::cli::address::listen_address;
 use crate::cli::lines;
 use crate::cli::live::intake::Origin;
+use crate::cli::osnma::args::Osnma;
 use crate::cli::packed::{Bits, Packed};
 use crate::cli::printed::Printed;
 use crate::cli::sink::Spec;
@@ -48,6 +49,8 @@ pub enum Command {
     Plan(Plan),
     /// Run a parameter study: vary keys, repeat with other noise, write tables, curves and a report
     Study(Study),
+    /// Verify the authentication of Galileo's navigation messages (OSNMA)
+    Osnma(Osnma),
     /// Convert the tables of a run or a study to Parquet
     Parquet(Parquet),
     /// List every key of scenarios, receiver settings, studies and limits: default, unit, range, meaning

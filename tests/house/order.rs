@@ -183,6 +183,20 @@ pub const ORDER: Order<'static> = &[
         ],
     ),
     (
+        "osnma",
+        &[
+            &["bits", "time"],
+            &["fields"],
+            &["chain", "page", "tables"],
+            &["data", "mac", "subframe"],
+            &["dsm", "report"],
+            &["keys"],
+            &["files"],
+            &["verifier"],
+            &["tests"],
+        ],
+    ),
+    (
         "study",
         &[
             &["correlation", "demand", "measure", "normal", "watch"],

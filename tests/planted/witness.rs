@@ -45,6 +45,8 @@ mod navic;
 mod navic_l1;
 #[path = "../witness/orbit.rs"]
 mod orbit;
+#[path = "../witness/osnma.rs"]
+mod osnma;
 #[path = "../witness/packed.rs"]
 mod packed;
 #[path = "../witness/printed.rs"]

@@ -2,5 +2,6 @@
 
 mod cli;
 mod live;
+mod osnma;
 mod ports;
 mod study;
