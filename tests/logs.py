@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Logs of real receivers as `gnss-twin logs` and `gnss-twin analyze --log` read them, against other programs.
 
-Every field of every message of the shipped logs (and of those in $GNSS_TWIN_DATA) is compared with pyubx2's and pyrtcm's reading. Then
-a run's own observations and positions are written as UBX by pyubx2, and the judge must give the verdict of the
-RINEX and NMEA files that they came from.
+Every field of every message of the shipped logs (and of those in $GNSS_TWIN_DATA) is compared with the reading of pyubx2 and
+pyrtcm. Then a run's own observations and positions are written as UBX (by pyubx2), as MSM7 of RTCM 3 and as SBF (by this
+script, read again by pyrtcm and pysbf2), and the judge must give the verdict of the RINEX and NMEA files that they came from.
 
-usage: tests/logs.py PROGRAM      the environment needs pyubx2 1.4.0 and pyrtcm 1.2.1: tests/logs.sh makes one
+usage: tests/logs.py PROGRAM      the environment needs pyubx2, pyrtcm and pysbf2: tests/logs.sh makes one
 exit:  0 all fields are equal; 1 they are not.
 """
 import csv
@@ -14,19 +14,23 @@ import json
 import math
 import os
 import pathlib
+import struct
 import subprocess
 import sys
 import tempfile
 
 from pyrtcm import RTCMReader
+from pysbf2 import SBFReader
 from pyubx2 import GET, UBXMessage, UBXReader
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 # Message names of one program and the other.
 NAMES = {"SEC-SIG-2": "SEC-SIG"}
 COLUMNS = {"sec": "second"}
-# Figures of foreign.json, and how far the resolution of UBX's fields may move them: 1 mm of a range and its carrier, 0.25 mHz
-# of Doppler in single precision, half a dB-Hz of C/N0, 1e-7 degrees and 1 mm of a position.
+LIGHT_MPS = 299792458.0
+WAVE_M = LIGHT_MPS / 1575.42e6
+# Figures of foreign.json, and how far the resolution of the logs' fields may move them: 1 mm of a range, 1/1000 cycle of a
+# carrier, 0.5 mHz of Doppler, half a dB-Hz of C/N0, 1e-7 degrees and 1 mm of a position.
 CLOSED = [("code", "rms_m", 1e-4), ("carrier", "rms_cycles", 1e-5), ("doppler", "rms_hz", 1e-4), ("cn0", "bias_db", 0.5),
           ("position", "horizontal_rms_m", 0.012), ("position", "up_rms_m", 0.012)]
 RINEX_START = datetime.datetime(1980, 1, 6)
@@ -272,34 +276,175 @@ def ubx_positions(fixes, leap_s):
     return frames
 
 
+class Arcs:
+    """Whole cycles that bring each arc's carrier near its code, and the time of its lock."""
+
+    def __init__(self):
+        self.of, self.before = {}, {}
+
+    def carrier(self, sv, at, own):
+        """Carrier near the code in cycles, and the seconds since the lock began."""
+        cycles, lost = own["L1C"]
+        if lost or at - self.before.get(sv, -1e9) > 30:
+            self.of[sv] = round(cycles - own["C1C"][0] / WAVE_M), at
+        self.before[sv] = at
+        whole, since = self.of[sv]
+        return cycles - whole, at - since
+
+
+def rtcm_observations(epochs):
+    """MSM7 of GPS L1 C/A (RTCM 10403.3, 3.5.16)."""
+    arcs, frames = Arcs(), []
+    for whole, fraction, values in epochs:
+        numbers = sorted(int(sv[1:]) for sv in values)
+        bits = [(1077, 12), (0, 12), (round(1000 * (whole % 604800 + fraction)), 30), (0, 19),
+                (sum(1 << (64 - number) for number in numbers), 64), (1 << 30, 32), ((1 << len(numbers)) - 1, len(numbers))]
+        rows = []
+        for number in numbers:
+            own = values[f"G{number:02d}"]
+            milliseconds = own["C1C"][0] / LIGHT_MPS * 1e3
+            rough = round(milliseconds * 1024)
+            cycles, lock = arcs.carrier(number, whole + fraction, own)
+            rate = -own["D1C"][0] * WAVE_M
+            indicator = max(one for one in range(704) if lock_ms(one) <= round(1000 * lock))
+            rows.append((rough >> 10, 0, rough & 1023, round(rate), round((milliseconds - rough / 1024) * 2**29),
+                         round((cycles * WAVE_M / LIGHT_MPS * 1e3 - rough / 1024) * 2**31), indicator, 0,
+                         round(16 * own["S1C"][0]), round((rate - round(rate)) * 1e4)))
+        for field, width in enumerate((8, 4, 10, 14, 20, 24, 10, 1, 10, 15)):
+            bits += [(row[field], width) for row in rows]
+        text = "".join(format(value & ((1 << width) - 1), f"0{width}b") for value, width in bits)
+        text += "0" * (-len(text) % 8)
+        body = int(text, 2).to_bytes(len(text) // 8, "big")
+        frame = b"\xd3" + struct.pack(">H", len(body)) + body
+        frames.append(frame + crc24q(frame).to_bytes(3, "big"))
+    return frames
+
+
+def lock_ms(indicator):
+    doublings = max((indicator >> 5) - 1, 0)
+    return indicator - 32 * doublings << doublings
+
+
+def crc24q(data):
+    crc = 0
+    for byte in data:
+        crc ^= byte << 16
+        for _ in range(8):
+            crc = crc << 1 ^ (0x1864CFB if crc & 0x800000 else 0)
+    return crc
+
+
+def block(number, body):
+    """Block of SBF."""
+    body += bytes(-len(body) % 4)
+    tail = struct.pack("<HH", number, 8 + len(body)) + body
+    crc = 0
+    for byte in tail:
+        crc ^= byte << 8
+        for _ in range(8):
+            crc = (crc << 1 ^ (0x1021 if crc & 0x8000 else 0)) & 0xFFFF
+    return b"$@" + struct.pack("<H", crc) + tail
+
+
+def sbf_observations(epochs):
+    """MeasEpoch of GPS L1 C/A."""
+    arcs, blocks = Arcs(), []
+    for whole, fraction, values in epochs:
+        body = struct.pack("<IHBBBBBB", round(1000 * (whole % 604800 + fraction)), int(whole // 604800), len(values), 20, 12, 0,
+                           0, 0)
+        for sv, own in sorted(values.items()):
+            cycles, lock = arcs.carrier(sv, whole + fraction, own)
+            millimetres = round(1000 * own["C1C"][0])
+            offset = round(1000 * (cycles - 1e-3 * millimetres / WAVE_M))
+            body += struct.pack("<BBBBIiHbBHBB", 1, 0, int(sv[1:]), millimetres >> 32, millimetres & 0xFFFFFFFF,
+                                round(1e4 * own["D1C"][0]), offset & 0xFFFF, offset >> 16, round(4 * (own["S1C"][0] - 10)),
+                                int(lock), 0, 0)
+        blocks.append(block(4027, body))
+    return blocks
+
+
+def sbf_positions(fixes):
+    """PVTCartesian of the rows of rx/fixes.csv: the clock's bias is what the whole millisecond leaves."""
+    blocks = []
+    for row in fixes:
+        second, fraction = int(row["gps_s"]), float(row["gps_fraction_s"])
+        tow_ms = round(1000 * (second % 604800 + fraction))
+        bias_ms = tow_ms - 1000 * (second % 604800 + fraction)
+        place = [float(row[key]) for key in ("x_m", "y_m", "z_m")]
+        velocity = [float(row[key]) for key in ("vx_mps", "vy_mps", "vz_mps")]
+        blocks.append(block(4006, struct.pack("<IHBB3df3ffdfBBBBHHIBBHHHHB", tow_ms, second // 604800, 1, 0, *place, -2e10,
+                                              *velocity, -2e10, bias_ms, 0, 0, 0, int(row["satellites"]), 0, 0, 65535, 0, 0,
+                                              0, 0, 0, 100, 150, 0)))
+    return blocks
+
+
+def compare_sbf(path, found):
+    """Blocks that this script has written, by pysbf2: fields of PVTCartesian, and of MeasEpoch's first signals."""
+    compared = 0
+    parsed = [message for _, message in SBFReader(open(path, "rb"), quitonerror=2) if message]
+    for name, identity in (("PVTCartesian", "PVTCartesian"), ("MeasEpoch", "MeasEpoch")):
+        wanted = [message for message in parsed if message.identity.startswith(identity)]
+        if len(wanted) != len(found[name]):
+            sys.exit(f"logs: {path.name}: {len(found[name])} of {len(wanted)} {name}")
+        for (byte, rows), message in zip(sorted(found[name].items()), wanted):
+            if name == "PVTCartesian":
+                for column, cell in rows[0].items():
+                    value = getattr(message, column, None)
+                    if isinstance(value, (int, float)):
+                        compared += expect(path, byte, name, column, cell, value)
+                continue
+            for index, row in enumerate(rows, 1):
+                field = lambda key: getattr(message, f"{key}_{index:02d}")
+                range_m = field("CodeMSB") + field("CodeLSB")
+                carrier = range_m / WAVE_M + field("CarrierMSB") + field("CarrierLSB")
+                for column, value in (("PR", range_m), ("L", carrier), ("Doppler", field("Doppler")), ("SVID", field("SVID")),
+                                      ("CN0", field("CN0") + 10), ("LockTime", field("LockTime"))):
+                    compared += expect(path, byte, name, column, row[column], value)
+    return compared
+
+
 def verdict(directory):
     with open(directory / "foreign_verdict.csv", newline="") as file:
         return list(csv.DictReader(file))
 
 
 def closed_loop(work):
-    """Verdicts by RINEX and NMEA and by UBX of the same observations and positions."""
+    """Verdicts by RINEX and NMEA and by logs of the same observations and positions; returns rows and fields of SBF."""
     scene = ROOT / "scenarios/static.toml"
     program("run", scene, "--level", "correlations", "--out", work / "run", "--report", "none", "--quiet")
     rinex, nmea, truth = work / "run/rx/observations.rnx", work / "run/rx/fixes.nmea", work / "run/truth"
     with open(work / "run/rx/fixes.csv", newline="") as file:
         fixes = list(csv.DictReader(file))
-    log = work / "closed.ubx"
-    log.write_bytes(b"".join(ubx_observations(read_rinex(rinex)) + ubx_positions(fixes, 15)))
+    epochs = read_rinex(rinex)
     program("analyze", "--truth", truth, "--rinex-obs", rinex, "--nmea", nmea, "--out", work / "files", "--report", "none")
-    told = program("analyze", "--truth", truth, "--log", log, "--out", work / "log", "--report", "none")
-    if f"RXM-RAWX {len(read_rinex(rinex))}" not in told or f"NAV-PVT {len(fixes)}" not in told:
-        sys.exit(f"logs: not all messages are counted:\n{told}")
-    one, other = verdict(work / "files"), verdict(work / "log")
+    rows = 0
+    for form, frames, more, counted in [
+            ("ubx", ubx_observations(epochs) + ubx_positions(fixes, 15), [], f"NAV-PVT {len(fixes)}, RXM-RAWX {len(epochs)}"),
+            ("rtcm3", rtcm_observations(epochs), ["--nmea", nmea], f"1077 {len(epochs)}"),
+            ("sbf", sbf_observations(epochs) + sbf_positions(fixes), [], f"MeasEpoch {len(epochs)}, PVTCartesian {len(fixes)}")]:
+        log = work / f"closed.{form}"
+        log.write_bytes(b"".join(frames))
+        told = program("analyze", "--truth", truth, "--log", log, *more, "--out", work / form, "--report", "none")
+        if counted not in told:
+            sys.exit(f"logs: not all messages are counted, expected {counted}:\n{told}")
+        rows += same_verdict(work / "files", work / form, form)
+    program("logs", work / "closed.rtcm3", "--out", work / "closed-rtcm3", "--quiet")
+    compare_rtcm(work / "closed.rtcm3", tables(work / "closed-rtcm3"))
+    program("logs", work / "closed.sbf", "--out", work / "closed-sbf", "--quiet")
+    return rows, compare_sbf(work / "closed.sbf", tables(work / "closed-sbf"))
+
+
+def same_verdict(files, log, form):
+    one, other = verdict(files), verdict(log)
     if [row["figure"] for row in one] != [row["figure"] for row in other]:
-        sys.exit(f"logs: other rows: {set(row['figure'] for row in one) ^ set(row['figure'] for row in other)}")
+        sys.exit(f"logs: {form}: other rows: {set(row['figure'] for row in one) ^ set(row['figure'] for row in other)}")
     for row, again in zip(one, other):
         if row["status"] != again["status"]:
-            sys.exit(f"logs: {row['figure']}: {row['status']} by RINEX and NMEA, {again['status']} by UBX")
+            sys.exit(f"logs: {row['figure']}: {row['status']} by RINEX and NMEA, {again['status']} by {form}")
     for group, figure, resolution in CLOSED:
-        values = [json.loads((work / form / "foreign.json").read_text())[group][figure] for form in ("files", "log")]
+        values = [json.loads((where / "foreign.json").read_text())[group][figure] for where in (files, log)]
         if abs(values[0] - values[1]) > resolution:
-            sys.exit(f"logs: {group}.{figure}: {values[0]} by RINEX and NMEA, {values[1]} by UBX")
+            sys.exit(f"logs: {group}.{figure}: {values[0]} by RINEX and NMEA, {values[1]} by {form}")
     return len(one)
 
 
@@ -321,6 +466,7 @@ if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as name:
         work = pathlib.Path(name)
         fields = [witness(work, "ubx", "ubx", compare_ubx), witness(work, "rtcm", "rtcm3", compare_rtcm)]
-        rows = closed_loop(work)
+        rows, blocks = closed_loop(work)
         refusals(work)
-    print(f"logs: {fields[0]} fields of UBX equal pyubx2's, {fields[1]} of RTCM 3 pyrtcm's; {rows} verdict rows by UBX as by RINEX")
+    print(f"logs: {fields[0]} fields of UBX equal pyubx2's, {fields[1]} of RTCM 3 pyrtcm's, {blocks} of SBF pysbf2's; "
+          f"{rows} verdict rows by UBX, RTCM 3 and SBF as by RINEX and NMEA")
