@@ -2,13 +2,14 @@
 //!
 //! It reads only what generator and receiver wrote into a run's directory, and writes `summary.json`, tables,
 //! pictures and a report beside them. [`judge`](judge()) does all of it, [`assess`] stops at the summary.
-//! Five rooms follow one another, and each uses only those before it:
+//! Six rooms follow one another, and each uses only those before it:
 //!
 //! 1. [`read`]: a run's files as values.
 //! 2. [`expect`]: what theory and truth let one expect.
 //! 3. [`measure`](mod@measure): estimate minus truth, and what follows from it.
 //! 4. [`judge`](mod@judge): figures against limits.
 //! 5. [`show`]: tables, pictures, reports.
+//! 6. [`logged`]: another receiver by its binary log.
 //!
 //! Below all of them lie [`error`], [`statistics`] and [`waveform`], the spectrum and the correlation of a
 //! signal.
@@ -21,6 +22,7 @@ extern crate gnss;
 pub mod error;
 pub mod expect;
 pub mod judge;
+pub mod logged;
 pub mod measure;
 pub mod read;
 pub mod response;

@@ -2,17 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::cli::args;
 use crate::cli::check::Gate;
 use crate::cli::error::CliError;
+use crate::cli::logs as log_tables;
 use crate::cli::printed;
 use crate::cli::run::judge_error;
 use crate::cli::scenario;
 use analysis::judge::foreign::{self, Files};
 use analysis::judge::schema::SUMMARY;
 use analysis::judge::verdict::Verdict;
+use analysis::logged;
 use analysis::show;
 use gnss::renamed::{self, Class};
 
@@ -48,7 +50,14 @@ fn earlier_files(run: &Path) -> Vec<String> {
 fn another_receiver(truth: &Path, arguments: &args::Analyze) -> Result<(), CliError> {
     let files = Files { rinex_obs: arguments.files.rinex_obs.clone(), nmea: arguments.files.nmea.clone() };
     let gate = Gate::read(arguments.check.as_ref(), &foreign::FIGURES)?;
-    let judgement = foreign::judge(truth, &files).map_err(judge_error)?;
+    let asked = arguments.log_as.map(args::LogProtocol::protocol);
+    let logged = arguments.files.log.as_ref().map(|log| logged::judge(truth, log, asked, &files)).transpose();
+    let (judgement, log) = match logged.map_err(judge_error)? {
+        Some(logged) => {
+            (logged.judgement, Some((logged.protocol, logged.contents, logged.without_fix, logged.reported)))
+        }
+        None => (foreign::judge(truth, &files).map_err(judge_error)?, None),
+    };
     let mut verdict = Verdict::of_foreign(&judgement).map_err(judge_error)?;
     if let Some(limits) = gate.limits() {
         let figures = serde_json::to_value(&judgement.summary).unwrap_or_default();
@@ -60,11 +69,31 @@ fn another_receiver(truth: &Path, arguments: &args::Analyze) -> Result<(), CliEr
     });
     std::fs::create_dir_all(&out).map_err(|error| CliError::create(out.display(), &error))?;
     show::foreign::write(&judgement, &verdict, &out, arguments.report.forms()).map_err(judge_error)?;
-    let text = format!("{}\n{verdict}\nresults in {}\n", judgement.summary, out.display());
-    arguments.printed.results(
-        &text,
-        || json!({ "results": out, "summary": judgement.summary, "verdict": printed::verdict(&verdict) }),
-    )?;
+    let (mut words, mut object) = (String::new(), Value::Null);
+    if let Some((protocol, contents, without_fix, reported)) = &log {
+        words = format!("log of {}\n{contents}", protocol.name());
+        if *without_fix > 0 {
+            words += &format!("{:<14}{without_fix} epochs\n", "without fix");
+        }
+        if let Some(reported) = reported {
+            reported.write(&out).map_err(judge_error)?;
+            words += &reported.to_string();
+        }
+        words.push('\n');
+        object = log_tables::object(contents);
+        object["judged"] = json!(protocol.name());
+        object["without_fix"] = json!(without_fix);
+        object["reported"] = json!(reported);
+    }
+    let text = format!("{words}{}\n{verdict}\nresults in {}\n", judgement.summary, out.display());
+    arguments.printed.results(&text, || {
+        let summary = &judgement.summary;
+        let mut whole = json!({ "results": out, "summary": summary, "verdict": printed::verdict(&verdict) });
+        if !object.is_null() {
+            whole["log"] = object;
+        }
+        whole
+    })?;
     gate.enforce(&verdict, arguments.printed)
 }
 

@@ -20,6 +20,7 @@ use generator::fidelity::Grade;
 use gnss::exchange::Version;
 use gnss::samples::Format;
 use gnss::time::Epoch;
+use logs::frames::Protocol;
 
 /// A GNSS digital twin: generates IF samples from real ephemerides, receives them and judges the receiver.
 ///
@@ -49,6 +50,8 @@ pub enum Command {
     Plan(Plan),
     /// Run a parameter study: vary keys, repeat with other noise, write tables, curves and a report
     Study(Study),
+    /// Show what a receiver's log holds, or convert it to tables
+    Logs(Logs),
     /// Verify the authentication of Galileo's navigation messages (OSNMA)
     Osnma(Osnma),
     /// Convert the tables of a run or a study to Parquet
@@ -65,6 +68,46 @@ pub enum Command {
     Completions(Completions),
     /// Write the manual pages
     Man(Man),
+}
+
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Examples:\n  gnss-twin logs COM3.ubx\n  gnss-twin logs COM3.ubx --out tables\n\nMESSAGE.csv holds \
+                  the fields of all messages of that name; observations.csv and fixes.csv have what can be judged"
+)]
+pub struct Logs {
+    /// Log as it came out of the device: UBX, RTCM 3, SBF, also mixed with NMEA; - is standard input
+    pub log: PathBuf,
+    /// Directory for one table per kind of message [default: no tables are written]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Time within three days of the log, for messages that name no week: UTC like 2026-11-23T05:00:00Z
+    #[arg(long, value_name = "UTC", value_parser = Epoch::parse)]
+    pub near: Option<Epoch>,
+    #[command(flatten)]
+    pub printed: Printed,
+}
+
+/// Binary protocol of a log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum LogProtocol {
+    /// u-blox
+    Ubx,
+    /// RTCM 10403, version 3
+    Rtcm3,
+    /// Septentrio
+    Sbf,
+}
+
+impl LogProtocol {
+    /// Protocol of the reader.
+    pub fn protocol(self) -> Protocol {
+        match self {
+            Self::Ubx => Protocol::Ubx,
+            Self::Rtcm3 => Protocol::Rtcm,
+            Self::Sbf => Protocol::Sbf,
+        }
+    }
 }
 
 #[derive(Args, Debug)]
@@ -502,6 +545,9 @@ pub struct Analyze {
     pub truth: Option<PathBuf>,
     #[command(flatten)]
     pub files: ReceiverFiles,
+    /// Protocol of --log [default: the one with the most frames]
+    #[arg(long = "as", value_name = "PROTOCOL", value_enum, requires = "log")]
+    pub log_as: Option<LogProtocol>,
     /// Directory for the results about another receiver [default: reports/SCENE-foreign]
     #[arg(long, value_name = "DIR", requires = "truth")]
     pub out: Option<PathBuf>,
@@ -521,6 +567,10 @@ pub struct ReceiverFiles {
     /// Positions of the other receiver: NMEA 0183 with GGA; RMC or ZDA give the date, RMC or VTG the velocity
     #[arg(long, value_name = "FILE", requires = "truth")]
     pub nmea: Option<PathBuf>,
+    /// Log of the other receiver as it came out of the device: UBX, RTCM 3 or SBF, known by its content.
+    /// Observations of --rinex-obs and positions of --nmea go before its own
+    #[arg(long, value_name = "FILE", requires = "truth")]
+    pub log: Option<PathBuf>,
 }
 
 #[derive(Args, Debug)]

@@ -15,6 +15,7 @@ mod glimpse;
 mod interrupt;
 mod lines;
 mod live;
+mod logs;
 mod osnma;
 mod packed;
 #[cfg(feature = "parquet")]
@@ -90,6 +91,7 @@ fn execute(arguments: Arguments) -> Result<(), CliError> {
         Command::Analyze(arguments) => analyze::execute(&arguments),
         Command::Plan(arguments) => plan::execute(&arguments),
         Command::Study(arguments) => study::execute(&arguments),
+        Command::Logs(arguments) => logs::execute(&arguments),
         Command::Osnma(arguments) => osnma::execute(&arguments),
         #[cfg(feature = "parquet")]
         Command::Parquet(arguments) => parquet::execute(&arguments),

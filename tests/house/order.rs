@@ -102,8 +102,10 @@ pub const ORDER: Order<'static> = &[
             &["measure"],
             &["judge"],
             &["show"],
+            &["logged"],
         ],
     ),
+    ("logs", &[&["bits", "frames", "observed", "table"], &["contents", "rtcm", "sbf", "ubx"], &["log"]]),
     (
         "analysis/read",
         &[
