@@ -178,7 +178,7 @@ fn read(path: &Path, asked: Option<Protocol>, near: Epoch) -> Result<(Protocol, 
         let needed = logs::log::needed(protocol);
         let without = match usable.without_fix {
             0 => String::new(),
-            count => format!(" ({count} of them say that there is no fix)"),
+            count => format!(", where {count} say that there is no fix"),
         };
         let has = contents.messages_of(protocol);
         let what = format!("{} with nothing to judge: it has {has}{without}; expected {needed}", protocol.name());
