@@ -30,9 +30,9 @@ COLUMNS = {"sec": "second"}
 LIGHT_MPS = 299792458.0
 WAVE_M = LIGHT_MPS / 1575.42e6
 # Figures of foreign.json, and how far the resolution of the logs' fields may move them: 1 mm of a range, 1/1000 cycle of a
-# carrier, 0.5 mHz of Doppler, half a dB-Hz of C/N0, 1e-7 degrees and 1 mm of a position.
+# carrier, 0.5 mHz of Doppler, half a dB-Hz of C/N0, 1 mm of a position in NMEA.
 CLOSED = [("code", "rms_m", 1e-4), ("carrier", "rms_cycles", 1e-5), ("doppler", "rms_hz", 1e-4), ("cn0", "bias_db", 0.5),
-          ("position", "horizontal_rms_m", 0.012), ("position", "up_rms_m", 0.012)]
+          ("position", "horizontal_rms_m", 0.001), ("position", "up_rms_m", 0.001)]
 RINEX_START = datetime.datetime(1980, 1, 6)
 
 
@@ -273,6 +273,12 @@ def ubx_positions(fixes, leap_s):
                   "velE": round(1000 * east), "velD": round(1000 * down), "hAcc": round(1000 * sigma),
                   "vAcc": round(1000 * number["sigma_up_m"]), "sAcc": 100, "tAcc": 30}
         frames.append(UBXMessage("NAV", "NAV-PVT", GET, **fields).serialize())
+        # The further digits, as the interface description has them: numbers of whole units and of hundredths or tenths.
+        digits = [round(math.degrees(longitude) * 1e9), round(math.degrees(latitude) * 1e9), round(1e4 * height)]
+        parts = [round(digits[0] / 100), round(digits[1] / 100), round(digits[2] / 10)]
+        rest = [digits[0] - 100 * parts[0], digits[1] - 100 * parts[1], digits[2] - 10 * parts[2]]
+        payload = struct.pack("<BHBIiiiibbbbII", 0, 0, 0, fields["iTOW"], *parts, parts[2], *rest, rest[2], 0, 0)
+        frames.append(UBXMessage("NAV", "NAV-HPPOSLLH", GET, payload=payload).serialize())
     return frames
 
 

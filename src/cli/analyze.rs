@@ -84,6 +84,8 @@ fn another_receiver(truth: &Path, arguments: &args::Analyze) -> Result<(), CliEr
         object["judged"] = json!(protocol.name());
         object["without_fix"] = json!(without_fix);
         object["reported"] = json!(reported);
+        let path = out.join("foreign_log.json");
+        std::fs::write(&path, format!("{object:#}\n")).map_err(|error| CliError::output(path.display(), &error))?;
     }
     let text = format!("{words}{}\n{verdict}\nresults in {}\n", judgement.summary, out.display());
     arguments.printed.results(&text, || {

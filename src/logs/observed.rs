@@ -98,6 +98,15 @@ pub struct ClockReading {
     pub drift: f64,
 }
 
+/// Further digits of the position of a fix, in a message of their own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refinement {
+    /// Time of the fix to the millisecond, in GPS time.
+    pub label: Epoch,
+    /// Position, Earth-fixed, metres.
+    pub position_m: Vector3<f64>,
+}
+
 /// Part of a log that can be joined with a truth.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
@@ -105,6 +114,8 @@ pub enum Event {
     Observations(ObservedEpoch),
     /// Position.
     Fix(Fix),
+    /// Further digits of the position before.
+    Refinement(Refinement),
     /// Epoch whose message says that there is no fix.
     NoFix,
     /// Offset of the receiver's clock.

@@ -1,14 +1,13 @@
 //! UBX, the binary protocol of u-blox receivers.
 //!
-//! Source: u-blox F9 HPG 1.32 interface description. [`layouts`] has the fields of each message;
-//! here messages become observations (RXM-RAWX), positions (NAV-PVT) and clock readings (NAV-CLOCK). The
-//! whole second of a fix is that of iTOW, its week that of the UTC date: a receiver that does not know the
-//! leap seconds yet has a wrong UTC and a right time of week. Limits: the digits that NAV-HPPOSLLH adds to a
-//! position are in its table alone.
+//! Source: u-blox F9 HPG 1.32 interface description. [`layouts`] has the fields of each message; here
+//! messages become observations (RXM-RAWX), positions (NAV-PVT) and clock readings (NAV-CLOCK). The whole
+//! second of a fix is that of iTOW, its week that of the UTC date: a receiver that does not know the leap
+//! seconds yet has a wrong UTC and a right time of week. NAV-HPPOSLLH behind a position adds digits to it.
 
 mod layouts;
 
-use crate::observed::{Calendar, ClockReading, Event, Fix, Locks, Observed, ObservedEpoch, Solution};
+use crate::observed::{Calendar, ClockReading, Event, Fix, Locks, Observed, ObservedEpoch, Refinement, Solution};
 use crate::table::{Layout, Table};
 use gnss::earth::Geodetic;
 use gnss::satellite::{Sv, System};
@@ -47,6 +46,7 @@ pub fn event(table: &Table, calendar: &mut Calendar, locks: &mut Locks) -> Optio
     match table.name {
         "NAV-PVT" => Some(fix(table, calendar)),
         "NAV-CLOCK" => Some(clock(table, calendar)),
+        "NAV-HPPOSLLH" => refinement(table, calendar),
         "RXM-RAWX" => {
             let mut epoch = observations(table)?;
             calendar.learn(epoch.label);
@@ -112,6 +112,17 @@ fn label(table: &Table, calendar: &Calendar) -> Option<Epoch> {
     let dated = Epoch::parse(&text).ok()?.plus_s(table.number(0, "nano")? * 1e-9);
     let counted = Calendar::new(Some(dated)).at_ms(tow_ms)?;
     Some(dated.plus_s(counted.since(dated).round()))
+}
+
+/// Position with the further digits of NAV-HPPOSLLH: 1e-9 degrees and 0.1 mm.
+fn refinement(table: &Table, calendar: &Calendar) -> Option<Event> {
+    let sum = |name: &str, digits: &str| Some(table.number(0, name)? + table.number(0, digits)?);
+    let label = table.integer(0, "iTOW").and_then(|tow_ms| calendar.at_ms(tow_ms));
+    let label = label.filter(|_| table.integer(0, "invalidLlh") == Some(0))?;
+    let (latitude_deg, longitude_deg) = (sum("lat", "latHp")?, sum("lon", "lonHp")?);
+    let height_m = 1e-3 * sum("height", "heightHp")?;
+    let position_m = Geodetic::from_degrees(latitude_deg, longitude_deg, height_m).to_ecef();
+    Some(Event::Refinement(Refinement { label, position_m }))
 }
 
 fn clock(table: &Table, calendar: &Calendar) -> Event {

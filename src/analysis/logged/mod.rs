@@ -24,7 +24,7 @@ use gnss::time::{Epoch, WEEK_S};
 use logs::contents::Contents;
 use logs::frames::Protocol;
 use logs::log::Log;
-use logs::observed::{self, ClockReading, Event, Fix};
+use logs::observed::{self, ClockReading, Event, Fix, Refinement};
 use reported::Reported;
 
 /// Judgement by a log.
@@ -48,6 +48,8 @@ struct Usable {
     fixes: Vec<Fix>,
     clocks: Vec<ClockReading>,
     without_fix: usize,
+    /// True if a position has the digits of a message of their own.
+    is_refined: bool,
 }
 
 /// Judges a receiver's log against the truth in a directory. Observations and positions of RINEX and NMEA
@@ -99,7 +101,7 @@ pub fn judge(truth: &Path, log: &Path, asked: Option<Protocol>, files: &Files) -
             judged.rollover_s[1] = shift_s;
             let fixes: Vec<PlaceFix> = usable.fixes.iter().map(place_fix).collect();
             let mut measured = place::measure(&fixes, &timeline, shift_s);
-            measured.resolution_m = resolution_m(protocol);
+            measured.resolution_m = resolution_m(protocol, usable.is_refined);
             if measured.rows.is_empty() {
                 return Err(elsewhere(log, &labels, &timeline));
             }
@@ -153,6 +155,7 @@ fn read(path: &Path, asked: Option<Protocol>, near: Epoch) -> Result<(Protocol, 
             Some(Event::Fix(fix)) if own.fixes.last().is_none_or(|before| fix.label.since(before.label) > 0.0) => {
                 own.fixes.push(fix);
             }
+            Some(Event::Refinement(refinement)) => own.refine(&refinement),
             Some(Event::Clock(reading)) => own.clocks.push(reading),
             Some(Event::NoFix) => own.without_fix += 1,
             Some(Event::Fix(_) | Event::Undated) | None => {}
@@ -175,7 +178,7 @@ fn read(path: &Path, asked: Option<Protocol>, near: Epoch) -> Result<(Protocol, 
         let needed = logs::log::needed(protocol);
         let without = match usable.without_fix {
             0 => String::new(),
-            count => format!(" ({count} of them say that there is no fix)"),
+            count => format!(", where {count} say that there is no fix"),
         };
         let has = contents.messages_of(protocol);
         let what = format!("{} with nothing to judge: it has {has}{without}; expected {needed}", protocol.name());
@@ -194,6 +197,15 @@ impl Usable {
             Some(last) if since_s == 0.0 => last.values.extend(values),
             _ if since_s > 0.0 => self.epochs.push(ObservedEpoch { label: epoch.label, values: values.collect() }),
             _ => {}
+        }
+    }
+
+    /// Gives the last position its further digits, if they are of the same time.
+    fn refine(&mut self, refinement: &Refinement) {
+        let same = |fix: &&mut Fix| fix.label.since(refinement.label).abs() < reported::SAME_S;
+        if let Some(fix) = self.fixes.last_mut().filter(same) {
+            fix.position_m = refinement.position_m;
+            self.is_refined = true;
         }
     }
 }
@@ -215,10 +227,12 @@ fn place_fix(fix: &Fix) -> PlaceFix {
 }
 
 /// Smallest step of a latitude in a protocol's positions, metres.
-fn resolution_m(protocol: Protocol) -> f64 {
+fn resolution_m(protocol: Protocol, is_refined: bool) -> f64 {
+    // A minute of latitude is a nautical mile.
+    let degree_m = 60.0 * 1852.0;
     match protocol {
-        // 1e-7 degrees; a minute of latitude is a nautical mile.
-        Protocol::Ubx => 60.0 * 1852.0 * 1e-7,
+        Protocol::Ubx if is_refined => 1e-9 * degree_m,
+        Protocol::Ubx => 1e-7 * degree_m,
         _ => 0.0,
     }
 }
@@ -247,3 +261,6 @@ fn elsewhere(path: &Path, labels: &[Epoch], timeline: &Timeline) -> JudgeError {
 fn refuse(path: &Path, what: &str) -> JudgeError {
     JudgeError::NotOfThisTruth { path: path.to_owned(), what: what.to_owned() }
 }
+
+#[cfg(test)]
+mod tests;

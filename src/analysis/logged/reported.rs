@@ -81,8 +81,8 @@ pub struct Reported {
     pub clock_drift: Option<f64>,
 }
 
-/// Clock readings belong to the fix of the same time, to the millisecond of their label.
-const SAME_S: f64 = 1.5e-3;
+/// Clock offsets and further digits belong to the fix of the same time, to the millisecond of their label.
+pub(super) const SAME_S: f64 = 1.5e-3;
 
 impl Reported {
     /// Joins fixes with the truth; `shift_s` is taken from every label first.

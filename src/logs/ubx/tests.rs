@@ -67,6 +67,24 @@ fn a_position_that_the_receiver_takes_back_is_no_fix() {
 }
 
 #[test]
+fn further_digits_belong_to_the_position_of_their_time() {
+    let mut payload = vec![0; 36];
+    payload[4..8].copy_from_slice(&(475_218_000_u32).to_le_bytes());
+    payload[8..12].copy_from_slice(&(-1_234_567_i32).to_le_bytes());
+    payload[12..16].copy_from_slice(&(515_000_000_i32).to_le_bytes());
+    payload[16..20].copy_from_slice(&(45_678_i32).to_le_bytes());
+    payload[24..27].copy_from_slice(&[-42_i8 as u8, 7, 3]);
+    let near = Epoch::parse("2024-03-01T00:00:00").ok();
+    let Event::Refinement(found) = event_of(&frame(0x01, 0x14, &payload), near) else { panic!("none") };
+    assert_eq!(found.label, Epoch::parse("2024-03-01T12:00:18").unwrap());
+    let expected = Geodetic::from_degrees(51.500_000_007, -0.123_456_742, 45.678_3).to_ecef();
+    assert!((found.position_m - expected).norm() < 1e-6);
+    payload[3] = 1;
+    let table = read_one(&frame(0x01, 0x14, &payload));
+    assert_eq!(event(&table, &mut Calendar::new(near), &mut Locks::default()), None);
+}
+
+#[test]
 fn an_older_and_shorter_message_leaves_cells_empty() {
     let whole = position(7, 1);
     let table = read_one(&frame(0x01, 0x07, &whole[6..6 + 84]));
