@@ -9,18 +9,13 @@
 pub mod reported;
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
-use std::io;
 use std::path::Path;
 
 use crate::error::JudgeError;
-use crate::expect::due::receiver::front_end_costs_db;
-use crate::expect::timeline::Timeline;
-use crate::judge::foreign::{self, Files, ForeignSummary, Judged, Judgement, observables, place};
-use crate::read::Run;
+use crate::judge::foreign::{self, Draft, Files, Judgement};
 use crate::read::nmea::PlaceFix;
-use crate::read::rinex_obs::{LARGEST_BYTES, ObservedEpoch, Values};
-use gnss::time::{Epoch, WEEK_S};
+use crate::read::rinex_obs::{ObservedEpoch, Values};
+use gnss::time::Epoch;
 use logs::contents::Contents;
 use logs::frames::Protocol;
 use logs::log::Log;
@@ -59,96 +54,31 @@ struct Usable {
 /// [`JudgeError::NotOfThisTruth`] for a log without usable messages or of another time, and all errors of
 /// [`foreign::judge`].
 pub fn judge(truth: &Path, log: &Path, asked: Option<Protocol>, files: &Files) -> Result<Logged, JudgeError> {
-    let has_files = files.rinex_obs.is_some() || files.nmea.is_some();
-    let base = if has_files { Some(foreign::judge(truth, files)?) } else { None };
-    let run = match &base {
-        Some(_) => None,
-        None => Some(Run::read_truth(truth)?),
-    };
-    let Some(timeline) =
-        Timeline::new(base.as_ref().map_or_else(|| run.as_ref(), |base| Some(&base.run)).ok_or_else(|| {
-            JudgeError::NotOfThisTruth { path: truth.to_owned(), what: "no truth: expected one".to_owned() }
-        })?)?
-    else {
-        let what = "no rows: expected the antenna's motion".to_owned();
-        return Err(JudgeError::NotOfThisTruth { path: truth.join("trajectory.csv"), what });
-    };
-    let middle = timeline.origin.plus_s(0.5 * timeline.span_s().1);
-    let (protocol, usable, contents) = read(log, asked, middle)?;
-    let (run, mut judged) = match (base, run) {
-        (Some(base), _) => (base.run, base.judged),
-        (None, Some(run)) => {
-            let judged = without_files(&run, &timeline);
-            (run, judged)
-        }
-        (None, None) => return Err(refuse(log, "no truth: expected one")),
-    };
-    if !usable.epochs.is_empty() && judged.observables.is_none() {
-        let labels: Vec<Epoch> = usable.epochs.iter().map(|epoch| epoch.label).collect();
-        judged.rollover_s[0] = rollover_s(log, &labels, &timeline)?;
-        let measured = observables::measure(&usable.epochs, &timeline, judged.rollover_s[0], &front_end_costs_db(&run));
-        if measured.rows.is_empty() {
-            return Err(elsewhere(log, &labels, &timeline));
-        }
-        judged.observables = Some(measured);
+    let mut draft = Draft::new(truth, files)?;
+    let (protocol, usable, contents) = read(log, asked, draft.middle())?;
+    if !usable.epochs.is_empty() && !draft.has_observations() {
+        draft.observe(log, &usable.epochs, None)?;
     }
     let mut reported = None;
     if !usable.fixes.is_empty() {
         let labels: Vec<Epoch> = usable.fixes.iter().map(|fix| fix.label).collect();
-        let shift_s = rollover_s(log, &labels, &timeline)?;
-        reported = Some(Reported::new(&usable.fixes, &usable.clocks, &timeline, shift_s));
-        if judged.places.is_none() {
-            judged.rollover_s[1] = shift_s;
+        let shift_s = draft.rollover_s(log, &labels)?;
+        reported = Some(Reported::new(&usable.fixes, &usable.clocks, &draft.timeline, shift_s));
+        if !draft.has_positions() {
             let fixes: Vec<PlaceFix> = usable.fixes.iter().map(place_fix).collect();
-            let mut measured = place::measure(&fixes, &timeline, shift_s);
-            measured.resolution_m = resolution_m(protocol, usable.is_refined);
-            if measured.rows.is_empty() {
-                return Err(elsewhere(log, &labels, &timeline));
-            }
-            judged.places = Some(measured);
+            draft.place(log, &fixes, resolution_m(protocol, usable.is_refined))?;
         }
     }
-    let summary = ForeignSummary::new(&judged);
-    let judgement = Judgement { run, judged, summary };
-    Ok(Logged { judgement, protocol, contents, without_fix: usable.without_fix, reported })
-}
-
-/// Judgement before any file.
-fn without_files(run: &Run, timeline: &Timeline) -> Judged {
-    Judged {
-        scene: run.scene.name.clone(),
-        receiver: None,
-        truth_interval_s: timeline.interval_s(),
-        interpolation: timeline.interpolation,
-        sampler_drift: run.trajectory.first().map_or(0.0, |row| row.clock_drift),
-        rollover_s: [0; 2],
-        observables: None,
-        places: None,
-        labels_late_s: None,
-        separations_assumed: 0,
-    }
+    Ok(Logged { judgement: draft.finish(), protocol, contents, without_fix: usable.without_fix, reported })
 }
 
 /// Reads a log and chooses its protocol.
 fn read(path: &Path, asked: Option<Protocol>, near: Epoch) -> Result<(Protocol, Usable, Contents), JudgeError> {
-    let failed = |source: io::Error| match source.kind() {
-        io::ErrorKind::NotFound => {
-            JudgeError::Missing { path: path.to_owned(), remedy: "it is the log of the receiver under test" }
-        }
-        _ => JudgeError::Read { path: path.to_owned(), source },
-    };
-    let about = fs::metadata(path).map_err(failed)?;
-    // A pipe or a device has no size, and perhaps no end.
-    if !about.is_file() {
-        return Err(refuse(path, "is not an ordinary file"));
-    }
-    if about.len() > LARGEST_BYTES {
-        return Err(refuse(path, &format!("{} bytes: expected at most 256 MiB", about.len())));
-    }
-    let mut log = Log::new(File::open(path).map_err(failed)?, Some(near));
+    let (file, _) = foreign::opened(path)?;
+    let mut log = Log::new(file, Some(near));
     let mut all: BTreeMap<Protocol, Usable> = BTreeMap::new();
     for message in &mut log {
-        let message = message.map_err(failed)?;
+        let message = message.map_err(|source| foreign::unreadable(path, source))?;
         let own = all.entry(message.protocol).or_default();
         match message.event {
             Some(Event::Observations(epoch)) => own.take(epoch),
@@ -235,27 +165,6 @@ fn resolution_m(protocol: Protocol, is_refined: bool) -> f64 {
         Protocol::Ubx => 1e-7 * degree_m,
         _ => 0.0,
     }
-}
-
-/// Seconds, a multiple of 1024 weeks, by which labels lie ahead of the truth.
-fn rollover_s(path: &Path, labels: &[Epoch], timeline: &Timeline) -> Result<i64, JudgeError> {
-    const PERIOD_S: i64 = 1024 * WEEK_S;
-    const NEAR_S: f64 = 86_400.0;
-    let (from_s, to_s) = timeline.span_s();
-    let first_s = labels.first().map_or(0.0, |first| first.since(timeline.origin));
-    let shift_s = (first_s / PERIOD_S as f64).round() as i64 * PERIOD_S;
-    let near =
-        |label: &Epoch| (from_s - NEAR_S..=to_s + NEAR_S).contains(&(label.since(timeline.origin) - shift_s as f64));
-    if labels.iter().any(near) { Ok(shift_s) } else { Err(elsewhere(path, labels, timeline)) }
-}
-
-fn elsewhere(path: &Path, labels: &[Epoch], timeline: &Timeline) -> JudgeError {
-    let (from_s, to_s) = timeline.span_s();
-    let [from, to] = [from_s, to_s].map(|t_s| timeline.origin.plus_s(t_s));
-    let own = labels.first().zip(labels.last());
-    let own = own.map_or("nothing".to_owned(), |(first, last)| format!("{first} to {last}"));
-    let what = format!("epochs from {own} of GPS time have no truth: expected epochs from {from} to {to}");
-    refuse(path, &what)
 }
 
 fn refuse(path: &Path, what: &str) -> JudgeError {
