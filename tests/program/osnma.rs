@@ -98,6 +98,9 @@ fn forged_data_a_wrong_key_and_a_wrong_clock_end_with_three() {
     assert!(code == Some(3) && said.contains("DSM-KROOT (forged, or the public key is another)"), "{said}");
     let (code, _, said) = twin(here.path(), &["pages.csv", "--merkle-root", &"00".repeat(32)]);
     assert!(code == Some(3) && said.contains("DSM-PKR (forged, or the Merkle tree is another)"), "{said}");
+    fs::write(here.path().join("second.xml"), key_file(2)).unwrap();
+    let (code, _, said) = twin(here.path(), &["pages.csv", "--public-key", "second.xml"]);
+    assert!(code == Some(3) && said.contains("no root key of the public key was received"), "{said}");
     let late = twin(here.path(), &["pages.csv", "--merkle-root", &root, "--clock-offset-s", "3600"]);
     assert!(late.0 == Some(3) && late.2.contains("see --clock-offset-s"), "{}", late.2);
     let vague = twin(here.path(), &["pages.csv", "--merkle-root", &root, "--time-uncertainty-s", "60", "--json"]);

@@ -202,15 +202,23 @@ impl<'a> Summary<'a> {
             ];
             return Some(format!("refused: {}", listed(parts.into_iter())));
         }
-        let authentic = self.tags(None, "authentic");
-        (authentic == 0).then(|| match state {
+        if self.tags(None, "authentic") > 0 {
+            return None;
+        }
+        let reason = match state {
             State::ClockDisagrees => {
-                "no tag is authentic: the receiver's own time contradicts the pages: see --clock-offset-s and \
-                 --time-uncertainty-s"
-                    .to_owned()
+                "the receiver's own time contradicts the pages: see --clock-offset-s and --time-uncertainty-s"
             }
-            _ => format!("no tag is authentic: state at the end: {state}"),
-        })
+            State::NoKey => {
+                "no public key of the Merkle tree was received: expected a longer recording, or --public-key"
+            }
+            State::KeyVerified => {
+                "no root key of the public key was received: expected a longer recording, or the key in force"
+            }
+            State::DoNotUse => "the system says that its authentication must not be used",
+            _ => "no data came with a tag and its key: expected a longer recording",
+        };
+        Some(format!("no tag is authentic: {reason}"))
     }
 }
 

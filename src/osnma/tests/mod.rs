@@ -11,9 +11,10 @@ use crate::time::Gst;
 use crate::verifier::{Settings, Verifier};
 use signed::{BEGIN, SENDERS, Signed, merged, page, pkr, point, public, root, sky};
 
-/// Operational, chain 1, nominal.
-const NOMINAL: NmaHeader = NmaHeader(0b10_01_001_0);
-const STOP: NmaHeader = NmaHeader(0b11_01_001_0);
+/// Operational, chain 1, nominal: two bits, two bits, three bits and a reserved one.
+const NOMINAL: NmaHeader = NmaHeader(0b1001_0010);
+/// Not to be used, chain 1, nominal.
+const STOP: NmaHeader = NmaHeader(0b1101_0010);
 
 fn chain() -> Signed {
     Signed::new(1, Hash::Sha256, MacFunction::HmacSha256)
@@ -243,7 +244,7 @@ fn the_next_chain_follows_the_end_of_one() {
     let mut own = warm();
     feed(&mut own, &sky(&old, NOMINAL, 10, 20), 0.0);
     // End of chain: the next chain's root while the old one is in force, then the next one.
-    let (ending, next) = (NmaHeader(0b10_01_010_0), NmaHeader(0b10_10_001_0));
+    let (ending, next) = (NmaHeader(0b1001_0100), NmaHeader(0b1010_0010));
     feed(&mut own, &with(&old, ending, &new.kroot(ending, 1, 0), 20, 40), 0.0);
     assert_eq!(own.state(), State::Authentic);
     feed(&mut own, &with(&new, next, &new.kroot(next, 1, 0), 40, 70), 0.0);
@@ -259,7 +260,7 @@ fn a_revoked_chain_does_not_come_back() {
     let (old, new) = (chain(), Signed::new(2, Hash::Sha256, MacFunction::HmacSha256));
     let mut own = warm();
     feed(&mut own, &sky(&old, NOMINAL, 10, 20), 0.0);
-    let (stop, after) = (NmaHeader(0b11_01_011_0), NmaHeader(0b10_10_011_0));
+    let (stop, after) = (NmaHeader(0b1101_0110), NmaHeader(0b1010_0110));
     feed(&mut own, &with(&old, stop, &new.kroot(stop, 1, 0), 20, 30), 0.0);
     assert_eq!(own.state(), State::DoNotUse);
     feed(&mut own, &with(&new, after, &new.kroot(after, 1, 0), 30, 50), 0.0);
@@ -278,7 +279,7 @@ fn a_revoked_public_key_signs_nothing_any_more() {
     let (old, new) = (chain(), Signed::new(2, Hash::Sha256, MacFunction::HmacSha256));
     let mut own = verifier(Anchor::Tree(root()));
     feed(&mut own, &sky(&old, NOMINAL, 0, 20), 0.0);
-    let (stop, after) = (NmaHeader(0b11_01_101_0), NmaHeader(0b10_10_101_0));
+    let (stop, after) = (NmaHeader(0b1101_1010), NmaHeader(0b1010_1010));
     let all = |number: i64| SENDERS.map(|sender| old.subframe(sender, BEGIN.later(number), stop, 13, &pkr(1)));
     feed(&mut own, &merged((20..34).flat_map(all)), 0.0);
     feed(&mut own, &with(&old, stop, &new.kroot(stop, 2, 0), 34, 44), 0.0);
