@@ -15,6 +15,8 @@ mod glimpse;
 mod interrupt;
 mod lines;
 mod live;
+mod made;
+mod pack;
 mod packed;
 #[cfg(feature = "parquet")]
 mod parquet;
@@ -89,6 +91,7 @@ fn execute(arguments: Arguments) -> Result<(), CliError> {
         Command::Analyze(arguments) => analyze::execute(&arguments),
         Command::Plan(arguments) => plan::execute(&arguments),
         Command::Study(arguments) => study::execute(&arguments),
+        Command::Pack(arguments) => pack::execute(&arguments),
         #[cfg(feature = "parquet")]
         Command::Parquet(arguments) => parquet::execute(&arguments),
         #[cfg(not(feature = "parquet"))]

@@ -2,5 +2,6 @@
 
 mod cli;
 mod live;
+mod pack;
 mod ports;
 mod study;
