@@ -53,7 +53,7 @@ pub enum Command {
     Pack(Pack),
     /// Convert the tables of a run or a study to Parquet
     Parquet(Parquet),
-    /// List every key of scenarios, receiver settings, studies and limits: default, unit, range, meaning
+    /// List every key of scenarios, receiver settings, studies, packs and limits: default, unit, range, meaning
     Reference(Reference),
     /// List the scenes that come with the program, or copy some of them
     Scenes(Scenes),
@@ -144,7 +144,7 @@ pub struct Man {
 #[derive(Args, Debug)]
 #[command(after_help = "Example: gnss-twin reference front_end")]
 pub struct Reference {
-    /// Table to list, such as motion, receiver.tracking, study.axis or limits [default: all tables]
+    /// Table to list, such as motion, receiver.tracking, study.axis, pack or limits [default: all tables]
     pub table: Option<String>,
 }
 

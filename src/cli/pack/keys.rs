@@ -14,6 +14,7 @@ pub const PACK: &[Key] = &[
     text("licence", "a text", "licence of the pack and of its data").required(),
     text("about", "a text", "introduction of the matrix").or_else("none"),
     tables("entry", ENTRY, "Scene of the pack, and the verdict that is expected of it.").required(),
+    tables("may_fail", MAY_FAIL, "Figure of the verdict that may fail in every entry with verdict = \"pass\"."),
     tables("not_said", NOT_SAID, "Test of the source that no scene can say; the matrix lists it."),
 ];
 

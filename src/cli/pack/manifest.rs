@@ -101,9 +101,11 @@ impl Pack {
         let whole: Document = toml::from_str(text).map_err(|error| source.refused(&error))?;
         let sets = |number: usize| whole.get("entry")?.get(number)?.get("set").cloned();
         let mut refusals = Refusals::default();
+        let common: Vec<(String, String)> = refusals.take(may_fail(&root)).unwrap_or_default();
         let mut entries = Vec::new();
         for (number, table) in root.tables("entry")?.unwrap_or_default().iter().enumerate() {
-            entries.extend(refusals.take(Entry::read(table, sets(number), directory)));
+            let entry = Entry::read(table, sets(number), directory);
+            entries.extend(refusals.take(entry.map(|entry| entry.allowed(&common))));
         }
         let not_said = root.tables("not_said")?.unwrap_or_default();
         let not_said: Vec<NotSaid> = not_said.iter().filter_map(|table| refusals.take(NotSaid::read(table))).collect();
@@ -168,12 +170,25 @@ impl Entry {
             limits: limits(table, directory)?,
         })
     }
+
+    /// The entry with what may fail in every one of the pack.
+    fn allowed(mut self, common: &[(String, String)]) -> Self {
+        if let Expectation::Pass(own) = &mut self.expectation {
+            own.extend_from_slice(common);
+        }
+        self
+    }
+}
+
+/// Patterns of figures that may fail, each with its reason.
+fn may_fail(table: &Table<'_>) -> Result<Vec<(String, String)>, ScenarioError> {
+    let one = |table: &Table<'_>| Ok((table.need_text("figure")?.to_owned(), words(table.need_text("reason")?)));
+    table.tables("may_fail")?.unwrap_or_default().iter().map(one).collect()
 }
 
 impl Expectation {
     fn read(table: &Table<'_>) -> Result<Self, ScenarioError> {
         let reason = table.text("reason")?.map(words);
-        let may_fail = table.tables("may_fail")?.unwrap_or_default();
         let given = || reason.clone().ok_or_else(|| table.bad("reason", "a text, which this verdict needs"));
         match table.choice("verdict", &[("pass", "pass"), ("fail", "fail"), ("any", "any")])? {
             Some(verdict @ ("fail" | "any")) => {
@@ -182,12 +197,7 @@ impl Expectation {
                 }
                 Ok(if verdict == "fail" { Self::Fail(given()?) } else { Self::Any(given()?) })
             }
-            _ => {
-                let one = |table: &Table<'_>| {
-                    Ok::<_, ScenarioError>((table.need_text("figure")?.to_owned(), words(table.need_text("reason")?)))
-                };
-                may_fail.iter().map(one).collect::<Result<_, _>>().map(Self::Pass)
-            }
+            _ => may_fail(table).map(Self::Pass),
         }
     }
 
@@ -333,5 +343,8 @@ mod tests {
         let expectation = &pack.entries[0].expectation;
         assert_eq!(expectation.excuse("horizontal error", ""), Some("r"));
         assert_eq!(expectation.excuse("vertical error", "position.vertical_p95_m"), None);
+        let pack = read(&format!("{TOP}{ENTRY}[[may_fail]]\nfigure = \"position.*\"\nreason = \"all\"\n")).unwrap();
+        let expectation = &pack.entries[0].expectation;
+        assert_eq!(expectation.excuse("vertical error", "position.vertical_p95_m"), Some("all"));
     }
 }

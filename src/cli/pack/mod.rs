@@ -17,7 +17,6 @@ mod record;
 use std::collections::BTreeSet;
 use std::env;
 use std::fs::{self, File, TryLockError};
-use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -41,7 +40,7 @@ use study::sweep::sha256_of_file;
 
 /// Memory that is set aside for an entry at work: a scene of one band takes less.
 const ENTRY_BYTES: u64 = 1 << 30;
-/// File that marks a directory of results, and is locked while one is made.
+/// File that marks a directory of results.
 const MARK: &str = "pack.json";
 
 /// Does what is asked of a pack.
@@ -142,15 +141,16 @@ fn build() -> Result<String, CliError> {
     hash.map_err(|error| CliError::read("the program itself", &error))
 }
 
-/// Makes or takes over a directory of results of this pack, and locks it until the file is dropped.
-fn begin(out: &Path, pack: &Pack) -> Result<File, CliError> {
+/// Makes or takes over a directory of results of this pack, and locks it until the handle is dropped.
+fn begin(out: &Path, pack: &Pack) -> Result<Option<File>, CliError> {
     let error = |error: std::io::Error| CliError::create(out.display(), &error);
     let mark = out.join(MARK);
     let foreign = |what: &str| {
         CliError::refused_output(format!("{} {what}: name another directory with --out, or remove it", out.display()))
     };
     let is_empty = match fs::read_dir(out) {
-        Ok(mut entries) => entries.next().is_none(),
+        // What a killed run was making there is none of the user's.
+        Ok(mut entries) => entries.all(|entry| entry.is_ok_and(|entry| entry.file_name() == ".pack.json.part")),
         Err(missing) if missing.kind() == std::io::ErrorKind::NotFound => true,
         Err(other) => return Err(error(other)),
     };
@@ -158,23 +158,19 @@ fn begin(out: &Path, pack: &Pack) -> Result<File, CliError> {
         return Err(foreign("exists and holds no results of a pack"));
     }
     fs::create_dir_all(out).map_err(error)?;
-    let mut file = File::options().read(true).write(true).create(true).truncate(false).open(&mark).map_err(error)?;
-    match file.try_lock() {
-        Err(TryLockError::WouldBlock) => {
-            return Err(CliError::passing(format!("{}: another pack run is at work there", out.display())));
-        }
-        // A file system without locks has no second run that this one could see.
-        Ok(()) | Err(TryLockError::Error(_)) => {}
+    // A directory that cannot be opened or locked has no second run that this one could see.
+    let lock = File::open(out).ok();
+    if lock.as_ref().is_some_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock))) {
+        return Err(CliError::passing(format!("{}: another pack run is at work there", out.display())));
     }
-    let mut found = String::new();
-    file.read_to_string(&mut found).map_err(|error| CliError::read(mark.display(), &error))?;
     let own = format!("{}\n", json!({ "pack": pack.name }));
-    if found.is_empty() {
-        file.write_all(own.as_bytes()).map_err(|error| CliError::output(mark.display(), &error))?;
-    } else if found != own {
-        return Err(foreign("holds results of another pack"));
+    if !mark.is_file() {
+        let staging = Staging::file(&mark)?;
+        staging.write(own.as_bytes())?;
+        staging.commit()?;
     }
-    Ok(file)
+    let found = fs::read_to_string(&mark).map_err(|error| CliError::read(mark.display(), &error))?;
+    if found == own { Ok(lock) } else { Err(foreign("holds results of another pack")) }
 }
 
 /// Removes what a killed run was making.
