@@ -53,7 +53,8 @@ pub enum Command {
     Pack(Pack),
     /// Convert the tables of a run or a study to Parquet
     Parquet(Parquet),
-    /// List every key of scenarios, receiver settings, studies, packs and limits: default, unit, range, meaning
+    /// List every key of scenarios, receiver settings, studies, packs and limits: default, unit, range,
+    /// meaning
     Reference(Reference),
     /// List the scenes that come with the program, or copy some of them
     Scenes(Scenes),
