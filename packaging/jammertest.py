@@ -21,6 +21,8 @@ L1_HZ = 1575.42e6
 HALF_BAND_HZ = 2e6
 # Distances that the catalogue leaves open.
 LOW_POWER_M, HIGH_POWER_M = 100, 1000
+# Receivers of a meaconer, metres north and east of the antenna, and its delay through cable and amplifier.
+RX1_M, RX2_M, DELAY_S = (300, 0), (0, 300), 1e-6
 # Power of a satellite at the antenna, for spoofers: IS-GPS-200N, 6.3.1.
 SATELLITE_DBW = -158.5
 BEGIN_S, END_S, STEP_S = 32, 48, 0.5
@@ -31,7 +33,8 @@ ROUTE = "its route is in no data of the catalogue"
 # The first pattern that is in a test's code, name or description says why no scene says it.
 UNSAID = [
     (r"^2\.[14678]\.|^2\.6|^2\.9", "a spoofer has the ephemerides, the health and the time of the true satellites"),
-    (r"^3\.", "a meaconer's receivers and their positions are in no data of the catalogue"),
+    (r"^3\.[45]", "spoofing or jammers beside meaconing, on a route that is in no data of the catalogue"),
+    (r"^3\.2\.(6|7|9|1)", "the durations between which it switches are in no data of the catalogue"),
     (r"^2\.10\.|^1\.24\.", "spoofing or meaconing beside jammers, on a route that is in no data of the catalogue"),
     (r"Deprecated", "the catalogue has withdrawn it"),
     (r"^2.*Galileo (only|E1$)|^2.*E1$", "the spoofed signals are Galileo's, and the base scene receives GPS L1 C/A"),
@@ -39,7 +42,6 @@ UNSAID = [
     (r"Pseudorange error", "the catalogue leaves the rate open (x ns/s)"),
     (r"Nav data manip|UTC-param|PRN 37", "a spoofer sends the messages of the true satellites"),
     (r"[Rr]oute|Long duration|Longer period", ROUTE),
-    (r"drift.*gaussian", "interference of kind noise has one centre"),
     (r"overtaking|in vehicle being", "an emitter does not move"),
     (r"inside car|inside public", "the loss through a car or a deck is in no data of the catalogue"),
     (r"pulse duration", "pulses of a spread code"),
@@ -249,6 +251,16 @@ def jammed(test, known):
         notes.append("the spread code as Gaussian noise of the chip rate's bandwidth")
     if "drift" in name:
         notes.append("the drift in 10 s")
+        if "gaussian" in name:
+            # Noise has one centre: it steps through the band of the base scene, 0.5 MHz at a time.
+            speed = source["sweep_hz"] / 10
+            dwell = round(0.5e6 / abs(speed), 6)
+            notes.append("one pass in steps of 0.5 MHz")
+            steps = range(-5, 6) if speed > 0 else range(5, -6, -1)
+            noise = {"kind": "noise", "bandwidth_hz": 0.5e6, "eirp_dbw": source["eirp_dbw"], "distance_m": HIGH_POWER_M}
+            return static([noise | {"center_hz": L1_HZ + 0.5e6 * step, "on_s": round(BEGIN_S + dwell * n, 6),
+                                    "off_s": round(BEGIN_S + dwell * (n + 1), 6)} for n, step in enumerate(steps)]), \
+                "; ".join(notes)
     if group in (6, 7, 14) or "increments" in name:
         low = re.search(r"\((-\d+)dBm\)", name)
         low_dbw = int(low[1]) - 30 if low else -70
@@ -301,6 +313,49 @@ def spoofed(test):
     return keys, "; ".join(notes)
 
 
+def meaconed(test):
+    """Keys and what they leave out: tests of meaconing, where a spoofer is at a receiver's position and late."""
+    name, description = test["name"], test["description"]
+    north_deg, east_deg = 1 / 111_560, 1 / 39_540
+    top_w = float(test["max_power_w"]) or 10
+
+    def at(place_m, power_w, begin=BEGIN_S, end=None):
+        place = {"kind": "static", "latitude_deg": round(69.27547832 + place_m[0] * north_deg, 8),
+                 "longitude_deg": round(15.96832496 + place_m[1] * east_deg, 8), "height_m": 35}
+        power = {"power_db": round(dbw(power_w) - 96.4 - SATELLITE_DBW, 1), "on_s": begin}
+        return power | ({"off_s": end} if end else {}) | {"clock_bias_s": -DELAY_S, "motion": place}
+
+    both = [at(RX1_M, top_w), at(RX2_M, top_w)]
+    notes = ["receivers 300 m from the antenna, 1 µs late, heard at 1 km"]
+    growth = {"power_start_db": round(-30 - 96.4 - SATELLITE_DBW, 1), "ramp_s": 16}
+    if "alternating" in name:
+        step = 8 if "breaks" in name else 4
+        both = [at((RX1_M, RX2_M)[n % 2], top_w, BEGIN_S + step * n, BEGIN_S + step * n + 4) for n in range(16 // step)]
+        notes.append("4 s for a minute")
+    elif "different times" in name:
+        both = [at(RX1_M, top_w, BEGIN_S, BEGIN_S + 12), at(RX2_M, top_w, BEGIN_S + 4)]
+        notes.append("4 s for five minutes")
+    elif "adding RX2" in name:
+        both = [at(RX1_M, 0.5), at(RX2_M, top_w, BEGIN_S + 4)]
+        notes.append("4 s for five minutes")
+    elif "constant" in name:
+        both = [at(RX1_M, 5), at(RX2_M, top_w) | growth]
+    elif "ramp" in name.lower():
+        both = [at(RX1_M, top_w) | growth]
+    elif "RX1 and RX2" not in name:
+        both = [at(RX2_M if "RX2" in name else RX1_M, top_w)]
+    if "power_start_db" in str(both):
+        notes.append("the power grows evenly within 16 s")
+    keys = {"spoofer": both} | longer(75)
+    if "jamming" in f"{name} {description}":
+        jammer = {"kind": "noise", "bandwidth_hz": 3e6, "center_hz": L1_HZ, "distance_m": HIGH_POWER_M,
+                  "eirp_dbw": 0 if "30 dBm" in description else 17}
+        pauses = [(BEGIN_S + 4, BEGIN_S + 8), (BEGIN_S + 12, BEGIN_S + 16)] if "in breaks" in name else [(26, BEGIN_S)]
+        keys["interference"] = [one for pause in pauses for one in timed([jammer], *pause)]
+        notes.append("jamming of some seconds")
+    return keys, "; ".join(notes)
+
+
 def toml(value):
     """A value on one line of TOML."""
     if isinstance(value, dict):
@@ -328,7 +383,8 @@ def manifest():
                 code, name = test["test_code"], " ".join(test["name"].split())
                 reason, keys, note = reason_of(test), None, ""
                 if reason is None:
-                    keys, note = jammed(test, known) if kind["type_id"] == 1 else spoofed(test)
+                    tell = {1: lambda test: jammed(test, known), 2: spoofed, 3: meaconed}[kind["type_id"]]
+                    keys, note = tell(test)
                     reason = note if keys is None else None
                 head = f"name = {toml(code)}\ngroup = {toml(title)}\n"
                 if keys is None:
