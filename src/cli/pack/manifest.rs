@@ -320,7 +320,7 @@ mod tests {
                 "entry[1].limits = \"l.toml\": expected a file that can be read: cannot read",
             ),
             (entry("[entry.set]\nduration_s = -1"), "scene with set: duration_s = -1"),
-            (entry("[entry.set]\n\"interference[2].js_db\" = 1"), "interference[2].js_db: interference has no entr"),
+            (entry("[entry.set]\n\"interference[2].js_db\" = 1"), "interference[2].js_db: interference is no array"),
             (entry("[[entry.may_fail]]\nfigure = \"x\""), "entry[1].may_fail[1].reason = absent: expected a text"),
             (format!("{TOP}{ENTRY}{ENTRY}"), "pack.toml:11:8: entry[2].name = \"a\": expected each name once"),
             (format!("{TOP}{}", ENTRY.replace("s.toml", "q.toml")), "scene = \"q.toml\": expected a scene that can be"),
