@@ -109,7 +109,7 @@ impl Pack {
         }
         let not_said = root.tables("not_said")?.unwrap_or_default();
         let not_said: Vec<NotSaid> = not_said.iter().filter_map(|table| refusals.take(NotSaid::read(table))).collect();
-        if !root.tables("entry")?.is_some_and(|tables| !tables.is_empty()) {
+        if root.tables("entry")?.is_none_or(|tables| tables.is_empty()) {
             refusals.add(root.bad("entry", "at least one [[entry]]"));
         }
         let mut seen = BTreeSet::new();

@@ -33,6 +33,9 @@ pub struct Matrix<'p> {
     pub part: Option<&'p [String]>,
 }
 
+/// Condition of a row that a chapter lists.
+type Holds = fn(&Row<'_>) -> bool;
+
 impl<'p> Row<'p> {
     /// Holds a record against the expectation of its entry.
     pub fn new(entry: &'p Entry, record: Record) -> Self {
@@ -285,7 +288,7 @@ impl Matrix<'_> {
     /// Chapters of what is not as expected, what is excused, what did not run, and what each entry is.
     fn reasons(&self, report: &mut Report) {
         let columns = || [("entry", Side::Left), ("description", Side::Left), ("reason", Side::Left)];
-        let chapters: [(&str, &str, fn(&Row<'_>) -> bool); 3] = [
+        let chapters: [(&str, &str, Holds); 3] = [
             ("Not as expected", "Entries that did not end as the pack expects", |row| row.is_expected() == Some(false)),
             ("Excused", "Failed figures that the pack excuses", |row| {
                 row.is_expected() == Some(true) && !row.excused.is_empty()
