@@ -10,6 +10,7 @@ use crate::cli::address::listen_address;
 use crate::cli::lines;
 use crate::cli::live::intake::Origin;
 use crate::cli::osnma::args::Osnma;
+use crate::cli::pack::args::Pack;
 use crate::cli::packed::{Bits, Packed};
 use crate::cli::printed::Printed;
 use crate::cli::sink::Spec;
@@ -50,13 +51,16 @@ pub enum Command {
     Plan(Plan),
     /// Run a parameter study: vary keys, repeat with other noise, write tables, curves and a report
     Study(Study),
+    /// Run the scenes of a pack and write one matrix of their verdicts
+    Pack(Pack),
     /// Show what a receiver's log holds, or convert it to tables
     Logs(Logs),
     /// Verify the authentication of Galileo's navigation messages (OSNMA)
     Osnma(Osnma),
     /// Convert the tables of a run or a study to Parquet
     Parquet(Parquet),
-    /// List every key of scenarios, receiver settings, studies and limits: default, unit, range, meaning
+    /// List every key of scenarios, receiver settings, studies, packs and limits: default, unit, range,
+    /// meaning
     Reference(Reference),
     /// List the scenes that come with the program, or copy some of them
     Scenes(Scenes),
@@ -122,10 +126,14 @@ pub struct Parquet {
 }
 
 #[derive(Args, Debug)]
-#[command(after_help = "Examples:\n  gnss-twin scenes\n  gnss-twin scenes jammed ionex --out my-scenes")]
+#[command(after_help = "Examples:\n  gnss-twin scenes\n  gnss-twin scenes jammed ionex --out my-scenes\n  gnss-twin \
+                        scenes --pack dynamics --out dynamics")]
 pub struct Scenes {
-    /// Scenes to copy, with the files that they name [default: list all scenes]
+    /// Scenes to copy, with the files that they name [default: list all scenes and packs]
     pub names: Vec<String>,
+    /// Pack to copy, with its scenes and the files that they name
+    #[arg(long, value_name = "NAME", conflicts_with = "names")]
+    pub pack: Option<String>,
     /// Destination directory
     #[arg(long, value_name = "DIR", default_value = ".")]
     pub out: PathBuf,
@@ -183,7 +191,7 @@ pub struct Man {
 #[derive(Args, Debug)]
 #[command(after_help = "Example: gnss-twin reference front_end")]
 pub struct Reference {
-    /// Table to list, such as motion, receiver.tracking, study.axis or limits [default: all tables]
+    /// Table to list, such as motion, receiver.tracking, study.axis, pack or limits [default: all tables]
     pub table: Option<String>,
 }
 

@@ -89,6 +89,17 @@ impl CliError {
         self.code
     }
 
+    /// Message of this end, without the word that it is printed after.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
+    /// End whose message begins with its position.
+    pub fn at(self, place: &str) -> Self {
+        let message = if self.message.is_empty() { self.message } else { format!("{place}: {}", self.message) };
+        Self { message, ..self }
+    }
+
     /// Prints the message on standard error, control characters escaped; a failure to do so is silent.
     pub fn print(&self) {
         if self.message.is_empty() {

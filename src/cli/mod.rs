@@ -16,7 +16,9 @@ mod interrupt;
 mod lines;
 mod live;
 mod logs;
+mod made;
 mod osnma;
+mod pack;
 mod packed;
 #[cfg(feature = "parquet")]
 mod parquet;
@@ -91,6 +93,7 @@ fn execute(arguments: Arguments) -> Result<(), CliError> {
         Command::Analyze(arguments) => analyze::execute(&arguments),
         Command::Plan(arguments) => plan::execute(&arguments),
         Command::Study(arguments) => study::execute(&arguments),
+        Command::Pack(arguments) => pack::execute(&arguments),
         Command::Logs(arguments) => logs::execute(&arguments),
         Command::Osnma(arguments) => osnma::execute(&arguments),
         #[cfg(feature = "parquet")]

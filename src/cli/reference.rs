@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use crate::cli::args;
 use crate::cli::error::CliError;
+use crate::cli::pack::keys::PACK;
 use crate::cli::scenario;
 use analysis::judge::judgement::MARGINAL_SHARE;
 use analysis::judge::schema;
@@ -49,7 +50,7 @@ pub fn whole() -> String {
     out
 }
 
-fn chapters() -> [(&'static str, Vec<Section>); 5] {
+fn chapters() -> [(&'static str, Vec<Section>); 6] {
     let top = "At the top of the file. Paths are relative to the scenario and stay below its directory.";
     let study =
         "At the top of the file. At level = \"samples\" an axis may take any key of the scene or of the receiver.";
@@ -59,6 +60,7 @@ fn chapters() -> [(&'static str, Vec<Section>); 5] {
         ("Signal file", declared(tables_of(SIGNAL, "", signal), "signal", "signal.")),
         ("Receiver settings", of_receiver()),
         ("Study", declared(tables_of(STUDY, "", study), "study", "study.")),
+        ("Pack", declared(tables_of(PACK, "", "At the top of a pack's pack.toml."), "pack", "pack.")),
         ("Limits (`--check`)", vec![Section { name: "limits".to_owned(), text: limits() }]),
     ]
 }
@@ -126,7 +128,7 @@ mod tests {
     #[test]
     fn every_declared_key_has_a_meaning_and_stands_in_the_reference() {
         let text = whole();
-        for table in [SCENARIO, SIGNAL, STUDY].into_iter().flat_map(|keys| tables_of(keys, "", "x")) {
+        for table in [SCENARIO, SIGNAL, STUDY, PACK].into_iter().flat_map(|keys| tables_of(keys, "", "x")) {
             assert!(!table.meaning.is_empty(), "{}", table.path);
             for key in table.keys {
                 assert!(!key.meaning.is_empty(), "{}.{}", table.path, key.name);

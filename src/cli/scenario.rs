@@ -125,7 +125,7 @@ pub fn refused(error: &SettingsError) -> CliError {
 }
 
 /// Error that lists several messages, each as one of its own.
-fn all(messages: impl Iterator<Item = String>) -> CliError {
+pub fn all(messages: impl Iterator<Item = String>) -> CliError {
     CliError::input(messages.collect::<Vec<_>>().join("\nerror: "))
 }
 

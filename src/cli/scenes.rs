@@ -1,7 +1,8 @@
-//! `scenes` and `init`: the scenes that come with the program, and a commented one to begin with.
+//! `scenes` and `init`: the scenes and packs that come with the program, and a commented scene to begin with.
 //!
 //! Scenes are copied with the files that they name and with the schema that their first line names, so that a
-//! copy runs and an editor knows its keys wherever it lies.
+//! copy runs and an editor knows its keys wherever it lies. A pack is copied with its own files and the
+//! shipped scenes that its manifest names.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -11,12 +12,14 @@ use include_dir::{Dir, File, include_dir};
 
 use crate::cli::args;
 use crate::cli::error::CliError;
+use crate::cli::pack::MANIFEST;
 use crate::cli::scenario;
 use crate::cli::schema;
 use crate::cli::staging::Staging;
 use gnss::place::nearest;
 
 static SHIPPED: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/scenarios");
+static PACKS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/packs");
 /// The scene of [`init`]. Lines that begin with `#` and a letter or a bracket are TOML to be uncommented.
 const COMMENTED: &str = include_str!("../../assets/commented_scene.toml");
 /// The name of the schema beside a copy.
@@ -26,11 +29,20 @@ const DIRECTIVE: &str = "#:schema ";
 
 /// Lists all scenes, or copies some.
 pub fn execute(arguments: &args::Scenes) -> Result<(), CliError> {
+    if let Some(name) = &arguments.pack {
+        return write_all(&arguments.out, pack(name)?, arguments.force);
+    }
     let scenes = scenes();
     if arguments.names.is_empty() {
         let width = scenes.keys().map(String::len).max().unwrap_or(0);
         let lines = scenes.iter().map(|(name, file)| format!("{name:width$}  {}\n", about(text(file))));
-        return scenario::print(&lines.collect::<String>());
+        let packs = packs();
+        let packs = packs.iter().map(|(name, dir)| format!("{name:width$}  {}\n", title(manifest_of(dir))));
+        let packs: String = packs.collect();
+        return scenario::print(&format!(
+            "{}\nPacks (gnss-twin scenes --pack NAME --out DIR copies one):\n{packs}",
+            lines.collect::<String>()
+        ));
     }
     let mut copies: BTreeMap<PathBuf, Vec<u8>> = BTreeMap::new();
     for wanted in &arguments.names {
@@ -43,6 +55,56 @@ pub fn execute(arguments: &args::Scenes) -> Result<(), CliError> {
         copies.extend(with_its_files(scene));
     }
     write_all(&arguments.out, copies, arguments.force)
+}
+
+/// The shipped packs by name.
+fn packs() -> BTreeMap<&'static str, &'static Dir<'static>> {
+    let name = |dir: &'static Dir<'static>| Some((dir.path().to_str()?, dir));
+    PACKS.dirs().filter_map(name).collect()
+}
+
+fn manifest_of(dir: &'static Dir<'static>) -> &'static str {
+    dir.get_file(dir.path().join(MANIFEST)).map_or("", text)
+}
+
+/// The title in a manifest.
+fn title(manifest: &str) -> String {
+    let table: toml::Table = toml::from_str(manifest).unwrap_or_default();
+    table.get("title").and_then(toml::Value::as_str).unwrap_or_default().to_owned()
+}
+
+/// Files of a shipped pack: its own, and the shipped scenes that its manifest names and it has not itself.
+fn pack(wanted: &str) -> Result<BTreeMap<PathBuf, Vec<u8>>, CliError> {
+    let packs = packs();
+    let Some(dir) = packs.get(wanted) else {
+        let names: Vec<&str> = packs.keys().copied().collect();
+        let hint = nearest(wanted, &names).map_or(String::new(), |near| format!(" (did you mean {near}?)"));
+        return Err(CliError::usage(format!("no pack {wanted:?}{hint}: expected one of {}", names.join(", "))));
+    };
+    let manifest = manifest_of(dir);
+    let named = |file: &&File<'static>| {
+        let name = file.path().file_name().map(|name| name.to_string_lossy().into_owned());
+        name.is_some_and(|name| manifest.contains(&format!("scene = \"{name}\"")))
+    };
+    let mut copies: BTreeMap<PathBuf, Vec<u8>> =
+        scenes().values().copied().filter(named).flat_map(with_its_files).collect();
+    let own = |file: &'static File<'static>| {
+        let is_scene = text(file).starts_with(DIRECTIVE);
+        let bytes = if is_scene { with_its_schema(text(file)) } else { file.contents().to_vec() };
+        Some((PathBuf::from(file.path().file_name()?), bytes))
+    };
+    copies.extend(dir.files().filter_map(own));
+    copies.entry(SCHEMA.into()).or_insert_with(|| schema::scenario().into());
+    Ok(copies)
+}
+
+/// Shipped pack that a directory without a manifest may mean, in words.
+pub fn pack_hint(directory: &Path) -> Option<String> {
+    let name = directory.file_name()?.to_str()?;
+    let packs = packs();
+    let names: Vec<&str> = packs.keys().copied().collect();
+    let near = if packs.contains_key(name) { name.to_owned() } else { nearest(name, &names)? };
+    Some(format!("`gnss-twin scenes --pack {near} --out {near}` copies the pack {near} that comes with the program"))
 }
 
 /// Bundled scene that a path without a file may mean, in words: the one of that name, or the most similar
@@ -124,13 +186,18 @@ fn with_its_files(scene: &'static File<'static>) -> Vec<(PathBuf, Vec<u8>)> {
         text(scene).contains(&quoted)
     });
     let mut copies: Vec<_> = named.map(|file| (name(file.path()), file.contents().to_vec())).collect();
-    let own = text(scene).lines().map(|line| match line.starts_with(DIRECTIVE) {
+    copies.push((name(scene.path()), with_its_schema(text(scene))));
+    copies.push((SCHEMA.into(), schema::scenario().into()));
+    copies
+}
+
+/// A scene whose first line names the schema beside it.
+fn with_its_schema(text: &str) -> Vec<u8> {
+    let own = text.lines().map(|line| match line.starts_with(DIRECTIVE) {
         true => format!("{DIRECTIVE}{SCHEMA}\n"),
         false => format!("{line}\n"),
     });
-    copies.push((name(scene.path()), own.collect::<String>().into_bytes()));
-    copies.push((SCHEMA.into(), schema::scenario().into()));
-    copies
+    own.collect::<String>().into_bytes()
 }
 
 #[cfg(test)]
@@ -140,7 +207,7 @@ mod tests {
 
     fn copied(names: &[&str], directory: &Path) -> Result<(), CliError> {
         let names = names.iter().map(|name| (*name).to_owned()).collect();
-        execute(&args::Scenes { names, out: directory.to_owned(), force: false })
+        execute(&args::Scenes { names, pack: None, out: directory.to_owned(), force: false })
     }
 
     #[test]

@@ -126,6 +126,7 @@ fn processor_locale_and_clock_change_no_byte() {
             "study merge",
             "study report",
             "study run of samples",
+            "pack run",
         ]
     } else {
         &["plan", "generate"]

@@ -80,6 +80,12 @@ fn ends(code: i32, text: &str, directory: &Path) {
     assert_eq!(output.status.code(), Some(code), "{text}: {}", String::from_utf8_lossy(&output.stderr));
 }
 
+/// Two entries of one scene.
+const PACK: &str = "name = \"small\"\ntitle = \"Small\"\nsource = \"this test\"\nlicence = \"MIT\"\n[[entry]]\nname = \
+                    \"a\"\ngroup = \"g\"\ndescription = \"d\"\nscene = \"tiny.toml\"\nverdict = \"any\"\nreason = \
+                    \"short\"\n[[entry]]\nname = \"b\"\ngroup = \"g\"\ndescription = \"d\"\nscene = \"tiny.toml\"\n\
+                    verdict = \"any\"\nreason = \"short\"\nset.seed = 2\n";
+
 impl Bench {
     /// A bench with the named tasks.
     pub fn new(names: &[&'static str]) -> Self {
@@ -171,6 +177,12 @@ impl Bench {
                 fs::write(at("study.toml"), SAMPLED).unwrap();
                 good("study plan study.toml -o lab --shards 2", &before);
                 "study run lab --jobs 2"
+            }
+            "pack run" => {
+                fs::create_dir(at("small")).unwrap();
+                fs::copy(at("tiny.toml"), at("small/tiny.toml")).unwrap();
+                fs::write(at("small/pack.toml"), PACK).unwrap();
+                "pack run small --out res --threads 2"
             }
             other => panic!("no task {other}"),
         };
@@ -297,7 +309,7 @@ fn lasting(name: &str, bytes: Vec<u8>) -> Vec<u8> {
         return bytes;
     }
     match name.rsplit('/').next() {
-        Some("speed.json") => b"speed".to_vec(),
+        Some("speed.json" | "times.csv") => b"speed".to_vec(),
         // Whole from its first to its last line.
         Some("report.pdf") if bytes.starts_with(b"%PDF-") && bytes.trim_ascii_end().ends_with(b"%%EOF") => {
             b"report".to_vec()

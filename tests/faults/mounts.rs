@@ -71,6 +71,7 @@ fn a_full_or_read_only_disk_refuses_and_with_room_the_same_command_completes() {
             "study merge",
             "study report",
             "study run of samples",
+            "pack run",
         ]
     } else {
         &["generate"]

@@ -108,6 +108,7 @@ fn a_signal_at_any_moment_ends_the_program_at_once_and_the_next_run_is_right() {
             "study plan",
             "study report",
             "study run of samples",
+            "pack run",
             "run",
             "analyze",
         ]

@@ -3,5 +3,6 @@
 mod cli;
 mod live;
 mod osnma;
+mod pack;
 mod ports;
 mod study;

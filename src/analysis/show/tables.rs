@@ -9,6 +9,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::error::JudgeError;
+use crate::judge::verdict::Verdict;
 use crate::measure::elevation::Elevations;
 use crate::measure::errors::PositionError;
 use crate::measure::jitter::Jitter;
@@ -175,7 +176,15 @@ pub(crate) fn write(directory: &Path, judged: &Judged<'_>) -> Result<(), JudgeEr
         let rows = rows.map(|(row, &density_db)| TheoryRow { frequency_hz: row.frequency_hz, density_db });
         write_rows(&directory.join("psd_theory.csv"), "", rows)?;
     }
-    write_rows(&directory.join("verdict.csv"), "", judged.summary.details.verdict.csv_rows())
+    write_verdict(directory, &judged.summary.details.verdict)
+}
+
+/// Writes `verdict.csv` into a run's directory.
+///
+/// # Errors
+/// The file that cannot be written.
+pub fn write_verdict(directory: &Path, verdict: &Verdict) -> Result<(), JudgeError> {
+    write_rows(&directory.join("verdict.csv"), "", verdict.csv_rows())
 }
 
 fn position(error: &PositionError, fix: Option<&Fix>) -> PositionRow {
