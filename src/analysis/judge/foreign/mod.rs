@@ -206,7 +206,7 @@ pub struct Judgement {
 /// File of a receiver under test, with its size in bytes.
 ///
 /// # Errors
-/// [`JudgeError::Missing`] and [`JudgeError::Read`], and [`JudgeError::NotOfThisTruth`] for what is no ordinary
+/// [`JudgeError::Missing`], [`JudgeError::Read`], and [`JudgeError::NotOfThisTruth`] for what is no ordinary
 /// file or too large.
 pub(crate) fn opened(path: &Path) -> Result<(File, u64), JudgeError> {
     let failed = |source: io::Error| unreadable(path, source);
