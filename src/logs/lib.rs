@@ -8,6 +8,7 @@
 //! Internal crate: programs use the facade `gnss_twin`. What it does not hand on may change with any version.
 
 pub mod bits;
+pub mod content;
 pub mod contents;
 pub mod frames;
 pub mod log;

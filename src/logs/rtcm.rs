@@ -9,24 +9,12 @@
 mod msm;
 
 use crate::bits::Bits;
-use crate::observed::{Calendar, Event, Locks};
+use crate::content::Content;
+use crate::observed::{Calendar, Locks};
 use crate::table::{Table, Value};
 
 /// Messages that the judge needs.
 pub const NEEDED: &str = "MSM4 to MSM7 (1074 to 1137) for observations";
-
-/// Content of a frame.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Content {
-    /// Number of the message, with a name where it has one.
-    pub name: String,
-    /// True if the fields of such messages are known.
-    pub is_known: bool,
-    /// Fields.
-    pub table: Option<Table>,
-    /// Content that can be joined with a truth.
-    pub event: Option<Event>,
-}
 
 /// Reads a frame.
 pub fn read(frame: &[u8], calendar: &Calendar, locks: &mut Locks) -> Content {

@@ -10,6 +10,7 @@
 mod layouts;
 mod measured;
 
+use crate::content::Content;
 use crate::observed::{Calendar, Event, Fix, Locks, Solution};
 use crate::table::{Table, little_endian};
 use gnss::earth::Geodetic;
@@ -23,19 +24,6 @@ pub const NEEDED: &str = "MeasEpoch for observations, or PVTGeodetic or PVTCarte
 const MEAS_EPOCH: u16 = 4027;
 /// Floating-point numbers that say that there is none (4.1.5).
 const NONE_BELOW: f64 = -1e10;
-
-/// Content of a block.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Content {
-    /// Name or number of the block.
-    pub name: String,
-    /// True if the fields of such blocks are known.
-    pub is_known: bool,
-    /// Fields.
-    pub table: Option<Table>,
-    /// Content that can be joined with a truth.
-    pub event: Option<Event>,
-}
 
 /// Reads a block.
 pub fn read(block: &[u8], calendar: &mut Calendar, locks: &mut Locks) -> Content {

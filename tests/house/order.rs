@@ -105,7 +105,7 @@ pub const ORDER: Order<'static> = &[
             &["logged"],
         ],
     ),
-    ("logs", &[&["bits", "frames", "observed", "table"], &["contents", "rtcm", "sbf", "ubx"], &["log"]]),
+    ("logs", &[&["bits", "frames", "observed", "table"], &["content"], &["contents", "rtcm", "sbf", "ubx"], &["log"]]),
     (
         "analysis/read",
         &[

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-const TWIN: &str = env!("CARGO_BIN_EXE_gnss-twin");
+use crate::command::{TWIN, code, stderr, twin};
 
 /// A static scene of two seconds that needs nothing but the program.
 const SHORT: &str = r#"
@@ -24,18 +24,6 @@ format = "ci8"
 cn0_dbhz = 45.0
 [noise]
 "#;
-
-fn twin(arguments: &[&str], directory: &Path) -> Output {
-    Command::new(TWIN).args(arguments).current_dir(directory).stdin(Stdio::null()).output().unwrap()
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-fn code(output: &Output) -> i32 {
-    output.status.code().unwrap_or(-1)
-}
 
 /// A directory with `short.toml` in it.
 fn workplace() -> tempfile::TempDir {

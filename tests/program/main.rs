@@ -1,6 +1,7 @@
 //! The program as a user calls it: the command line, ports, live streams and studies.
 
 mod cli;
+mod command;
 mod live;
 mod osnma;
 mod pack;

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-const TWIN: &str = env!("CARGO_BIN_EXE_gnss-twin");
+use crate::command::{TWIN, code, stderr, twin};
 
 /// A static scene that needs nothing but the program.
 const SCENE: &str = r#"
@@ -56,18 +56,6 @@ group = "limits"
 description = "a moving jammer"
 reason = "an emitter has one position"
 "#;
-
-fn twin(arguments: &[&str], directory: &Path) -> Output {
-    Command::new(TWIN).args(arguments).current_dir(directory).stdin(Stdio::null()).output().unwrap()
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-fn code(output: &Output) -> i32 {
-    output.status.code().unwrap_or(-1)
-}
 
 /// A directory with the pack in `small/`.
 fn workplace() -> tempfile::TempDir {

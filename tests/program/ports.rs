@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::thread;
 
-const TWIN: &str = env!("CARGO_BIN_EXE_gnss-twin");
+use crate::command::TWIN;
 
 /// A directory with a scene of that length.
 fn workplace(duration_s: f64) -> tempfile::TempDir {

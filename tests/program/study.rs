@@ -16,7 +16,7 @@ use study::sweep::estimate::Estimate;
 use study::sweep::plan::{Cut, Plan};
 use study::sweep::shard::{self, Found};
 
-const TWIN: &str = env!("CARGO_BIN_EXE_gnss-twin");
+use crate::command::{TWIN, code};
 
 /// A study of modelled correlations: 60 cells, 5 repetitions.
 const MODELLED: &str = r#"
@@ -54,10 +54,6 @@ fn command(arguments: &[&str], directory: &Path) -> Command {
 
 fn study(arguments: &[&str], directory: &Path) -> Output {
     command(arguments, directory).output().unwrap()
-}
-
-fn code(output: &Output) -> i32 {
-    output.status.code().unwrap_or(-1)
 }
 
 fn text(output: &Output) -> String {

@@ -2,7 +2,7 @@ use std::io::Cursor;
 
 use super::*;
 use crate::frames::{Frames, Protocol};
-use crate::observed::ObservedEpoch;
+use crate::observed::{Event, ObservedEpoch};
 use gnss::time::Epoch;
 
 /// Frames of a shipped log of RTCM 3.
