@@ -1,6 +1,6 @@
 //! UBX, the binary protocol of u-blox receivers.
 //!
-//! Source: u-blox F9 HPG 1.32 interface description. [`layouts`] has the fields of each message; here
+//! Source: u-blox F9 HPG 1.32 interface description. `layouts` has the fields of each message; here
 //! messages become observations (RXM-RAWX), positions (NAV-PVT) and clock readings (NAV-CLOCK). The whole
 //! second of a fix is that of iTOW, its week that of the UTC date: a receiver that does not know the leap
 //! seconds yet has a wrong UTC and a right time of week. NAV-HPPOSLLH behind a position adds digits to it.
