@@ -45,6 +45,10 @@ fn handle() -> std::io::Result<()> {
         }
         Ok(())
     })?;
+    // A signal that was held back is noticed here: a short work would be done before the thread below wakes.
+    if let Some(signal) = received() {
+        signal_hook::low_level::exit(128 + signal);
+    }
     thread::Builder::new().name("signals".to_owned()).stack_size(STACK_BYTES).spawn(move || wait(ear))?;
     Ok(())
 }
