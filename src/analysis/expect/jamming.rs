@@ -19,12 +19,12 @@ use gnss::facts::Interference;
 use gnss::signal::sinc_squared;
 
 /// Cycles of a sweep beyond which its lines lie too close to be distinguished from a band.
-const MOST_CYCLES: f64 = 4096.0;
+const MOST_CYCLES: f64 = 131_072.0;
 
 /// A spectrum of unit power about its carrier.
 #[derive(Clone, Debug, Default)]
 pub struct Spectrum {
-    /// Offset and power of each line.
+    /// Offset and power of each line, upwards.
     pub lines: Vec<(f64, f64)>,
     density: Option<Density>,
 }
@@ -51,29 +51,11 @@ impl Spectrum {
             |width_hz: f64| Self { lines: Vec::new(), density: Some(Density::Flat { width_hz: width_hz.abs() }) };
         match *source {
             Interference::Cw => Self { lines: vec![(0.0, 1.0)], density: None },
-            Interference::Chirp { width_hz, repetition_hz } => {
-                let reach = width_hz.abs() / repetition_hz;
-                if reach > MOST_CYCLES {
-                    return flat(width_hz);
-                }
-                Self::series(repetition_hz, reach, |x| reach * 0.5 * x * (x - 1.0))
+            Interference::Chirp { width_hz, .. } | Interference::Fmcw { width_hz, .. } => {
+                harmonics(source).map_or_else(|| flat(width_hz), Self::of_lines)
             }
-            Interference::Fmcw { width_hz, repetition_hz } => {
-                let reach = width_hz.abs() / repetition_hz;
-                if reach > MOST_CYCLES {
-                    return flat(width_hz);
-                }
-                Self::series(repetition_hz, reach, |x| {
-                    let (y, sign) = if x < 0.5 { (2.0 * x, 0.5) } else { (2.0 * x - 1.0, -0.5) };
-                    sign * reach * 0.5 * y * (y - 1.0)
-                })
-            }
+            Interference::SineFm { .. } => harmonics(source).map_or_else(Self::default, Self::of_lines),
             Interference::Noise { width_hz } | Interference::Recording { width_hz } => flat(width_hz),
-            Interference::SineFm { deviation_hz, repetition_hz } => {
-                let index = deviation_hz / repetition_hz;
-                let cycles = index / std::f64::consts::TAU;
-                Self::series(repetition_hz, 2.0 * index, |x| cycles * libm::sin(std::f64::consts::TAU * x))
-            }
             Interference::Matched { repetition_hz } => {
                 Self { lines: Vec::new(), density: Some(Density::Chips { rate_hz: repetition_hz }) }
             }
@@ -81,25 +63,9 @@ impl Spectrum {
         }
     }
 
-    /// The lines of a carrier of unit power whose phase over a period is `cycles`.
-    fn series(repetition_hz: f64, reach: f64, cycles: impl Fn(f64) -> f64) -> Self {
-        // Lines beyond the reach fall with the square of their number or faster: eight times it leaves 1e-3
-        // of the power.
-        let points = ((8.0 * reach) as usize + 512).next_power_of_two();
-        let mut wave: Vec<Complex<f64>> = (0..points)
-            .map(|k| {
-                let (sin, cos) = libm::sincos(std::f64::consts::TAU * cycles(k as f64 / points as f64));
-                Complex::new(cos, sin)
-            })
-            .collect();
-        Planner::<f64>::new().plan_fft_forward(points).process(&mut wave);
-        let half = points as i64 / 2;
-        let line = |(k, c): (usize, &Complex<f64>)| {
-            let k = if k as i64 >= half { k as i64 - points as i64 } else { k as i64 };
-            (k as f64 * repetition_hz, c.norm_sqr() / (points as f64 * points as f64))
-        };
-        let lines = wave.iter().enumerate().map(line).filter(|(_, power)| *power > 1e-9).collect();
-        Self { lines, density: None }
+    fn of_lines(lines: Vec<(f64, Complex<f64>)>) -> Self {
+        let power = lines.into_iter().map(|(hz, line)| (hz, line.norm_sqr())).filter(|(_, power)| *power > 1e-9);
+        Self { lines: power.collect(), density: None }
     }
 
     /// Rectangular pulses, each late by a uniform random share `jitter` of the period.
@@ -139,6 +105,44 @@ impl Spectrum {
         };
         sampler.aliases().map(met).sum()
     }
+}
+
+/// Amplitudes of a sweep's lines at unit power by their frequencies from its middle, upwards; `None` for
+/// sources without and for those whose lines lie too close.
+pub fn harmonics(source: &Interference) -> Option<Vec<(f64, Complex<f64>)>> {
+    match *source {
+        Interference::Chirp { width_hz, repetition_hz } => {
+            let reach = width_hz.abs() / repetition_hz;
+            (reach <= MOST_CYCLES).then(|| series(repetition_hz, reach, |x| reach * 0.5 * x * (x - 1.0)))
+        }
+        Interference::Fmcw { width_hz, repetition_hz } => {
+            let reach = width_hz.abs() / repetition_hz;
+            let cycles = |x: f64| {
+                let (y, sign) = if x < 0.5 { (2.0 * x, 0.5) } else { (2.0 * x - 1.0, -0.5) };
+                sign * reach * 0.5 * y * (y - 1.0)
+            };
+            (reach <= MOST_CYCLES).then(|| series(repetition_hz, reach, cycles))
+        }
+        Interference::SineFm { deviation_hz, repetition_hz } => {
+            let index = deviation_hz / repetition_hz;
+            let cycles = index / std::f64::consts::TAU;
+            Some(series(repetition_hz, 2.0 * index, |x| cycles * libm::sin(std::f64::consts::TAU * x)))
+        }
+        _ => None,
+    }
+}
+
+/// Lines of a carrier of unit power whose phase over a period is `cycles`.
+fn series(repetition_hz: f64, reach: f64, cycles: impl Fn(f64) -> f64) -> Vec<(f64, Complex<f64>)> {
+    // Lines beyond the reach fall with the square of their number or faster: eight times it leaves 1e-3 of
+    // the power.
+    let points = ((8.0 * reach) as usize + 512).next_power_of_two();
+    let mut wave: Vec<Complex<f64>> = (0..points)
+        .map(|k| Complex::cis(std::f64::consts::TAU * cycles(k as f64 / points as f64)) / points as f64)
+        .collect();
+    Planner::<f64>::new().plan_fft_forward(points).process(&mut wave);
+    wave.rotate_left(points / 2);
+    (-(points as i64) / 2..).zip(wave).map(|(k, line)| (k as f64 * repetition_hz, line)).collect()
 }
 
 /// Interference of a run on average, in the samples.
@@ -187,8 +191,10 @@ pub fn separation_s(source: &Source, signal: &Waveform, signal_hz: f64, sampler:
 pub fn density(source: &Source, f_hz: f64, bin_hz: f64, sampler: &Sampler) -> f64 {
     let from_hz = f_hz - source.frequency_hz;
     // Lines as far as eight bins; the window's side lobes are 100 dB down there.
-    let lines = source.spectrum.lines.iter().filter(|(line_hz, _)| (line_hz - from_hz).abs() < 8.0 * bin_hz);
-    let lines: f64 = lines.map(|(line_hz, power)| power * hann((from_hz - line_hz) / bin_hz) / bin_hz).sum();
+    let first = source.spectrum.lines.partition_point(|(line_hz, _)| *line_hz < from_hz - 8.0 * bin_hz);
+    let lines = source.spectrum.lines.get(first..).unwrap_or_default().iter();
+    let near = lines.take_while(|(line_hz, _)| *line_hz < from_hz + 8.0 * bin_hz);
+    let lines: f64 = near.map(|(line_hz, power)| power * hann((from_hz - line_hz) / bin_hz) / bin_hz).sum();
     source.jn0_hz * (lines + source.spectrum.sampled(sampler, from_hz))
 }
 

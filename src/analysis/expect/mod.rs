@@ -2,7 +2,7 @@
 //!
 //! [`theory`] has the closed forms with their sources. [`samples`] is the density that the samples should
 //! have as [`welch`] shows it, through a [`converter`] and the response of a filter, and [`spectrum`]
-//! what follows from it; [`jamming`] and [`multiple_access`] say what interference and other satellites take
+//! what follows from it; `sweep` is how a slow sweep scatters in it. [`jamming`] and [`multiple_access`] say what interference and other satellites take
 //! from C/N0. [`timeline`] is the truth as a function of time. `loops` are the receiver's three loops as
 //! linear systems, each one `closed`; [`multipath`] is the code error that reflected rays leave in them, and
 //! `beats` what codes add that run alike. [`smoothing`] is what the carrier makes of the code, [`quantile`]
@@ -27,6 +27,7 @@ pub mod samples;
 pub mod smoothing;
 pub mod spectrum;
 pub mod stated;
+pub(crate) mod sweep;
 pub mod theory;
 pub mod timeline;
 pub mod welch;

@@ -20,6 +20,7 @@ use crate::error::JudgeError;
 use crate::expect::converter::Staircase;
 use crate::expect::front_end::FrontEnd;
 use crate::expect::jamming::{self, Source};
+use crate::expect::sweep;
 use crate::expect::welch;
 use crate::read::{PsdRow, Run};
 use crate::waveform::Waveform;
@@ -31,6 +32,9 @@ use gnss::signal::{Link, Signal};
 
 /// Bins about a line that it fills: its frequency within a run, not its level, decides what they hold.
 const LINE_BINS: f64 = 8.0;
+/// Share of a noise's bandwidth within which its density falls, on either side of each edge, and bins of the
+/// window beside. The generator states that it falls within 0.08 of 1.5 bandwidths beyond an edge.
+const EDGE: f64 = 0.12;
 
 /// A satellite's signal while its spectrum is looked at.
 #[derive(Clone, Debug)]
@@ -131,9 +135,9 @@ pub struct Expected {
     pub codes_hz: Vec<f64>,
     /// Mean square over squared mean of the density over the looks, 1 where it is steady.
     pub unsteady: Vec<f64>,
-    /// Relative variance that the number of pulses in the looks makes.
+    /// Relative variance that the number of pulses in the looks and the phases of sweeps make.
     pub pulses: Vec<f64>,
-    /// True if a line fills the bin.
+    /// True if a line or the edge of a noise's band fills the bin.
     pub line: Vec<bool>,
     /// True if the level is that of the truth, false if it is fitted.
     pub absolute: bool,
@@ -149,6 +153,8 @@ struct Jammer<'a> {
     levels_hz: Vec<f64>,
     /// Density of unit power at the frequencies of the estimate.
     unit: Vec<f64>,
+    /// Relative variance there that the sweep's phase makes.
+    wander: Vec<f64>,
 }
 
 impl Expected {
@@ -216,9 +222,16 @@ impl Expected {
         let square = (0..looks).map(|look| in_look(look) * in_look(look)).sum::<f64>() / looks as f64;
         for one in jammers {
             let own = (0..looks).map(|look| of(one, look)).sum::<f64>() / looks as f64 / mean;
-            self.pulses[index] += own * own * one.scatter();
+            self.pulses[index] += own * own * (one.scatter() + one.wander.get(index).copied().unwrap_or(0.0));
             let from_hz = f_hz - one.source.frequency_hz;
-            self.line[index] |= matches!(one.shape, Interference::Cw) && from_hz.abs() < LINE_BINS * bin_hz;
+            self.line[index] |= match *one.shape {
+                Interference::Cw => from_hz.abs() < LINE_BINS * bin_hz,
+                // As wide as the samples' band it is white.
+                Interference::Noise { width_hz } if width_hz < bin_hz * self.line.len() as f64 => {
+                    (from_hz.abs() - 0.5 * width_hz).abs() < EDGE * width_hz + LINE_BINS * bin_hz
+                }
+                _ => false,
+            };
         }
         (self.density[index], self.unsteady[index]) = (mean, square / (mean * mean));
     }
@@ -352,6 +365,11 @@ fn shown(front_end: &FrontEnd<'_>, mut smooth: Vec<f64>, absolute: bool) -> Show
     Shown { density: lags.iter().step_by(2).map(|value| value.re.max(0.0) / front_end.rate_hz).collect(), gain }
 }
 
+/// True if the window does not tell the lines of a sweep apart: its main lobe is four bins wide.
+pub fn merges(repetition_hz: f64, bin_hz: f64) -> bool {
+    repetition_hz < 4.0 * bin_hz
+}
+
 /// Interference in each look, of a scene's only front end.
 fn jammers<'a>(
     run: &'a Run,
@@ -374,12 +392,23 @@ fn jammers<'a>(
             let at = |f_hz: f64| jamming::density(&one, f_hz, bin_hz, &front_end.sampler);
             at(row.frequency_hz) + if mirrored { at(-row.frequency_hz) } else { 0.0 }
         };
-        Some(Jammer {
-            source,
-            shape,
-            levels_hz: ticks.iter().map(|tick| own.get(tick).copied().unwrap_or(0.0)).collect(),
-            unit: rows.iter().map(unit).collect(),
-        })
+        let levels_hz: Vec<f64> = ticks.iter().map(|tick| own.get(tick).copied().unwrap_or(0.0)).collect();
+        let wander = shape.sweeps_hz().filter(|hz| merges(*hz, bin_hz)).zip(jamming::harmonics(shape)).map_or_else(
+            Vec::new,
+            |(repetition_hz, lines)| {
+                let on = looks.pieces(front_end.samples).zip(&levels_hz).filter(|(_, level)| **level > 0.0);
+                let bins = (front_end.rate_hz / bin_hz).round() as u64;
+                let starts = on.flat_map(|(piece, _)| {
+                    let last = (piece.end + 1).saturating_sub(bins);
+                    (piece.start..last).step_by((bins / 2).max(1) as usize)
+                });
+                let phases: Vec<f64> =
+                    starts.map(|start| (start as f64 / front_end.rate_hz * repetition_hz).fract()).collect();
+                let offsets_hz = rows.iter().map(|row| row.frequency_hz - source.frequency_hz);
+                sweep::wander(&lines, repetition_hz, (offsets_hz, bin_hz), &phases)
+            },
+        );
+        Some(Jammer { source, shape, levels_hz, unit: rows.iter().map(unit).collect(), wander })
     };
     sources.iter().filter_map(of).collect()
 }

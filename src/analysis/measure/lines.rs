@@ -3,7 +3,8 @@
 //! The receiver makes a spectrum a second. A row of it is false where no source was on in that second. A wave
 //! has to be reported where it was on for a whole second with a J/N0 of [`LEAST_DBHZ`], which is clear of
 //! any bin of such a spectrum. Limits: sweeps and pulses have lines too, so rows of them are neither false
-//! nor asked for.
+//! nor asked for. A wave within [`OFFSET_HZ`] of 0 Hz in the samples is not asked for either: a constant
+//! offset of a converter looks the same, and a receiver leaves it out.
 
 use std::collections::BTreeSet;
 
@@ -17,6 +18,9 @@ use gnss::record::{InterferenceRow, LineRow};
 /// Waves this strong have to be reported: 8 dB above what shows at 2.6 Msps, for wider bins and for waves
 /// between two.
 pub const LEAST_DBHZ: f64 = 45.0;
+/// Frequency in the samples up to which a wave may pass for a constant offset: three of the receiver's widest
+/// bins.
+pub const OFFSET_HZ: f64 = 3000.0;
 
 /// `interference` in `summary.json`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -27,7 +31,9 @@ pub struct Lines {
     pub false_told: usize,
     /// Seconds all through which a strong continuous wave was on.
     pub wave_seconds: usize,
-    /// Number of those seconds in which the receiver reported the wave.
+    /// Further such seconds, whose waves are all too near to 0 Hz to be told from a constant offset.
+    pub offset_seconds: usize,
+    /// Number of `wave_seconds` in which the receiver reported the wave.
     pub wave_seconds_told: usize,
     /// Largest distance in frequency of a report from the nearest wave where nothing else was on, Hz.
     pub frequency_error_max_hz: Option<f64>,
@@ -79,15 +85,19 @@ impl Lines {
             Some((apart(line, of), (line.jn0_dbhz - of.jn0_dbhz).abs()))
         };
         let whole = (run.scene.duration_s.floor() as u64).min(u64::MAX >> 1);
-        let strong = |number: u64| {
-            let first = (number as f64 * rate_hz).ceil() as u64;
-            let inside = second(first);
-            let on: BTreeSet<u64> =
-                waves(first).filter(|row| row.jn0_dbhz >= LEAST_DBHZ).map(|row| row.sample).collect();
-            let all = ticks.iter().filter(|tick| inside(**tick)).count();
-            (all > 0 && on.len() == all).then_some(first)
+        let (ticks, second, waves) = (&ticks, &second, &waves);
+        let strong = |from_hz: f64| {
+            let on = move |number: u64| {
+                let first = (number as f64 * rate_hz).ceil() as u64;
+                let inside = second(first);
+                let counts = |row: &&InterferenceRow| row.jn0_dbhz >= LEAST_DBHZ && row.frequency_hz.abs() >= from_hz;
+                let on: BTreeSet<u64> = waves(first).filter(counts).map(|row| row.sample).collect();
+                let all = ticks.iter().filter(|tick| inside(**tick)).count();
+                (all > 0 && on.len() == all).then_some(first)
+            };
+            (0..whole).filter_map(on).collect::<Vec<u64>>()
         };
-        let seconds: Vec<u64> = (0..whole).filter_map(strong).collect();
+        let seconds = strong(OFFSET_HZ);
         let found = |first: &&u64| told.iter().any(|line| (line.sample.abs_diff(**first) as f64) < 0.5 * rate_hz);
         let errors: Vec<(f64, f64)> = told.iter().filter_map(nearest).collect();
         let largest = |of: fn(&(f64, f64)) -> f64| errors.iter().map(of).max_by(f64::total_cmp);
@@ -98,6 +108,7 @@ impl Lines {
                 .filter(|line| !run.interference.iter().any(|row| second(line.sample)(row.sample)))
                 .count(),
             wave_seconds: seconds.len(),
+            offset_seconds: strong(0.0).len() - seconds.len(),
             wave_seconds_told: seconds.iter().filter(found).count(),
             frequency_error_max_hz: largest(|error| error.0),
             resolution_hz: told.iter().map(|line| line.resolution_hz).max_by(f64::total_cmp),
@@ -135,6 +146,7 @@ mod tests {
         write(&run.path().join("rx/interference.csv"), &rows);
         let summary = judge(run.path()).unwrap();
         let lines = summary.interference.unwrap();
+        assert_eq!(lines.offset_seconds, 0);
         assert_eq!((lines.told, lines.false_told, lines.wave_seconds, lines.wave_seconds_told), (10, 1, 10, 9));
         assert!((lines.frequency_error_max_hz.unwrap() - 40.0).abs() < 1e-9, "{lines:?}");
         assert!(
@@ -150,5 +162,13 @@ mod tests {
         assert!(
             failed("interference reported while") && failed("seconds of a continuous") && !failed("frequency of the")
         );
+        // A wave at 1 kHz in the samples may be a constant offset of the converter.
+        let near = |tick: u64| InterferenceRow { frequency_hz: -1e3, ..wave(tick) };
+        write(&run.path().join("truth/interference.csv"), &(200..300).map(near).collect::<Vec<_>>());
+        let summary = judge(run.path()).unwrap();
+        let lines = summary.interference.unwrap();
+        assert_eq!((lines.wave_seconds, lines.offset_seconds), (0, 10));
+        let told = &summary.details.verdict.not_judged;
+        assert!(told.iter().any(|one| one.starts_with("10 s of a continuous wave")), "{told:?}");
     }
 }

@@ -8,17 +8,20 @@
 //! - the variance of lines of codes, which are taken as random. A band B of a component of period T has B·T
 //!   lines, each with a standard deviation of its mean. It has half as many where B spans the carrier, about
 //!   which a real code's lines are alike;
-//! - the variance of the number of pulses of interference within the looks.
+//! - the variance of the number of pulses of interference within the looks, and of the phase at which they
+//!   meet a slow sweep.
 //!
 //! A mean of squares is near gamma with shape 1/v, whose quantiles are (1 − v/9 ± z·√v/3)³ (Wilson and
 //! Hilferty 1931); z is that of the false alarm over the number of slices or bins. Nothing is added for an
-//! error of the expectation. Bins that a line fills, those 40 dB below the peak, and of real samples the ends
-//! of the band are left out. Limits: [`excuse`] names what is not judged.
+//! error of the expectation. Bins that a line or the edge of a noise's band fills, those 40 dB below the
+//! peak, and of real samples the ends of the band are left out. Limits: [`excuse`] names what is not judged,
+//! and sweeps longer than [`sweep::SEGMENTS`] segments are not.
 
 use crate::error::JudgeError;
 use crate::expect::front_end::FrontEnd;
 use crate::expect::quantile::largest;
 use crate::expect::samples::{Expected, Sent};
+use crate::expect::sweep;
 use crate::expect::welch;
 use crate::read::{PsdRow, Run};
 use gnss::facts::Interference;
@@ -141,6 +144,10 @@ impl Departures {
         let spacing_hz = rows.get(1).zip(rows.first()).map_or(0.0, |(b, a)| b.frequency_hz - a.frequency_hz);
         if (spacing_hz / bin_hz - 1.0).abs() > 1e-6 {
             return Err("its frequencies are not those of the samples");
+        }
+        let slow = |hz: f64| hz < bin_hz / sweep::SEGMENTS;
+        if run.scene.interference.iter().filter_map(Interference::sweeps_hz).any(slow) {
+            return Err("a sweep lasts longer than 16 segments of the spectrum");
         }
         let segments = front_end.looks(run).segments(front_end.samples, bins);
         if segments < LEAST_SEGMENTS {

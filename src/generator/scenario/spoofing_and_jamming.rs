@@ -12,6 +12,7 @@ use crate::levels::strongest;
 use crate::scene::{CodeEdge, Scene};
 use crate::spoof::{Constellation, Drag, Place};
 use crate::stage::interference::arrival::{Path as Way, Repetition, Tuning};
+use crate::stage::interference::period::Period;
 use crate::stage::interference::{ChipEdge, Interferer, Recorded, Waveform};
 use crate::synth::band::Filter;
 use crate::synth::resample::Interpolator;
@@ -98,10 +99,17 @@ impl Source<'_> {
         // Noise is drawn at the front end's rate, all else by the time: that is the same for every front end.
         let own = matches!(fitted.waveform, Waveform::Noise { .. } | Waveform::White);
         let seed = if own { self.scene.noise_seed() } else { self.scene.seed };
+        let (low_hz, high_hz) = self.tuning.band_hz();
+        let place_hz = self.tuning.place_hz(fitted.carrier_hz);
+        let period = fitted.waveform.sweeps_at().and_then(|repetition| {
+            let modulation = fitted.waveform.modulation(self.tuning.sign());
+            Period::of(modulation, repetition.hz(), (low_hz - place_hz, high_hz - place_hz))
+        });
         Ok(Some(Interferer {
             source: self.number,
             kind,
             waveform: fitted.waveform,
+            period: period.map(Arc::new),
             carrier_hz: fitted.carrier_hz,
             jn0_hz: libm::pow(10.0, jn0_dbhz / 10.0),
             path,

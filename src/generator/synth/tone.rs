@@ -4,7 +4,8 @@
 //! polynomial of the position in `f64`, taken modulo one by adding 1.5·2^52, which rounds alike on every
 //! instruction set. Errors: sines 3e-7, the modulation 1e-16 of its cycles (sine FM: 3e-7 of its index).
 //! Where the momentary frequency lies outside the samples' band there is silence, as behind a front end's
-//! filter; sidebands of a fast sweep beyond the band still fold.
+//! filter. That is right for sweeps that are slow at the band's edge; others are added as a period whose
+//! lines lie in the band ([`crate::stage::interference::period`]).
 
 use crate::synth::angle::cos_sin;
 use crate::synth::noise::LANES;
@@ -29,6 +30,32 @@ pub enum Modulation {
         /// The peak deviation over 2π times the period.
         cycles: f64,
     },
+}
+
+impl Modulation {
+    /// Phase in cycles at `x` of a period, from 0 to 1.
+    pub fn cycles_at(self, x: f64) -> f64 {
+        match self {
+            Self::None => 0.0,
+            Self::Sawtooth { cycles } => 0.5 * cycles * x * (x - 1.0),
+            Self::Triangle { cycles } => {
+                let (y, sign) = if x < 0.5 { (2.0 * x, 1.0) } else { (2.0 * x - 1.0, -1.0) };
+                0.5 * sign * cycles * y * (y - 1.0)
+            }
+            Self::Sine { cycles } => cycles * libm::sin(std::f64::consts::TAU * x),
+        }
+    }
+
+    /// Width of the sweep, and the largest slope of the frequency over the width and a period: cycles a
+    /// period, and one over periods.
+    pub fn reach(self) -> (f64, f64) {
+        match self {
+            Self::None => (0.0, 0.0),
+            Self::Sawtooth { cycles } => (cycles.abs(), 1.0),
+            Self::Triangle { cycles } => (2.0 * cycles.abs(), 2.0),
+            Self::Sine { cycles } => (2.0 * std::f64::consts::TAU * cycles.abs(), std::f64::consts::PI),
+        }
+    }
 }
 
 /// A carrier over up to 4096 samples.

@@ -58,6 +58,18 @@ pub enum Interference {
     },
 }
 
+impl Interference {
+    /// Rate at which a sweep repeats, in Hz; `None` for any other waveform.
+    pub fn sweeps_hz(&self) -> Option<f64> {
+        match *self {
+            Self::Chirp { repetition_hz, .. }
+            | Self::Fmcw { repetition_hz, .. }
+            | Self::SineFm { repetition_hz, .. } => Some(repetition_hz),
+            _ => None,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,7 +3,7 @@
 //!
 //! The truth has rows every tenth of a second or so; a search in between is compared with cubics through
 //! values and rates. Limits: a search that begins before the first or after the last row is not compared with
-//! anything.
+//! anything, nor one at a time in which the scene expects errors of any size.
 
 use std::collections::BTreeSet;
 
@@ -65,7 +65,7 @@ pub(super) fn findings(run: &Run) -> Result<Vec<Finding>, JudgeError> {
     Ok(all)
 }
 
-/// Largest errors of the searches that found what the scene has.
+/// Largest errors of the searches that found what the scene has, while it does not expect errors of any size.
 fn against_truth(run: &Run) -> Result<Vec<Finding>, JudgeError> {
     let setting = |key: &str| run.receiver.pointer(&format!("/settings/acquisition/{key}"))?.as_f64();
     let (Some(periods), Some(cells)) = (setting("coherent_periods"), setting("cells_per_chip")) else {
@@ -91,6 +91,9 @@ fn against_truth(run: &Run) -> Result<Vec<Finding>, JudgeError> {
         let refinement = Refinement::of(run, link.signal);
         for row in searches {
             let Some((true_row, after_s)) = near(&mut truth, row.sample, run.scene.sample_rate_hz) else { continue };
+            if !run.scene.expect.bounded(run.time_s(row.sample)) {
+                continue;
+            }
             count += 1;
             doppler = doppler
                 .max((row.doppler_hz - true_row.doppler_hz - run.common.doppler_hz).abs() / (DOPPLER_BINS * bin_hz));
@@ -106,7 +109,7 @@ fn against_truth(run: &Run) -> Result<Vec<Finding>, JudgeError> {
             let noise_chips = refinement.as_ref().map_or(0.0, |refinement| refinement.sigma_chips(cn0_dbhz));
             code = code.max(off / (CELLS / cells).max(SIGMAS * noise_chips));
             // Without noise a search finds a C/N0 of its own rounding.
-            if run.scene.noise && run.scene.expect.bounded(run.time_s(row.sample)) {
+            if run.scene.noise {
                 cn0 = cn0.max((row.cn0_dbhz - true_row.cn0_dbhz).abs());
             }
         }

@@ -2,7 +2,9 @@
 //! its time.
 //!
 //! The offset of a receiver's clock from the truth's nominal time may be any constant. That constant is the
-//! same for every row of every table. Limits: a receiver that sets its clock again within a run has several.
+//! same for every row of every table. Limits: a receiver that sets its clock again within a run has several. It
+//! may while the scene expects errors of any size, as where a spoofer's signals come late all at once: rows of
+//! such a time are not compared.
 
 use super::{Finding, Found};
 use crate::error::JudgeError;
@@ -28,7 +30,8 @@ pub(super) fn findings(run: &Run) -> Result<Vec<Finding>, JudgeError> {
         let mut truth = run.truth.finder(link)?;
         for row in run.observations.cursor(link) {
             let row = row?;
-            let Some(true_row) = truth.get(row.sample) else { continue };
+            let judged = run.scene.expect.bounded(run.time_s(row.sample));
+            let Some(true_row) = truth.get(row.sample).filter(|_| judged) else { continue };
             let ahead_s = row.sent().since(true_row.sent());
             readings.push(row.pseudorange_m - true_row.pseudorange_m + SPEED_OF_LIGHT_MPS * ahead_s)?;
         }
@@ -88,7 +91,7 @@ fn fixes(run: &Run, reading_m: Option<f64>) -> Result<Vec<Finding>, JudgeError> 
     let mut truth = run.trajectory.finder()?;
     let (mut any, mut most_m, mut most): (_, f64, Option<f64>) = (false, 0.0, None);
     run.fixes.each(|fix| {
-        if let Some(true_row) = truth.get(fix.sample) {
+        if let Some(true_row) = truth.get(fix.sample).filter(|_| run.scene.expect.bounded(run.time_s(fix.sample))) {
             // Both are by the scale of the fix, and what that is ahead of GPS time cancels.
             let bias_m = SPEED_OF_LIGHT_MPS * (fix.clock_bias_s - true_row.clock_bias_s);
             let one = SPEED_OF_LIGHT_MPS * fix.time().since(true_row.time()) + bias_m;

@@ -2,7 +2,8 @@
 //!
 //! Limits: two rows of a satellite count as doubled at the same sample, whatever else they say. A row repeats
 //! the one before where all measured values are the same to the last bit, or where one is that noise has
-//! changed in a tenth of a second: what is frozen is not measured.
+//! changed in a tenth of a second: what is frozen is not measured. A receiver may hold observations back
+//! while all satellites vanish at once, so a gap counts only where the scene does not expect any losses.
 
 use std::collections::{HashMap, HashSet};
 
@@ -11,6 +12,7 @@ use crate::error::JudgeError;
 use crate::measure::errors::{Errors, Link};
 use crate::read::{Numbers, Run};
 use crate::statistics::median;
+use gnss::facts::Losses;
 use gnss::record::{Event, Fix, Observation, TrackingRow};
 
 /// Steps beyond this many usual ones are gaps.
@@ -113,8 +115,10 @@ fn observations(run: &Run, link: Link, rows: &mut Rows) -> Result<(), JudgeError
         let step = row.sample as f64 - old.sample as f64;
         rows.order("observation of", &key, old.sample, row.sample);
         let locked = row.locked_s - old.locked_s;
+        let due = |sample: u64| run.scene.expect.losses(link.sv, run.time_s(sample)) != Some(Losses::Any);
         // The lock is as old as before and the time that passed: it went on.
         if step > GAP * usual
+            && (due(old.sample) || due(row.sample))
             && (locked - step / run.scene.sample_rate_hz).abs() < 0.5 * usual / run.scene.sample_rate_hz
         {
             rows.missing.add(|| format!("observation of {key} before sample {}", row.sample));

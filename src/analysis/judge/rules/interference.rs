@@ -17,6 +17,11 @@ impl Verdict {
             Bound::Max(0.0),
             "the detector's false alarms come once in 1e8 seconds",
         );
+        if lines.offset_seconds > 0 {
+            let seconds = lines.offset_seconds;
+            let reason = "at 0 Hz in the samples it looks like a constant offset of the converter";
+            self.not_judged.push(format!("{seconds} s of a continuous wave: {reason}"));
+        }
         if lines.wave_seconds == 0 {
             return;
         }

@@ -55,6 +55,11 @@ impl Verdict {
 
     pub(super) fn cn0(&mut self, run: &Run, summary: &Summary) {
         if let Some(bias) = summary.observables.cn0_bias_db.filter(|_| run.scene.noise) {
+            if !run.scene.expect.always_bounded() {
+                let reason = "the scene expects any errors for a time; satellites are judged one by one outside it";
+                self.not_judged.push(format!("C/N0 bias of all satellites together: {reason}"));
+                return;
+            }
             self.judge(
                 "C/N0 bias, magnitude",
                 "",

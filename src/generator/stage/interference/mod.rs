@@ -8,11 +8,13 @@
 //! Limits: no polarisation, no pattern, one straight path.
 
 pub mod arrival;
+pub mod period;
 
 use std::ops::Range;
 use std::sync::Arc;
 
 use arrival::{Path, Repetition, Tuning};
+use period::Period;
 
 use crate::random::mix;
 use crate::stage::{Block, Stage};
@@ -122,7 +124,34 @@ pub enum Waveform {
     },
 }
 
-/// Planar samples of a file.
+impl Waveform {
+    /// Modulation of a sweep in samples, where `sign` is −1 if their spectrum is mirrored; that of a carrier
+    /// for any other waveform.
+    pub fn modulation(&self, sign: f64) -> Modulation {
+        match self {
+            Self::Chirp { sweep_hz, repetition } => Modulation::Sawtooth { cycles: sign * sweep_hz / repetition.hz() },
+            Self::Fmcw { sweep_hz, repetition } => {
+                Modulation::Triangle { cycles: 0.5 * sign * sweep_hz / repetition.hz() }
+            }
+            Self::SineFm { deviation_hz, repetition } => {
+                Modulation::Sine { cycles: sign * deviation_hz / (std::f64::consts::TAU * repetition.hz()) }
+            }
+            _ => Modulation::None,
+        }
+    }
+
+    /// Rate of the repetition of a sweep; `None` for any other waveform.
+    pub fn sweeps_at(&self) -> Option<Repetition> {
+        match self {
+            Self::Chirp { repetition, .. } | Self::Fmcw { repetition, .. } | Self::SineFm { repetition, .. } => {
+                Some(*repetition)
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Planar samples of a file, or of a period.
 #[derive(Clone, Debug)]
 pub struct Recorded {
     /// I components.
@@ -140,6 +169,8 @@ pub struct Interferer {
     pub kind: &'static str,
     /// Waveform of the source.
     pub waveform: Waveform,
+    /// Period of a sweep that leaves the samples' band.
+    pub period: Option<Arc<Period>>,
     /// Carrier or middle of the band in Hz, as sent.
     pub carrier_hz: f64,
     /// Power over noise density at the antenna in Hz when the scene starts; for pulses, while a pulse is on.
@@ -291,29 +322,16 @@ impl Interferer {
     /// Adds samples `from` to `from + i.len()` of the anchor's segment.
     fn add(&self, level: Level, anchor: &Anchor, from: u64, i: &mut [f32], q: &mut [f32]) {
         match &self.waveform {
+            Waveform::Chirp { repetition, .. }
+            | Waveform::Fmcw { repetition, .. }
+            | Waveform::SineFm { repetition, .. } => match &self.period {
+                Some(period) => self.lines(level, anchor, from, (period, *repetition), i, q),
+                None => {
+                    let modulation = self.waveform.modulation(self.tuning.sign());
+                    isa::add_tone(level, &self.tone(anchor, from, modulation, Some(*repetition)), i, q);
+                }
+            },
             Waveform::Cw => isa::add_tone(level, &self.tone(anchor, from, Modulation::None, None), i, q),
-            Waveform::Chirp { sweep_hz, repetition } => {
-                let cycles = self.tuning.sign() * sweep_hz / repetition.hz();
-                isa::add_tone(
-                    level,
-                    &self.tone(anchor, from, Modulation::Sawtooth { cycles }, Some(*repetition)),
-                    i,
-                    q,
-                );
-            }
-            Waveform::Fmcw { sweep_hz, repetition } => {
-                let cycles = 0.5 * self.tuning.sign() * sweep_hz / repetition.hz();
-                isa::add_tone(
-                    level,
-                    &self.tone(anchor, from, Modulation::Triangle { cycles }, Some(*repetition)),
-                    i,
-                    q,
-                );
-            }
-            Waveform::SineFm { deviation_hz, repetition } => {
-                let cycles = self.tuning.sign() * deviation_hz / (std::f64::consts::TAU * repetition.hz());
-                isa::add_tone(level, &self.tone(anchor, from, Modulation::Sine { cycles }, Some(*repetition)), i, q);
-            }
             Waveform::Pulse { width_s, repetition, jitter } => {
                 self.pulses(level, anchor, from, (width_s * repetition.hz(), *repetition, *jitter), i, q);
             }
@@ -321,13 +339,14 @@ impl Interferer {
             Waveform::White => {
                 let first = (anchor.n + from) as i64;
                 let (wi, wq) = draw(level, self.seed, (first, first + i.len() as i64));
-                self.turn(level, anchor, from, (&wi, &wq), i, q);
+                let (turns, step, amplitude) = anchor.turned(from);
+                isa::turn(level, (&wi, &wq), (turns, step), amplitude, (i, q));
             }
             Waveform::Noise { step, by, .. } => {
                 let place = u128::from(anchor.n + from) * u128::from(*step);
                 let position = Position { whole: (place >> 32) as i64, fraction: place as u32, step: *step };
                 let source = draw(level, self.seed, Interpolator::reach(position, i.len()));
-                self.resampled(level, anchor, from, (by, position, source), i, q);
+                resampled(level, (by, position, source), anchor.turned(from), i, q);
             }
             Waveform::Recording { samples, rate, by, repeat } => {
                 // Its first sample is sent when it is switched on.
@@ -337,22 +356,25 @@ impl Interferer {
                 let step = (advance >> 32) as u64;
                 let position = Position { whole: (place >> 64) as i64, fraction: (place >> 32) as u32, step };
                 let source = samples.read(Interpolator::reach(position, i.len()), *repeat, self.tuning.inverted);
-                self.resampled(level, anchor, from, (by, position, source), i, q);
+                resampled(level, (by, position, source), anchor.turned(from), i, q);
             }
         }
     }
 
+    /// Position in a repetition at sample `from` of the run, and its advance per sample, in 2^-64.
+    fn phase(&self, anchor: &Anchor, repetition: Repetition, from: u64) -> (u64, u64) {
+        let (_, place, step) = self.place(anchor, repetition, 0.0);
+        let step = step as u64;
+        (place.wrapping_add(step.wrapping_mul(from)), step)
+    }
+
     fn tone(&self, anchor: &Anchor, from: u64, modulation: Modulation, repetition: Option<Repetition>) -> Tone {
-        let (place, place_step) = repetition.map_or((0, 0), |repetition| {
-            let (_, place, step) = self.place(anchor, repetition, 0.0);
-            let step = step as u64;
-            (place.wrapping_add(step.wrapping_mul(from)), step)
-        });
+        let (place, place_step) = repetition.map_or((0, 0), |repetition| self.phase(anchor, repetition, from));
         let rate_hz = self.tuning.clock.rate.hz();
         let (low_hz, high_hz) = self.tuning.band_hz();
         let carrier_hz = self.tuning.place_hz(self.carrier_hz);
         Tone {
-            turns: anchor.turns.wrapping_add(anchor.turns_step.wrapping_mul(from)),
+            turns: anchor.turns_at(from),
             turns_step: anchor.turns_step,
             place,
             place_step,
@@ -360,6 +382,23 @@ impl Interferer {
             band_cps: ((low_hz - carrier_hz) / rate_hz, (high_hz - carrier_hz) / rate_hz),
             amplitude: anchor.amplitude as f32,
         }
+    }
+
+    /// The lines of a sweep that lie in the samples' band.
+    fn lines(
+        &self,
+        level: Level,
+        anchor: &Anchor,
+        from: u64,
+        (period, repetition): (&Period, Repetition),
+        i: &mut [f32],
+        q: &mut [f32],
+    ) {
+        let (place, step) = self.phase(anchor, repetition, from);
+        let (by, position, source) = period.read((place, step), i.len());
+        let turns = anchor.turns_at(from).wrapping_add(period.turns(place));
+        let turned = (turns, anchor.turns_step.wrapping_add(period.turns(step)), anchor.amplitude as f32);
+        resampled(level, (by, position, source), turned, i, q);
     }
 
     /// The carrier wherever a pulse is on: `duty` of a period, late by `jitter` times a random share of it.
@@ -412,32 +451,38 @@ impl Interferer {
             bits: &bits,
             position: (chip - start * 64) as u64 * CODE_ONE + ((place as u64) >> 16),
             step,
-            turns: anchor.turns.wrapping_add(anchor.turns_step.wrapping_mul(from)),
+            turns: anchor.turns_at(from),
             turns_step: anchor.turns_step,
             amplitude: anchor.amplitude,
             pulse: None,
         };
         isa::accumulate(level, edge, &[&[run]], i, q, &mut Buffers::default());
     }
+}
 
-    fn resampled(
-        &self,
-        level: Level,
-        anchor: &Anchor,
-        from: u64,
-        (by, position, source): (&Interpolator, Position, (Vec<f32>, Vec<f32>)),
-        i: &mut [f32],
-        q: &mut [f32],
-    ) {
-        let (mut wi, mut wq) = (vec![0.0; i.len()], vec![0.0; q.len()]);
-        isa::interpolate(level, by, position, (&source.0, &source.1), (&mut wi, &mut wq));
-        self.turn(level, anchor, from, (&wi, &wq), i, q);
+impl Anchor {
+    /// Carrier's phase at sample `from` of the run, in 2^-64 turn.
+    fn turns_at(&self, from: u64) -> u64 {
+        self.turns.wrapping_add(self.turns_step.wrapping_mul(from))
     }
 
-    fn turn(&self, level: Level, anchor: &Anchor, from: u64, wave: (&[f32], &[f32]), i: &mut [f32], q: &mut [f32]) {
-        let turns = anchor.turns.wrapping_add(anchor.turns_step.wrapping_mul(from));
-        isa::turn(level, wave, (turns, anchor.turns_step), anchor.amplitude as f32, (i, q));
+    /// Carrier's phase at sample `from` of the run, its advance per sample and the amplitude.
+    fn turned(&self, from: u64) -> (u64, u64, f32) {
+        (self.turns_at(from), self.turns_step, self.amplitude as f32)
     }
+}
+
+/// Adds a source at another rate, turned by a carrier.
+fn resampled(
+    level: Level,
+    (by, position, source): (&Interpolator, Position, (Vec<f32>, Vec<f32>)),
+    (turns, step, amplitude): (u64, u64, f32),
+    i: &mut [f32],
+    q: &mut [f32],
+) {
+    let (mut wi, mut wq) = (vec![0.0; i.len()], vec![0.0; q.len()]);
+    isa::interpolate(level, by, position, (&source.0, &source.1), (&mut wi, &mut wq));
+    isa::turn(level, (&wi, &wq), (turns, step), amplitude, (i, q));
 }
 
 /// A share in [0, 1) that belongs to a number.
@@ -448,16 +493,23 @@ fn random_share(seed: u64, number: i64) -> f64 {
 impl Recorded {
     /// Samples `first` to `last` (exclusive): again from the start where the file ends, or silence.
     fn read(&self, (first, last): (i64, i64), repeat: bool, inverted: bool) -> (Vec<f32>, Vec<f32>) {
-        let length = self.i.len().max(1) as i64;
         let sign = if inverted { -1.0 } else { 1.0 };
-        let sample = |plane: &[f32], k: i64| {
-            let k = if repeat { k.rem_euclid(length) } else { k };
-            usize::try_from(k).ok().and_then(|k| plane.get(k)).copied().unwrap_or(0.0)
+        let of = |plane: &[f32], sign: f32| -> Vec<f32> {
+            let count = (last - first).max(0) as usize;
+            if repeat && !plane.is_empty() {
+                let mut found = Vec::with_capacity(count);
+                let mut at = first.rem_euclid(plane.len() as i64) as usize;
+                while found.len() < count {
+                    let end = plane.len().min(at + count - found.len());
+                    found.extend(plane.get(at..end).unwrap_or_default().iter().map(|x| sign * x));
+                    at = 0;
+                }
+                return found;
+            }
+            let sample = |k: i64| usize::try_from(k).ok().and_then(|k| plane.get(k)).copied().unwrap_or(0.0);
+            (first..last).map(|k| sign * sample(k)).collect()
         };
-        (
-            (first..last).map(|k| sample(&self.i, k)).collect(),
-            (first..last).map(|k| sign * sample(&self.q, k)).collect(),
-        )
+        (of(&self.i, 1.0), of(&self.q, sign))
     }
 }
 
