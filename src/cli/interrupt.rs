@@ -28,7 +28,7 @@ pub fn install() -> Result<(), CliError> {
 }
 
 fn handle() -> std::io::Result<()> {
-    let received = RECEIVED.get_or_init(Default::default);
+    let flag = RECEIVED.get_or_init(Default::default);
     let second = Arc::new(AtomicBool::new(false));
     let (bell, ear) = platform::bell()?;
     let signals = platform::signals();
@@ -40,7 +40,7 @@ fn handle() -> std::io::Result<()> {
             // finds its number.
             signal_hook::flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&second))?;
             signal_hook::flag::register(signal, Arc::clone(&second))?;
-            signal_hook::flag::register_usize(signal, Arc::clone(received), signal as usize)?;
+            signal_hook::flag::register_usize(signal, Arc::clone(flag), signal as usize)?;
             bell.rings_for(signal)?;
         }
         Ok(())

@@ -121,6 +121,7 @@ pub const ORDER: Order<'static> = &[
         &[
             &["theory"],
             &["converter", "followed", "jamming", "message", "quantile", "smoothing", "welch"],
+            &["sweep"],
             &["front_end", "multiple_access"],
             &["samples"],
             &["spectrum"],

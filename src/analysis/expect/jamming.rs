@@ -132,14 +132,19 @@ pub fn harmonics(source: &Interference) -> Option<Vec<(f64, Complex<f64>)>> {
     }
 }
 
+/// The unit number of a phase in cycles.
+pub(super) fn turned(cycles: f64) -> Complex<f64> {
+    let (sin, cos) = libm::sincos(std::f64::consts::TAU * cycles);
+    Complex::new(cos, sin)
+}
+
 /// Lines of a carrier of unit power whose phase over a period is `cycles`.
 fn series(repetition_hz: f64, reach: f64, cycles: impl Fn(f64) -> f64) -> Vec<(f64, Complex<f64>)> {
     // Lines beyond the reach fall with the square of their number or faster: eight times it leaves 1e-3 of
     // the power.
     let points = ((8.0 * reach) as usize + 512).next_power_of_two();
-    let mut wave: Vec<Complex<f64>> = (0..points)
-        .map(|k| Complex::cis(std::f64::consts::TAU * cycles(k as f64 / points as f64)) / points as f64)
-        .collect();
+    let mut wave: Vec<Complex<f64>> =
+        (0..points).map(|k| turned(cycles(k as f64 / points as f64)) / points as f64).collect();
     Planner::<f64>::new().plan_fft_forward(points).process(&mut wave);
     wave.rotate_left(points / 2);
     (-(points as i64) / 2..).zip(wave).map(|(k, line)| (k as f64 * repetition_hz, line)).collect()

@@ -2,13 +2,13 @@
 //!
 //! [`theory`] has the closed forms with their sources. [`samples`] is the density that the samples should
 //! have as [`welch`] shows it, through a [`converter`] and the response of a filter, and [`spectrum`]
-//! what follows from it; `sweep` is how a slow sweep scatters in it. [`jamming`] and [`multiple_access`] say what interference and other satellites take
-//! from C/N0. [`timeline`] is the truth as a function of time. `loops` are the receiver's three loops as
-//! linear systems, each one `closed`; [`multipath`] is the code error that reflected rays leave in them, and
-//! `beats` what codes add that run alike. [`smoothing`] is what the carrier makes of the code, [`quantile`]
-//! how far random errors may go. [`message`] is what the satellites sent, and [`due`] when each satellite
-//! must be found, observed and used. Of the receiver only its settings enter, and the times at which it took
-//! its rows.
+//! what follows from it; `sweep` is how a slow sweep scatters in it. [`jamming`] and [`multiple_access`] say
+//! what interference and other satellites take from C/N0. [`timeline`] is the truth as a function of time.
+//! `loops` are the receiver's three loops as linear systems, each one `closed`; [`multipath`] is the code
+//! error that reflected rays leave in them, and `beats` what codes add that run alike. [`smoothing`] is what
+//! the carrier makes of the code, [`quantile`] how far random errors may go. [`message`] is what the
+//! satellites sent, and [`due`] when each satellite must be found, observed and used. Of the receiver only
+//! its settings enter, and the times at which it took its rows.
 
 pub(crate) mod beats;
 pub(crate) mod closed;

@@ -3,12 +3,14 @@
 //! A segment shows what the sweep does within it. Its bin holds P(φ) = |Σ a_k e^(2πikφ)|², with φ the sweep's
 //! phase in the segment's middle and a_k its lines under the window's transform. P has the harmonics
 //! p_m = Σ a_(k+m) a_k*, and the mean over segments at phases φ0 + φ_s has p_m·H_m, where
-//! H_m = mean of e^(2πimφ_s). The truth does not state φ0, so the estimate scatters by Σ 2|p_m H_m|²/p_0² with
-//! m from 1. Limits: the phases φ_s are those of a resting antenna; sweeps longer than [`SEGMENTS`] segments
-//! are not described.
+//! H_m = mean of e^(2πimφ_s). The truth does not state φ0, so the estimate scatters by Σ 2|p_m H_m|²/p_0²
+//! with m from 1. Limits: the phases φ_s are those of a resting antenna; sweeps longer than [`SEGMENTS`]
+//! segments are not described.
 
-use gnss::signal::sinc;
 use num_complex::Complex;
+
+use crate::expect::jamming::turned;
+use gnss::signal::sinc;
 
 /// Longest sweep, in segments.
 pub const SEGMENTS: f64 = 16.0;
@@ -29,7 +31,7 @@ pub fn wander(
     // |H_m|² of each harmonic.
     let seen: Vec<f64> = (0..=most)
         .map(|m| {
-            let turn = |phase: &f64| Complex::cis(std::f64::consts::TAU * (m as f64 * phase).fract());
+            let turn = |phase: &f64| turned((m as f64 * phase).fract());
             (phases.iter().map(turn).sum::<Complex<f64>>() / phases.len().max(1) as f64).norm_sqr()
         })
         .collect();
@@ -68,7 +70,7 @@ mod tests {
         let line = |k: i32| {
             let at = |n: i32| {
                 let x = f64::from(n) / f64::from(points);
-                Complex::cis(std::f64::consts::TAU * (0.5 * cycles * x * (x - 1.0) - f64::from(k) * x))
+                turned(0.5 * cycles * x * (x - 1.0) - f64::from(k) * x)
             };
             (f64::from(k) * repetition_hz, (0..points).map(at).sum::<Complex<f64>>() / f64::from(points))
         };
@@ -83,9 +85,9 @@ mod tests {
             let at = |n: i32| {
                 let t_s = (start + f64::from(n)) / rate_hz;
                 let x = (t_s * repetition_hz).rem_euclid(1.0);
-                let hann = 0.5 - 0.5 * (std::f64::consts::TAU * f64::from(n) / f64::from(size)).cos();
+                let hann = 0.5 - 0.5 * turned(f64::from(n) / f64::from(size)).re;
                 let turns = 0.5 * cycles * x * (x - 1.0) - offset_hz * t_s;
-                hann * Complex::cis(std::f64::consts::TAU * turns)
+                hann * turned(turns)
             };
             (0..size).map(at).sum::<Complex<f64>>().norm_sqr()
         };

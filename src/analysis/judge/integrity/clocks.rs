@@ -2,9 +2,9 @@
 //! its time.
 //!
 //! The offset of a receiver's clock from the truth's nominal time may be any constant. That constant is the
-//! same for every row of every table. Limits: a receiver that sets its clock again within a run has several. It
-//! may while the scene expects errors of any size, as where a spoofer's signals come late all at once: rows of
-//! such a time are not compared.
+//! same for every row of every table. Limits: a receiver that sets its clock again within a run has several.
+//! It may while the scene expects errors of any size, as where a spoofer's signals come late all at once:
+//! rows of such a time are not compared.
 
 use super::{Finding, Found};
 use crate::error::JudgeError;

@@ -9,24 +9,25 @@
 
 pub mod arrival;
 pub mod period;
+mod waveform;
 
 use std::ops::Range;
 use std::sync::Arc;
 
 use arrival::{Path, Repetition, Tuning};
 use period::Period;
+pub use waveform::{ChipEdge, Recorded, Waveform};
 
 use crate::random::mix;
 use crate::stage::{Block, Stage};
 use crate::switches::{Source, Switches};
-use crate::synth::band::Filter;
 use crate::synth::chips::MARGIN_STEPS;
 use crate::synth::isa::{self, Level};
 use crate::synth::lanes::Buffers;
 use crate::synth::noise::BLOCK_SAMPLES;
 use crate::synth::resample::{Interpolator, Position, draw};
 use crate::synth::tone::{Modulation, Tone};
-use crate::synth::{CODE_ONE, Edge, Run};
+use crate::synth::{CODE_ONE, Run};
 use gnss::facts::Interference;
 use gnss::record::InterferenceRow;
 
@@ -36,129 +37,6 @@ const RUN: u64 = BLOCK_SAMPLES as u64;
 /// Shares of a sample by which a pulse's edge is moved, so that rounding does not decide about a sample on
 /// it.
 const EDGE_SAMPLES: f64 = 1e-6;
-
-/// Model of the chip edges of a matched waveform between samples.
-#[derive(Clone, Debug)]
-pub enum ChipEdge {
-    /// Edge at the nearest sample.
-    Nearest,
-    /// Share of the sample's area on either side of the edge.
-    Area,
-    /// Through a low-pass filter.
-    BandLimited(Arc<Filter>),
-}
-
-impl ChipEdge {
-    fn edge(&self) -> Edge<'_> {
-        match self {
-            Self::Nearest => Edge::Nearest,
-            Self::Area => Edge::Area,
-            Self::BandLimited(filter) => Edge::BandLimited(filter),
-        }
-    }
-}
-
-/// Waveform of an interferer.
-#[derive(Clone, Debug)]
-pub enum Waveform {
-    /// A continuous wave.
-    Cw,
-    /// Linear sweep over `sweep_hz` (downwards if negative), from the start again at once.
-    Chirp {
-        /// Width of the sweep, in Hz.
-        sweep_hz: f64,
-        /// Rate of the repetition.
-        repetition: Repetition,
-    },
-    /// Linear up and down; a repetition is both.
-    Fmcw {
-        /// Width of the sweep, in Hz.
-        sweep_hz: f64,
-        /// Rate of the repetition.
-        repetition: Repetition,
-    },
-    /// Frequency that follows a cosine.
-    SineFm {
-        /// Largest deviation from the carrier, in Hz.
-        deviation_hz: f64,
-        /// Rate of the repetition.
-        repetition: Repetition,
-    },
-    /// A carrier that is on for `width_s`; each pulse comes late by up to `jitter` of a period, at random.
-    Pulse {
-        /// Length of a pulse, in seconds.
-        width_s: f64,
-        /// Rate of the repetition.
-        repetition: Repetition,
-        /// Largest delay of a pulse, as a share of the period.
-        jitter: f64,
-    },
-    /// Random chips, so that the spectrum is that of a code.
-    Matched {
-        /// Rate of the chips.
-        chips: Repetition,
-        /// Model of the chip edges between samples.
-        edge: ChipEdge,
-    },
-    /// Gaussian noise over the samples' whole band.
-    White,
-    /// Gaussian noise of a band; `step` source samples per sample, in 2^-32.
-    Noise {
-        /// Width of the band, in Hz.
-        width_hz: f64,
-        /// Source samples per sample, in 2^-32.
-        step: u64,
-        /// Interpolator from the source's samples to the scene's.
-        by: Interpolator,
-    },
-    /// Recorded samples of unit mean power.
-    Recording {
-        /// The samples of the file.
-        samples: Arc<Recorded>,
-        /// Rate of the source's samples.
-        rate: Repetition,
-        /// Interpolator from the source's samples to the scene's.
-        by: Interpolator,
-        /// True if the samples restart at their end.
-        repeat: bool,
-    },
-}
-
-impl Waveform {
-    /// Modulation of a sweep in samples, where `sign` is −1 if their spectrum is mirrored; that of a carrier
-    /// for any other waveform.
-    pub fn modulation(&self, sign: f64) -> Modulation {
-        match self {
-            Self::Chirp { sweep_hz, repetition } => Modulation::Sawtooth { cycles: sign * sweep_hz / repetition.hz() },
-            Self::Fmcw { sweep_hz, repetition } => {
-                Modulation::Triangle { cycles: 0.5 * sign * sweep_hz / repetition.hz() }
-            }
-            Self::SineFm { deviation_hz, repetition } => {
-                Modulation::Sine { cycles: sign * deviation_hz / (std::f64::consts::TAU * repetition.hz()) }
-            }
-            _ => Modulation::None,
-        }
-    }
-
-    /// Rate of the repetition of a sweep; `None` for any other waveform.
-    pub fn sweeps_at(&self) -> Option<Repetition> {
-        match self {
-            Self::Chirp { repetition, .. } | Self::Fmcw { repetition, .. } | Self::SineFm { repetition, .. } => {
-                Some(*repetition)
-            }
-            _ => None,
-        }
-    }
-}
-
-/// Planar samples of a file, or of a period.
-#[derive(Clone, Debug)]
-pub struct Recorded {
-    /// I components.
-    pub i: Vec<f32>,
-    /// Quadrature components.
-    pub q: Vec<f32>,
-}
 
 /// Source of interference in a scene.
 #[derive(Clone, Debug)]
@@ -488,29 +366,6 @@ fn resampled(
 /// A share in [0, 1) that belongs to a number.
 fn random_share(seed: u64, number: i64) -> f64 {
     (mix(seed ^ mix(number as u64)) >> 11) as f64 / 9_007_199_254_740_992.0
-}
-
-impl Recorded {
-    /// Samples `first` to `last` (exclusive): again from the start where the file ends, or silence.
-    fn read(&self, (first, last): (i64, i64), repeat: bool, inverted: bool) -> (Vec<f32>, Vec<f32>) {
-        let sign = if inverted { -1.0 } else { 1.0 };
-        let of = |plane: &[f32], sign: f32| -> Vec<f32> {
-            let count = (last - first).max(0) as usize;
-            if repeat && !plane.is_empty() {
-                let mut found = Vec::with_capacity(count);
-                let mut at = first.rem_euclid(plane.len() as i64) as usize;
-                while found.len() < count {
-                    let end = plane.len().min(at + count - found.len());
-                    found.extend(plane.get(at..end).unwrap_or_default().iter().map(|x| sign * x));
-                    at = 0;
-                }
-                return found;
-            }
-            let sample = |k: i64| usize::try_from(k).ok().and_then(|k| plane.get(k)).copied().unwrap_or(0.0);
-            (first..last).map(|k| sign * sample(k)).collect()
-        };
-        (of(&self.i, 1.0), of(&self.q, sign))
-    }
 }
 
 impl Stage for Interferer {

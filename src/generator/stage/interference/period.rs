@@ -74,7 +74,7 @@ impl Period {
     ) -> (&Interpolator, Position, (Vec<f32>, Vec<f32>)) {
         let length = self.samples.i.len() as u128;
         let at = u128::from(place) * length;
-        let step = (u128::from(step) * length >> 32) as u64;
+        let step = ((u128::from(step) * length) >> 32) as u64;
         let position = Position { whole: (at >> 64) as i64, fraction: (at >> 32) as u32, step };
         (&self.by, position, self.samples.read(Interpolator::reach(position, samples), true, false))
     }
@@ -101,7 +101,8 @@ mod tests {
 
     #[test]
     fn a_sine_s_lines_are_bessel_functions() {
-        // Modulation index 5 at 100 kHz, lines from -200 to 100 kHz: J_k(5)², Abramowitz and Stegun, table 9.2.
+        // Modulation index 5 at 100 kHz, lines from -200 to 100 kHz: J_k(5)², Abramowitz and Stegun, table
+        // 9.2.
         let modulation = Modulation::Sine { cycles: 5.0 / std::f64::consts::TAU };
         let period = Period::of(modulation, 1e5, (-2e5, 2e5)).unwrap();
         let bessel = [0.046_565_116_3_f64, -0.327_579_137_6, -0.177_596_771_3, -0.327_579_137_6];
