@@ -219,7 +219,8 @@ pub struct InterferenceRow {
     pub source: usize,
     /// Mean power over a repetition, relative to the density of the thermal noise, in dB-Hz.
     pub jn0_dbhz: f64,
-    /// Carrier frequency in the samples, in Hz, with Doppler and the receiver's clock included.
+    /// Carrier frequency in the samples, in Hz, with Doppler and the receiver's clock included; beyond their
+    /// band for a sweep whose middle lies there.
     pub frequency_hz: f64,
 }
 

@@ -140,6 +140,25 @@ fn a_chirp_and_an_fmcw_have_the_lines_of_fresnel_s_integrals() {
     assert!((total - 1.0).abs() < 0.01, "{total}");
 }
 
+#[test]
+fn a_sweep_that_leaves_the_band_has_its_lines_inside_and_nothing_else() {
+    // 40 MHz in 8 us about 25 MHz above the centre of 20 MHz: it enters the band and leaves it in 1 us.
+    let scene = scene(20e6, "kind = \"chirp\"\noffset_hz = 25e6\nsweep_hz = 40e6\nsweep_s = 8e-6\njs_db = 20");
+    let row = scene.interference[0].row(1, 0).unwrap();
+    assert!((row.frequency_hz - 25e6).abs() < 1e-2, "{row:?}");
+    let samples = alone(&scene, 0, 3200);
+    let mut total = 0.0;
+    for k in -80..80_i64 {
+        let (re, im) = sweep(320.0, (k - 200) as f64);
+        let (found, expected) = (line(&samples, 20 * k), re * re + im * im);
+        total += expected;
+        // Of 1/320 an interpolator with 80 dB in its stop band leaves 6e-7.
+        assert!((found - expected).abs() < 2e-6, "line {k}: {found} {expected}");
+    }
+    let power = samples.iter().map(|(i, q)| i * i + q * q).sum::<f64>() / 3200.0;
+    assert!((power / total - 1.0).abs() < 1e-3 && (0.1..0.15).contains(&total), "{power} {total}");
+}
+
 /// Bessel function of the first kind by its power series.
 fn bessel(order: i32, x: f64) -> f64 {
     let mut term = (1..=order).fold(1.0, |product, k| product * 0.5 * x / f64::from(k));
@@ -399,10 +418,10 @@ fn what_lies_outside_the_band_is_told_and_not_computed() {
     let (scene, warnings) =
         composed("[[interference]]\nkind = \"chirp\"\nsweep_hz = 10e6\nsweep_s = 1e-3\njs_db = 60\n");
     assert!(warnings.iter().any(|w| w.contains("the rest is silent")), "{warnings:?}");
-    // 2.6 of 10 MHz.
+    // 2.6 of 10 MHz, with Fresnel's ripple at the edges: √(1 ms/10 MHz) of 0.26 ms.
     let samples = alone(&scene, 0, 260_000);
-    let on = samples.iter().filter(|(i, q)| (*i, *q) != (0.0, 0.0)).count();
-    assert!((on as f64 / 260_000.0 - 0.26).abs() < 0.001, "{on}");
+    let power = samples.iter().map(|(i, q)| i * i + q * q).sum::<f64>() / 260_000.0;
+    assert!((power / 0.26 - 1.0).abs() < 0.02, "{power}");
     // Noise of 26 MHz leaves a tenth of its power in 2.6 MHz.
     let (scene, _) = composed("[[interference]]\nkind = \"noise\"\nbandwidth_hz = 26e6\njs_db = 60\n");
     assert!((10.0 * libm::log10(scene.interference[0].jn0_hz) - 95.0).abs() < 1e-9);

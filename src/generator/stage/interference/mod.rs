@@ -153,8 +153,20 @@ impl Interferer {
             sample,
             source,
             jn0_dbhz: 10.0 * libm::log10(self.jn0_at(sample) * self.duty()),
-            frequency_hz: step as i64 as f64 / 18_446_744_073_709_551_616.0 * self.tuning.clock.rate.hz(),
+            frequency_hz: self.unfolded_hz(step as i64 as f64 / 18_446_744_073_709_551_616.0),
         })
+    }
+
+    /// Frequency in the samples, in Hz, of a carrier with this advance in cycles per sample: that of a sweep
+    /// whose middle lies outside of their band is not folded into it.
+    fn unfolded_hz(&self, advance_cps: f64) -> f64 {
+        let rate_hz = self.tuning.clock.rate.hz();
+        let (place_hz, folded_hz) = (self.tuning.place_hz(self.carrier_hz), advance_cps * rate_hz);
+        let (low_hz, high_hz) = self.tuning.band_hz();
+        match (low_hz..=high_hz).contains(&place_hz) {
+            true => folded_hz,
+            false => folded_hz + rate_hz * ((place_hz - folded_hz) / rate_hz).round(),
+        }
     }
 
     /// Samples of a tick, where the antenna's motion is pushed and sources are switched.
