@@ -87,6 +87,7 @@ pub const ORDER: Order<'static> = &[
             &["followed"],
             &["diagnosis"],
             &["output"],
+            &["authentic"],
             &["outcome"],
             &["session"],
             &["run"],

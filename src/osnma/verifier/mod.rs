@@ -85,6 +85,19 @@ pub struct Verifier {
     last_authentic: Option<Gst>,
     counts: Counts,
     reports: Vec<TagReport>,
+    /// Ephemerides that became authentic since they were taken last.
+    authentic: Vec<Authenticated>,
+}
+
+/// Ephemeris, clock and status of a satellite that became authentic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Authenticated {
+    /// Satellite whose data they are.
+    pub satellite: u8,
+    /// Words 1 to 5 with the covered bits ([`crate::data::words_under`]).
+    pub words: [u128; 5],
+    /// Sub-frame of the tag that made them authentic.
+    pub sent: Gst,
 }
 
 impl Verifier {
@@ -118,6 +131,7 @@ impl Verifier {
             last_authentic: None,
             counts: Counts::default(),
             reports: Vec::new(),
+            authentic: Vec::new(),
         };
         match anchor {
             Anchor::Tree(root) => verifier.tree = Some(root),
@@ -177,6 +191,16 @@ impl Verifier {
         self.close();
         self.give_up(|_| true);
         std::mem::take(&mut self.reports)
+    }
+
+    /// Ephemerides that became authentic since this was asked last.
+    pub fn take_authentic(&mut self) -> Vec<Authenticated> {
+        std::mem::take(&mut self.authentic)
+    }
+
+    /// Sub-frame that is open: that of the newest page.
+    pub fn now(&self) -> Option<Gst> {
+        self.now
     }
 
     /// State after the last page.

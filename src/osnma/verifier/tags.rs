@@ -1,9 +1,9 @@
 //! Keys and tags within a verifier: the key of each sub-frame, tags that wait for theirs, and their results.
 
-use super::{FAST_LIMIT_S, Verifier};
+use super::{Authenticated, FAST_LIMIT_S, Verifier};
 use crate::bits::Row;
 use crate::chain::{Chain, KeyError, TeslaKey, Trust};
-use crate::data::{Words, zeros};
+use crate::data::{Words, words_under, zeros};
 use crate::fields::{Adkd, NmaHeader, NmaStatus};
 use crate::mac::{Tagged, mac, macseq};
 use crate::page::SATELLITES;
@@ -190,7 +190,7 @@ impl Verifier {
             }
         }
         if let (Outcome::Authentic, Ok(data)) = (outcome, &tag.data) {
-            self.strengthen(tag, data, waiting.chain.tag_bits);
+            self.strengthen(tag, data, waiting);
         }
         let Waiting { start: sent, sender, .. } = *waiting;
         let Tag { of, adkd, position, .. } = *tag;
@@ -198,7 +198,8 @@ impl Verifier {
         *self.counts.tags.entry((adkd, outcome)).or_default() += 1;
     }
 
-    fn strengthen(&mut self, tag: &Tag, data: &Row, bits: usize) {
+    fn strengthen(&mut self, tag: &Tag, data: &Row, waiting: &Waiting) {
+        let bits = waiting.chain.tag_bits;
         let enough = self.settings.tag_bits;
         let held = self.strength.entry((tag.of, tag.adkd == Adkd::Timing)).or_default();
         if held.0 != *data {
@@ -209,7 +210,12 @@ impl Verifier {
         if held.1 < enough {
             return;
         }
-        self.counts.authentic_data += u64::from(before < enough);
+        if before < enough {
+            self.counts.authentic_data += 1;
+            let words = (tag.adkd != Adkd::Timing).then(|| words_under(data, waiting.start)).flatten();
+            let sent = waiting.start;
+            self.authentic.extend(words.map(|words| Authenticated { satellite: tag.of, words, sent }));
+        }
         let end = self.now.map(|now| now.later(1));
         self.first_authentic = self.first_authentic.or(end);
         self.last_authentic = end;

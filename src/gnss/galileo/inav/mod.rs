@@ -438,6 +438,18 @@ fn elements(sv: Sv, words: [&u128; 5], near: Epoch) -> Option<Ephemeris> {
     Some(OF_SET.decoded(sv, words, sent_at(five, near)?))
 }
 
+/// Ephemeris of words 1 to 5, as their bits state it; `None` if they are not of one issue and of this satellite.
+/// `near` resolves the week of word 5.
+pub fn ephemeris_of(sv: Sv, words: &[u128; 5], near: Epoch) -> Option<Ephemeris> {
+    elements(sv, words.each_ref(), near)
+}
+
+/// Coefficients of the ionosphere in a word 5.
+pub fn ionosphere_of(word: &u128) -> Option<Coefficients> {
+    let all = parameters(word)?;
+    ionosphere(&|name: &str| all.iter().find(|(other, _)| *other == name).map(|(_, raw)| *raw))
+}
+
 /// The start of the page by its own week and time of week, the week near `near`; `None` for words without
 /// them.
 fn sent_at(word: &u128, near: Epoch) -> Option<Epoch> {
