@@ -9,6 +9,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use crate::catalogue::Catalogue;
+use gnss::facts::OsnmaFacts;
 use gnss::galileo::e1::E1;
 use gnss::galileo::inav::{self, GST_WEEK, INAV};
 use gnss::message::{Authentication, Common};
@@ -22,6 +23,8 @@ use osnma::time::Gst;
 #[derive(Debug)]
 pub struct Osnma {
     transmission: Transmission,
+    /// Facts about it for the judge.
+    pub facts: OsnmaFacts,
 }
 
 /// Words that satellites send on E1-B without faults.
@@ -39,7 +42,12 @@ impl Osnma {
     /// Creates the authentication of the words that satellites send by their ephemerides and `common`.
     pub fn new(provider: Provider, catalogue: &Arc<Catalogue>, common: &Common) -> Self {
         let sent = Sent { catalogue: Arc::clone(catalogue), words: inav::Words::new(common) };
-        Self { transmission: Transmission::new(provider, Box::new(sent)) }
+        Self { transmission: Transmission::new(provider, Box::new(sent)), facts: OsnmaFacts::default() }
+    }
+
+    /// Authentication with facts about it.
+    pub fn with_facts(self, facts: OsnmaFacts) -> Self {
+        Self { facts, ..self }
     }
 
     /// Keys that a receiver may trust which starts at an instant.

@@ -33,8 +33,9 @@ pub fn zeros(kind: Adkd) -> Option<Row> {
     Some(row)
 }
 
-/// Words 1 to 5 whose covered bits are those of a tag of the ephemeris, or `None` for a row of another length.
-/// Week and second in word 5, which no tag covers, are those of `sent`; other bits that no tag covers are zero.
+/// Words 1 to 5 whose covered bits are those of a tag of the ephemeris, or `None` for a row of another
+/// length. Week and second in word 5, which no tag covers, are those of `sent`; other bits that no tag covers
+/// are zero.
 pub fn words_under(row: &Row, sent: Gst) -> Option<[u128; 5]> {
     if row.len() != EPHEMERIS.iter().map(|(_, _, count)| *count as usize).sum::<usize>() {
         return None;

@@ -121,7 +121,7 @@ pub const ORDER: Order<'static> = &[
         "analysis/expect",
         &[
             &["theory"],
-            &["converter", "followed", "jamming", "message", "quantile", "smoothing", "welch"],
+            &["authenticated", "converter", "followed", "jamming", "message", "quantile", "smoothing", "welch"],
             &["front_end", "multiple_access"],
             &["samples"],
             &["spectrum"],
@@ -136,7 +136,7 @@ pub const ORDER: Order<'static> = &[
     (
         "analysis/measure",
         &[
-            &["allan", "errors", "independent", "ionosphere", "lines", "peaks", "psd", "spectrum", "spoofing"],
+            &["allan", "errors", "independent", "ionosphere", "lines", "osnma", "peaks", "psd", "spectrum", "spoofing"],
             &["clock", "consistency", "elevation", "jitter"],
             &["slips"],
         ],

@@ -8,19 +8,20 @@ use super::{Overrides, Scenario, ScenarioError, satellite_list};
 use crate::authentication::{Osnma, gst};
 use crate::catalogue::Catalogue;
 use crate::random::Stream;
+use gnss::facts::{OsnmaFacts, SpoofedBits, SpoofedMessages};
 use gnss::galileo::inav::INAV;
 use gnss::message::{Authentication, Common};
 use gnss::satellite::System;
 use gnss::time::GST;
 use osnma::chain::{Hash, MacFunction};
+use osnma::page::satellite;
 use osnma::provider::{Change, Provider, Published, Settings, Transition};
 use osnma::time::SUBFRAME_S;
 
 /// Hashes of a chain with their names.
 const HASHES: [(&str, Hash); 2] = [("sha256", Hash::Sha256), ("sha3_256", Hash::Sha3)];
 /// Functions of tags with their names.
-const MACS: [(&str, MacFunction); 2] =
-    [("hmac_sha256", MacFunction::HmacSha256), ("cmac_aes", MacFunction::CmacAes)];
+const MACS: [(&str, MacFunction); 2] = [("hmac_sha256", MacFunction::HmacSha256), ("cmac_aes", MacFunction::CmacAes)];
 /// States of the service with their names: true where it is operational.
 const STATES: [(&str, bool); 2] = [("operational", true), ("test", false)];
 /// Authentication of a spoofer's messages with its names.
@@ -143,7 +144,25 @@ impl Scenario {
             let reason = "no signal of the scene carries it: add \"Galileo E1\" to signals";
             return Err(self.conflict("osnma", reason.to_owned()));
         }
-        Ok(Some(Arc::new(Osnma::new(self.provider(spec, seed)?, catalogue, common))))
+        let own = Osnma::new(self.provider(spec, seed)?, catalogue, common);
+        Ok(Some(Arc::new(own.with_facts(self.osnma_facts(spec)))))
+    }
+
+    fn osnma_facts(&self, spec: &OsnmaSpec) -> OsnmaFacts {
+        let bits = |spoofed: Spoofed| match spoofed {
+            Spoofed::True => SpoofedBits::True,
+            Spoofed::None => SpoofedBits::None,
+            Spoofed::OwnKeys => SpoofedBits::OwnKeys,
+        };
+        OsnmaFacts {
+            without: spec.without.iter().map(|number| satellite(*number)).collect(),
+            public_key_every_s: spec.key_turn_s[0],
+            public_key_for_s: spec.key_turn_s[1],
+            first_transition_s: spec.transitions.first().map(|(_, time_s)| *time_s),
+            spoofers: (self.spoofers.iter())
+                .map(|spoofer| SpoofedMessages { bits: bits(spoofer.osnma), replay_s: spoofer.replay_s })
+                .collect(),
+        }
     }
 
     /// Authentication in the messages of spoofers that do not repeat the true bits, by their number from 1.

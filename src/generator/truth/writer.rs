@@ -252,6 +252,7 @@ impl Writer {
             expect: scene.expect.clone(),
             time_offsets: time_offsets(scene),
             renewals: renewals(scene, part),
+            osnma: scene.osnma.as_ref().map(|osnma| osnma.facts.clone()),
         };
         self.write_facts(&file)?;
         self.driven = scene.switches.as_ref().map(|switches| (Arc::clone(switches), scene.clock.rate, file));

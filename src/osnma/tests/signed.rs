@@ -169,7 +169,8 @@ pub fn words(sender: u8) -> BTreeMap<u8, u128> {
     (1..=10).map(|kind| (kind, word(kind))).collect()
 }
 
-/// Word with the time at which its page begins, where it has one: in words 5 and 6, in bits that no tag covers.
+/// Word with the time at which its page begins, where it has one: in words 5 and 6, in bits that no tag
+/// covers.
 fn dated(word: u128, begin: Gst) -> u128 {
     let put = |word: u128, first: u32, count: u32, value: u32| {
         let shift = 128 - first - count;

@@ -157,8 +157,8 @@ impl Authentic {
         self.settle(&reports, self.newest, sink)
     }
 
-    /// Takes a fix with these satellites. The first fix that authentic data alone determine is that with as many
-    /// satellites whose data in use are authentic as there are unknowns.
+    /// Takes a fix with these satellites. The first fix that authentic data alone determine is that with as
+    /// many satellites whose data in use are authentic as there are unknowns.
     pub fn fixed(&mut self, sample: u64, used: &[Sv], in_use: &Sets) {
         if self.first_fix.is_some() || self.first_data.is_none() {
             return;

@@ -112,7 +112,7 @@ impl Serialize for Authenticity {
         object["position_of_authentic_data"] = json!(self.position_required);
         object["first_authentic_s"] = json!(self.first_data_s);
         object["first_authentic_fix_s"] = json!(self.first_fix_s);
-        object["kroot"] = json!(self.kroot);
+        object["stored_root"] = json!(self.kroot);
         object.serialize(serializer)
     }
 }

@@ -94,8 +94,8 @@ fn signed_pages_are_authentic_from_each_start_and_their_ephemerides_are_trusted(
         assert_eq!(outcome.satellites, SENDERS.map(satellite).to_vec());
         let root = outcome.kroot.clone().unwrap();
         assert_eq!(root, hot().kroot);
-        // Data of the first sub-frame have a tag in the second and its key in the third. The first page after it
-        // closes it, and the first symbol is sent a second after a sub-frame begins.
+        // Data of the first sub-frame have a tag in the second and its key in the third. The first page after
+        // it closes it, and the first symbol is sent a second after a sub-frame begins.
         if outcome.start == "hot" {
             assert_eq!(outcome.first_data_s, Some(92.0));
             assert_eq!(outcome.states.first().unwrap().state, "root verified");

@@ -424,7 +424,7 @@ impl Sink for Output {
         if let Some(osnma) = summary.get("osnma") {
             // Without a tag the table says that there were none.
             self.tags()?;
-            if let Some(kroot) = osnma["kroot"].as_str() {
+            if let Some(kroot) = osnma["stored_root"].as_str() {
                 let path = self.directory.join(STORED_ROOT);
                 fs::write(&path, format!("{kroot}\n")).map_err(|error| write_error(&path, error))?;
             }

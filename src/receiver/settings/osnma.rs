@@ -26,6 +26,18 @@ pub enum PositionData {
     Authentic,
 }
 
+/// Start with the keys that a scene publishes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SceneStart {
+    /// Public key and root key.
+    Hot,
+    /// Public key.
+    Warm,
+    /// Root of the Merkle tree.
+    Cold,
+}
+
 described! {
 /// Settings of the verification of Galileo's message authentication.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -39,6 +51,9 @@ pub struct OsnmaSettings {
     /// Hot start: root key that an earlier reception stored, as hexadecimal digits or the file kroot.hex. It
     /// needs `public_key`, which signed it.
     pub kroot: String,
+    /// Start with the keys of a scene, in a run of it without keys here. hot: public key and root key. warm:
+    /// public key. cold: root of the Merkle tree.
+    pub start: SceneStart,
     /// Bound of the error of the receiver's own time. Tags of ADKD 0 and 4 need less than 30 s, those of
     /// ADKD 12 less than 330 s.
     pub time_uncertainty_s: f64,
@@ -60,6 +75,7 @@ impl Default for OsnmaSettings {
             merkle_root: String::new(),
             public_key: String::new(),
             kroot: String::new(),
+            start: SceneStart::Hot,
             time_uncertainty_s: 15.0,
             clock_offset_s: 0.0,
             tag_bits: 40,
@@ -134,6 +150,20 @@ impl OsnmaSettings {
     /// True if no key is given.
     pub fn has_no_anchor(&self) -> bool {
         self.merkle_root.is_empty() && self.public_key.is_empty() && self.kroot.is_empty()
+    }
+
+    /// Takes the keys that a scene publishes, as far as its start needs them, if none is given.
+    pub fn or_keys(&mut self, root: &MerkleRoot, key: &PublicKey, kroot: &[u8]) {
+        if !self.has_no_anchor() {
+            return;
+        }
+        match self.start {
+            SceneStart::Cold => self.merkle_root = hex(&root.0),
+            SceneStart::Warm | SceneStart::Hot => self.public_key = format!("{}:{}", key.id, hex(&key.point())),
+        }
+        if self.start == SceneStart::Hot {
+            self.kroot = hex(kroot);
+        }
     }
 
     /// Replaces names of files, relative to a directory, by the keys in them. `origin` names the settings'

@@ -16,12 +16,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Matrix4;
 
 use crate::error::JudgeError;
+use crate::expect::authenticated::{self, Verification};
 use crate::expect::message::Message;
 use crate::expect::multiple_access::MultipleAccess;
 use crate::read::Run;
 use crate::statistics::median;
 use gnss::earth::Geodetic;
 use gnss::facts::{Expect, FaultKind, Fixes};
+use gnss::galileo::e1::E1;
 use gnss::ionosphere::Model;
 use gnss::satellite::Sv;
 use gnss::signal::Link;
@@ -188,7 +190,10 @@ impl Expectations {
             let one = found.satellite(run, &scene, (&access, &mut counted), link, in_space, observed)?;
             found.satellites.insert(link, one);
         }
-        found.fixes_due(&run.scene.expect, start);
+        let verified = Verification::of(&run.receiver).filter(|own| own.is_required);
+        let authentic_s = verified
+            .map(|own| authenticated::first_s(run, &own, satellite::LOCK_S).map_or(f64::INFINITY, |(at_s, _)| at_s));
+        found.fixes_due(&run.scene.expect, start, authentic_s);
         Ok(found)
     }
 
@@ -232,6 +237,9 @@ impl Expectations {
         let excuses: Vec<Excuse> = plain.iter().filter_map(|row| scene.excuse(link.sv, row, usual_dbhz)).collect();
         one.excuse = excuses.get(excuses.len() / 2).copied();
         let measured = self.measured();
+        // Of data that tags cover there are those of Galileo's I/NAV alone.
+        let is_verified = Verification::of(&run.receiver).is_some_and(|own| own.is_required);
+        let serves = !is_verified || link.signal == &E1;
         let dated_s = if link.signal.is_dated() { Some(f64::NEG_INFINITY) } else { counted.dated_s };
         for ((sample, row), required) in samples.iter().zip(&plain).zip(&required) {
             // What does not say its time has it once another signal of the satellite is observed.
@@ -242,7 +250,7 @@ impl Expectations {
             one.take(row, required, measured.contains_at(at, self), seen.binary_search(sample).is_ok());
             let Some(due) = self.epochs.get_mut(at) else { continue };
             due.held += u32::from(required.held && Counted::is_first(&mut counted.held, at));
-            let used = required.used && Counted::is_first(&mut counted.used, at);
+            let used = required.used && serves && Counted::is_first(&mut counted.used, at);
             if let (true, Some((azimuth_deg, elevation_deg))) = (used, look(*sample)) {
                 due.add(azimuth_deg.to_radians(), elevation_deg.to_radians());
             }
@@ -255,7 +263,7 @@ impl Expectations {
         Measured { interval_s: self.receiver.interval_s }
     }
 
-    fn fixes_due(&mut self, expect: &Expect, start: Epoch) {
+    fn fixes_due(&mut self, expect: &Expect, start: Epoch, authentic_s: Option<f64>) {
         let ready = |due: &&Due| due.pdop() <= LARGEST_PDOP;
         self.four_by_s = self.epochs.iter().find(ready).map(|due| due.time_s);
         let receiver = &self.receiver;
@@ -274,6 +282,9 @@ impl Expectations {
         let page_s = signals.iter().filter(brings).map(page_s).fold(f64::INFINITY, f64::min);
         let waited_s = four_s + receiver.ionosphere_wait_s;
         self.fixes_from_s = if receiver.requires_ionosphere { four_s.max(page_s) } else { waited_s } + SOLVE_S;
+        if let Some(authentic_s) = authentic_s {
+            self.fixes_from_s = self.fixes_from_s.max(authentic_s + SOLVE_S);
+        }
         // Where the scene excuses a time, the clock begins again after it.
         self.first_fix_s = self.epochs.iter().find(|due| self.fix_due(expect, due, None)).map(|due| due.time_s);
     }

@@ -465,8 +465,8 @@ fn elements(sv: Sv, words: [&u128; 5], near: Epoch) -> Option<Ephemeris> {
     Some(OF_SET.decoded(sv, words, sent_at(five, near)?))
 }
 
-/// Ephemeris of words 1 to 5, as their bits state it; `None` if they are not of one issue and of this satellite.
-/// `near` resolves the week of word 5.
+/// Ephemeris of words 1 to 5, as their bits state it; `None` if they are not of one issue and of this
+/// satellite. `near` resolves the week of word 5.
 pub fn ephemeris_of(sv: Sv, words: &[u128; 5], near: Epoch) -> Option<Ephemeris> {
     elements(sv, words.each_ref(), near)
 }
