@@ -16,11 +16,14 @@ use gnss::facts::OsnmaFacts;
 use gnss::galileo::e1::E1;
 use gnss::galileo::inav::GST_WEEK;
 use gnss::satellite::Sv;
+use gnss::signal::Link;
 use gnss::time::{Epoch, WEEK_S};
 
-/// Seconds of a sub-frame, and of a page.
+/// Seconds of a sub-frame.
 pub const SUBFRAME_S: i64 = 30;
-const PAGE_S: f64 = 2.0;
+/// Second of a sub-frame at which its first page has ended: on E1-B it begins at second 1 and lasts two (OS SIS
+/// ICD 2.1, 4.3.2.2).
+const FIRST_PAGE_S: f64 = 3.0;
 /// Travel of the signal and a receiver's block.
 const SLACK_S: f64 = 0.5;
 /// Blocks of the message with the public key (ICD, table 3) and of that with the root key (table 5).
@@ -82,6 +85,31 @@ impl Verification {
     }
 }
 
+/// Conditions under which a receiver has positions of authentic data alone.
+#[derive(Clone, Debug)]
+pub struct Required {
+    /// Time from which on they are due; infinite where they never are.
+    pub from_s: f64,
+    /// Satellites that sign.
+    satellites: BTreeSet<Sv>,
+}
+
+impl Required {
+    /// Conditions of a run whose receiver takes authentic data alone; `None` of another. It has locked by
+    /// `lock_s`.
+    pub fn of(run: &Run, lock_s: f64) -> Option<Self> {
+        let own = Verification::of(&run.receiver).filter(|own| own.is_required)?;
+        let satellites = run.scene.osnma.as_ref().map(|facts| signing(run, facts)).unwrap_or_default();
+        let from_s = first_s(run, &own, lock_s).map_or(f64::INFINITY, |(at_s, _)| at_s);
+        Some(Self { from_s, satellites })
+    }
+
+    /// True if a position may use a signal: tags cover I/NAV alone.
+    pub fn serves(&self, link: Link) -> bool {
+        link.signal == &E1 && self.satellites.contains(&link.sv)
+    }
+}
+
 /// Seconds of GST at the run's first sample.
 pub fn begin_gst_s(run: &Run) -> Option<f64> {
     let start = Epoch::parse(&run.scene.start).ok()?;
@@ -135,7 +163,7 @@ pub fn first_s(run: &Run, verification: &Verification, lock_s: f64) -> Option<(f
     };
     let slow = if verification.admits(0, SLACK_S) { 0 } else { 10 };
     let last = root.max(first + 3 + slow);
-    let at_s = (last * SUBFRAME_S) as f64 + PAGE_S + SLACK_S - begin_s;
+    let at_s = (last * SUBFRAME_S) as f64 + FIRST_PAGE_S + SLACK_S - begin_s;
     if facts.first_transition_s.is_some_and(|transition_s| transition_s <= at_s) {
         return None;
     }

@@ -16,14 +16,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Matrix4;
 
 use crate::error::JudgeError;
-use crate::expect::authenticated::{self, Verification};
+use crate::expect::authenticated;
 use crate::expect::message::Message;
 use crate::expect::multiple_access::MultipleAccess;
 use crate::read::Run;
 use crate::statistics::median;
 use gnss::earth::Geodetic;
 use gnss::facts::{Expect, FaultKind, Fixes};
-use gnss::galileo::e1::E1;
 use gnss::ionosphere::Model;
 use gnss::satellite::Sv;
 use gnss::signal::Link;
@@ -172,6 +171,7 @@ impl Expectations {
         let in_space = Geodetic::from_ecef(&first.position_m()).height_m >= SPACE_M;
         let access = MultipleAccess::new(run);
         let mut counted = Counted::default();
+        let required = authenticated::Required::of(run, satellite::LOCK_S);
         let renewals = run.scene.renewals.iter().fold(BTreeMap::<Sv, Vec<f64>>::new(), |mut all, one| {
             all.entry(one.sv).or_default().push(one.at_s);
             all
@@ -187,13 +187,11 @@ impl Expectations {
                 interval_s,
             };
             counted.begin(link.sv, found.epochs.len());
-            let one = found.satellite(run, &scene, (&access, &mut counted), link, in_space, observed)?;
+            let serves = required.as_ref().is_none_or(|required| required.serves(link));
+            let one = found.satellite(run, &scene, (&access, &mut counted), (link, serves), in_space, observed)?;
             found.satellites.insert(link, one);
         }
-        let verified = Verification::of(&run.receiver).filter(|own| own.is_required);
-        let authentic_s = verified
-            .map(|own| authenticated::first_s(run, &own, satellite::LOCK_S).map_or(f64::INFINITY, |(at_s, _)| at_s));
-        found.fixes_due(&run.scene.expect, start, authentic_s);
+        found.fixes_due(&run.scene.expect, start, required.map(|required| required.from_s));
         Ok(found)
     }
 
@@ -202,7 +200,7 @@ impl Expectations {
         run: &Run,
         scene: &Scene<'_>,
         (access, counted): (&MultipleAccess<'_>, &mut Counted),
-        link: Link,
+        (link, serves): (Link, bool),
         in_space: bool,
         observed: &impl Observed,
     ) -> Result<Satellite, JudgeError> {
@@ -237,9 +235,6 @@ impl Expectations {
         let excuses: Vec<Excuse> = plain.iter().filter_map(|row| scene.excuse(link.sv, row, usual_dbhz)).collect();
         one.excuse = excuses.get(excuses.len() / 2).copied();
         let measured = self.measured();
-        // Of data that tags cover there are those of Galileo's I/NAV alone.
-        let is_verified = Verification::of(&run.receiver).is_some_and(|own| own.is_required);
-        let serves = !is_verified || link.signal == &E1;
         let dated_s = if link.signal.is_dated() { Some(f64::NEG_INFINITY) } else { counted.dated_s };
         for ((sample, row), required) in samples.iter().zip(&plain).zip(&required) {
             // What does not say its time has it once another signal of the satellite is observed.
