@@ -5,7 +5,7 @@
 //! receiver. A hot start needs no more than those; a warm one the root key (8 blocks, one a sub-frame of each
 //! satellite) and a cold one the public key before it (13 blocks, in its turns). Satellites send the blocks
 //! in turn, each by its number ahead. Limits: satellites count that the truth has nearly always; a start near
-//! a transition has no time.
+//! a transition or a spoofer has no time.
 
 use std::collections::BTreeSet;
 
@@ -164,7 +164,8 @@ pub fn first_s(run: &Run, verification: &Verification, lock_s: f64) -> Option<(f
     let slow = if verification.admits(0, SLACK_S) { 0 } else { 10 };
     let last = root.max(first + 3 + slow);
     let at_s = (last * SUBFRAME_S) as f64 + FIRST_PAGE_S + SLACK_S - begin_s;
-    if facts.first_transition_s.is_some_and(|transition_s| transition_s <= at_s) {
+    let changes = facts.first_transition_s.into_iter().chain(facts.spoofers.iter().map(|spoofer| spoofer.on_s));
+    if changes.into_iter().any(|change_s| change_s <= at_s) {
         return None;
     }
     let mut text = format!(

@@ -216,7 +216,7 @@ impl Judge<'_> {
         let time_s = start_s as f64 - begin_s;
         let Some(number) = self.source(sender, start_s) else { return Truth::Unknown };
         let spoofer = number.checked_sub(1).and_then(|index| self.spoofers.get(index)).copied();
-        let SpoofedMessages { bits, replay_s } = spoofer.unwrap_or_default();
+        let SpoofedMessages { bits, replay_s, .. } = spoofer.unwrap_or_default();
         if bits != SpoofedBits::True {
             return Truth::False(format!("spoofer {number} sent it, without the true bits"));
         }
@@ -235,5 +235,77 @@ impl Judge<'_> {
         }
         let is_clean = |sv: Sv| !self.is_faulty(sv, time_s - REMEMBERED_S - sub, time_s + sub, false);
         if number == 0 && is_clean(sender) && is_clean(of) { Truth::True } else { Truth::Unknown }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hand_made;
+    use std::fs;
+
+    /// Run by hand, which begins at TOW 375 150 of week 566 of GST, whose receiver verifies with a clock so far
+    /// ahead; E12 has a fault of its message if asked for.
+    fn run(offset_s: f64, faulty: bool) -> (tempfile::TempDir, Run) {
+        let place = hand_made::planted();
+        let path = place.path().join("truth/scene.json");
+        let mut scene: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+        scene["osnma"] = serde_json::json!({"public_key_every_s": 600.0, "public_key_for_s": 180.0});
+        if faulty {
+            scene["faults"] = serde_json::json!([{"kind": "parameter", "satellites": ["E12"], "from_s": 0.0}]);
+        }
+        fs::write(&path, scene.to_string()).unwrap();
+        let settings = serde_json::json!({"public_key": "1:03", "kroot": "52", "time_uncertainty_s": 15.0,
+            "clock_offset_s": offset_s, "position": "all"});
+        let receiver = serde_json::json!({"settings": {"osnma": settings},
+            "osnma": {"start": "hot", "state": "authentic", "tags": {"all": {"authentic": 2, "refused": 1}}}});
+        fs::write(place.path().join("rx/receiver.json"), receiver.to_string()).unwrap();
+        let table = "gst_week,tow_s,sender,satellite,adkd,position,result,reason\n\
+                     566,375240,E05,E12,0,2,authentic,\n566,375240,E05,E12,12,3,authentic,\n\
+                     566,375240,E05,E11,0,4,refused,tag is not the MAC of the data\n";
+        fs::write(place.path().join("rx/osnma.csv"), table).unwrap();
+        let run = Run::read(place.path()).unwrap();
+        (place, run)
+    }
+
+    fn counts(offset_s: f64, faulty: bool) -> [u64; 3] {
+        let found = Osnma::of(&run(offset_s, faulty).1).unwrap().unwrap();
+        [found.false_accepted, found.true_refused, found.rows_differing]
+    }
+
+    #[test]
+    fn tags_over_changed_words_and_tags_later_than_their_keys_are_false_and_others_true() {
+        assert_eq!(counts(0.0, false), [0, 1, 0]);
+        assert_eq!(counts(0.0, true), [2, 1, 0]);
+        // By 20 s and 15 s of uncertainty the key of ADKD 0 may have been sent, by an hour that of the slow MAC.
+        assert_eq!(counts(20.0, false)[0], 1);
+        assert_eq!(counts(3600.0, false)[0], 2);
+    }
+
+    #[test]
+    fn the_sender_that_was_followed_decides_on_its_tags() {
+        let (_place, run) = run(0.0, false);
+        let verification = Verification::of(&run.receiver).unwrap();
+        let subframe = (566 * WEEK_S + 375_240) / SUBFRAME_S;
+        let spoofed = |bits, replay_s| SpoofedMessages { bits, replay_s, on_s: 0.0 };
+        let truth = |spoofer: SpoofedMessages, followed: &[(&str, i64, usize)]| {
+            let mut all = Followed::new();
+            for (sv, after, number) in followed {
+                all.entry((sv.parse().unwrap(), subframe + after)).or_default().insert(*number);
+            }
+            let judge = Judge { run: &run, verification, spoofers: &[spoofer], followed: all };
+            let row = run.tags().unwrap().remove(2);
+            judge.truth(&row, begin_gst_s(&run).unwrap())
+        };
+        let own_keys = spoofed(SpoofedBits::OwnKeys, 0.0);
+        let at_own = [("E05", 0, 0), ("E11", -1, 0)];
+        assert_eq!(truth(own_keys, &at_own), Truth::True);
+        assert!(matches!(truth(own_keys, &[("E05", 0, 1), ("E11", -1, 0)]), Truth::False(_)));
+        // Followed at both in one sub-frame, or not at all.
+        assert_eq!(truth(own_keys, &[("E05", 0, 0), ("E05", 0, 1), ("E11", -1, 0)]), Truth::Unknown);
+        assert_eq!(truth(own_keys, &[]), Truth::Unknown);
+        // A replay of two sub-frames comes after the key, one of none repeats what is true.
+        assert!(matches!(truth(spoofed(SpoofedBits::True, 60.0), &[("E05", 2, 1), ("E11", 1, 1)]), Truth::False(_)));
+        assert_eq!(truth(spoofed(SpoofedBits::True, 0.0), &[("E05", 0, 1), ("E11", -1, 1)]), Truth::Unknown);
     }
 }

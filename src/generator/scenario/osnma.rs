@@ -160,7 +160,11 @@ impl Scenario {
             public_key_for_s: spec.key_turn_s[1],
             first_transition_s: spec.transitions.first().map(|(_, time_s)| *time_s),
             spoofers: (self.spoofers.iter())
-                .map(|spoofer| SpoofedMessages { bits: bits(spoofer.osnma), replay_s: spoofer.replay_s })
+                .map(|spoofer| SpoofedMessages {
+                    bits: bits(spoofer.osnma),
+                    replay_s: spoofer.replay_s,
+                    on_s: spoofer.on_s,
+                })
                 .collect(),
         }
     }

@@ -24,6 +24,8 @@ pub struct SpoofedMessages {
     pub bits: SpoofedBits,
     /// Seconds by which they lie behind the true ones.
     pub replay_s: f64,
+    /// Begin of its signals, in seconds since the start of the samples.
+    pub on_s: f64,
 }
 
 /// Authentication of Galileo's messages on E1-B.
