@@ -194,7 +194,7 @@ pub const ORDER: Order<'static> = &[
             &["dsm", "report"],
             &["keys"],
             &["files"],
-            &["verifier"],
+            &["provider", "verifier"],
             &["tests"],
         ],
     ),
