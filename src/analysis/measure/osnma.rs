@@ -242,28 +242,10 @@ impl Judge<'_> {
 mod tests {
     use super::*;
     use crate::hand_made;
-    use std::fs;
 
-    /// Run by hand, which begins at TOW 375 150 of week 566 of GST, whose receiver verifies with a clock so far
-    /// ahead; E12 has a fault of its message if asked for.
     fn run(offset_s: f64, faulty: bool) -> (tempfile::TempDir, Run) {
         let place = hand_made::planted();
-        let path = place.path().join("truth/scene.json");
-        let mut scene: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
-        scene["osnma"] = serde_json::json!({"public_key_every_s": 600.0, "public_key_for_s": 180.0});
-        if faulty {
-            scene["faults"] = serde_json::json!([{"kind": "parameter", "satellites": ["E12"], "from_s": 0.0}]);
-        }
-        fs::write(&path, scene.to_string()).unwrap();
-        let settings = serde_json::json!({"public_key": "1:03", "kroot": "52", "time_uncertainty_s": 15.0,
-            "clock_offset_s": offset_s, "position": "all"});
-        let receiver = serde_json::json!({"settings": {"osnma": settings},
-            "osnma": {"start": "hot", "state": "authentic", "tags": {"all": {"authentic": 2, "refused": 1}}}});
-        fs::write(place.path().join("rx/receiver.json"), receiver.to_string()).unwrap();
-        let table = "gst_week,tow_s,sender,satellite,adkd,position,result,reason\n\
-                     566,375240,E05,E12,0,2,authentic,\n566,375240,E05,E12,12,3,authentic,\n\
-                     566,375240,E05,E11,0,4,refused,tag is not the MAC of the data\n";
-        fs::write(place.path().join("rx/osnma.csv"), table).unwrap();
+        hand_made::verified(place.path(), offset_s, faulty);
         let run = Run::read(place.path()).unwrap();
         (place, run)
     }
