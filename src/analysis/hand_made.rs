@@ -304,8 +304,8 @@ pub(crate) fn two_bands(run: &Path, error_m: impl Fn(u64) -> f64) {
     write(&run.join("rx/ionosphere.csv"), &(0..41).map(row).collect::<Vec<_>>());
 }
 
-/// Makes the receiver of a run one that verifies Galileo's authentication, from TOW 375 150 of week 566 of GST
-/// on, by a clock so far ahead; E12 has a fault of its message if asked for.
+/// Makes the receiver of a run one that verifies Galileo's authentication, from TOW 375 150 of week 566 of
+/// GST on, by a clock so far ahead; E12 has a fault of its message if asked for.
 pub(crate) fn verified(run: &Path, offset_s: f64, faulty: bool) {
     let path = run.join("truth/scene.json");
     let mut scene: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();

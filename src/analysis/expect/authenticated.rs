@@ -21,8 +21,8 @@ use gnss::time::{Epoch, WEEK_S};
 
 /// Seconds of a sub-frame.
 pub const SUBFRAME_S: i64 = 30;
-/// Second of a sub-frame at which its first page has ended: on E1-B it begins at second 1 and lasts two (OS SIS
-/// ICD 2.1, 4.3.2.2).
+/// Second of a sub-frame at which its first page has ended: on E1-B it begins at second 1 and lasts two (OS
+/// SIS ICD 2.1, 4.3.2.2).
 const FIRST_PAGE_S: f64 = 3.0;
 /// Travel of the signal and a receiver's block.
 const SLACK_S: f64 = 0.5;
