@@ -259,7 +259,7 @@ mod tests {
     fn tags_over_changed_words_and_tags_later_than_their_keys_are_false_and_others_true() {
         assert_eq!(counts(0.0, false), [0, 1, 0]);
         assert_eq!(counts(0.0, true), [2, 1, 0]);
-        // By 20 s and 15 s of uncertainty the key of ADKD 0 may have been sent, by an hour that of the slow one.
+        // Late by 20 s and 15 s of uncertainty ADKD 0 may have its key, late by an hour ADKD 12 too.
         assert_eq!(counts(20.0, false)[0], 1);
         assert_eq!(counts(3600.0, false)[0], 2);
     }
