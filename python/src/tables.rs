@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use generator::truth::{self, TruthError};
 use gnss::record::{
     AcquisitionRow, ClockRow, EventRow, Fix, Geographic, InterferenceRow, IonosphereRow, LineRow, NavigationRow,
-    Observation, PassRow, RayRow, SightRow, SkyRow, TrackingRow, TrajectoryRow,
+    Observation, PassRow, RayRow, SightRow, SkyRow, TagRow, TrackingRow, TrajectoryRow,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -80,6 +80,7 @@ pub struct Received {
     sights: Table<SightRow>,
     ionosphere: Table<IonosphereRow>,
     interference: Table<(LineRow, FrontEnd)>,
+    osnma: Table<TagRow>,
     /// Parameters so far: those of one issue are reported once.
     parameters: BTreeSet<NavigationRow>,
     /// Summary of the reception, once it has ended.
@@ -108,6 +109,7 @@ impl output::Sink for Received {
             output::Record::Clocks(rows) => rows.iter().for_each(|row| self.clocks.push(row)),
             output::Record::Sights(rows) => rows.iter().for_each(|row| self.sights.push(row)),
             output::Record::Ionosphere(rows) => rows.iter().for_each(|row| self.ionosphere.push(row)),
+            output::Record::Tag(row) => self.osnma.push(&row),
             output::Record::Interference { front_end, row } => self.interference.push(&(row, FrontEnd { front_end })),
         }
         Ok(())
@@ -124,7 +126,8 @@ impl Received {
     pub fn drain<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         tables!(
             self, py;
-            acquisition, tracking, events, observations, navigation, fixes, clocks, sights, ionosphere, interference
+            acquisition, tracking, events, observations, navigation, fixes, clocks, sights, ionosphere, interference,
+            osnma
         )
     }
 

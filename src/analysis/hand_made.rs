@@ -303,3 +303,26 @@ pub(crate) fn two_bands(run: &Path, error_m: impl Fn(u64) -> f64) {
     };
     write(&run.join("rx/ionosphere.csv"), &(0..41).map(row).collect::<Vec<_>>());
 }
+
+/// Makes the receiver of a run one that verifies Galileo's authentication, from TOW 375 150 of week 566 of
+/// GST on, by a clock so far ahead; E12 has a fault of its message if asked for.
+pub(crate) fn verified(run: &Path, offset_s: f64, faulty: bool) {
+    let path = run.join("truth/scene.json");
+    let mut scene: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    scene["osnma"] = serde_json::json!({"public_key_every_s": 600.0, "public_key_for_s": 180.0});
+    if faulty {
+        scene["faults"] = serde_json::json!([{"kind": "parameter", "satellites": ["E12"], "from_s": 0.0}]);
+    }
+    fs::write(&path, scene.to_string()).unwrap();
+    let path = run.join("rx/receiver.json");
+    let mut receiver: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    receiver["settings"]["osnma"] = serde_json::json!({"public_key": "1:03", "kroot": "52", "time_uncertainty_s": 15.0,
+        "clock_offset_s": offset_s, "position": "all"});
+    receiver["osnma"] = serde_json::json!({"start": "hot", "state": "authentic",
+        "tags": {"all": {"authentic": 2, "refused": 1}}});
+    fs::write(&path, receiver.to_string()).unwrap();
+    let table = "gst_week,tow_s,sender,satellite,adkd,position,result,reason\n\
+                 566,375240,E05,E12,0,2,authentic,\n566,375240,E05,E12,12,3,authentic,\n\
+                 566,375240,E05,E11,0,4,refused,tag is not the MAC of the data\n";
+    fs::write(run.join("rx/osnma.csv"), table).unwrap();
+}

@@ -32,7 +32,8 @@ pub fn execute(arguments: &args::Receive) -> Result<(), CliError> {
         None => Settings::default(),
         Some(path) => {
             let (name, text) = scenario::text(path)?;
-            Settings::parse(&text, &name).map_err(|error| scenario::refused(&error))?
+            let settings = Settings::parse(&text, &name).map_err(|error| scenario::refused(&error))?;
+            scenario::with_keys(settings, path.parent(), &name, "")?
         }
     };
     let taken = to_lines(arguments).filter(|spec| **spec == lines::Spec::Stdout).count();

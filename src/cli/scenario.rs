@@ -116,7 +116,23 @@ pub fn scenario_error(error: ScenarioError) -> CliError {
 
 /// The receiver's settings that the scenario carries for it.
 pub fn receiver_settings(named: &Named) -> Result<Settings, CliError> {
-    Settings::of_scenario(&named.text, &named.name).map_err(|error| refused(&error))
+    let settings = Settings::of_scenario(&named.text, &named.name).map_err(|error| refused(&error))?;
+    with_keys(settings, Some(&named.directory), &named.name, "receiver.")
+}
+
+/// The settings with the keys of authentication in place of the files that have them, which are relative to a
+/// directory.
+pub fn with_keys(
+    mut settings: Settings,
+    directory: Option<&Path>,
+    origin: &str,
+    above: &str,
+) -> Result<Settings, CliError> {
+    if let Some(osnma) = &mut settings.osnma {
+        let directory = directory.unwrap_or(Path::new("."));
+        osnma.read_files(directory, origin, above).map_err(|error| refused(&error))?;
+    }
+    Ok(settings)
 }
 
 /// Error that lists all errors of receiver's settings, each as one of its own.

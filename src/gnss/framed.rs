@@ -61,6 +61,8 @@ pub trait Content: Clone + fmt::Debug + Send + Sync {
     fn missing(&self) -> Vec<u8>;
     /// Takes a time that is known to within a year.
     fn know(&mut self, _near: Epoch) {}
+    /// Hands on whole pages from here on.
+    fn keep_pages(&mut self) {}
 }
 
 /// Reader of a message whose frames have one length.
@@ -89,6 +91,10 @@ impl<C: Content> Reader for Framed<C> {
 
     fn know(&mut self, near: Epoch) {
         self.content.know(near);
+    }
+
+    fn keep_pages(&mut self) {
+        self.content.keep_pages();
     }
 
     fn skip(&mut self) {

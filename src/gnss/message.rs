@@ -149,6 +149,15 @@ pub struct Common {
     /// Ground network that supplies the content of augmentation messages; absent means that they contain no
     /// corrections.
     pub network: Option<Arc<dyn Network>>,
+    /// Authentication of I/NAV on E1-B; absent means zeros in its bits.
+    pub authentication: Option<Arc<dyn Authentication>>,
+}
+
+/// Authentication of a constellation's messages.
+pub trait Authentication: fmt::Debug + Send + Sync {
+    /// Bits of authentication in the page of a satellite that begins at a time, the first sent the most
+    /// significant.
+    fn bits(&self, sv: Sv, start: Epoch) -> u64;
 }
 
 /// Step of an almanac's reference time, and the last one inside a week (IS-GPS-200N, table 20-VI;
@@ -283,10 +292,23 @@ pub enum Read {
     /// Satellite that transmits, if it differs from the assumed one. Some satellites share code and carrier,
     /// and only the message identifies them. All later results belong to this satellite.
     Sender(Sv),
+    /// A whole page, of a reader that keeps them ([`Reader::keep_pages`]).
+    Page(SentPage),
     /// Raw parameters as decoded.
     Parameters(Vec<NavigationRow>),
     /// A unit that passed its checks is not used, or parts that did make no ephemeris: why.
     Refused(String),
+}
+
+/// Page whose check is right, all of its bits as they were sent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SentPage {
+    /// Number of symbols from the page's first to the newest, both counted.
+    pub symbols: u64,
+    /// Second at which the page began, by the satellite's message.
+    pub start: Epoch,
+    /// Even and odd part, each in the low 120 bits.
+    pub parts: [u128; 2],
 }
 
 impl Read {
@@ -308,6 +330,8 @@ pub trait Reader: fmt::Debug + Send + Sync {
     fn take(&mut self, soft: f32, near: Epoch) -> Vec<Read>;
     /// Takes a time that is known to within a year. Messages whose own date is incomplete are dated by it.
     fn know(&mut self, _near: Epoch) {}
+    /// Hands on whole pages from here on, where the message has pages that carry authentication.
+    fn keep_pages(&mut self) {}
     /// Symbols are missing before the next one.
     fn skip(&mut self);
     /// The time of a unit contradicts those before: where units begin is searched again.

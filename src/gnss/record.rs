@@ -512,6 +512,32 @@ impl NavigationRow {
     }
 }
 
+/// Result of one tag of Galileo's message authentication: `rx/osnma.csv`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TagRow {
+    /// Week of GST in which the tag's sub-frame began.
+    pub gst_week: u16,
+    /// Second of the week at which the sub-frame began.
+    pub tow_s: u32,
+    /// Satellite that sent the tag.
+    pub sender: String,
+    /// Satellite whose data it covers, as the tag states it.
+    pub satellite: String,
+    /// Kind of the data: 0 ephemeris, 4 timing parameters, 12 ephemeris under the slow key.
+    pub adkd: u8,
+    /// Position of the tag in its sub-frame, from 1 on.
+    pub position: u8,
+    /// Result: `authentic`, `no_data`, `refused` or `not_verifiable`.
+    pub result: String,
+    /// Reason; empty for a tag that is right.
+    pub reason: String,
+}
+
+impl TagRow {
+    /// Columns of the table.
+    pub const COLUMNS: [&str; 8] = ["gst_week", "tow_s", "sender", "satellite", "adkd", "position", "result", "reason"];
+}
+
 /// Something that happened to a channel: `rx/events.csv`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct EventRow {

@@ -33,6 +33,26 @@ pub fn zeros(kind: Adkd) -> Option<Row> {
     Some(row)
 }
 
+/// Words 1 to 5 whose covered bits are those of a tag of the ephemeris, or `None` for a row of another
+/// length. Week and second in word 5, which no tag covers, are those of `sent`; other bits that no tag covers
+/// are zero.
+pub fn words_under(row: &Row, sent: Gst) -> Option<[u128; 5]> {
+    if row.len() != EPHEMERIS.iter().map(|(_, _, count)| *count as usize).sum::<usize>() {
+        return None;
+    }
+    let bit = |index: usize| row.bytes().get(index / 8).is_some_and(|byte| byte >> (7 - index % 8) & 1 == 1);
+    let mut begin = 0;
+    let mut words = [0; 5];
+    for (word, &(kind, first, count)) in words.iter_mut().zip(EPHEMERIS) {
+        let bits = (begin..begin + count as usize).fold(0_u128, |all, index| all << 1 | u128::from(bit(index)));
+        *word = u128::from(kind) << 122 | bits << (128 - first - count);
+        begin += count as usize;
+    }
+    // OS SIS ICD 2.1, 4.3.5, table 46: week of 12 bits from bit 73 on, second of 20 bits behind it.
+    words[4] |= u128::from(sent.week()) << 43 | u128::from(sent.tow_s()) << 23;
+    Some(words)
+}
+
 /// Reason for which there are no data to hold a tag to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DataGap {
@@ -114,6 +134,21 @@ mod tests {
         assert!(covered(3).is_ok());
         assert_eq!(covered(2), Err(DataGap::Old));
         assert_eq!(held.covered(4, Adkd::Ephemeris, Gst::new(1251, 90), 3), Err(DataGap::Missing));
+    }
+
+    #[test]
+    fn covered_bits_give_their_words_back() {
+        let mut held = Words::default();
+        let sent: BTreeMap<u8, u128> = words(9).into_iter().map(|(kind, word)| (kind, word | 0x5A5A << 60)).collect();
+        held.put(3, Gst::new(1251, 0), &sent);
+        let row = held.covered(3, Adkd::Ephemeris, Gst::new(1251, 30), 1).unwrap();
+        let back = words_under(&row, Gst::new(1251, 25)).unwrap();
+        for (word, (kind, first, count)) in back.iter().zip(EPHEMERIS) {
+            assert_eq!(part(*word, 128, 0, 6), u128::from(*kind));
+            assert_eq!(part(*word, 128, *first, *count), part(sent[kind], 128, *first, *count));
+        }
+        assert_eq!((part(back[4], 128, 73, 12), part(back[4], 128, 85, 20)), (1251, 25));
+        assert_eq!(words_under(&Row::default(), Gst::new(1251, 25)), None);
     }
 
     #[test]

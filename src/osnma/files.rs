@@ -131,6 +131,18 @@ pub fn key(text: &str) -> Result<PublicKey, FileError> {
     public_key(key)
 }
 
+/// Reads the key of a public key's file as its number and its point in compressed form.
+///
+/// # Errors
+/// [`FileError`].
+pub fn key_point(text: &str) -> Result<(u8, Vec<u8>), FileError> {
+    let id = key(text)?.id;
+    let document = parse(text)?;
+    let node = named(document.root(), "PublicKey");
+    let node = node.ok_or_else(|| missing(document.root_element(), "PublicKey", "a public key of the GSC"))?;
+    Ok((id, point(node)?))
+}
+
 fn public_key(key: Node<'_, '_>) -> Result<PublicKey, FileError> {
     exactly(key, "PKType", "ECDSA P-256/SHA-256")?;
     let id = number(child(key, "PKID")?, "PKID", 1, 15)?;
@@ -236,6 +248,8 @@ mod tests {
     fn a_tree_gives_its_root_and_a_key_file_its_key() {
         assert_eq!(merkle_root(&tree()).unwrap().0[..2], [0x0e, 0x63]);
         assert_eq!(key(&format!("<a>{}</a>", public())).unwrap().id, 1);
+        let (id, point) = key_point(&format!("<a>{}</a>", public())).unwrap();
+        assert_eq!((id, point), (1, unhex(POINT).unwrap()));
     }
 
     #[test]

@@ -63,6 +63,11 @@ impl PublicKey {
         Ok(Self { id, key })
     }
 
+    /// Point in compressed form.
+    pub fn point(&self) -> Vec<u8> {
+        self.key.to_sec1_point(true).as_bytes().to_vec()
+    }
+
     /// Holds a root key's signature to this key.
     ///
     /// # Errors

@@ -107,6 +107,11 @@ impl Page {
         if crc24q(checked) == 0 { Ok(()) } else { Err(PageError::Checksum) }
     }
 
+    /// Even and odd part, each in the low 120 bits.
+    pub fn parts(&self) -> [u128; 2] {
+        [self.even, self.odd]
+    }
+
     /// Word of 128 bits.
     pub fn word(&self) -> u128 {
         part(self.even, PART_BITS, 2, 112) << 16 | part(self.odd, PART_BITS, 2, 16)

@@ -5,7 +5,9 @@ use std::fmt;
 
 use crate::data::DataGap;
 use crate::fields::Adkd;
+use crate::page::satellite;
 use crate::time::Gst;
+use gnss::record::TagRow;
 
 /// State of a verifier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -153,6 +155,22 @@ pub struct TagReport {
     pub position: u8,
     /// Result.
     pub outcome: Outcome,
+}
+
+impl TagReport {
+    /// Row of `osnma.csv`.
+    pub fn row(&self) -> TagRow {
+        TagRow {
+            gst_week: self.sent.week(),
+            tow_s: self.sent.tow_s(),
+            sender: satellite(self.sender).to_string(),
+            satellite: satellite(self.of).to_string(),
+            adkd: self.adkd.number(),
+            position: self.position,
+            result: self.outcome.name().to_owned(),
+            reason: self.outcome.reason().to_owned(),
+        }
+    }
 }
 
 /// Counts of a verifier.

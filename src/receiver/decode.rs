@@ -9,7 +9,7 @@ use crate::track::Symbol;
 use gnss::augmentation::Content;
 use gnss::broadcast::Ephemeris;
 use gnss::ionosphere::Coefficients;
-use gnss::message::{Read, Reader};
+use gnss::message::{Read, Reader, SentPage};
 use gnss::record::NavigationRow;
 use gnss::satellite::Sv;
 use gnss::signal::Signal;
@@ -56,6 +56,8 @@ pub enum News {
         /// Content of the block.
         content: Box<Content>,
     },
+    /// Whole page, of a decoder that keeps them.
+    Page(SentPage),
     /// Raw parameters as decoded.
     Parameters(Vec<NavigationRow>),
     /// A unit that passed its checks is not used: why.
@@ -116,6 +118,12 @@ impl Decoder {
                 begin: None,
             }),
         })
+    }
+
+    /// Decoder that hands on the whole pages of a message that carries authentication.
+    pub fn with_pages(mut self) -> Self {
+        self.reader.keep_pages();
+        self
     }
 
     /// True if another signal of the satellite has to give the time.
@@ -206,6 +214,7 @@ impl Decoder {
                 }
                 Read::Ionosphere(coefficients) => news.push(News::Ionosphere(coefficients)),
                 Read::Sender(sv) => news.push(News::Sender(sv)),
+                Read::Page(page) => news.push(News::Page(page)),
                 Read::Parameters(rows) => news.push(News::Parameters(rows)),
                 Read::Refused(why) => news.push(News::Refused(why)),
                 Read::Augmentation(label, content) => {

@@ -6,6 +6,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::acquire::AcquireError;
+use crate::authentic::{AnchorError, Authenticity};
 use crate::diagnosis::{Diagnosis, duration};
 use crate::gap::Jump;
 use crate::output::OutputError;
@@ -44,6 +45,9 @@ pub enum ReceiveError {
         /// Reason in words.
         reason: String,
     },
+    /// Verification of authentication that cannot begin.
+    #[error(transparent)]
+    Osnma(#[from] AnchorError),
     /// Settings that are refused.
     #[error(transparent)]
     Settings(#[from] SettingsError),
@@ -92,6 +96,8 @@ pub struct Outcome {
     pub interfered: Option<Interfered>,
     /// Code-carrier divergence that all satellites share, if any.
     pub parted: Option<Parted>,
+    /// Verification of Galileo's authentication, if the settings ask for it.
+    pub osnma: Option<Authenticity>,
     /// Gaps and repetitions in the samples.
     pub jumps: Vec<Jump>,
     /// Margins to what is refused.
@@ -162,6 +168,7 @@ impl fmt::Display for Outcome {
         }
         self.interfered.as_ref().map_or(Ok(()), |seen| write!(f, "; {seen}"))?;
         self.parted.as_ref().map_or(Ok(()), |parted| write!(f, "; {parted}"))?;
+        self.osnma.as_ref().map_or(Ok(()), |osnma| write!(f, "; {osnma}"))?;
         self.jumps.iter().try_for_each(|jump| write!(f, "; {jump}"))
     }
 }

@@ -241,6 +241,7 @@ impl Reception {
     pub fn finish(mut self, sink: &mut dyn Sink) -> Result<Outcome, ReceiveError> {
         let cut_bytes = self.take_rest(sink)?;
         self.session.search_rest(self.samples(), sink)?;
+        self.session.end_verification(sink)?;
         let Some(metadata) = self.metadata.first() else { return Err(ReceiveError::NoFrontEnd) };
         let settings = &self.settings;
         let count = self.samples();
@@ -451,6 +452,9 @@ fn summary(
         "warnings": outcome.warnings,
         "diagnosis": outcome.diagnosis.as_ref().map(ToString::to_string),
     });
+    if let Some(osnma) = &outcome.osnma {
+        summary["osnma"] = json!(osnma);
+    }
     if metadata.len() > 1 {
         let each = metadata.iter().zip(signals).map(|(metadata, signals)| {
             let mut front_end = of(metadata);

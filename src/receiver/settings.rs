@@ -4,6 +4,7 @@
 //! All errors of a text are reported at once, in its order. The known keys are those of the defaults
 //! themselves, so the list cannot go stale.
 
+pub mod osnma;
 pub mod reference;
 
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,7 @@ use crate::position::PositionSettings;
 use crate::track::{TrackingSettings, TrackingSettingsError};
 use gnss::place::{Keys, hint, nearest};
 use gnss::time::{Epoch, TimeError};
+use osnma::OsnmaSettings;
 
 /// All choices of the receiver.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -29,6 +31,9 @@ pub struct Settings {
     pub position: PositionSettings,
     /// Main loop.
     pub operation: OperationSettings,
+    /// Verification of Galileo's message authentication; `None` for none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub osnma: Option<OsnmaSettings>,
 }
 
 described! {
@@ -282,6 +287,14 @@ impl Settings {
                 });
             }
         }
+        let refused = self.osnma.as_ref().map_or(Ok(()), OsnmaSettings::validate);
+        refused.map_err(|(key, value, expected)| SettingsError::Range {
+            origin: origin.to_owned(),
+            above: String::new(),
+            key,
+            value,
+            expected,
+        })?;
         if !operation.measurement_interval_ms.is_multiple_of(operation.tracking_interval_ms) {
             return Err(SettingsError::Range {
                 origin: origin.to_owned(),
@@ -381,9 +394,11 @@ fn several(mut faults: Vec<SettingsError>) -> SettingsError {
     }
 }
 
-/// The keys of the defaults, with their defaults.
+/// The keys of the defaults, with their defaults. Tables that are off by default are among them.
 fn known() -> Table {
-    Table::try_from(Settings::default()).unwrap_or_default()
+    let settings = Settings { osnma: Some(OsnmaSettings::default()), ..Settings::default() };
+    // A structure of numbers, words and truth values is a table.
+    Table::try_from(settings).unwrap_or_default()
 }
 
 /// Takes the keys that `known` does not have out of `table`, by walking both, and returns their errors.
@@ -505,7 +520,7 @@ mod tests {
     #[test]
     fn every_number_out_of_its_range_is_refused_by_name() {
         // What no key can be: not a number. Walks all keys of the defaults, so that none is forgotten.
-        for (section, keys) in Table::try_from(Settings::default()).unwrap() {
+        for (section, keys) in known() {
             for (key, value) in keys.as_table().unwrap() {
                 let bad = match value {
                     Value::Float(_) => "nan",

@@ -96,11 +96,21 @@ pub fn run(
     Ok(Done { generated: fed.generated, outcome: reception.finish(records)? })
 }
 
-/// The settings with which a scene is received: where they name no signals to search for, those of the scene.
+/// The settings with which a scene is received: where they name no signals to search for, those of the scene,
+/// and where they ask for authentication without a key, those that the scene publishes.
 pub fn settings_for(scenes: &[Scene], settings: &Settings) -> Settings {
     let signals: Vec<&'static Signal> = scenes.iter().flat_map(|scene| scene.signals.iter().copied()).collect();
     let mut own = settings.clone();
     own.acquisition.or_signals(&signals);
+    let published = || {
+        let scene = scenes.iter().find(|scene| scene.osnma.is_some())?;
+        scene.osnma.as_ref()?.anchor(scene.clock.start)
+    };
+    if let Some(osnma) = &mut own.osnma
+        && let Some(keys) = published()
+    {
+        osnma.or_keys(&keys.root, &keys.key, &keys.kroot);
+    }
     own
 }
 

@@ -44,7 +44,7 @@ pub const ORDER: Order<'static> = &[
             &["message"],
             &["effect"],
             &["fast_phase"],
-            &["augmentation"],
+            &["augmentation", "authentication"],
             &["spoof"],
             &["synth"],
             &["knots"],
@@ -87,6 +87,7 @@ pub const ORDER: Order<'static> = &[
             &["followed"],
             &["diagnosis"],
             &["output"],
+            &["authentic"],
             &["outcome"],
             &["session"],
             &["run"],
@@ -120,7 +121,7 @@ pub const ORDER: Order<'static> = &[
         "analysis/expect",
         &[
             &["theory"],
-            &["converter", "followed", "jamming", "message", "quantile", "smoothing", "welch"],
+            &["authenticated", "converter", "followed", "jamming", "message", "quantile", "smoothing", "welch"],
             &["sweep"],
             &["front_end", "multiple_access"],
             &["samples"],
@@ -136,7 +137,7 @@ pub const ORDER: Order<'static> = &[
     (
         "analysis/measure",
         &[
-            &["allan", "errors", "independent", "ionosphere", "lines", "peaks", "psd", "spectrum", "spoofing"],
+            &["allan", "errors", "independent", "ionosphere", "lines", "osnma", "peaks", "psd", "spectrum", "spoofing"],
             &["clock", "consistency", "elevation", "jitter"],
             &["slips"],
         ],
@@ -195,7 +196,7 @@ pub const ORDER: Order<'static> = &[
             &["dsm", "report"],
             &["keys"],
             &["files"],
-            &["verifier"],
+            &["provider", "verifier"],
             &["tests"],
         ],
     ),

@@ -1,8 +1,8 @@
 //! The judge judged: results of a sound receiver are damaged, a little and a little more, and the verdict
 //! must pass the one and fail the other.
 //!
-//! Five closed loops are run: at rest, in motion, of two systems, of two bands, and without the ionosphere's
-//! parameters. Each kind of damage edits the
+//! Six closed loops are run: at rest, in motion, of two systems, of two bands, without the ionosphere's
+//! parameters, and with authenticated messages. Each kind of damage edits the
 //! tables of `rx/` or the spectrum in a copy and has two sizes: one that an evaluator would still call sound,
 //! with which no row may fail, and one a small factor larger, which must fail by a row that names it. Where
 //! no size is sound (a row twice, a week too many) the smaller one is absent.
@@ -16,6 +16,7 @@ mod fixes;
 mod foreign;
 mod links;
 mod observations;
+mod osnma;
 mod rinex;
 mod run;
 mod spectrum;
@@ -53,6 +54,7 @@ fn kinds() -> Vec<Kind> {
         files::kinds(),
         excused::kinds(),
         early::kinds(),
+        osnma::kinds(),
     ]
     .into_iter()
     .flatten()

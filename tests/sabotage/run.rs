@@ -21,6 +21,8 @@ pub enum Scene {
     TwoSystems,
     /// Receiver at rest, NavIC on L5 and L1.
     TwoBands,
+    /// Receiver at rest that verifies Galileo's authentication.
+    Verified,
     /// Receiver at rest elsewhere, before the ionosphere's parameters come.
     Early,
 }
@@ -87,6 +89,21 @@ pub fn galileo() -> &'static Path {
     make(&RUN, "galileo", include_str!("../../scenarios/galileo.toml"))
 }
 
+/// Satellite with a fault of its message in the scene with authentication.
+pub const FORGED: &str = "E07";
+
+/// Scene of Galileo with authenticated messages and a receiver that verifies them from a hot start. One
+/// satellite states another accuracy than was signed.
+fn verified() -> &'static Path {
+    static RUN: OnceLock<Made> = OnceLock::new();
+    let more = format!(
+        "\n[osnma]\n[receiver.osnma]\n[fidelity]\nlevel = \"correlations\"\n[[message_fault]]\n\
+         kind = \"parameter\"\nsatellites = [\"{FORGED}\"]\nparameter = \"sisa_index\"\nadd = 1\n"
+    );
+    let scene = include_str!("../../scenarios/galileo.toml").replace("duration_s = 60", "duration_s = 150");
+    make(&RUN, "verified", &(scene + &more))
+}
+
 /// The shipped street between two walls.
 pub fn urban() -> &'static Path {
     static RUN: OnceLock<Made> = OnceLock::new();
@@ -126,6 +143,7 @@ impl Rx {
             Scene::TwoSystems => two_systems(),
             Scene::TwoBands => two_bands(),
             Scene::Early => elsewhere(),
+            Scene::Verified => verified(),
         };
         for name in ["truth", "rx"] {
             fs::create_dir(to.join(name)).unwrap();

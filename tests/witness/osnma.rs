@@ -3,15 +3,26 @@
 //! The files' conditions do not let us ship them. Counts are those that another verifier found in the same
 //! files: 23 951 right tags, eight of them aside that say that their sender had no data.
 
+use std::collections::BTreeMap;
 use std::fs;
+use std::path::Path;
 
+use gnss::galileo::e1::E1;
+use gnss::galileo::inav::{GST_WEEK, encode_page};
 use gnss::inflate::inflate;
+use gnss::satellite::Sv;
+use gnss::time::{Epoch, Rate, WEEK_S};
 use osnma::fields::Adkd;
 use osnma::files;
 use osnma::keys::Anchor;
-use osnma::page::Page;
+use osnma::page::{Page, satellite};
 use osnma::report::{Gap, Outcome, State, TagReport};
 use osnma::verifier::{Settings, Verifier};
+use receiver::authentic::Authentic;
+use receiver::decode::{Decoder, News};
+use receiver::output::Record;
+use receiver::settings::osnma::OsnmaSettings;
+use receiver::track::Symbol;
 
 use super::data::external;
 
@@ -92,4 +103,63 @@ fn another_trees_root_or_another_days_key_makes_no_tag_authentic() {
         assert!(reports.is_empty(), "{key}");
         assert_ne!(verifier.state(), State::Authentic, "{key}");
     }
+}
+
+/// Symbols of pages of the recording, by satellite, each with its number from the first page on.
+fn symbols(pages: &[Page]) -> Vec<(u64, Sv, f32)> {
+    let first = pages.iter().map(|page| page.start).min().unwrap();
+    let bits = |part: u128| (0..120).map(move |at| part >> (119 - at) & 1 == 1).collect::<Vec<bool>>();
+    let mut all = Vec::new();
+    for page in pages {
+        let begin = 250 * page.start.since_s(first) as u64;
+        let coded = encode_page(&page.parts().map(bits));
+        let sv = satellite(page.sender);
+        all.extend((begin..).zip(coded).map(|(number, bit)| (number, sv, if bit { -9.0 } else { 9.0 })));
+    }
+    all.sort_by_key(|(number, sv, _)| (*number, *sv));
+    all
+}
+
+#[test]
+fn recorded_pages_come_through_symbols_and_decoders_bit_for_bit_and_their_tags_are_as_right() {
+    let (pages, key) = ("osnma/16_AUG_2023_fixed.csv.gz", "osnma/OSNMA_PublicKey_16_AUG_2023.xml");
+    let Some((_, expected)) = verified(pages, key) else { return };
+    let (Some(pages), Some(key)) = (external(pages), external(key)) else { return };
+    let text = String::from_utf8(inflate(&fs::read(pages).unwrap(), 1 << 24).unwrap()).unwrap();
+    let pages: Vec<Page> = text.lines().map(|row| Page::from_row(row).unwrap()).collect();
+    let mut settings = OsnmaSettings { public_key: key.to_string_lossy().into_owned(), ..OsnmaSettings::default() };
+    settings.read_files(Path::new("/"), "rx.toml", "").unwrap();
+    let first = pages.iter().map(|page| page.start).min().unwrap();
+    let start = Epoch::new(first.seconds() + GST_WEEK * WEEK_S, 0.08);
+    // A sample a symbol.
+    let mut own = Authentic::new(&settings, &[&E1], Some(start), Rate::from_hz(250.0).unwrap()).unwrap();
+    let mut decoders: BTreeMap<Sv, Decoder> = BTreeMap::new();
+    let (mut found, mut records) = (BTreeMap::new(), Vec::<Record>::new());
+    for (number, sv, soft) in symbols(&pages) {
+        let decoder = decoders.entry(sv).or_insert_with(|| Decoder::new(&E1, sv).unwrap().with_pages());
+        for news in decoder.take(&Symbol { first_period: number, end: number + 1, soft }, start) {
+            if let News::Page(page) = news {
+                found.insert((page.start.seconds() - GST_WEEK * WEEK_S, sv.number), page.parts);
+                own.take(sv, number + 1, page);
+            }
+        }
+        if number % 25 == 0 {
+            own.verify(&mut records).unwrap();
+        }
+    }
+    own.finish(&mut records).unwrap();
+    // Pages after a satellite's last word with a time are there too; before its first they wait for it.
+    for page in pages.iter().filter(|page| page.check().is_ok()) {
+        let place = (page.start.seconds(), page.sender);
+        assert_eq!(found.get(&place), Some(&page.parts()), "{place:?}");
+    }
+    let count =
+        |name: &str| records.iter().filter(|record| matches!(record, Record::Tag(row) if row.result == name)).count();
+    let given = |name: &str| expected.iter().filter(|report| report.outcome.name() == name).count();
+    for name in ["authentic", "no_data", "refused"] {
+        assert_eq!(count(name), given(name), "{name}");
+    }
+    assert_eq!((count("authentic"), own.outcome().state), (12_524, "authentic"));
+    // The ephemerides that became authentic are those that the decoders read.
+    assert!(own.outcome().satellites.len() > 15, "{:?}", own.outcome().satellites);
 }

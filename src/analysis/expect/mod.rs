@@ -7,9 +7,10 @@
 //! `loops` are the receiver's three loops as linear systems, each one `closed`; [`multipath`] is the code
 //! error that reflected rays leave in them, and `beats` what codes add that run alike. [`smoothing`] is what
 //! the carrier makes of the code, [`quantile`] how far random errors may go. [`message`] is what the
-//! satellites sent, and [`due`] when each satellite must be found, observed and used. Of the receiver only
-//! its settings enter, and the times at which it took its rows.
+//! satellites sent, [`due`] when each satellite must be found, observed and used, and [`authenticated`] when
+//! data must be authentic. Of the receiver only its settings enter, and the times at which it took its rows.
 
+pub mod authenticated;
 pub(crate) mod beats;
 pub(crate) mod closed;
 pub mod converter;

@@ -139,7 +139,7 @@ pub fn find<'a>(summary: &'a Value, path: &str) -> Option<&'a Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_made::{planted, reported, two_bands, write};
+    use crate::hand_made::{planted, reported, two_bands, verified, write};
     use crate::judge;
     use std::fs;
 
@@ -159,6 +159,7 @@ mod tests {
         fs::copy(run.path().join("truth/trajectory.csv"), run.path().join("truth/claimed.csv")).unwrap();
         write(&run.path().join("rx/interference.csv"), &[reported(3, 1e5)]);
         two_bands(run.path(), |_| 0.1);
+        verified(run.path(), 0.0, false);
         let summary = judge(run.path()).unwrap();
         let mut written = Vec::new();
         paths("", &serde_json::to_value(&summary).unwrap(), &mut written);

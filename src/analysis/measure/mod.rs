@@ -6,8 +6,8 @@
 //! their own covariance, [`clock`] the receiver's clock with the deviations of [`allan`]. [`psd`] estimates
 //! the spectrum of the samples, [`peaks`] their correlation with the codes, [`lines`] compares the continuous
 //! waves that the receiver reported with those that there were, [`spoofing`] measures how far a spoofer moved
-//! the fixes, [`ionosphere`] what two bands showed of it. [`independent`] says how many independent values a
-//! correlated series is worth.
+//! the fixes, [`osnma`] which tags it took for authentic, [`ionosphere`] what two bands showed of it.
+//! [`independent`] says how many independent values a correlated series is worth.
 
 pub mod allan;
 pub mod clock;
@@ -18,6 +18,7 @@ pub mod independent;
 pub mod ionosphere;
 pub mod jitter;
 pub mod lines;
+pub mod osnma;
 pub mod peaks;
 pub mod psd;
 pub mod slips;

@@ -21,9 +21,10 @@ use crate::read::table::Table;
 use crate::statistics::{mean, median};
 use crate::waveform::Sampler;
 use gnss::facts::{FrontEndFacts, SceneFacts};
+use gnss::galileo::e1::E1;
 use gnss::record::{
     AcquisitionRow, ClockRow, EventRow, Fix, InterferenceRow, IonosphereRow, LineRow, NavigationRow, Observation,
-    RayRow, SkyRow, TrackingRow, TrajectoryRow,
+    RayRow, SkyRow, TagRow, TrackingRow, TrajectoryRow,
 };
 use gnss::satellite::Sv;
 use gnss::signal::described::registered;
@@ -120,6 +121,8 @@ pub struct Run {
     /// Signals that a search cannot tell from one of the truth, on the same carrier with the same code, by
     /// whose name they count: until its message says who a satellite is, a receiver takes either name.
     pub alike: BTreeMap<Link, Sv>,
+    /// Directory of the truth's tables.
+    truth_place: PathBuf,
     /// Directory of the receiver's tables; `None` for a truth alone.
     pub rx: Option<PathBuf>,
     /// The receiver's observations.
@@ -336,6 +339,7 @@ impl Run {
             interference: optional(&truth.join("interference.csv"))?,
             claimed,
             alike: BTreeMap::new(),
+            truth_place: truth.to_owned(),
             rx: None,
             observations: SpillStore::new(directory),
             fixes: Fixes::new(directory),
@@ -468,6 +472,30 @@ impl Run {
         let center_hz = first.carrier_hz() - sign(scene.inverted ^ mirrored) * rest_hz(first_hz).abs();
         (scene.inverted, scene.center_hz) = (scene.inverted ^ mirrored, Some(center_hz));
         Ok(())
+    }
+
+    /// Results of the tags of a receiver that verifies Galileo's authentication.
+    ///
+    /// # Errors
+    /// A table that is missing or cannot be read.
+    pub fn tags(&self) -> Result<Vec<TagRow>, JudgeError> {
+        self.rx.as_ref().map_or(Ok(Vec::new()), |rx| rows(&rx.join("osnma.csv"), RECEIVER))
+    }
+
+    /// Observations of a spoofer's signals on E1 alone, by satellite and sample; spoofers count from 1.
+    ///
+    /// # Errors
+    /// A table that cannot be read.
+    pub fn spoofed(&self, number: usize) -> Result<BTreeMap<(Sv, u64), Observation>, JudgeError> {
+        let suffix = if number > 1 { format!("_{number}") } else { String::new() };
+        let mut all = BTreeMap::new();
+        each_of_any(&self.truth_place.join(format!("spoofed{suffix}.csv")), |_, row: Observation| {
+            if row.signal == &E1 {
+                all.insert((row.sv, row.sample), row);
+            }
+            Ok(())
+        })?;
+        Ok(all)
     }
 
     /// A number among the receiver's tracking settings, if they name it.

@@ -99,6 +99,23 @@ impl Summary {
                 metres(spoofing.from_claim_p95_m)
             )?;
         }
+        if let Some(osnma) = &self.osnma {
+            let after = |value: Option<f64>| value.map_or("never".to_owned(), |s| format!("after {s:.1} s"));
+            writeln!(
+                f,
+                "osnma         {} start, {}: {} tags authentic ({} of them false), {} refused ({} of them true), {} \
+                 open; first authentic data {}, first authentic fix {}",
+                osnma.start,
+                osnma.state,
+                osnma.tags_authentic,
+                osnma.false_accepted,
+                osnma.tags_refused,
+                osnma.true_refused,
+                osnma.tags_open,
+                after(osnma.first_authentic_s),
+                after(osnma.first_authentic_fix_s)
+            )?;
+        }
         if let Some(measured) = &self.ionosphere {
             writeln!(
                 f,

@@ -11,6 +11,7 @@ use osnma::page::Page;
 use osnma::report::{Counts, Outcome, State};
 use osnma::time::Gst;
 use osnma::verifier::Verifier;
+use receiver::authentic::counted;
 
 /// Weeks of GPS before the first of GST (Galileo OS SIS ICD 2.1, 5.1.2).
 const GPS_WEEKS: u32 = 1024;
@@ -133,61 +134,18 @@ impl<'a> Summary<'a> {
 
     /// Object of the summary.
     pub fn object(&self) -> Value {
-        let counts = self.counts();
-        let tags = |kind| {
-            let names = ["authentic", "no_data", "refused", "not_verifiable"];
-            names.iter().map(|name| ((*name).to_owned(), json!(self.tags(kind, name)))).collect::<Value>()
-        };
         let chain = |(id, newest): (u8, Gst)| json!({ "id": id, "newest_key": calendar(newest) });
         let chains: Vec<Value> = self.verifier.last_keys().into_iter().map(chain).collect();
-        json!({
-            "first_page": calendar(self.first),
-            "last_page": calendar(self.last),
-            "satellites": self.satellites,
-            "pages": {
-                "all": counts.pages,
-                "checksum": counts.checksum,
-                "not_nominal": counts.not_nominal,
-                "out_of_order": counts.out_of_order,
-                "clock_disagrees": counts.clock_disagrees,
-            },
-            "subframes": {
-                "authenticated": counts.subframes,
-                "not_authenticated": counts.unsigned_subframes,
-                "without_root": counts.subframes_without_root,
-                "unknown_table": counts.subframes_unreadable,
-            },
-            "pkr": {
-                "verified": counts.pkr_verified,
-                "refused": counts.pkr_refused,
-                "without_tree": counts.pkr_without_tree,
-            },
-            "kroot": {
-                "verified": counts.kroot_verified,
-                "refused": counts.kroot_refused,
-                "without_key": counts.kroot_without_key,
-            },
-            "dsm_unreadable": counts.dsm_unreadable,
-            "keys": {
-                "verified": counts.keys_verified,
-                "refused": counts.keys_refused,
-                "not_verifiable": counts.keys_not_verifiable,
-            },
-            "chains": chains,
-            "tags": {
-                "all": tags(None),
-                "adkd_0": tags(Some(Adkd::Ephemeris)),
-                "adkd_4": tags(Some(Adkd::Timing)),
-                "adkd_12": tags(Some(Adkd::SlowMac)),
-                "refused_by": self.reasons("refused"),
-                "not_verifiable_by": self.reasons("not_verifiable"),
-            },
-            "authentic_data": counts.authentic_data,
-            "start": self.start,
-            "root_after_s": self.after_s(self.verifier.first_root()),
-            "first_authentic_after_s": self.after_s(self.verifier.first_authentic()),
-            "state": self.verifier.state().name(),
-        })
+        let mut object = counted(self.counts());
+        object["first_page"] = json!(calendar(self.first));
+        object["last_page"] = json!(calendar(self.last));
+        object["satellites"] = json!(self.satellites);
+        object["chains"] = json!(chains);
+        object["start"] = json!(self.start);
+        object["root_after_s"] = json!(self.after_s(self.verifier.first_root()));
+        object["first_authentic_after_s"] = json!(self.after_s(self.verifier.first_authentic()));
+        object["state"] = json!(self.verifier.state().name());
+        object
     }
 
     /// Reason for which the recording is not authentic as a whole, if there is one.

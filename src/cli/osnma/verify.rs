@@ -10,16 +10,13 @@ use crate::cli::error::CliError;
 use crate::cli::osnma::args::Verify;
 use crate::cli::osnma::pages::{anchor, read};
 use crate::cli::osnma::summary::Summary;
+use crate::cli::run::output_error;
 use crate::cli::staging::Staging;
 use osnma::bits::hex;
 use osnma::keys::Anchor;
-use osnma::page::satellite;
 use osnma::report::TagReport;
 use osnma::verifier::{Settings, Verifier};
-
-/// Table of tags, a row each.
-const TABLE: &str = "osnma.csv";
-const HEADER: &str = "gst_week,tow_s,sender,satellite,adkd,position,result,reason\n";
+use receiver::output::{STORED_ROOT, TagTable};
 
 /// Verifies the recording, writes the tags if a directory is named, and prints the summary.
 pub fn execute(arguments: &Verify) -> Result<(), CliError> {
@@ -62,14 +59,9 @@ fn write(staging: &Staging, reports: &[TagReport], summary: &Summary<'_>, root: 
         let path = staging.path().join(name);
         fs::write(&path, text).map_err(|error| CliError::output(Path::new(name).display(), &error))
     };
-    let mut table = HEADER.to_owned();
-    for report in reports {
-        let TagReport { sent, sender, of, adkd, position, outcome } = report;
-        let (week, tow_s, sender, of) = (sent.week(), sent.tow_s(), satellite(*sender), satellite(*of));
-        let (adkd, result, reason) = (adkd.number(), outcome.name(), outcome.reason());
-        let _ = writeln!(table, "{week},{tow_s},{sender},{of},{adkd},{position},{result},{reason}");
-    }
-    put(TABLE, table)?;
+    let mut table = TagTable::create(staging.path()).map_err(output_error)?;
+    reports.iter().try_for_each(|report| table.write(&report.row())).map_err(output_error)?;
+    table.flush().map_err(output_error)?;
     put("osnma.json", format!("{:#}\n", summary.object()))?;
-    root.map_or(Ok(()), |root| put("kroot.hex", hex(root) + "\n"))
+    root.map_or(Ok(()), |root| put(STORED_ROOT, hex(root) + "\n"))
 }

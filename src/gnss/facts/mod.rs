@@ -7,6 +7,7 @@
 
 mod front_end;
 mod interference;
+mod osnma;
 mod scene;
 
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,7 @@ pub use front_end::{
     BalanceSpec, ConverterSpec, Edge, FilterShape, FilterSpec, StageSpec, converter, filters, oscillator_offset_hz,
 };
 pub use interference::Interference;
+pub use osnma::{OsnmaFacts, SpoofedBits, SpoofedMessages};
 pub use scene::{FrontEndFacts, OscillatorFacts, Renewal, SceneFacts};
 
 /// Offset of a system's time scale from GPS time.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Edge, Expect, Fault, Interference, StageSpec, TimeOffset};
+use super::{Edge, Expect, Fault, Interference, OsnmaFacts, StageSpec, TimeOffset};
 use crate::satellite::Sv;
 use crate::signal::Layers;
 
@@ -117,6 +117,9 @@ pub struct SceneFacts {
     /// Times at which satellites begin to send another ephemeris, ascending.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub renewals: Vec<Renewal>,
+    /// Authentication of Galileo's messages, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub osnma: Option<OsnmaFacts>,
 }
 
 impl SceneFacts {

@@ -111,9 +111,10 @@ impl Signed {
         let kinds = [2, 4, 6, 10, 1, 3, 5];
         (0..15)
             .map(|at| {
-                let word = kinds.get(at).map_or(63 << 122, |kind| words[kind]);
+                let begin = Gst::of_seconds(start.seconds() + 2 * at as i64 + 1);
+                let word = kinds.get(at).map_or(63 << 122, |kind| dated(words[kind], begin));
                 let section = mack.bytes()[4 * at..4 * at + 4].iter().fold(0, |all, &byte| all << 8 | u32::from(byte));
-                page(sender, Gst::of_seconds(start.seconds() + 2 * at as i64 + 1), word, hkroot[at], section)
+                page(sender, begin, word, hkroot[at], section)
             })
             .collect()
     }
@@ -160,8 +161,26 @@ impl Signed {
 
 /// Words of a satellite, by type; all of one issue.
 pub fn words(sender: u8) -> BTreeMap<u8, u128> {
-    let word = |kind: u8| u128::from(kind) << 122 | 77 << 112 | u128::from(sender) << 60 | 0x1_0000_0000 | 0x55;
+    let word = |kind: u8| match kind {
+        // The satellite's number is at the place that it has in word 4 (OS SIS ICD 2.1, 4.3.5).
+        4 => 4 << 122 | 77 << 112 | u128::from(sender) << 106 | 0x1_0000_0000,
+        _ => u128::from(kind) << 122 | 77 << 112 | u128::from(sender) << 60 | 0x1_0000_0000 | 0x55,
+    };
     (1..=10).map(|kind| (kind, word(kind))).collect()
+}
+
+/// Word with the time at which its page begins, where it has one: in words 5 and 6, in bits that no tag
+/// covers.
+fn dated(word: u128, begin: Gst) -> u128 {
+    let put = |word: u128, first: u32, count: u32, value: u32| {
+        let shift = 128 - first - count;
+        word & !(((1 << count) - 1) << shift) | u128::from(value) << shift
+    };
+    match word >> 122 {
+        5 => put(put(word, 73, 12, begin.week().into()), 85, 20, begin.tow_s()),
+        6 => put(word, 105, 20, begin.tow_s()),
+        _ => word,
+    }
 }
 
 /// Even and odd part of a page, each of 120 bits.

@@ -73,8 +73,8 @@ pub struct Verifier {
     waiting: Vec<Waiting>,
     /// Sub-frames before the root of their chain is known, with the words before each.
     unrooted: Vec<(Subframe, Arc<Words>)>,
-    /// Sub-frames of the last hours whose key was proved.
-    proved: BTreeSet<Gst>,
+    /// Sub-frames of the last hours whose key was proved, with the number of the chain.
+    proved: BTreeMap<Gst, u8>,
     status: Option<NmaStatus>,
     alert: bool,
     clock_disagrees: bool,
@@ -85,6 +85,19 @@ pub struct Verifier {
     last_authentic: Option<Gst>,
     counts: Counts,
     reports: Vec<TagReport>,
+    /// Ephemerides that became authentic since they were taken last.
+    authentic: Vec<Authenticated>,
+}
+
+/// Ephemeris, clock and status of a satellite that became authentic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Authenticated {
+    /// Satellite whose data they are.
+    pub satellite: u8,
+    /// Words 1 to 5 with the covered bits ([`crate::data::words_under`]).
+    pub words: [u128; 5],
+    /// Sub-frame of the tag that made them authentic.
+    pub sent: Gst,
 }
 
 impl Verifier {
@@ -108,7 +121,7 @@ impl Verifier {
             now: None,
             waiting: Vec::new(),
             unrooted: Vec::new(),
-            proved: BTreeSet::new(),
+            proved: BTreeMap::new(),
             status: None,
             alert: false,
             clock_disagrees: false,
@@ -118,6 +131,7 @@ impl Verifier {
             last_authentic: None,
             counts: Counts::default(),
             reports: Vec::new(),
+            authentic: Vec::new(),
         };
         match anchor {
             Anchor::Tree(root) => verifier.tree = Some(root),
@@ -177,6 +191,16 @@ impl Verifier {
         self.close();
         self.give_up(|_| true);
         std::mem::take(&mut self.reports)
+    }
+
+    /// Ephemerides that became authentic since this was asked last.
+    pub fn take_authentic(&mut self) -> Vec<Authenticated> {
+        std::mem::take(&mut self.authentic)
+    }
+
+    /// Sub-frame that is open: that of the newest page.
+    pub fn now(&self) -> Option<Gst> {
+        self.now
     }
 
     /// State after the last page.
@@ -266,7 +290,7 @@ impl Verifier {
             self.words.put(subframe.sender, start, &subframe.words());
         }
         self.give_up(|then| start.since_s(then) > PATIENCE_S);
-        self.proved.retain(|then| start.since_s(*then) <= PATIENCE_S);
+        self.proved.retain(|then, _| start.since_s(*then) <= PATIENCE_S);
     }
 
     /// Takes keys and tags of sub-frames that waited for a root which is known now.

@@ -1,9 +1,9 @@
 //! Keys and tags within a verifier: the key of each sub-frame, tags that wait for theirs, and their results.
 
-use super::{FAST_LIMIT_S, Verifier};
+use super::{Authenticated, FAST_LIMIT_S, Verifier};
 use crate::bits::Row;
 use crate::chain::{Chain, KeyError, TeslaKey, Trust};
-use crate::data::{Words, zeros};
+use crate::data::{Words, words_under, zeros};
 use crate::fields::{Adkd, NmaHeader, NmaStatus};
 use crate::mac::{Tagged, mac, macseq};
 use crate::page::SATELLITES;
@@ -76,7 +76,10 @@ impl Verifier {
         let first = (slots.len() + 1) * (chain.tag_bits + INFO_BITS);
         let Some(key) = subframe.mack(first, 8 * chain.key_bytes) else { return };
         match trust.accept(&TeslaKey { start: subframe.start, bytes: key.bytes().to_vec() }) {
-            Ok(()) => self.counts.keys_verified += u64::from(self.proved.insert(subframe.start)),
+            Ok(()) => {
+                let is_new = self.proved.insert(subframe.start, header.chain()).is_none();
+                self.counts.keys_verified += u64::from(is_new);
+            }
             Err(KeyError::Foreign) => self.counts.keys_refused += 1,
             Err(KeyError::BeforeRoot | KeyError::TooFar) => self.counts.keys_not_verifiable += 1,
         }
@@ -138,21 +141,28 @@ impl Verifier {
         let mut still = Vec::new();
         for mut waiting in std::mem::take(&mut self.waiting) {
             let trust = self.chains.get(&waiting.chain.id).filter(|trust| trust.chain == waiting.chain);
-            let Some(trust) = trust.cloned() else {
+            if trust.is_none() {
                 self.report_all(&waiting, Gap::ChainGone);
                 continue;
+            }
+            // A tag has the key that is sent so much later, of the chain that is in force then.
+            let key_at = |after: i64| {
+                let sent = waiting.start.later(after);
+                let chain = self.proved.get(&sent).copied().unwrap_or(waiting.chain.id);
+                self.chains.get(&chain)?.key_at(sent).ok()
             };
-            let key_at = |after: i64| trust.key_at(waiting.start.later(after)).ok();
-            if let (None, Some(key)) = (waiting.checked, key_at(1)) {
-                waiting.checked = Some(waiting.check_sequence(&key));
+            let [fast, slow] = [Adkd::Ephemeris, Adkd::SlowMac].map(|kind| key_at(kind.key_after()));
+            if let (None, Some(key)) = (waiting.checked, &fast) {
+                waiting.checked = Some(waiting.check_sequence(key));
             }
             let mut left = Vec::new();
             for tag in std::mem::take(&mut waiting.tags) {
-                let Some(key) = key_at(tag.adkd.key_after()) else {
+                let key = if tag.adkd == Adkd::SlowMac { &slow } else { &fast };
+                let Some(key) = key else {
                     left.push(tag);
                     continue;
                 };
-                let outcome = waiting.outcome(&tag, &key);
+                let outcome = waiting.outcome(&tag, key);
                 self.report(&waiting, &tag, outcome);
             }
             if !left.is_empty() {
@@ -190,7 +200,7 @@ impl Verifier {
             }
         }
         if let (Outcome::Authentic, Ok(data)) = (outcome, &tag.data) {
-            self.strengthen(tag, data, waiting.chain.tag_bits);
+            self.strengthen(tag, data, waiting);
         }
         let Waiting { start: sent, sender, .. } = *waiting;
         let Tag { of, adkd, position, .. } = *tag;
@@ -198,7 +208,8 @@ impl Verifier {
         *self.counts.tags.entry((adkd, outcome)).or_default() += 1;
     }
 
-    fn strengthen(&mut self, tag: &Tag, data: &Row, bits: usize) {
+    fn strengthen(&mut self, tag: &Tag, data: &Row, waiting: &Waiting) {
+        let bits = waiting.chain.tag_bits;
         let enough = self.settings.tag_bits;
         let held = self.strength.entry((tag.of, tag.adkd == Adkd::Timing)).or_default();
         if held.0 != *data {
@@ -209,7 +220,12 @@ impl Verifier {
         if held.1 < enough {
             return;
         }
-        self.counts.authentic_data += u64::from(before < enough);
+        if before < enough {
+            self.counts.authentic_data += 1;
+            let words = (tag.adkd != Adkd::Timing).then(|| words_under(data, waiting.start)).flatten();
+            let sent = waiting.start;
+            self.authentic.extend(words.map(|words| Authenticated { satellite: tag.of, words, sent }));
+        }
         let end = self.now.map(|now| now.later(1));
         self.first_authentic = self.first_authentic.or(end);
         self.last_authentic = end;

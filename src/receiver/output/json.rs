@@ -67,6 +67,7 @@ impl<W: Write> Sink for JsonLines<W> {
                 value["front_end"] = json!(front_end);
                 self.line("interference", value)
             }
+            Record::Tag(row) => self.row("tag", &row),
             Record::Clocks(_) | Record::Observation(_) | Record::Navigation(_) => Ok(()),
         }
     }

@@ -20,7 +20,7 @@ use thiserror::Error;
 
 use gnss::record::{
     AcquisitionRow, ClockRow, EventRow, Fix, Geographic, IonosphereRow, LineRow, NavigationRow, Observation, SightRow,
-    TrackingRow,
+    TagRow, TrackingRow,
 };
 use gnss::time::GPST;
 pub use json::JsonLines;
@@ -73,6 +73,8 @@ pub enum Record {
     Sights(Vec<SightRow>),
     /// The ionosphere at the fix before, of satellites with two bands.
     Ionosphere(Vec<IonosphereRow>),
+    /// Result of a tag of Galileo's message authentication.
+    Tag(TagRow),
     /// A line in the spectrum of a front end's samples; front ends count from 0.
     Interference {
         /// The front end's index, from 0 on.
@@ -161,6 +163,38 @@ impl Sheet {
     }
 }
 
+/// Root key of a hot start, as hexadecimal digits.
+pub const STORED_ROOT: &str = "kroot.hex";
+
+/// Table of the results of tags: `osnma.csv`.
+pub struct TagTable(Sheet);
+
+impl TagTable {
+    /// Creates the table in an existing directory.
+    ///
+    /// # Errors
+    /// [`OutputError::Create`] with the path that cannot be made.
+    pub fn create(directory: &Path) -> Result<Self, OutputError> {
+        Sheet::create(directory, "osnma.csv", &TagRow::COLUMNS).map(Self)
+    }
+
+    /// Writes a row.
+    ///
+    /// # Errors
+    /// [`OutputError::Write`] with the file.
+    pub fn write(&mut self, row: &TagRow) -> Result<(), OutputError> {
+        self.0.write(row)
+    }
+
+    /// Writes what is buffered.
+    ///
+    /// # Errors
+    /// [`OutputError::Write`] with the file.
+    pub fn flush(&mut self) -> Result<(), OutputError> {
+        self.0.flush()
+    }
+}
+
 /// All files of one reception.
 pub struct Output {
     directory: PathBuf,
@@ -177,6 +211,8 @@ pub struct Output {
     clocks: Option<Sheet>,
     /// File of the ionosphere, which exists once a satellite has two bands.
     ionosphere: Option<Sheet>,
+    /// File of the results of tags, which exists where authentication is verified.
+    tags: Option<TagTable>,
     /// Parameters written so far: those of one issue are written once.
     parameters: BTreeSet<NavigationRow>,
 }
@@ -279,6 +315,7 @@ impl Output {
             interference_of: BTreeMap::new(),
             clocks: None,
             ionosphere: None,
+            tags: None,
             parameters: BTreeSet::new(),
         })
     }
@@ -301,6 +338,7 @@ impl Output {
         }
         self.clocks.as_mut().map_or(Ok(()), Sheet::flush)?;
         self.ionosphere.as_mut().map_or(Ok(()), Sheet::flush)?;
+        self.tags.as_mut().map_or(Ok(()), |tags| tags.0.flush())?;
         self.interference_of.values_mut().try_for_each(Sheet::flush)
     }
 
@@ -323,6 +361,14 @@ impl Output {
         }
         let Some(sheet) = &mut self.ionosphere else { return Ok(()) };
         rows.iter().try_for_each(|row| sheet.write(row))
+    }
+
+    fn tags(&mut self) -> Result<&mut TagTable, OutputError> {
+        let tags = match self.tags.take() {
+            Some(tags) => tags,
+            None => TagTable::create(&self.directory)?,
+        };
+        Ok(self.tags.insert(tags))
     }
 
     /// Writes a line of a front end's spectrum.
@@ -368,12 +414,21 @@ impl Sink for Output {
             Record::Ionosphere(rows) => self.ionosphere(&rows),
             // It follows from the fix and the ephemerides.
             Record::Sights(_) => Ok(()),
+            Record::Tag(row) => self.tags()?.write(&row),
             Record::Interference { front_end, row } => self.interference(front_end, &row),
         }
     }
 
-    /// Writes what is buffered, and `receiver.json`.
+    /// Writes what is buffered, `receiver.json`, and what a verification of authentication leaves.
     fn finish(&mut self, summary: &serde_json::Value) -> Result<(), OutputError> {
+        if let Some(osnma) = summary.get("osnma") {
+            // Without a tag the table says that there were none.
+            self.tags()?;
+            if let Some(kroot) = osnma["stored_root"].as_str() {
+                let path = self.directory.join(STORED_ROOT);
+                fs::write(&path, format!("{kroot}\n")).map_err(|error| write_error(&path, error))?;
+            }
+        }
         self.flush()?;
         let path = self.directory.join("receiver.json");
         let text = serde_json::to_string_pretty(summary).unwrap_or_default() + "\n";
@@ -412,6 +467,8 @@ mod tests {
         assert_eq!(header(&row), NAVIGATION.join(","));
         let row = EventRow { sample: 0, sv, signal: &L1_CA, event: Event::Acquired };
         assert_eq!(header(&row), EVENTS.join(","));
+        let row: TagRow = from_csv(&TagRow::COLUMNS, "1251,0,E01,E02,0,1,authentic,");
+        assert_eq!(header(&row), TagRow::COLUMNS.join(","));
         let row = IonosphereRow { sample: 0, sv, delay_m: 0.0, sigma_m: 0.0 };
         assert_eq!(header(&row), IONOSPHERE.join(","));
         let row: LineRow = from_csv(&INTERFERENCE, &zero(8));

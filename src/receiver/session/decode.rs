@@ -2,6 +2,7 @@
 
 use super::step::Counted;
 use super::{FrontEnd, Session, Shared, Track};
+use crate::authentic::Authentic;
 use crate::decode::News;
 use crate::outcome::ReceiveError;
 use crate::output::{Record, Sink};
@@ -21,6 +22,9 @@ impl Session {
             front_end.decode(own.unwrap_or(u64::MAX), &mut self.shared, sink)?;
         }
         self.drop_echoes();
+        if let Some(authentic) = &mut self.shared.authentic {
+            authentic.verify(sink)?;
+        }
         Ok(())
     }
 
@@ -54,11 +58,14 @@ impl Session {
 impl FrontEnd {
     /// Gives every symbol that ended before the sample `until` to its decoder and takes in what comes out.
     fn decode(&mut self, until: u64, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
-        let sink = &mut Counted { sink, step: self.step, ticks: &[] };
+        let step = self.step;
+        let sink = &mut Counted { sink, step, ticks: &[] };
         for track in &mut self.tracks {
             let (near, known) = (shared.near(), shared.known());
             let (mut sv, signal) = (track.channel.sv(), track.channel.signal());
             let Some(decoder) = &mut track.decoder else { continue };
+            // A position of verified data alone takes nothing that no tag covers.
+            let all_data = !shared.authentic.as_ref().is_some_and(Authentic::is_required);
             known.into_iter().for_each(|known| decoder.know(known));
             let slipped = track.report.events.iter().any(|(_, event)| *event == Event::CycleSlip);
             let mut all = Vec::new();
@@ -107,20 +114,30 @@ impl FrontEnd {
                         sv = other;
                         Some(Event::Identified)
                     }
+                    News::Page(page) => {
+                        if let Some(authentic) = &mut shared.authentic {
+                            authentic.take(sv, step.main(sample), page);
+                        }
+                        None
+                    }
                     News::Parameters(rows) => {
                         sink.take(Record::Navigation(rows))?;
                         None
                     }
                     News::Augmentation { sent, content } => {
-                        shared.solver.take_augmentation(sv, sent, &content);
+                        if all_data {
+                            shared.solver.take_augmentation(sv, sent, &content);
+                        }
                         None
                     }
                     News::AheadOfGps { scale, ahead } => {
-                        shared.solver.take_ahead(scale, ahead);
+                        if all_data {
+                            shared.solver.take_ahead(scale, ahead);
+                        }
                         None
                     }
                     News::Reduced { set, with_delays } => {
-                        let serves = shared.solver.take_reduced(*set, with_delays);
+                        let serves = all_data && shared.solver.take_reduced(*set, with_delays);
                         (serves && shared.ephemerides.of(sv).is_empty()).then_some(Event::ReducedElements)
                     }
                     News::Ephemeris(ephemeris) => {

@@ -1,6 +1,7 @@
 //! Observations and a fix at one tick.
 
 use super::{FrontEnd, Session, Tick, WRONG_TIME_FIXES};
+use crate::authentic::Authentic;
 use crate::observe::Reading;
 use crate::outcome::ReceiveError;
 use crate::output::{Record, Sink};
@@ -60,7 +61,9 @@ impl Session {
         }
         let Some(clock) = shared.timebase.clock() else { return Ok(()) };
         let observations: Vec<Observation> = observed.into_iter().map(|one| one.observation).collect();
-        match shared.solver.solve(tick, clock, &observations, &shared.ephemerides, shared.ionosphere) {
+        let verified = shared.authentic.as_ref().filter(|authentic| authentic.is_required());
+        let (sets, ionosphere) = verified.map_or((&shared.ephemerides, shared.ionosphere), Authentic::data);
+        match shared.solver.solve(tick, clock, &observations, sets, ionosphere) {
             Ok(solved) => {
                 if let Some(first) = self.front_ends.first_mut()
                     && first.clock_jumped(&solved.fix, shared, sink)?
@@ -75,6 +78,9 @@ impl Session {
                 let condition = solved.fix.condition;
                 shared.worst_condition = Some(shared.worst_condition.map_or(condition, |worst| worst.max(condition)));
                 shared.fixes += 1;
+                if let Some(authentic) = &mut shared.authentic {
+                    authentic.fixed(tick, &solved.used, &shared.ephemerides);
+                }
                 shared.clock_drift = Some(solved.fix.clock_drift);
                 shared.latest = Some(solved.fix.clone());
                 if let Some(first) = self.front_ends.first() {

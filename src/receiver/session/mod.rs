@@ -6,6 +6,7 @@
 //! [`Shared`]: [`decode`] takes in messages, [`measure`] observes and solves with the signals of all. Records
 //! count samples of the first front end ([`step`]).
 
+use crate::authentic::Authentic;
 use crate::correlate::layers_refusal;
 use crate::diagnosis::Stage;
 use crate::lead::{lead, refusal};
@@ -80,11 +81,15 @@ impl Session {
             let step = Step::new(number, metadata.rate, first.rate);
             front_ends.push(FrontEnd::new(step, metadata, own, signals.clone())?);
         }
-        let loops = settings.tracking.least_margins(noises.iter().filter_map(|(signal, _)| lead(signal)));
         let start = metadata.iter().find_map(|metadata| metadata.start);
+        let authentic = match &settings.osnma {
+            Some(osnma) => Some(Authentic::new(osnma, &settings.acquisition.signals(), start, first.rate)?),
+            None => None,
+        };
+        let loops = settings.tracking.least_margins(noises.iter().filter_map(|(signal, _)| lead(signal)));
         Ok(Self {
             front_ends,
-            shared: Shared::new(settings, noises, first.rate, (start, week_reference)),
+            shared: Shared::new(settings, noises, first.rate, (start, week_reference), authentic),
             next_tick: 0,
             loops,
         })
@@ -104,6 +109,11 @@ impl Session {
             front_end.needs().map_or(next, |needed| needed.min(next))
         };
         self.front_ends.iter().map(needed).collect()
+    }
+
+    /// Ends the verification of authentication: tags that still wait for their keys are given as they are.
+    pub fn end_verification(&mut self, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
+        Ok(self.shared.authentic.as_mut().map_or(Ok(()), |authentic| authentic.finish(sink))?)
     }
 
     /// Takes the next blocks, one a front end over the same time, through the whole chain.
@@ -187,6 +197,7 @@ impl Session {
             diagnosis: None,
             interfered: strongest.max_by(|a, b| a.strongest.jn0_dbhz.total_cmp(&b.strongest.jn0_dbhz)),
             parted: self.front_ends.iter().find_map(|front_end| front_end.parted(shared)),
+            osnma: shared.authentic.as_ref().map(Authentic::outcome),
             jumps: self.front_ends.iter().flat_map(|front_end| front_end.gap.jumps.iter().copied()).collect(),
             warnings: self.warnings(),
             conditioning: Conditioning {

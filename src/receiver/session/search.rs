@@ -275,7 +275,7 @@ impl FrontEnd {
                 channel,
                 line: Line::default(),
                 watched: Watched::default(),
-                decoder: Decoder::new(hit.signal, hit.sv),
+                decoder: shared.decoder(hit.signal, hit.sv),
                 report: Report::default(),
                 since,
                 cn0_dbhz: hit.cn0_dbhz,

@@ -3,6 +3,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::authentic::Authentic;
+use crate::decode::Decoder;
 use crate::diagnosis::{Refusal, Stage};
 use crate::observe::Timebase;
 use crate::position::least_squares::UNKNOWNS;
@@ -43,6 +45,8 @@ pub(super) struct Shared {
     pub ephemerides: Sets,
     /// Model that corrects the ionosphere, if any.
     pub ionosphere_model: Option<Model>,
+    /// Verification of Galileo's authentication, if the settings ask for it.
+    pub authentic: Option<Authentic>,
     /// Coefficients of that model.
     pub ionosphere: Option<Coefficients>,
     pub last_fix: Option<LastFix>,
@@ -72,6 +76,7 @@ impl Shared {
         noises: Noises,
         rate: Rate,
         (start, week_reference): (Option<Epoch>, Epoch),
+        authentic: Option<Authentic>,
     ) -> Self {
         Self {
             settings: settings.clone(),
@@ -83,6 +88,7 @@ impl Shared {
             ephemerides: Sets::default(),
             ionosphere_model: settings.position.ionosphere.model(&settings.acquisition.signals()),
             ionosphere: None,
+            authentic,
             last_fix: None,
             latest: None,
             dopplers: BTreeMap::new(),
@@ -98,6 +104,12 @@ impl Shared {
             used: BTreeSet::new(),
             losses: 0,
         }
+    }
+
+    /// Decoder of a channel's message. With verification it keeps whole pages.
+    pub fn decoder(&self, signal: &Signal, sv: Sv) -> Option<Decoder> {
+        let decoder = Decoder::new(signal, sv);
+        if self.authentic.is_some() { decoder.map(Decoder::with_pages) } else { decoder }
     }
 
     /// Noise of the code loop of a signal.

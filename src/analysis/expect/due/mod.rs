@@ -16,6 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Matrix4;
 
 use crate::error::JudgeError;
+use crate::expect::authenticated;
 use crate::expect::message::Message;
 use crate::expect::multiple_access::MultipleAccess;
 use crate::read::Run;
@@ -170,6 +171,7 @@ impl Expectations {
         let in_space = Geodetic::from_ecef(&first.position_m()).height_m >= SPACE_M;
         let access = MultipleAccess::new(run);
         let mut counted = Counted::default();
+        let required = authenticated::Required::of(run, satellite::LOCK_S);
         let renewals = run.scene.renewals.iter().fold(BTreeMap::<Sv, Vec<f64>>::new(), |mut all, one| {
             all.entry(one.sv).or_default().push(one.at_s);
             all
@@ -185,10 +187,11 @@ impl Expectations {
                 interval_s,
             };
             counted.begin(link.sv, found.epochs.len());
-            let one = found.satellite(run, &scene, (&access, &mut counted), link, in_space, observed)?;
+            let serves = required.as_ref().is_none_or(|required| required.serves(link));
+            let one = found.satellite(run, &scene, (&access, &mut counted), (link, serves), in_space, observed)?;
             found.satellites.insert(link, one);
         }
-        found.fixes_due(&run.scene.expect, start);
+        found.fixes_due(&run.scene.expect, start, required.map(|required| required.from_s));
         Ok(found)
     }
 
@@ -197,7 +200,7 @@ impl Expectations {
         run: &Run,
         scene: &Scene<'_>,
         (access, counted): (&MultipleAccess<'_>, &mut Counted),
-        link: Link,
+        (link, serves): (Link, bool),
         in_space: bool,
         observed: &impl Observed,
     ) -> Result<Satellite, JudgeError> {
@@ -242,7 +245,7 @@ impl Expectations {
             one.take(row, required, measured.contains_at(at, self), seen.binary_search(sample).is_ok());
             let Some(due) = self.epochs.get_mut(at) else { continue };
             due.held += u32::from(required.held && Counted::is_first(&mut counted.held, at));
-            let used = required.used && Counted::is_first(&mut counted.used, at);
+            let used = required.used && serves && Counted::is_first(&mut counted.used, at);
             if let (true, Some((azimuth_deg, elevation_deg))) = (used, look(*sample)) {
                 due.add(azimuth_deg.to_radians(), elevation_deg.to_radians());
             }
@@ -255,7 +258,7 @@ impl Expectations {
         Measured { interval_s: self.receiver.interval_s }
     }
 
-    fn fixes_due(&mut self, expect: &Expect, start: Epoch) {
+    fn fixes_due(&mut self, expect: &Expect, start: Epoch, authentic_s: Option<f64>) {
         let ready = |due: &&Due| due.pdop() <= LARGEST_PDOP;
         self.four_by_s = self.epochs.iter().find(ready).map(|due| due.time_s);
         let receiver = &self.receiver;
@@ -274,6 +277,9 @@ impl Expectations {
         let page_s = signals.iter().filter(brings).map(page_s).fold(f64::INFINITY, f64::min);
         let waited_s = four_s + receiver.ionosphere_wait_s;
         self.fixes_from_s = if receiver.requires_ionosphere { four_s.max(page_s) } else { waited_s } + SOLVE_S;
+        if let Some(authentic_s) = authentic_s {
+            self.fixes_from_s = self.fixes_from_s.max(authentic_s + SOLVE_S);
+        }
         // Where the scene excuses a time, the clock begins again after it.
         self.first_fix_s = self.epochs.iter().find(|due| self.fix_due(expect, due, None)).map(|due| due.time_s);
     }

@@ -16,6 +16,7 @@ mod kind;
 mod links;
 mod losses;
 mod motion;
+mod osnma;
 mod own_fixes;
 mod position;
 mod reception;
@@ -65,6 +66,7 @@ impl Verdict {
         verdict.about(Group::Samples).spectrum(run)?;
         verdict.about(Group::Interference).interference(summary);
         verdict.spoofing(run, summary)?;
+        verdict.osnma(summary);
         verdict.about(Group::Tables).tables(run, errors)?;
         verdict.hint(run);
         Ok(verdict)

@@ -7,6 +7,7 @@
 use std::collections::BTreeMap;
 
 use crate::error::JudgeError;
+use crate::expect::authenticated::Required;
 use crate::expect::due::receiver::Receiver;
 use crate::expect::due::satellite::LOCK_S;
 use crate::expect::due::{Due, LARGEST_PDOP};
@@ -49,7 +50,10 @@ impl Verdict {
         let decoded = run.events.iter().find(|row| row.event == Event::IonosphereDecoded).map(|row| row.sample);
         let ionosphere = if receiver.requires_ionosphere { decoded.unwrap_or(u64::MAX) } else { 0 };
         let mut all = Vec::new();
-        for link in run.observations.keys().filter(|link| !faulty(link.sv)) {
+        let required = Required::of(run, LOCK_S);
+        let from_s = required.as_ref().map_or(0.0, |required| required.from_s);
+        let serves = |link: &Link| required.as_ref().is_none_or(|required| required.serves(*link));
+        for link in run.observations.keys().filter(|link| !faulty(link.sv) && serves(link)) {
             let sky = run.seen_at(link.sv)?;
             all.push(Seen { link, rows: run.observations.cursor(link).peekable(), sky });
         }
@@ -72,7 +76,8 @@ impl Verdict {
             }
             let time_s = run.time_s(sample);
             let expected = run.scene.expect.fix(time_s);
-            let enough = systems.values().any(|system| system.pdop() <= LARGEST_PDOP) && sample >= ionosphere;
+            let enough = systems.values().any(|system| system.pdop() <= LARGEST_PDOP);
+            let enough = enough && sample >= ionosphere && time_s >= from_s;
             if expected == Some(Fixes::None) || !enough {
                 since = None;
                 continue;

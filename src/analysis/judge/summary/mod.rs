@@ -20,6 +20,7 @@ use crate::measure::errors::{Errors, Link, SignalError};
 use crate::measure::ionosphere::Ionosphere;
 use crate::measure::jitter::{Jitter as LoopJitter, Loop, Pooled};
 use crate::measure::lines::Lines;
+use crate::measure::osnma::Osnma;
 use crate::measure::slips::{Cause, Slips};
 use crate::measure::spoofing::Spoofing;
 use crate::read::{Numbers, Run, Speed};
@@ -68,6 +69,9 @@ pub struct Summary {
     /// Effect of a spoofer on the fixes; absent without one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spoofing: Option<Spoofing>,
+    /// Verification of Galileo's authentication; absent of a receiver that does not verify.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub osnma: Option<Osnma>,
     /// The ionosphere that two bands showed; absent without a satellite that has them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ionosphere: Option<Ionosphere>,
@@ -341,6 +345,7 @@ impl Summary {
             psd,
             interference: Lines::of(run)?,
             spoofing: Spoofing::of(run)?,
+            osnma: Osnma::of(run)?,
             ionosphere: Ionosphere::of(run)?,
             jammed: !run.scene.interference.is_empty(),
             not_judged: Vec::new(),

@@ -7,8 +7,9 @@ use super::{
     INAV, PAGE_SYMBOLS, PART_SYMBOLS, PATTERN, REDUCED, WORDS_OF_SET, decode_any, elements, elements_in_short,
     gps_offset, ionosphere, is_alert, parameters, sent_at, time_of_week, word_of, word_type,
 };
+use crate::bits::number;
 use crate::framed::{Content, Framed};
-use crate::message::{Message, Read};
+use crate::message::{Message, Read, SentPage};
 use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::Epoch;
@@ -32,6 +33,7 @@ impl InavReader {
             complete: None,
             reduced: None,
             timed: None,
+            pages: None,
         })
     }
 }
@@ -52,7 +54,12 @@ pub struct InavContent {
     /// its time, with that time.
     reduced: Option<u64>,
     timed: Option<(u64, Epoch)>,
+    /// Pages that wait for a time, each with the number of its first symbol. `None`: pages are not kept.
+    pages: Option<Vec<(u64, [u128; 2])>>,
 }
+
+/// Pages that wait for a time at most: two sub-frames, in which the time is sent several times.
+const WAITING_PAGES: usize = 30;
 
 impl InavContent {
     /// Takes the word of the page whose first symbol has the number `begin`.
@@ -89,6 +96,22 @@ impl InavContent {
             news.extend(self.in_short());
         }
         news
+    }
+
+    /// The pages up to the one that began with the symbol `begin`, once a page has said its time.
+    fn whole_pages(&mut self, parts: &[Vec<bool>; 2], begin: u64) -> Vec<Read> {
+        let Some(waiting) = &mut self.pages else { return Vec::new() };
+        if waiting.len() >= WAITING_PAGES {
+            waiting.remove(0);
+        }
+        waiting.push((begin, parts.each_ref().map(|part| number(part))));
+        let Some((timed, time)) = self.timed else { return Vec::new() };
+        let page = |(first, parts): (u64, [u128; 2])| {
+            let after_s = ((first as i64 - timed as i64) as f64 * INAV.symbol_s).round() as i64;
+            let symbols = begin - first + PAGE_SYMBOLS as u64;
+            Read::Page(SentPage { symbols, start: Epoch::new(time.seconds() + after_s, 0.0), parts })
+        };
+        waiting.drain(..).map(page).collect()
     }
 
     /// The reduced elements, once the time of their page is known.
@@ -161,11 +184,22 @@ impl Content for InavContent {
         if is_alert(&parts) {
             return vec![Read::Refused("a page is an alert page".to_owned())];
         }
-        self.take(word_of(&parts), begin, inverted, near)
+        let news = self.take(word_of(&parts), begin, inverted, near);
+        let mut all = self.whole_pages(&parts, begin);
+        all.extend(news);
+        all
+    }
+
+    fn keep_pages(&mut self) {
+        // E5b has reserved bits where E1-B has authentication (OS SIS ICD 2.1, table 37).
+        if self.message == &INAV {
+            self.pages = Some(Vec::new());
+        }
     }
 
     fn forget_positions(&mut self) {
         (self.reduced, self.timed) = (None, None);
+        self.pages.iter_mut().for_each(Vec::clear);
     }
 
     fn missing(&self) -> Vec<u8> {

@@ -2,7 +2,6 @@
 
 use super::reseat::whole_number;
 use super::{FrontEnd, LOOK_S, Moved, Stage, Track, Units};
-use crate::decode::Decoder;
 use crate::gap::scan::Found;
 use crate::gap::{Fit, Step};
 use crate::lead::lead;
@@ -148,7 +147,7 @@ impl FrontEnd {
                 watched.trend.clear();
             }
             if known.is_none() {
-                track.decoder = Decoder::new(track.channel.signal(), track.channel.sv());
+                track.decoder = shared.decoder(track.channel.signal(), track.channel.sv());
                 track.since = now;
             }
         }
