@@ -35,7 +35,8 @@ pub struct Seen {
 pub(super) fn received(scene: &Scene, from: &Constellation, local: Epoch) -> (Epoch, f64, Motion) {
     let start = scene.clock.start;
     let elapsed_s = scene.receiver_clock.true_elapsed_s(start, local);
-    (scene.receiver_clock.true_time(start, local), elapsed_s, from.motion(&scene.trajectory, elapsed_s))
+    let time = from.replayed(scene.receiver_clock.true_time(start, local));
+    (time, elapsed_s, from.motion(&scene.trajectory, elapsed_s))
 }
 
 /// Computes the arrival from the true satellite `sv` at the time `local` of the receiver's clock; `None`
@@ -94,7 +95,7 @@ pub(super) fn seen_near(
         Some(known) => known.at(local, guess_s, find)?,
         None => find()?,
     };
-    Ok(found.map(|found| arriving(scene, signal, found)))
+    Ok(found.map(|found| arriving(scene, signal, found, from.replay_s)))
 }
 
 /// Like [`seen_from`], for a satellite on a short arc of its orbit, with the antenna's position if it is
@@ -114,15 +115,18 @@ pub fn seen_on(
         let (time, elapsed_s, motion) = received(scene, from, local);
         Place::new(time, elapsed_s, motion)
     };
+    // Stored places are those of the true time.
+    let places = places.filter(|_| from.replay_s == 0.0);
     let place = places.map_or_else(find, |places| places.at(local, find));
     let bias_s = local.since(place.time) - from.clock_s(place.elapsed_s);
     let found = arc.emission(&place)?;
     let gain = from.gain(place.elapsed_s);
-    Ok(found.map(|emission| arriving(scene, signal, Arriving { emission, bias_s, gain })))
+    Ok(found.map(|emission| arriving(scene, signal, Arriving { emission, bias_s, gain }, from.replay_s)))
 }
 
-/// Computes the rays of a signal from the arrival of its satellite.
-fn arriving(scene: &Scene, signal: &Signal, Arriving { emission, bias_s, gain }: Arriving) -> Seen {
+/// Computes the rays of a signal from the arrival of its satellite. Cycles of a replay's delay are not
+/// counted: its carrier begins at any phase.
+fn arriving(scene: &Scene, signal: &Signal, Arriving { emission, bias_s, gain }: Arriving, replay_s: f64) -> Seen {
     let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
     for effect in &scene.effects {
         effect.act(&emission.sight, signal, &mut rays);
@@ -132,13 +136,14 @@ fn arriving(scene: &Scene, signal: &Signal, Arriving { emission, bias_s, gain }:
     let ahead_s = scene.catalogue.signal_clock_s(emission.sight.sv, sent, signal);
     let satellite_clock_s = emission.satellite_clock_s + ahead_s;
     let common_s = bias_s + emission.travel_s - satellite_clock_s;
+    let counted_s = common_s - replay_s;
     rays.iter_mut().for_each(|ray| ray.cn0_hz *= gain);
     let arrivals = rays
         .iter()
         .map(|ray| Arrival {
             delay_s: common_s + ray.code_delay_s,
             carrier_cycles: signal.carrier_hz(emission.sight.sv)
-                * (planted!("generator.truth.clock_in_carrier", common_s, common_s - bias_s) + ray.carrier_delay_s)
+                * (planted!("generator.truth.clock_in_carrier", counted_s, common_s - bias_s) + ray.carrier_delay_s)
                 + ray.phase_cycles,
             cn0_hz: ray.cn0_hz,
         })

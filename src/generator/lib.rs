@@ -45,6 +45,7 @@ extern crate gnss;
 
 pub mod arrival;
 pub mod augmentation;
+pub mod authentication;
 pub mod catalogue;
 pub mod clock;
 pub mod dynamics;

@@ -21,6 +21,8 @@ const WORD_BITS: u64 = 30;
 /// Encoders of a scene's messages, by form of message.
 pub struct Senders {
     all: Vec<(&'static Message, Box<dyn Sender>)>,
+    /// Encoders of spoofers that do not repeat the true messages, by their number.
+    spoofed: Vec<(usize, Self)>,
 }
 
 impl Senders {
@@ -37,7 +39,17 @@ impl Senders {
                 all.push((message, (message.sender)(common)?));
             }
         }
-        Ok(Self { all })
+        Ok(Self { all, spoofed: Vec::new() })
+    }
+
+    /// Adds the encoders of a spoofer by its number.
+    pub fn put_spoofed(&mut self, number: usize, own: Self) {
+        self.spoofed.push((number, own));
+    }
+
+    /// Encoders of a constellation by its number: those of the true satellites, or its own.
+    pub fn of_constellation(&self, number: usize) -> &Self {
+        self.spoofed.iter().find(|(own, _)| *own == number).map_or(self, |(_, own)| own)
     }
 
     /// Returns the encoder of a message; `None` if no signal of the scene has it.

@@ -21,6 +21,7 @@ mod link;
 mod motion;
 mod multipath;
 mod obstruction;
+mod osnma;
 mod parts;
 mod propagation;
 mod pushed;
@@ -49,6 +50,7 @@ pub use hardware::ClockSpec;
 pub use interference::{InterferenceSpec, SpooferSpec};
 pub use link::{AntennaSpec, Power, Transmit};
 pub use motion::{FileKind, MotionSpec};
+pub use osnma::{OsnmaSpec, Spoofed};
 pub use propagation::{Electrons, Ionosphere, MappingKind, NeutralAtmosphere};
 pub use read::Place;
 use read::{Refusals, Source, Table};
@@ -230,6 +232,8 @@ pub struct Scenario {
     pub orbits: Option<OrbitsSpec>,
     /// Content of augmentation messages about other satellites; absent means none.
     pub sbas: Option<SbasSpec>,
+    /// Authentication of Galileo's messages; absent means zeros in its bits.
+    pub osnma: Option<OsnmaSpec>,
     /// Faults of satellites' clocks and orbits.
     pub satellite_faults: Vec<SatelliteFault>,
     /// Faults of navigation messages.
@@ -328,8 +332,8 @@ impl Scenario {
     /// Reads every table, and goes on where one is refused; `None` where a scene has no sense without it.
     fn read(root: &Table<'_>, refusals: &mut Refusals) -> Option<Self> {
         let mut open = |name: &'static str| refusals.take(root.table(name)).flatten();
-        let [navigation, of_satellites, orbits, sbas, motion, attitude, power] =
-            ["navigation", "satellites", "orbits", "sbas", "motion", "attitude", "power"].map(&mut open);
+        let [navigation, of_satellites, orbits, sbas, osnma, motion, attitude, power] =
+            ["navigation", "satellites", "orbits", "sbas", "osnma", "motion", "attitude", "power"].map(&mut open);
         let [ionosphere, troposphere, scintillation, receiver_clock, noise, truth, playback, expect] =
             ["ionosphere", "troposphere", "scintillation", "receiver_clock", "noise", "truth", "playback", "expect"]
                 .map(&mut open);
@@ -351,6 +355,7 @@ impl Scenario {
         let power = refusals.take(link::power(power.as_ref()));
         let clock = refusals.take(hardware::receiver_clock(receiver_clock.as_ref()));
         let sbas = refusals.take(sbas.map(|t| augmentation::sbas(&t)).transpose());
+        let osnma = refusals.take(osnma.map(|t| osnma::osnma(&t)).transpose());
         let orbits = refusals.take(orbits.map(|t| satellite::orbits(&t)).transpose());
         let attitude = refusals.take(attitude.map(|t| attitude::attitude(&t)).transpose());
         let ionosphere = refusals.take(ionosphere.map(|t| propagation::ionosphere(&t)).transpose());
@@ -389,6 +394,7 @@ impl Scenario {
             include_unhealthy,
             orbits: orbits?,
             sbas: sbas?,
+            osnma: osnma?,
             satellite_faults,
             message_faults,
             motion: motion?,

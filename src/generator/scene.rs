@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use crate::authentication::Osnma;
 use crate::catalogue::Catalogue;
 use crate::clock::ReceiverClock;
 use crate::clock::nodes::Nodes;
@@ -55,6 +56,8 @@ pub struct Scene {
     pub catalogue: Arc<Catalogue>,
     /// Messages that the satellites send besides their own ephemerides.
     pub messages: Arc<Senders>,
+    /// Authentication of Galileo's messages; absent means zeros in its bits.
+    pub osnma: Option<Arc<Osnma>>,
     /// Faults of messages.
     pub message_faults: Vec<MessageFault>,
     /// Satellite clock errors that are not broadcast.

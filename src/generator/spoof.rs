@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 use crate::clock::ReceiverClock;
 use crate::vehicle::{Motion, Trajectory};
 use gnss::satellite::Sv;
-use gnss::time::SampleClock;
+use gnss::time::{Epoch, SampleClock};
 
 /// Pieces of a power ramp, each linear in power: of 60 dB, a piece is 0.9 dB and off by 0.02 dB at most.
 const RAMP_PIECES: u32 = 64;
@@ -65,6 +65,8 @@ pub struct Constellation {
     pub clock_bias_s: f64,
     /// Rate of the clock offset, in s/s.
     pub clock_drift: f64,
+    /// Seconds by which its time and its messages lie behind the true ones.
+    pub replay_s: f64,
     /// `None` for all in view of the claimed position.
     pub satellites: Option<Vec<Sv>>,
     /// Power advantage over the true signals; `None` for the true satellites.
@@ -102,6 +104,7 @@ impl Constellation {
             drag: None,
             clock_bias_s: 0.0,
             clock_drift: 0.0,
+            replay_s: 0.0,
             satellites: None,
             advantage: None,
             on_s: f64::NEG_INFINITY..f64::INFINITY,
@@ -140,6 +143,11 @@ impl Constellation {
     /// Clock minus GPS time in seconds, `t_s` true seconds after the scene's start.
     pub fn clock_s(&self, t_s: f64) -> f64 {
         self.clock_bias_s + self.clock_drift * t_s
+    }
+
+    /// Time whose satellites and messages it sends, instead of the true time `at`.
+    pub fn replayed(&self, at: Epoch) -> Epoch {
+        if self.replay_s > 0.0 { at.plus_s(-self.replay_s) } else { at }
     }
 
     /// Factor on the power of every ray.
@@ -215,6 +223,9 @@ impl Constellation {
         }
         if let Some(drag) = &self.drag {
             text += &format!(", dragged at {} m/s from {} s", drag.speed_mps, drag.start_s);
+        }
+        if self.replay_s > 0.0 {
+            text += &format!(", replays {} s late", self.replay_s);
         }
         if (self.clock_bias_s, self.clock_drift) != (0.0, 0.0) {
             text += &format!(", clock {:e} s {:+e} s/s", self.clock_bias_s, self.clock_drift);

@@ -149,6 +149,15 @@ pub struct Common {
     /// Ground network that supplies the content of augmentation messages; absent means that they contain no
     /// corrections.
     pub network: Option<Arc<dyn Network>>,
+    /// Authentication of I/NAV on E1-B; absent means zeros in its bits.
+    pub authentication: Option<Arc<dyn Authentication>>,
+}
+
+/// Authentication of a constellation's messages.
+pub trait Authentication: fmt::Debug + Send + Sync {
+    /// Bits of authentication in the page of a satellite that begins at a time, the first sent the most
+    /// significant.
+    fn bits(&self, sv: Sv, start: Epoch) -> u64;
 }
 
 /// Step of an almanac's reference time, and the last one inside a week (IS-GPS-200N, table 20-VI;

@@ -44,7 +44,7 @@ pub const ORDER: Order<'static> = &[
             &["message"],
             &["effect"],
             &["fast_phase"],
-            &["augmentation"],
+            &["augmentation", "authentication"],
             &["spoof"],
             &["synth"],
             &["knots"],

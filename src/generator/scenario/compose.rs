@@ -11,6 +11,7 @@ use super::files::Files;
 use super::front_end::FrontEnd;
 use super::stages::PlaybackSpec;
 use super::{Scenario, ScenarioError, parts, satellite, spoofing_and_jamming};
+use crate::authentication::Osnma;
 use crate::catalogue::Catalogue;
 use crate::clock::ReceiverClock;
 use crate::clock::nodes::Nodes;
@@ -27,6 +28,7 @@ use crate::switches::Switches;
 use crate::vehicle::Trajectory;
 use gnss::broadcast::OrbitError;
 use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::message::Authentication;
 use gnss::place::counted;
 use gnss::samples::{Format, IfMetadata};
 use gnss::satellite::Sv;
@@ -59,6 +61,7 @@ struct World {
     end_s: f64,
     catalogue: Arc<Catalogue>,
     messages: Arc<Senders>,
+    osnma: Option<Arc<Osnma>>,
     excluded: Vec<Sv>,
     message_faults: Vec<MessageFault>,
     satellite_clocks: Arc<SatelliteClocks>,
@@ -206,7 +209,10 @@ impl Scenario {
         let parts::Sky { catalogue, mut common, excluded } = sky;
         let catalogue = Arc::new(catalogue);
         common.network = self.network(&catalogue, &effects, &message_faults, (&trajectory, end_s), warnings)?;
-        let messages = Arc::new(parts::messages(self, &common)?);
+        let osnma = self.osnma(&catalogue, &common, seed)?;
+        let spoofed = self.spoofed_osnma(&catalogue, &common, seed)?;
+        common.authentication = osnma.clone().map(|osnma| osnma as Arc<dyn Authentication>);
+        let messages = Arc::new(parts::messages(self, &common, spoofed)?);
         let felt = self.scintillation.clone().filter(|strength| strength.is_felt());
         Ok(World {
             message_faults,
@@ -217,6 +223,7 @@ impl Scenario {
             }),
             catalogue,
             messages,
+            osnma,
             excluded,
             seed,
             nodes,
@@ -255,6 +262,7 @@ impl Scenario {
             trajectory: world.trajectory.clone(),
             catalogue: Arc::clone(&world.catalogue),
             messages: Arc::clone(&world.messages),
+            osnma: world.osnma.clone(),
             message_faults: world.message_faults.clone(),
             satellite_clocks: Arc::clone(&world.satellite_clocks),
             fidelity: fidelity?,

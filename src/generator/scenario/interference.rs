@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use super::keys::motion::PLACE_IF_ANY;
 use super::motion::{MotionSpec, place};
+use super::osnma::{Spoofed, spoofed};
 use super::read::Table;
 use super::{ScenarioError, satellite_list};
 use crate::spoof::Advantage;
@@ -165,6 +166,10 @@ pub struct SpooferSpec {
     pub clock_bias_s: f64,
     /// Gain of its clock, in seconds per second.
     pub clock_drift: f64,
+    /// Seconds by which its time and its messages lie behind the true ones.
+    pub replay_s: f64,
+    /// Authentication in its messages.
+    pub osnma: Spoofed,
     /// Claimed motion; absent means that of the antenna.
     pub motion: Option<MotionSpec>,
     /// Drag of the claimed position; absent means that it stays.
@@ -296,6 +301,8 @@ pub(super) fn spoofer(table: &Table<'_>) -> Result<SpooferSpec, ScenarioError> {
         satellites,
         clock_bias_s: table.need("clock_bias_s")?,
         clock_drift: table.need("clock_drift_sps")?,
+        replay_s: table.need("replay_s")?,
+        osnma: spoofed(table)?,
         motion: motion.transpose()?,
         drag: table.table("drag")?.map(|drag| read_drag(&drag)).transpose()?,
     })

@@ -1,6 +1,7 @@
 //! Parts of a scene: navigation data, orbits, messages, and the effects of propagation.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::files::Files;
 use super::{Ionosphere, Overrides, Scenario, ScenarioError, multipath, satellite};
@@ -16,7 +17,7 @@ use gnss::broadcast::Ephemeris;
 use gnss::gps::lnav::{LeapEvent, UtcData};
 use gnss::ionosphere::NAVIC_HZ;
 use gnss::klobuchar::Klobuchar;
-use gnss::message::Common;
+use gnss::message::{Authentication, Common};
 use gnss::rinex::{self, Navigation};
 use gnss::satellite::{Sv, System};
 use gnss::signal::Signal;
@@ -296,16 +297,28 @@ fn common(scenario: &Scenario, navigation: &Navigation, almanac: Vec<Ephemeris>)
         almanac,
         reference: Some(scenario.start),
         network: None,
+        authentication: None,
     }
 }
 
 /// Creates the encoders of the satellites' messages.
-pub(super) fn messages(scenario: &Scenario, common: &Common) -> Result<Senders, ScenarioError> {
+pub(super) fn messages(
+    scenario: &Scenario,
+    common: &Common,
+    spoofed: Vec<(usize, Option<Arc<dyn Authentication>>)>,
+) -> Result<Senders, ScenarioError> {
     let scene = scenario.ionosphere.as_ref();
     let is_given = scene.is_some_and(|own| own.sent().is_some() || own.sent_bdgim_tecu().is_some());
     let key = if is_given { "ionosphere" } else { "navigation.file" };
-    Senders::new(common, &scenario.signals)
-        .map_err(|e| scenario.conflict(key, format!("the navigation message cannot carry it: {e}")))
+    let senders = |common: &Common| {
+        Senders::new(common, &scenario.signals)
+            .map_err(|e| scenario.conflict(key, format!("the navigation message cannot carry it: {e}")))
+    };
+    let mut all = senders(common)?;
+    for (number, authentication) in spoofed {
+        all.put_spoofed(number, senders(&Common { authentication, ..common.clone() })?);
+    }
+    Ok(all)
 }
 
 /// BDGIM coefficients that BeiDou's satellites of the third generation send: those of the scene, or those of

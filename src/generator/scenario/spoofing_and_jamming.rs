@@ -340,6 +340,7 @@ pub(super) fn spoofers(
             drag: None,
             clock_bias_s: spec.clock_bias_s,
             clock_drift: spec.clock_drift,
+            replay_s: spec.replay_s,
             satellites: spec.satellites.clone(),
             advantage: Some(spec.advantage),
             on_s: spec.on_s..spec.off_s.unwrap_or(f64::INFINITY),

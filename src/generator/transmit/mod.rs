@@ -260,7 +260,7 @@ impl Transmitter {
     /// The orbit over a span.
     fn orbit(&self, scene: &Scene, span: u64) -> Result<Option<sky::Arc>, OrbitError> {
         let samples = self.roots_of_span(scene) * self.root_samples();
-        let [from, to] = [span, span + 1].map(|span| scene.clock.epoch(span * samples));
+        let [from, to] = [span, span + 1].map(|span| self.from.replayed(scene.clock.epoch(span * samples)));
         let arc = sky::Arc::through(&scene.catalogue, self.sv, from, to)?;
         // Where the motion begins, which a replay knows as well.
         let first_m = scene.trajectory.composed_for().position_m;

@@ -65,8 +65,9 @@ impl Symbols {
         received: Epoch,
     ) -> Result<(), GenerateError> {
         let faults = if from.number == 0 { scene.message_faults.as_slice() } else { &[] };
+        let messages = scene.messages.of_constellation(from.number);
         for (message, units) in &mut self.units {
-            let Some(sender) = scene.messages.of(message) else { continue };
+            let Some(sender) = messages.of(message) else { continue };
             let number = |at: Epoch| message.unit_at(signal.time.label(at).seconds());
             let (first, last) = (number(first), number(last));
             *units = units.split_off(&first);

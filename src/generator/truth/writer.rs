@@ -78,7 +78,8 @@ struct Claims {
 
 /// Writes `observations.csv`, `sky.csv`, `trajectory.csv`, `navigation.csv`, `passes.csv` and `scene.json`;
 /// `rays.csv` where a satellite has more than one ray, with interference `interference.csv`, with spoofers
-/// `spoofed.csv` and `claimed.csv` (`spoofed_2.csv`, … from the second one on).
+/// `spoofed.csv` and `claimed.csv` (`spoofed_2.csv`, … from the second one on), and with authenticated
+/// messages `osnma_test_merkle_tree.xml`, `osnma_test_public_key.xml` and `osnma_test_kroot.hex`.
 pub struct Writer {
     directory: PathBuf,
     observations: Table,
@@ -210,6 +211,7 @@ impl Writer {
                 trajectory: Table::of_places(&self.directory, &format!("claimed{suffix}.csv"))?,
             });
         }
+        self.write_keys(scene, part)?;
         let (orbits, departures) = scene.catalogue.describe();
         let file = SceneFacts {
             name: scene.name.clone(),
@@ -253,6 +255,21 @@ impl Writer {
         };
         self.write_facts(&file)?;
         self.driven = scene.switches.as_ref().map(|switches| (Arc::clone(switches), scene.clock.rate, file));
+        Ok(())
+    }
+
+    /// Writes the test keys by which authenticated messages of the scene are verified.
+    fn write_keys(&self, scene: &Scene, part: &Range<u64>) -> Result<(), TruthError> {
+        let start = scene.clock.epoch(part.start);
+        let Some(keys) = scene.osnma.as_ref().and_then(|osnma| osnma.anchor(start)) else { return Ok(()) };
+        for (name, text) in [
+            ("osnma_test_merkle_tree.xml", keys.tree_file()),
+            ("osnma_test_public_key.xml", keys.key_file()),
+            ("osnma_test_kroot.hex", keys.kroot_file()),
+        ] {
+            let path = self.directory.join(name);
+            fs::write(&path, text).map_err(|source| TruthError::File { path, source })?;
+        }
         Ok(())
     }
 

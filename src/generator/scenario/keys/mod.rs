@@ -2,6 +2,7 @@
 
 pub(crate) mod hardware;
 pub(crate) mod motion;
+pub(crate) mod osnma;
 pub(crate) mod satellites;
 pub mod signal;
 pub(crate) mod spoofing_and_jamming;
@@ -54,7 +55,17 @@ pub const SCENARIO: &[Key] = &[
         "Corrections by SBAS satellites: the differences of true GPS orbits, clocks and ionosphere from the \
          broadcast ones. Absent: none.",
     ),
-    tables("message_fault", satellites::MESSAGE_FAULT, "Fault of a navigation message."),
+    table(
+        "osnma",
+        osnma::OSNMA,
+        "Authentication of Galileo's messages on E1-B (OSNMA), signed with test keys by the scene's seed. Absent: zeros \
+         in its bits.",
+    ),
+    tables(
+        "message_fault",
+        satellites::MESSAGE_FAULT,
+        "Fault of a navigation message. It acts after authentication: tags stay those of the true words.",
+    ),
     table("motion", motion::MOTION, "Position and motion of the antenna.").required(),
     table(
         "attitude",

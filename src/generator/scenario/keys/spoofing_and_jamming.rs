@@ -2,6 +2,7 @@
 
 use super::motion::{MOTION, PLACE_IF_ANY};
 use super::{A_PATH, LONGEST_S, SATELLITES};
+use crate::scenario::osnma::spoofed_names;
 use crate::scenario::schema::{Key, flag, number, table, text, word, words};
 
 const SWEEP: &[&str] = &["chirp", "fmcw"];
@@ -58,6 +59,20 @@ pub(crate) const SPOOFER: &[Key] = &[
     words("satellites", SATELLITES, "imitated satellites").or_else("all"),
     number("clock_bias_s", -1.0, 1.0, "s", "offset of its clock ahead of GPS time").or(0.0),
     number("clock_drift_sps", -1e-5, 1e-5, "s/s", "rate of the clock offset").or(0.0),
+    number(
+        "replay_s",
+        0.0,
+        1800.0,
+        "s",
+        "delay of a replay: its time and its messages are those of so much earlier, at the claimed position",
+    )
+    .or(0.0),
+    word(
+        "osnma",
+        spoofed_names,
+        "authentication in its messages: the true bits, zeros, or bits that it signs by keys of its own; with [osnma]",
+    )
+    .or_else("true"),
     table("motion", MOTION, "Claimed motion, as `[motion]`. Absent: the antenna's own."),
     table("drag", DRAG, "Drag of the claimed position away from the antenna's."),
 ];

@@ -13,6 +13,7 @@ pub(super) fn with(table: &str, line: &str) -> String {
         "spoofer.drag" => format!("{MINIMAL}{STATIC}[[spoofer]]\npower_db = 6\n[spoofer.drag]\n{line}\n"),
         "motion.point" => format!("{MINIMAL}{WAYPOINTS}{line}\n"),
         "expect.interval" => format!("{MINIMAL}{STATIC}[[expect.interval]]\n{line}\n"),
+        "osnma.transition" => format!("{MINIMAL}{STATIC}[[osnma.transition]]\n{line}\n"),
         "obstruction" => format!("{MINIMAL}{STATIC}[[obstruction]]\n{line}\n"),
         "multipath" => format!("{MINIMAL}{STATIC}[[multipath]]\n{line}\n"),
         table => format!("{MINIMAL}{STATIC}[{table}]\n{line}\n"),

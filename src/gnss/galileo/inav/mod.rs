@@ -4,8 +4,8 @@
 //! Source: Galileo OS SIS ICD 2.1, 4.3 and 5.1. A page is an even and an odd part of a second each; a part is
 //! a pattern of ten symbols and 120 bits, coded ([`Convolutional`]) and interleaved ([`Interleaver`]). Both
 //! parts carry one word of 128 bits and a check. Limits: Of almanacs (words 7 to 10) only the offset of GPS
-//! time is read. Alert pages keep their position and state nothing. The bits reserved for authentication and
-//! the return link are zero, as satellites send them on E5b.
+//! time is read. Alert pages keep their position and state nothing. The bits reserved for authentication on
+//! E1-B are those of the scene's provider, or zero; those of the return link are zero.
 
 pub(super) mod almanac;
 mod e5b;
@@ -127,6 +127,8 @@ const CHECK_BITS: usize = 24;
 /// First bit in the odd part of the bits before the check, and of those after it (4.3.2.3).
 const RESERVED_BEGIN: usize = 18;
 const RESERVED_BITS: usize = 64;
+/// Reserved bits after the 40 of authentication: return link and spare (4.3.2.3).
+const AFTER_AUTHENTICATION_BITS: u32 = 24;
 const LAST_BEGIN: usize = 106;
 const LAST_BITS: usize = 8;
 /// Types of the spare word (5.1.9.11), the word with reduced elements, and the words of an ephemeris.
@@ -199,7 +201,7 @@ impl Sender for Pages {
             return Err(FieldError::Start { message: message.name, start_s: start.tow_s(), expected });
         }
         let word = self.word(word_at(start), ephemeris, start)?;
-        Ok(encode_page(&page_with(&word, rest(start))))
+        Ok(encode_page(&page_with(&word, self.signed(ephemeris.sv, start, rest(start)))))
     }
 
     fn restored(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<Vec<bool>>, FieldError> {
@@ -208,11 +210,36 @@ impl Sender for Pages {
             return Ok(Vec::new());
         }
         let words = self.words_of_set(ephemeris, start)?;
-        Ok(words.iter().map(|word| encode_page(&page_with(word, rest(start)))).collect())
+        let rest = self.signed(ephemeris.sv, start, rest(start));
+        Ok(words.iter().map(|word| encode_page(&page_with(word, rest))).collect())
+    }
+}
+
+/// Words that satellites send on E1-B, without the pages around them.
+pub struct Words(Pages);
+
+impl Words {
+    /// Creates the words of satellites that send `common` besides their own elements.
+    pub fn new(common: &Common) -> Self {
+        Self(Pages { common: common.clone(), carrier: &ON_E1B })
+    }
+
+    /// Word of the page that begins at `start`, of 128 bits.
+    ///
+    /// # Errors
+    /// A value that the message cannot carry.
+    pub fn at(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<u128, FieldError> {
+        self.0.word(word_at(start), ephemeris, start)
     }
 }
 
 impl Pages {
+    /// The remaining bits of the odd part with the satellite's authentication, which E1-B alone carries.
+    fn signed(&self, sv: Sv, start: Epoch, (reserved, last): (u64, u8)) -> (u64, u8) {
+        let own = self.common.authentication.as_ref().filter(|_| self.carrier.message == &INAV);
+        (own.map_or(reserved, |own| reserved | own.bits(sv, start) << AFTER_AUTHENTICATION_BITS), last)
+    }
+
     /// The part of the almanac that is sent in the minute of `start`.
     fn triple(&self, start: Epoch) -> Triple {
         Triple::at(start, &self.common.almanac, self.common.reference.unwrap_or(start), self.common.galileo)
