@@ -19,8 +19,7 @@ use osnma::time::SUBFRAME_S;
 /// Hashes of a chain with their names.
 const HASHES: [(&str, Hash); 2] = [("sha256", Hash::Sha256), ("sha3_256", Hash::Sha3)];
 /// Functions of tags with their names.
-const MACS: [(&str, MacFunction); 2] =
-    [("hmac_sha256", MacFunction::HmacSha256), ("cmac_aes", MacFunction::CmacAes)];
+const MACS: [(&str, MacFunction); 2] = [("hmac_sha256", MacFunction::HmacSha256), ("cmac_aes", MacFunction::CmacAes)];
 /// States of the service with their names: true where it is operational.
 const STATES: [(&str, bool); 2] = [("operational", true), ("test", false)];
 /// Authentication of a spoofer's messages with its names.

@@ -44,9 +44,8 @@ impl Provider {
             mac(chain.chain.mac, &key.bytes, &message, TAG_BITS)
         };
         let cop = |of: u8, adkd: Adkd| covered(of, adkd).map_or(0, |(_, cop)| cop);
-        let info = |(of, adkd): (u8, Adkd)| {
-            u16::from(of) << 8 | u16::from(adkd.number()) << 4 | u16::from(cop(of, adkd))
-        };
+        let info =
+            |(of, adkd): (u8, Adkd)| u16::from(of) << 8 | u16::from(adkd.number()) << 4 | u16::from(cop(of, adkd));
         let flexible = slots.iter().zip(&kinds).filter(|(slot, _)| **slot == Slot::Flexible);
         let flexible: Vec<u16> = flexible.map(|(_, kind)| info(*kind)).collect();
         let chain = self.chain(start.later(1));

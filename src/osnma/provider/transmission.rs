@@ -129,7 +129,8 @@ impl Transmission {
         let Some(newest) = before.first() else { return BTreeMap::new() };
         let covered = |satellite: u8, adkd: Adkd| {
             let row = newest.get(&satellite)?[place(adkd)].as_ref()?;
-            let same = |rows: &&Arc<Rows>| rows.get(&satellite).is_some_and(|both| both[place(adkd)].as_ref() == Some(row));
+            let same =
+                |rows: &&Arc<Rows>| rows.get(&satellite).is_some_and(|both| both[place(adkd)].as_ref() == Some(row));
             let cop = before.iter().take_while(same).count();
             Some((row, cop as u8))
         };

@@ -10,7 +10,8 @@ pub(crate) const OSNMA: &[Key] = &[
     integer("maclt", 27, 41, "number of the MAC look-up table: 27, 31 or 33 to 41").or(34.0),
     word("status", states, "status of the service in the NMA header").or_else("operational"),
     words("without", SATELLITES, "satellites that send zeros instead of authentication").or_else("none"),
-    number("public_key_every_s", 30.0, 86_400.0, "s", "interval of the turns in which the public key is sent").or(600.0),
+    number("public_key_every_s", 30.0, 86_400.0, "s", "interval of the turns in which the public key is sent")
+        .or(600.0),
     number("public_key_for_s", 0.0, 86_400.0, "s", "duration of each of those turns; the root key has the others")
         .or(180.0),
     number("step_s", 30.0, 86_400.0, "s", "duration of each step of a transition").or(600.0),
