@@ -1,4 +1,4 @@
-//! Authentication of Galileo's navigation messages (OSNMA), as a receiver verifies it and a provider signs it.
+//! Authentication of Galileo's navigation messages (OSNMA), verified and signed.
 //!
 //! Source: Galileo OSNMA SIS ICD 1.1 and OSNMA receiver guidelines 1.3. Pages of I/NAV go in
 //! ([`page::Page`]); a [`verifier::Verifier`] gives each tag's result with its reason. What it trusts at the

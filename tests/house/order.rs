@@ -195,7 +195,7 @@ pub const ORDER: Order<'static> = &[
             &["dsm", "report"],
             &["keys"],
             &["files"],
-            &["verifier"],
+            &["provider", "verifier"],
             &["tests"],
         ],
     ),

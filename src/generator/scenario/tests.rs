@@ -1,6 +1,7 @@
 mod declared;
 mod front_end;
 mod navigation;
+mod osnma;
 mod propagation;
 mod satellite;
 mod shipped;
@@ -86,9 +87,11 @@ const HOSTILE: &str = "[[interference]]\nkind = \"chirp\"\noffset_hz = 1e5\njs_d
     repeat = true\n\
     [[interference]]\nkind = \"cw\"\neirp_dbw = -20\ndistance_m = 500\n\
     [[spoofer]]\npower_db = 6\npower_start_db = -10\nramp_s = 5\non_s = 1\noff_s = 9\nsatellites = [\"G13\"]\n\
-    clock_bias_s = 1e-6\n\
+    clock_bias_s = 1e-6\nreplay_s = 40\nosnma = \"own_keys\"\n\
     clock_drift_sps = 1e-9\n[spoofer.drag]\nstart_s = 3\nazimuth_deg = 90\nelevation_deg = 0\nspeed_mps = 5\n\
-    acceleration_mps2 = 2\n";
+    acceleration_mps2 = 2\n[osnma]\nchain_hash = \"sha3_256\"\nmac_function = \"cmac_aes\"\nmaclt = 33\n\
+    status = \"test\"\nwithout = [\"E05\"]\npublic_key_every_s = 900\npublic_key_for_s = 60\nstep_s = 300\n\
+    [[osnma.transition]]\nkind = \"alert\"\ntime_s = 600\n";
 
 fn parse(text: &str) -> Result<Scenario, ScenarioError> {
     Scenario::parse(text, "scene.toml")

@@ -93,8 +93,8 @@ impl Settings {
 /// Reason for which settings make no provider.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum SettingsError {
-    /// A look-up table that does not exist, or whose tags do not fit a sub-frame.
-    #[error("table {0}: expected one of 27, 31 and 33 to 41, whose tags of 40 bits fit a sub-frame")]
+    /// A look-up table that does not exist, or that has another number of tags.
+    #[error("table {0}: expected 27, 33, 34 or 35, which have as many tags of 40 bits as a sub-frame")]
     Table(u8),
     /// A transition that begins before the one before has ended.
     #[error("transition {0} begins before the one before it has ended: expected at least {1} s between them")]
@@ -146,7 +146,7 @@ impl Provider {
     /// # Errors
     /// [`SettingsError`].
     pub fn new(settings: Settings) -> Result<Self, SettingsError> {
-        let fits = slots(settings.table, 0).is_some_and(|slots| sections::bits(slots) <= sections::SECTION_BITS);
+        let fits = slots(settings.table, 0).is_some_and(|slots| slots.len() + 1 == sections::TAGS);
         if !fits {
             return Err(SettingsError::Table(settings.table));
         }

@@ -125,14 +125,15 @@ impl Stage {
         Self { notice: Notice::Nominal, must_stop: false, ..*self }.header(is_operational)
     }
 
-    /// True if a sub-frame has the turn of the public key: by the clock, and in every other ten sub-frames
-    /// while the leaf is new.
+    /// True if a sub-frame has the turn of the public key: by the clock, and half of the time while the leaf
+    /// is new.
     pub(super) fn sends_key(&self, start: Gst, settings: &Settings) -> bool {
         let number = start.seconds().div_euclid(SUBFRAME_S);
         let is_new = self.published != Leaf::Key { tree: self.tree, key: self.key }
             || matches!(self.notice, Notice::PublicKeyRevoked | Notice::NewPublicKey | Notice::NewMerkleTree);
         if is_new {
-            return start.since_s(self.from) / SUBFRAME_S % 20 < 10;
+            let half = (settings.step / 2).clamp(1, 10);
+            return start.since_s(self.from) / SUBFRAME_S % (2 * half) < half;
         }
         number.rem_euclid(settings.key_every.max(1)) < settings.key_for
     }

@@ -12,15 +12,11 @@ use crate::subframe::MACK_BITS;
 use crate::tables::{Slot, slots};
 use crate::time::{Gst, SUBFRAME_S};
 
-/// Bits of the section.
-pub(super) const SECTION_BITS: usize = MACK_BITS;
 /// Bits of the statement after a tag.
 const INFO_BITS: usize = 16;
 
-/// Bits that a row of slots fills, the first tag and the key among them.
-pub(super) fn bits(slots: &[Slot]) -> usize {
-    (slots.len() + 1) * (TAG_BITS + INFO_BITS) + 8 * KEY_BYTES
-}
+/// Tags of a sub-frame: as many as fit beside the key (ICD, 3.2.4).
+pub(super) const TAGS: usize = (MACK_BITS - 8 * KEY_BYTES) / (TAG_BITS + INFO_BITS);
 
 /// Data of a satellite as a tag covers them, with the count of sub-frames since they changed (COP).
 pub(super) type Covered<'a> = dyn Fn(u8, Adkd) -> Option<(&'a Row, u8)> + 'a;
@@ -59,7 +55,7 @@ impl Provider {
             row.push(info((of, adkd)).into(), INFO_BITS);
         }
         row.push_bytes(&self.chain(start).key(start)?.bytes);
-        row.push_zeros(SECTION_BITS.saturating_sub(row.len()));
+        row.push_zeros(MACK_BITS.saturating_sub(row.len()));
         Some(row)
     }
 }

@@ -128,9 +128,9 @@ impl Transmission {
             (1..=i64::from(MOST_COP)).map(|back| self.rows(memos, start.later(-back))).collect();
         let Some(newest) = before.first() else { return BTreeMap::new() };
         let covered = |satellite: u8, adkd: Adkd| {
-            let row = newest.get(&satellite)?[place(adkd)].as_ref()?;
+            let row = newest.get(&satellite)?[position(adkd)].as_ref()?;
             let same =
-                |rows: &&Arc<Rows>| rows.get(&satellite).is_some_and(|both| both[place(adkd)].as_ref() == Some(row));
+                |rows: &&Arc<Rows>| rows.get(&satellite).is_some_and(|both| both[position(adkd)].as_ref() == Some(row));
             let cop = before.iter().take_while(same).count();
             Some((row, cop as u8))
         };
@@ -158,7 +158,7 @@ impl Transmission {
     }
 }
 
-/// Place of a kind of data among a satellite's rows.
-fn place(adkd: Adkd) -> usize {
+/// Position of a kind of data among a satellite's rows.
+fn position(adkd: Adkd) -> usize {
     usize::from(adkd == Adkd::Timing)
 }

@@ -1,5 +1,6 @@
 //! Laws of the verifier, on a synthetic recording that is signed with test keys.
 
+mod provided;
 mod signed;
 
 use crate::chain::{Hash, MacFunction};
@@ -236,23 +237,6 @@ fn what_must_not_be_used_is_never_authentic() {
 fn with(signed: &Signed, header: NmaHeader, message: &[u8], from: i64, to: i64) -> Vec<Page> {
     let all = |number: i64| SENDERS.map(|sender| signed.subframe(sender, BEGIN.later(number), header, 4, message));
     merged((from..to).flat_map(all))
-}
-
-#[test]
-fn the_next_chain_follows_the_end_of_one() {
-    let (old, new) = (chain(), Signed::new(2, Hash::Sha256, MacFunction::HmacSha256));
-    let mut own = warm();
-    feed(&mut own, &sky(&old, NOMINAL, 10, 20), 0.0);
-    // End of chain: the next chain's root while the old one is in force, then the next one.
-    let (ending, next) = (NmaHeader(0b1001_0100), NmaHeader(0b1010_0010));
-    feed(&mut own, &with(&old, ending, &new.kroot(ending, 1, 0), 20, 40), 0.0);
-    assert_eq!(own.state(), State::Authentic);
-    feed(&mut own, &with(&new, next, &new.kroot(next, 1, 0), 40, 70), 0.0);
-    own.finish();
-    assert_eq!(own.counts().refused(), 0);
-    // The slow MAC's last ten keys of the old chain never come.
-    assert_eq!(own.counts().keys_verified, 60);
-    assert!(own.last_keys().contains(&(2, BEGIN.later(69))));
 }
 
 #[test]

@@ -73,8 +73,8 @@ pub struct Verifier {
     waiting: Vec<Waiting>,
     /// Sub-frames before the root of their chain is known, with the words before each.
     unrooted: Vec<(Subframe, Arc<Words>)>,
-    /// Sub-frames of the last hours whose key was proved.
-    proved: BTreeSet<Gst>,
+    /// Sub-frames of the last hours whose key was proved, with the number of the chain.
+    proved: BTreeMap<Gst, u8>,
     status: Option<NmaStatus>,
     alert: bool,
     clock_disagrees: bool,
@@ -108,7 +108,7 @@ impl Verifier {
             now: None,
             waiting: Vec::new(),
             unrooted: Vec::new(),
-            proved: BTreeSet::new(),
+            proved: BTreeMap::new(),
             status: None,
             alert: false,
             clock_disagrees: false,
@@ -266,7 +266,7 @@ impl Verifier {
             self.words.put(subframe.sender, start, &subframe.words());
         }
         self.give_up(|then| start.since_s(then) > PATIENCE_S);
-        self.proved.retain(|then| start.since_s(*then) <= PATIENCE_S);
+        self.proved.retain(|then, _| start.since_s(*then) <= PATIENCE_S);
     }
 
     /// Takes keys and tags of sub-frames that waited for a root which is known now.

@@ -76,7 +76,10 @@ impl Verifier {
         let first = (slots.len() + 1) * (chain.tag_bits + INFO_BITS);
         let Some(key) = subframe.mack(first, 8 * chain.key_bytes) else { return };
         match trust.accept(&TeslaKey { start: subframe.start, bytes: key.bytes().to_vec() }) {
-            Ok(()) => self.counts.keys_verified += u64::from(self.proved.insert(subframe.start)),
+            Ok(()) => {
+                let is_new = self.proved.insert(subframe.start, header.chain()).is_none();
+                self.counts.keys_verified += u64::from(is_new);
+            }
             Err(KeyError::Foreign) => self.counts.keys_refused += 1,
             Err(KeyError::BeforeRoot | KeyError::TooFar) => self.counts.keys_not_verifiable += 1,
         }
@@ -138,21 +141,28 @@ impl Verifier {
         let mut still = Vec::new();
         for mut waiting in std::mem::take(&mut self.waiting) {
             let trust = self.chains.get(&waiting.chain.id).filter(|trust| trust.chain == waiting.chain);
-            let Some(trust) = trust.cloned() else {
+            if trust.is_none() {
                 self.report_all(&waiting, Gap::ChainGone);
                 continue;
+            }
+            // A tag has the key that is sent so much later, of the chain that is in force then.
+            let key_at = |after: i64| {
+                let sent = waiting.start.later(after);
+                let chain = self.proved.get(&sent).copied().unwrap_or(waiting.chain.id);
+                self.chains.get(&chain)?.key_at(sent).ok()
             };
-            let key_at = |after: i64| trust.key_at(waiting.start.later(after)).ok();
-            if let (None, Some(key)) = (waiting.checked, key_at(1)) {
-                waiting.checked = Some(waiting.check_sequence(&key));
+            let [fast, slow] = [Adkd::Ephemeris, Adkd::SlowMac].map(|kind| key_at(kind.key_after()));
+            if let (None, Some(key)) = (waiting.checked, &fast) {
+                waiting.checked = Some(waiting.check_sequence(key));
             }
             let mut left = Vec::new();
             for tag in std::mem::take(&mut waiting.tags) {
-                let Some(key) = key_at(tag.adkd.key_after()) else {
+                let key = if tag.adkd == Adkd::SlowMac { &slow } else { &fast };
+                let Some(key) = key else {
                     left.push(tag);
                     continue;
                 };
-                let outcome = waiting.outcome(&tag, &key);
+                let outcome = waiting.outcome(&tag, key);
                 self.report(&waiting, &tag, outcome);
             }
             if !left.is_empty() {

@@ -58,8 +58,8 @@ pub const SCENARIO: &[Key] = &[
     table(
         "osnma",
         osnma::OSNMA,
-        "Authentication of Galileo's messages on E1-B (OSNMA), signed with test keys by the scene's seed. Absent: zeros \
-         in its bits.",
+        "Authentication of Galileo's messages on E1-B (OSNMA), signed with test keys by the seed. Absent: zeros in \
+         its bits.",
     ),
     tables(
         "message_fault",

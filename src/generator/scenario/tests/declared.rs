@@ -172,6 +172,7 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
                 ("expect", "interval" | "position_within_m") => {
                     cases.push((with("expect", &format!("{key} = 1")), table, key));
                 }
+                ("osnma", "transition") => cases.push((with("osnma", "transition = 1"), table, key)),
                 ("spoofer", "motion" | "drag") => {
                     cases.push((with("spoofer", &format!("power_db = 6\n{key} = 1")), table, key));
                 }
@@ -279,6 +280,9 @@ fn numbers_outside_their_range_are_refused_with_range_and_unit() {
         ("interference", "bandwidth_hz", "Hz"),
         ("spoofer", "power_db", "dB"),
         ("spoofer", "clock_drift_sps", "s/s"),
+        ("spoofer", "replay_s", "s"),
+        ("osnma", "step_s", "s"),
+        ("osnma.transition", "time_s", "s"),
         ("spoofer.drag", "speed_mps", "m/s"),
         ("orbits", "antenna_offset_m", "m"),
         ("satellite_fault", "step_s", "s"),
