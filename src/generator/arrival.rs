@@ -6,7 +6,7 @@
 
 use crate::geometry::{Arriving, Geometry, Places};
 use crate::knots::Arrival;
-use crate::presence::{Presence, presence};
+use crate::presence::{Presence, presence_in};
 use crate::ray::Ray;
 use crate::scene::Scene;
 use crate::sky::{Arc, Emission, LIGHT_TIME_S, Place, emission_near};
@@ -87,15 +87,15 @@ pub(super) fn seen_near(
 ) -> Result<Option<Seen>, OrbitError> {
     let find = || {
         let (time, elapsed_s, motion) = received(scene, from, local);
-        let emission = emission_near(&scene.catalogue, sv, time, &motion, guess_s)?;
-        let bias_s = local.since(time) - from.clock_s(elapsed_s);
+        let emission = emission_near(from.catalogue(scene), sv, time, &motion, guess_s)?;
+        let bias_s = from.ahead(local).since(time) - from.clock_s(elapsed_s);
         Ok(emission.map(|emission| Arriving { emission, bias_s, gain: from.gain(elapsed_s) }))
     };
     let found = match known {
         Some(known) => known.at(local, guess_s, find)?,
         None => find()?,
     };
-    Ok(found.map(|found| arriving(scene, signal, found, from.replay_s)))
+    Ok(found.map(|found| arriving(scene, from, signal, found)))
 }
 
 /// Like [`seen_from`], for a satellite on a short arc of its orbit, with the antenna's position if it is
@@ -116,27 +116,32 @@ pub fn seen_on(
         Place::new(time, elapsed_s, motion)
     };
     // Stored places are those of the true time.
-    let places = places.filter(|_| from.replay_s == 0.0);
+    let places = places.filter(|_| from.replay_s == 0.0 && from.ahead_s == 0);
     let place = places.map_or_else(find, |places| places.at(local, find));
-    let bias_s = local.since(place.time) - from.clock_s(place.elapsed_s);
+    let bias_s = from.ahead(local).since(place.time) - from.clock_s(place.elapsed_s);
     let found = arc.emission(&place)?;
     let gain = from.gain(place.elapsed_s);
-    Ok(found.map(|emission| arriving(scene, signal, Arriving { emission, bias_s, gain }, from.replay_s)))
+    Ok(found.map(|emission| arriving(scene, from, signal, Arriving { emission, bias_s, gain })))
 }
 
 /// Computes the rays of a signal from the arrival of its satellite. Cycles of a replay's delay are not
 /// counted: its carrier begins at any phase.
-fn arriving(scene: &Scene, signal: &Signal, Arriving { emission, bias_s, gain }: Arriving, replay_s: f64) -> Seen {
+fn arriving(
+    scene: &Scene,
+    from: &Constellation,
+    signal: &Signal,
+    Arriving { emission, bias_s, gain }: Arriving,
+) -> Seen {
     let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
     for effect in &scene.effects {
         effect.act(&emission.sight, signal, &mut rays);
     }
     // Small numbers only: no clock time enters a sum of seconds.
     let sent = emission.sight.received.plus_s(-emission.travel_s);
-    let ahead_s = scene.catalogue.signal_clock_s(emission.sight.sv, sent, signal);
+    let ahead_s = from.catalogue(scene).signal_clock_s(emission.sight.sv, sent, signal);
     let satellite_clock_s = emission.satellite_clock_s + ahead_s;
     let common_s = bias_s + emission.travel_s - satellite_clock_s;
-    let counted_s = common_s - replay_s;
+    let counted_s = common_s - from.replay_s;
     rays.iter_mut().for_each(|ray| ray.cn0_hz *= gain);
     let arrivals = rays
         .iter()
@@ -175,5 +180,5 @@ pub fn in_view_from(scene: &Scene, from: &Constellation, sv: Sv, local: Epoch) -
 /// Errors of the orbit.
 pub fn presence_from(scene: &Scene, from: &Constellation, sv: Sv, local: Epoch) -> Result<Presence, OrbitError> {
     let (time, _, motion) = received(scene, from, local);
-    presence(scene, sv, time, &motion)
+    presence_in(scene, from.catalogue(scene), sv, time, &motion)
 }

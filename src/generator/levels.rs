@@ -237,7 +237,7 @@ fn spoofed(scene: &Scene, kept: &Kept, from: &Constellation) -> Result<Spoofed, 
             continue;
         }
         let local = scene.clock.epoch(sample);
-        for sv in scene.satellites().filter(|sv| from.sends(*sv)) {
+        for sv in from.satellites(scene) {
             if !arrival::in_view_from(scene, from, sv, local)? {
                 continue;
             }

@@ -61,6 +61,8 @@ impl Senders {
 /// Fault in the messages of some satellites.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MessageFault {
+    /// Number of the constellation whose messages it spoils: 0 for the true satellites.
+    pub constellation: usize,
     /// `None` for all.
     pub satellites: Option<Vec<Sv>>,
     /// Interval of transmission in which the fault acts.
@@ -256,7 +258,8 @@ impl MessageFault {
         let from_s = self.on.start.since(start);
         let until_s = self.on.end.since(start);
         let until = if until_s < FOREVER_S { format!(" to {until_s} s") } else { String::new() };
-        format!("{who}: {what} from {from_s} s{until}")
+        let whose = if self.constellation == 0 { String::new() } else { format!("spoofer {}, ", self.constellation) };
+        format!("{whose}{who}: {what} from {from_s} s{until}")
     }
 }
 

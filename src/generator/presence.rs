@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use crate::catalogue::Silence;
+use crate::catalogue::{Catalogue, Silence};
 use crate::ray::SPACE_M;
 use crate::scene::Scene;
 use crate::sky::{Emission, emission, emission_of_set};
@@ -56,10 +56,24 @@ impl Presence {
 /// # Errors
 /// Errors of the orbit.
 pub fn presence(scene: &Scene, sv: Sv, time: Epoch, motion: &Motion) -> Result<Presence, OrbitError> {
-    if scene.catalogue.sent_at(sv, time).is_none() {
+    presence_in(scene, &scene.catalogue, sv, time, motion)
+}
+
+/// [`presence`] of a satellite of a catalogue, which may be a spoofer's.
+///
+/// # Errors
+/// Errors of the orbit.
+pub fn presence_in(
+    scene: &Scene,
+    catalogue: &Catalogue,
+    sv: Sv,
+    time: Epoch,
+    motion: &Motion,
+) -> Result<Presence, OrbitError> {
+    if catalogue.sent_at(sv, time).is_none() {
         return Ok(Presence::NoEphemeris);
     }
-    Ok(match emission(&scene.catalogue, sv, time, motion)? {
+    Ok(match emission(catalogue, sv, time, motion)? {
         None => Presence::NoEphemeris,
         Some(emission) if scene.sees(&emission.sight) => Presence::InView(Box::new(emission)),
         Some(emission) if emission.sight.user.height_m < SPACE_M => Presence::BelowMask,

@@ -22,6 +22,7 @@ mod motion;
 mod multipath;
 mod obstruction;
 mod osnma;
+mod own_sky;
 mod parts;
 mod propagation;
 mod pushed;
@@ -345,7 +346,7 @@ impl Scenario {
         let signals = refusals.take(signals(root));
         let ahead_ns = navigation.as_ref().map(|t| t.number("galileo_ahead_ns")).transpose();
         let ahead_ns = refusals.take(ahead_ns);
-        let moved_to = navigation.as_ref().map(moved_to).transpose();
+        let moved_to = navigation.as_ref().map(|t| moved_to(t, "moved_to")).transpose();
         let moved_to = refusals.take(moved_to).flatten().flatten();
         let files = navigation.map(|t| t.texts("file")).transpose();
         let files = refusals.take(files).flatten().flatten().unwrap_or_default();
@@ -435,10 +436,11 @@ fn start(root: &Table<'_>) -> Result<Epoch, ScenarioError> {
 }
 
 /// A day alone, or a time in it.
-fn moved_to(table: &Table<'_>) -> Result<Option<Epoch>, ScenarioError> {
-    let Some(text) = table.instant("moved_to")? else { return Ok(None) };
+/// Day to which navigation files are moved, by its key.
+fn moved_to(table: &Table<'_>, key: &str) -> Result<Option<Epoch>, ScenarioError> {
+    let Some(text) = table.instant(key)? else { return Ok(None) };
     let whole = if text.contains(['T', ' ']) { text } else { format!("{text}T00:00:00") };
-    Epoch::parse(&whole).map(Some).map_err(|e| table.bad("moved_to", e))
+    Epoch::parse(&whole).map(Some).map_err(|e| table.bad(key, e))
 }
 
 fn name(root: &Table<'_>) -> Result<String, ScenarioError> {

@@ -8,10 +8,13 @@
 //! satellite's clock or message.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use crate::catalogue::Catalogue;
 use crate::clock::ReceiverClock;
+use crate::scene::Scene;
 use crate::vehicle::{Motion, Trajectory};
 use gnss::satellite::Sv;
 use gnss::time::{Epoch, SampleClock};
@@ -52,6 +55,21 @@ pub struct Advantage {
     pub ramp_s: f64,
 }
 
+/// Ephemerides of a spoofer's own.
+#[derive(Clone, Debug)]
+pub struct OwnSky {
+    /// Orbits and clocks, which are those of its messages.
+    pub catalogue: Arc<Catalogue>,
+    /// Satellites that it does not send.
+    pub excluded: Vec<Sv>,
+}
+
+impl PartialEq for OwnSky {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.catalogue, &other.catalogue) && self.excluded == other.excluded
+    }
+}
+
 /// Constellation of satellite signals that have one origin.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Constellation {
@@ -67,6 +85,10 @@ pub struct Constellation {
     pub clock_drift: f64,
     /// Seconds by which its time and its messages lie behind the true ones.
     pub replay_s: f64,
+    /// Whole seconds by which the time of its satellites and messages is ahead of the true one.
+    pub ahead_s: i64,
+    /// Ephemerides of its own; `None` for the scene's.
+    pub sky: Option<OwnSky>,
     /// `None` for all in view of the claimed position.
     pub satellites: Option<Vec<Sv>>,
     /// Power advantage over the true signals; `None` for the true satellites.
@@ -105,6 +127,8 @@ impl Constellation {
             clock_bias_s: 0.0,
             clock_drift: 0.0,
             replay_s: 0.0,
+            ahead_s: 0,
+            sky: None,
             satellites: None,
             advantage: None,
             on_s: f64::NEG_INFINITY..f64::INFINITY,
@@ -147,7 +171,25 @@ impl Constellation {
 
     /// Time whose satellites and messages it sends, instead of the true time `at`.
     pub fn replayed(&self, at: Epoch) -> Epoch {
-        if self.replay_s > 0.0 { at.plus_s(-self.replay_s) } else { at }
+        self.ahead(if self.replay_s > 0.0 { at.plus_s(-self.replay_s) } else { at })
+    }
+
+    /// Time of its signals for the time `at` of a clock. Delays of its signals count from there: they stay
+    /// small, and their last digit with them.
+    pub fn ahead(&self, at: Epoch) -> Epoch {
+        if self.ahead_s == 0 { at } else { Epoch::new(at.seconds() + self.ahead_s, at.fraction()) }
+    }
+
+    /// Ephemerides, orbits and clocks of its satellites.
+    pub fn catalogue<'s>(&'s self, scene: &'s Scene) -> &'s Catalogue {
+        self.sky.as_ref().map_or(&scene.catalogue, |own| &own.catalogue)
+    }
+
+    /// Satellites that it may send, in order.
+    pub fn satellites(&self, scene: &Scene) -> Vec<Sv> {
+        let excluded = self.sky.as_ref().map_or(&scene.excluded, |own| &own.excluded);
+        let all = self.catalogue(scene).satellites();
+        all.filter(|sv| !excluded.contains(sv) && self.sends(*sv)).collect()
     }
 
     /// Factor on the power of every ray.
@@ -223,6 +265,9 @@ impl Constellation {
         }
         if let Some(drag) = &self.drag {
             text += &format!(", dragged at {} m/s from {} s", drag.speed_mps, drag.start_s);
+        }
+        if self.ahead_s != 0 {
+            text += &format!(", time {:+} s", self.ahead_s);
         }
         if self.replay_s > 0.0 {
             text += &format!(", replays {} s late", self.replay_s);

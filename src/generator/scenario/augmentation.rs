@@ -47,7 +47,7 @@ impl Scenario {
         }
         let ground = Ground {
             catalogue: Arc::clone(catalogue),
-            message_faults: message_faults.to_vec(),
+            message_faults: message_faults.iter().filter(|fault| fault.constellation == 0).cloned().collect(),
             departures: self.satellite_faults.iter().flat_map(departures).collect(),
             start: self.start,
             is_test: spec.test,

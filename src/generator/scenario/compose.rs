@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use super::files::Files;
 use super::front_end::FrontEnd;
+use super::own_sky::Own;
 use super::stages::PlaybackSpec;
 use super::{Scenario, ScenarioError, parts, satellite, spoofing_and_jamming};
 use crate::authentication::Osnma;
@@ -60,6 +61,8 @@ struct World {
     /// True time since the start at which the scene ends.
     end_s: f64,
     catalogue: Arc<Catalogue>,
+    /// Spoofers with ephemerides of their own.
+    own: Vec<Own>,
     messages: Arc<Senders>,
     osnma: Option<Arc<Osnma>>,
     excluded: Vec<Sv>,
@@ -133,8 +136,14 @@ impl Scenario {
         }
         warnings.extend(spoofing_and_jamming::unheard(self, &scenes));
         if let Some(first) = scenes.first() {
-            let spoofers =
-                spoofing_and_jamming::spoofers(self, first, world.end_s, directory, overrides, &mut warnings)?;
+            let spoofers = spoofing_and_jamming::spoofers(
+                self,
+                (first, &world.own),
+                world.end_s,
+                directory,
+                overrides,
+                &mut warnings,
+            )?;
             scenes.iter_mut().for_each(|scene| scene.spoofers.clone_from(&spoofers));
         }
         // A position may be by the signals of several front ends: the most satellites count.
@@ -201,18 +210,20 @@ impl Scenario {
         self.begin_ticks(&trajectory, start_s)?;
         // A file that begins at the scene's start must do with a receiver's clock that is ahead by its bias.
         self.covers(&self.motion, &trajectory, start_s.max(0.0), end_s.min(self.duration_s))?;
-        let navigation = parts::navigation(self, directory, overrides, warnings)?;
+        let navigation = parts::navigation(self, self.start, files, warnings)?;
         let sky = parts::sky(self, &navigation, files, end_s, warnings)?;
         let effects = parts::effects(self, files, &navigation, (&sky, &trajectory), end_s)?;
         let effects: Vec<Arc<dyn Effect>> = effects.into_iter().map(Arc::from).collect();
-        let message_faults = satellite::message_faults(self, &sky.catalogue, seed)?;
+        let own = self.own_skies(files, end_s, warnings)?;
+        let message_faults = satellite::message_faults(self, &sky.catalogue, &own, seed)?;
         let parts::Sky { catalogue, mut common, excluded } = sky;
         let catalogue = Arc::new(catalogue);
         common.network = self.network(&catalogue, &effects, &message_faults, (&trajectory, end_s), warnings)?;
         let osnma = self.osnma(&catalogue, &common, seed)?;
         let spoofed = self.spoofed_osnma(&catalogue, &common, seed)?;
         common.authentication = osnma.clone().map(|osnma| osnma as Arc<dyn Authentication>);
-        let messages = Arc::new(parts::messages(self, &common, spoofed)?);
+        let spoofed = self.spoofed_messages(&common, &own, spoofed);
+        let messages = Arc::new(parts::messages(self, &common, &spoofed)?);
         let felt = self.scintillation.clone().filter(|strength| strength.is_felt());
         Ok(World {
             message_faults,
@@ -224,6 +235,7 @@ impl Scenario {
             catalogue,
             messages,
             osnma,
+            own,
             excluded,
             seed,
             nodes,

@@ -81,7 +81,7 @@ impl Scenario {
             fault(kind, one.satellites.as_deref(), one.on_s, one.off_s)
         };
         let satellites = self.satellite_faults.iter().map(of_satellite);
-        satellites.chain(self.message_faults.iter().map(of_message)).collect()
+        satellites.chain(self.message_faults.iter().filter(|one| one.spoofer == 0).map(of_message)).collect()
     }
 }
 

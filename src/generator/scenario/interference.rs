@@ -7,12 +7,13 @@ use super::keys::motion::PLACE_IF_ANY;
 use super::motion::{MotionSpec, place};
 use super::osnma::{Spoofed, spoofed};
 use super::read::Table;
-use super::{ScenarioError, satellite_list};
+use super::{ScenarioError, moved_to, satellite_list};
 use crate::spoof::Advantage;
 use gnss::earth::Geodetic;
 use gnss::gps::l1ca::L1_CA;
 use gnss::samples::Format;
 use gnss::satellite::Sv;
+use gnss::time::Epoch;
 
 /// Strength of an interferer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -168,6 +169,14 @@ pub struct SpooferSpec {
     pub clock_drift: f64,
     /// Seconds by which its time and its messages lie behind the true ones.
     pub replay_s: f64,
+    /// Whole seconds by which the time that it claims is ahead of the true one.
+    pub ahead_s: i64,
+    /// Navigation files of its own; empty means the scene's.
+    pub navigation: Vec<PathBuf>,
+    /// Day to which they are moved.
+    pub moved_to: Option<Epoch>,
+    /// GPS time minus UTC in its messages, in seconds; absent means the true number.
+    pub leap_s: Option<i64>,
     /// Authentication in its messages.
     pub osnma: Spoofed,
     /// Claimed motion; absent means that of the antenna.
@@ -292,6 +301,16 @@ pub(super) fn spoofer(table: &Table<'_>) -> Result<SpooferSpec, ScenarioError> {
     if satellites.as_ref().is_some_and(Vec::is_empty) {
         return Err(table.bad("satellites", "an array of satellites like [\"G01\", \"G12\"]"));
     }
+    let whole = |key: &str, value: f64| match value.fract() {
+        0.0 => Ok(value as i64),
+        _ => Err(table.bad(key, "a whole number of seconds")),
+    };
+    let ahead_s = whole("time_offset_s", table.need("time_offset_s")?)?;
+    if ahead_s != 0 && table.need("replay_s")? > 0.0 {
+        return Err(table.bad("time_offset_s", "0, because replay_s is given: a replay has the time of its recording"));
+    }
+    let leap_s = table.number("leap_seconds")?.map(|value| whole("leap_seconds", value)).transpose()?;
+    let files = table.texts("navigation")?.unwrap_or_default();
     let motion = table.table("motion")?;
     let motion = motion.map(|motion| MotionSpec::read(&motion));
     Ok(SpooferSpec {
@@ -302,6 +321,10 @@ pub(super) fn spoofer(table: &Table<'_>) -> Result<SpooferSpec, ScenarioError> {
         clock_bias_s: table.need("clock_bias_s")?,
         clock_drift: table.need("clock_drift_sps")?,
         replay_s: table.need("replay_s")?,
+        ahead_s,
+        navigation: files.into_iter().map(PathBuf::from).collect(),
+        moved_to: moved_to(table, "navigation_moved_to")?,
+        leap_s,
         osnma: spoofed(table)?,
         motion: motion.transpose()?,
         drag: table.table("drag")?.map(|drag| read_drag(&drag)).transpose()?,

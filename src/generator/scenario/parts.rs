@@ -1,10 +1,7 @@
 //! Parts of a scene: navigation data, orbits, messages, and the effects of propagation.
 
-use std::path::Path;
-use std::sync::Arc;
-
 use super::files::Files;
-use super::{Ionosphere, Overrides, Scenario, ScenarioError, multipath, satellite};
+use super::{Ionosphere, Scenario, ScenarioError, multipath, satellite};
 use crate::catalogue::Catalogue;
 use crate::effect::obstruction::Obstruction;
 use crate::effect::wind_up::WindUp;
@@ -17,7 +14,7 @@ use gnss::broadcast::Ephemeris;
 use gnss::gps::lnav::{LeapEvent, UtcData};
 use gnss::ionosphere::NAVIC_HZ;
 use gnss::klobuchar::Klobuchar;
-use gnss::message::{Authentication, Common};
+use gnss::message::Common;
 use gnss::rinex::{self, Navigation};
 use gnss::satellite::{Sv, System};
 use gnss::signal::Signal;
@@ -41,16 +38,16 @@ pub(super) struct Sky {
     pub excluded: Vec<Sv>,
 }
 
-/// The navigation files that the scenario names, or the embedded one. What is not an ephemeris is taken from
+/// The navigation files that the scenario names, or the embedded one of the day of `near`. What is not an ephemeris is taken from
 /// the file of the scene's day, or else from the nearest that has it, whatever their order in the list.
 pub(super) fn navigation(
     scenario: &Scenario,
-    directory: &Path,
-    overrides: &Overrides,
+    near: Epoch,
+    Files { directory, overrides }: &Files<'_>,
     warnings: &mut Vec<String>,
 ) -> Result<Navigation, ScenarioError> {
     let refuse = |e: rinex::NavigationError| scenario.conflict("navigation.file", e.to_string());
-    let mut files = if scenario.navigation.is_empty() { vec![embedded(scenario)?] } else { Vec::new() };
+    let mut files = if scenario.navigation.is_empty() { vec![embedded(scenario, near)?] } else { Vec::new() };
     for path in &scenario.navigation {
         let bytes = scenario.load("navigation.file", directory, path, overrides)?;
         files.push(rinex::read(&bytes, &path.display().to_string()).map_err(refuse)?);
@@ -146,11 +143,11 @@ pub(super) fn absence(scenario: &Scenario, sv: Sv) -> String {
     }
 }
 
-/// The embedded file of the scene's day: the one with both systems where it reaches to the start.
-fn embedded(scenario: &Scenario) -> Result<Navigation, ScenarioError> {
+/// The embedded file of a day: the one with both systems where it reaches to that time.
+fn embedded(scenario: &Scenario, at: Epoch) -> Result<Navigation, ScenarioError> {
     let refuse = |e: rinex::NavigationError| scenario.conflict("navigation.file", e.to_string());
     let second = rinex::embedded_two_systems().map_err(refuse)?;
-    let near = |set: &Ephemeris| scenario.start.since(set.toe).abs() < 0.5 * set.fit_interval_s();
+    let near = |set: &Ephemeris| at.since(set.toe).abs() < 0.5 * set.fit_interval_s();
     if second.ephemerides.iter().any(near) { Ok(second) } else { rinex::embedded().map_err(refuse) }
 }
 
@@ -305,7 +302,7 @@ fn common(scenario: &Scenario, navigation: &Navigation, almanac: Vec<Ephemeris>)
 pub(super) fn messages(
     scenario: &Scenario,
     common: &Common,
-    spoofed: Vec<(usize, Option<Arc<dyn Authentication>>)>,
+    spoofed: &[(usize, Common)],
 ) -> Result<Senders, ScenarioError> {
     let scene = scenario.ionosphere.as_ref();
     let is_given = scene.is_some_and(|own| own.sent().is_some() || own.sent_bdgim_tecu().is_some());
@@ -315,8 +312,8 @@ pub(super) fn messages(
             .map_err(|e| scenario.conflict(key, format!("the navigation message cannot carry it: {e}")))
     };
     let mut all = senders(common)?;
-    for (number, authentication) in spoofed {
-        all.put_spoofed(number, senders(&Common { authentication, ..common.clone() })?);
+    for (number, common) in spoofed {
+        all.put_spoofed(*number, senders(common)?);
     }
     Ok(all)
 }

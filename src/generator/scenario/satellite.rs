@@ -8,6 +8,7 @@ use super::files::Files;
 use super::hardware::power_law;
 use super::interference::times;
 use super::keys::satellites::parameters;
+use super::own_sky::Own;
 use super::parts::absence;
 use super::read::Table;
 use super::{Scenario, ScenarioError, satellite_list};
@@ -93,6 +94,8 @@ pub enum SatelliteFault {
 /// One `[[message_fault]]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MessageSpec {
+    /// Number of the spoofer whose messages it spoils; 0 for the true satellites.
+    pub spoofer: usize,
     /// Satellites with the fault; absent means all.
     pub satellites: Option<Vec<Sv>>,
     /// Start of the fault, in seconds of true time since the scene's start.
@@ -234,7 +237,8 @@ pub(super) fn message_fault(table: &Table<'_>) -> Result<MessageSpec, ScenarioEr
             MessageKind::Parameter { name, add: table.need("add")? }
         }
     };
-    Ok(MessageSpec { satellites, on_s, off_s, kind })
+    let spoofer = table.integer("spoofer")?.unwrap_or(0) as usize;
+    Ok(MessageSpec { spoofer, satellites, on_s, off_s, kind })
 }
 
 impl OrbitsSpec {
@@ -347,11 +351,25 @@ pub(super) fn clocks(
 pub(super) fn message_faults(
     scenario: &Scenario,
     catalogue: &Catalogue,
+    own: &[Own],
     seed: u64,
 ) -> Result<Vec<MessageFault>, ScenarioError> {
     let mut faults = Vec::new();
     for (number, spec) in (1_u64..).zip(&scenario.message_faults) {
-        let at = |t_s: f64| scenario.start.plus_s(t_s);
+        let (catalogue, start) = match spec.spoofer.checked_sub(1).map(|index| scenario.spoofers.get(index)) {
+            None => (catalogue, scenario.start),
+            Some(Some(spoofer)) => {
+                let sky = own.iter().find(|own| own.number == spec.spoofer).and_then(|own| own.sky.as_ref());
+                let start = scenario.start.plus_s(spoofer.ahead_s as f64 - spoofer.replay_s);
+                (sky.map_or(catalogue, |sky| &sky.catalogue), start)
+            }
+            Some(None) => {
+                let known = scenario.spoofers.len();
+                let reason = format!("number {number}: {}: expected one of the {known} [[spoofer]]", spec.spoofer);
+                return Err(scenario.conflict("message_fault.spoofer", reason));
+            }
+        };
+        let at = |t_s: f64| start.plus_s(t_s);
         let kind = match spec.kind {
             MessageKind::BitErrors { rate: 0.0 } => continue,
             MessageKind::BitErrors { rate } => {
@@ -364,6 +382,7 @@ pub(super) fn message_faults(
             MessageKind::Alert => Kind::Alert,
         };
         let fault = MessageFault {
+            constellation: spec.spoofer,
             satellites: spec.satellites.clone(),
             on: at(spec.on_s)..at(spec.off_s.unwrap_or(FOREVER_S)),
             kind,
@@ -400,7 +419,8 @@ pub(super) fn strangers(scenario: &Scenario, catalogue: &Catalogue) -> Vec<Strin
         | SatelliteFault::Orbit { satellites, .. } => Some(satellites),
         SatelliteFault::Noise { satellites, .. } => satellites.as_ref(),
     });
-    let of_messages = scenario.message_faults.iter().filter_map(|fault| fault.satellites.as_ref());
+    let of_messages = scenario.message_faults.iter().filter(|fault| fault.spoofer == 0);
+    let of_messages = of_messages.filter_map(|fault| fault.satellites.as_ref());
     let named: BTreeSet<Sv> = of_satellites.chain(of_messages).flatten().copied().collect();
     let unknown = named.into_iter().filter(|sv| catalogue.sent_at(*sv, scenario.start).is_none());
     unknown.map(|sv| format!("a fault names {sv}: {}", absence(scenario, sv))).collect()

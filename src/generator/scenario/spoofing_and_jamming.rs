@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use super::interference::{InterferenceSpec, Kind, SpooferSpec, Strength};
+use super::own_sky::Own;
 use super::{MotionSpec, Overrides, Power, Scenario, ScenarioError};
 use crate::effect::link::LinkBudget;
 use crate::levels::strongest;
@@ -313,7 +314,7 @@ impl Source<'_> {
 /// The spoofers of a scene that ends at `end_s`.
 pub(super) fn spoofers(
     scenario: &Scenario,
-    scene: &Scene,
+    (scene, own): (&Scene, &[Own]),
     end_s: f64,
     directory: &Path,
     overrides: &Overrides,
@@ -341,6 +342,8 @@ pub(super) fn spoofers(
             clock_bias_s: spec.clock_bias_s,
             clock_drift: spec.clock_drift,
             replay_s: spec.replay_s,
+            ahead_s: spec.ahead_s,
+            sky: own.iter().find(|own| own.number == number).and_then(|own| own.sky.clone()),
             satellites: spec.satellites.clone(),
             advantage: Some(spec.advantage),
             on_s: spec.on_s..spec.off_s.unwrap_or(f64::INFINITY),

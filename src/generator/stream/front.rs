@@ -221,11 +221,10 @@ pub(super) fn share_geometry(fronts: &mut [Front<'_>]) {
 
 /// The signals of a scene, by constellation, satellite and signal.
 pub(crate) fn transmitters(scene: &Scene, edge: Edge<'_>) -> Result<Vec<Transmitter>, GenerateError> {
-    let satellites: BTreeSet<Sv> = scene.catalogue.satellites().filter(|sv| !scene.excluded.contains(sv)).collect();
     let mut found = Vec::new();
     let authentic = Arc::new(Constellation::authentic());
     for from in std::iter::once(&authentic).chain(&scene.spoofers) {
-        for &sv in satellites.iter().filter(|sv| from.sends(**sv)) {
+        for sv in from.satellites(scene) {
             for signal in scene.signals_of(sv) {
                 found.extend(Transmitter::of(scene, Arc::clone(from), sv, signal, edge)?);
             }

@@ -261,7 +261,7 @@ impl Transmitter {
     fn orbit(&self, scene: &Scene, span: u64) -> Result<Option<sky::Arc>, OrbitError> {
         let samples = self.roots_of_span(scene) * self.root_samples();
         let [from, to] = [span, span + 1].map(|span| self.from.replayed(scene.clock.epoch(span * samples)));
-        let arc = sky::Arc::through(&scene.catalogue, self.sv, from, to)?;
+        let arc = sky::Arc::through(self.from.catalogue(scene), self.sv, from, to)?;
         // Where the motion begins, which a replay knows as well.
         let first_m = scene.trajectory.composed_for().position_m;
         Ok(arc.map(|arc| if scene.trajectory.grown().is_some() { arc.near(&first_m) } else { arc }))
@@ -344,8 +344,13 @@ impl Transmitter {
             return Ok(());
         }
         // Margins of strips are code periods at most; a tenth of a second holds them.
-        let (first, last) = (scene.clock.epoch(from).plus_s(-most - 0.1), scene.clock.epoch(to).plus_s(-least + 0.1));
-        self.symbols.prepare(scene, &self.from, (self.sv, self.signal), [first, last], scene.clock.epoch(from))
+        let (first, last) = (self.epoch(scene, from).plus_s(-most - 0.1), self.epoch(scene, to).plus_s(-least + 0.1));
+        self.symbols.prepare(scene, &self.from, (self.sv, self.signal), [first, last], self.epoch(scene, from))
+    }
+
+    /// Time of a sample from which the delays of its signals count.
+    fn epoch(&self, scene: &Scene, sample: u64) -> Epoch {
+        self.from.ahead(scene.clock.epoch(sample))
     }
 
     /// True if the satellite is sent and in view at a sample of the prepared segment.
@@ -368,7 +373,7 @@ impl Transmitter {
         let [moved, _] = self.fast.ends(n, n);
         let rho_cycles = path.carrier.at(u) + moved.carrier_cycles;
         let (turns, _) = carrier(scene.metadata.inverted, tone, rho_cycles, 0.0);
-        let code = sent.spreading.at(scene.clock.epoch(n), path.delay.at(u) + moved.delay_s);
+        let code = sent.spreading.at(self.epoch(scene, n), path.delay.at(u) + moved.delay_s);
         Some((turns.wrapping_add(sent.turns), code))
     }
 
@@ -416,6 +421,7 @@ impl Transmitter {
         let real = if scene.metadata.format.is_complex() { 1.0 } else { std::f64::consts::SQRT_2 };
         let rate_hz = scene.clock.rate.hz();
         let gain = 0.5 * (first.gain + last.gain);
+        let epoch = self.from.ahead(anchor.epoch);
         let real = planted!("generator.synth.amplitude", real, 1.06 * real);
         let amplitude = real * gain * (2.0 * cn0_hz.max(0.0) / rate_hz).sqrt() * f64::from(scene.noise_lsb);
         for sent in &self.sent {
@@ -426,7 +432,7 @@ impl Transmitter {
             let delay_s = planted!("generator.synth.delay", delay_s, delay_s * (1.0 + 2e-7));
             let delay_s =
                 planted!("generator.synth.code_phase", delay_s, delay_s + 2e-9 * f64::from(self.sv.number % 3));
-            let at = sent.spreading.at(anchor.epoch, delay_s);
+            let at = sent.spreading.at(epoch, delay_s);
             // Periods of a strip follow each other, and most share a symbol.
             let (mut negative, mut until) = (false, i64::MIN);
             let negative = |period| {

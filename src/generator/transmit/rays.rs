@@ -81,7 +81,7 @@ impl Transmitter {
     /// Position of a component's code at a sample, for a delay.
     pub fn code_at(&self, scene: &Scene, component: usize, sample: u64, delay_s: f64) -> Option<CodePhase> {
         let sent = self.sent.iter().find(|sent| sent.component == component)?;
-        let at = sent.spreading.at(scene.clock.epoch(sample), delay_s);
+        let at = sent.spreading.at(self.epoch(scene, sample), delay_s);
         Some(CodePhase { at, share: at.steps() / f64::from(sent.spreading.pace().steps) })
     }
 

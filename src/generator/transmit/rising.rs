@@ -62,7 +62,7 @@ pub(super) fn rising<E>(
     let leap = Leap::new(scene, from, scene.clock.rate.elapsed_s(scene.clock.rate.first_sample_at(second, 1)));
     let time = |second: u64| {
         let reading = scene.clock.epoch(scene.clock.rate.first_sample_at(second, 1));
-        scene.receiver_clock.true_time(scene.clock.start, reading)
+        from.replayed(scene.receiver_clock.true_time(scene.clock.start, reading))
     };
     let mut since = None;
     let mut next = second.checked_sub(1);
@@ -70,7 +70,7 @@ pub(super) fn rising<E>(
         let Presence::InView(emission) = presence(second)? else { break };
         // Its clock may have lengthened a leap by less than a second.
         let earliest = second.saturating_sub(leap.seconds(&emission.sight).saturating_sub(1));
-        let sent = earliest < second && scene.catalogue.sent_throughout(sv, time(earliest), time(second));
+        let sent = earliest < second && from.catalogue(scene).sent_throughout(sv, time(earliest), time(second));
         let reached = if sent { earliest } else { second };
         since = Some(reached);
         next = reached.checked_sub(1);

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::error::GenerateError;
-use crate::message::{self, Sent as SentSymbols, Slot};
+use crate::message::{self, MessageFault, Sent as SentSymbols, Slot};
 use crate::scene::Scene;
 use crate::spoof::Constellation;
 use gnss::message::Message;
@@ -64,7 +64,9 @@ impl Symbols {
         [first, last]: [Epoch; 2],
         received: Epoch,
     ) -> Result<(), GenerateError> {
-        let faults = if from.number == 0 { scene.message_faults.as_slice() } else { &[] };
+        let own = |fault: &&MessageFault| fault.constellation == from.number;
+        let faults: Vec<MessageFault> = scene.message_faults.iter().filter(own).cloned().collect();
+        let catalogue = from.catalogue(scene);
         let messages = scene.messages.of_constellation(from.number);
         for (message, units) in &mut self.units {
             let Some(sender) = messages.of(message) else { continue };
@@ -76,14 +78,14 @@ impl Symbols {
                     continue;
                 }
                 let slot = Slot { message, time: signal.time, unit };
-                let fallback = || scene.catalogue.sent_at(sv, received);
-                let Some(ephemeris) = scene.catalogue.sent_at(sv, slot.set_chosen()).or_else(fallback) else {
+                let fallback = || catalogue.sent_at(sv, received);
+                let Some(ephemeris) = catalogue.sent_at(sv, slot.set_chosen()).or_else(fallback) else {
                     continue;
                 };
                 let earlier = Slot { unit: unit - 1, ..slot }.set_chosen();
-                let before = scene.catalogue.sent_at(sv, earlier).unwrap_or(ephemeris);
+                let before = catalogue.sent_at(sv, earlier).unwrap_or(ephemeris);
                 let SentSymbols { encoded, symbols, restored } =
-                    message::unit(faults, sender, [before, ephemeris], &slot)?;
+                    message::unit(&faults, sender, [before, ephemeris], &slot)?;
                 // What was meant and, where wrong symbols pass for right ones, what was sent.
                 let both = [&encoded, &symbols];
                 let distinct = if symbols == encoded { 1 } else { 2 };

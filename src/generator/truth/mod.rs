@@ -132,14 +132,14 @@ pub fn observe_by(
         arrival.with_fast_phase(scene.fast_phases().at(from.fading(sv), signal.carrier_hz(sv), sample as f64));
     let doppler_hz = doppler_hz(scene, from, (sv, signal), sample, (&seen, known))?;
     let Some(doppler_hz) = doppler_hz else { return Ok(None) };
-    let sent = local.plus_s(-arrival.delay_s);
+    let sent = from.ahead(local).plus_s(-arrival.delay_s);
     let observation = Observation {
         sample,
         sv,
         signal,
         sent_s: sent.seconds(),
         sent_fraction_s: sent.fraction(),
-        pseudorange_m: SPEED_OF_LIGHT_MPS * arrival.delay_s,
+        pseudorange_m: SPEED_OF_LIGHT_MPS * (arrival.delay_s - from.ahead_s as f64),
         carrier_cycles: arrival.carrier_cycles,
         doppler_hz,
         cn0_dbhz: 10.0 * libm::log10(arrival.cn0_hz),
@@ -196,7 +196,9 @@ pub fn trajectory(scene: &Scene, from: &Constellation, sample: u64) -> Trajector
         vx_mps: motion.velocity_mps.x,
         vy_mps: motion.velocity_mps.y,
         vz_mps: motion.velocity_mps.z,
-        clock_bias_s: clock.offset_at_reading_s(scene.clock.start, local) + quick_s - from.clock_s(elapsed_s),
+        clock_bias_s: clock.offset_at_reading_s(scene.clock.start, local) + quick_s
+            - from.clock_s(elapsed_s)
+            - from.ahead_s as f64,
         clock_drift: clock.drift_at_reading(scene.clock.start, local) - from.clock_drift,
     }
 }

@@ -96,6 +96,8 @@ pub(crate) const MESSAGE_FAULT: &[Key] = &[
     words("satellites", SATELLITES, "affected satellites").required().of(&["health", "parameter", "alert"]),
     on(),
     off(),
+    integer("spoofer", 1, 99, "number of the [[spoofer]] whose messages it spoils; times are true time, too")
+        .or_else("the true satellites"),
     number("rate", 0.0, 0.5, "(a probability)", "error probability of each bit").required().of(&["bit_errors"]),
     integer("subframe", 1, 5, "number of the subframe").required().of(&["bit"]),
     integer("word", 1, 10, "number of the word in the subframe").required().of(&["bit"]),

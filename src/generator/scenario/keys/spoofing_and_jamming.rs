@@ -3,7 +3,7 @@
 use super::motion::{MOTION, PLACE_IF_ANY};
 use super::{A_PATH, LONGEST_S, SATELLITES};
 use crate::scenario::osnma::spoofed_names;
-use crate::scenario::schema::{Key, flag, number, table, text, word, words};
+use crate::scenario::schema::{Key, flag, number, table, text, texts, time, word, words};
 
 const SWEEP: &[&str] = &["chirp", "fmcw"];
 const FM: &[&str] = &["sine_fm"];
@@ -67,6 +67,34 @@ pub(crate) const SPOOFER: &[Key] = &[
         "delay of a replay: its time and its messages are those of so much earlier, at the claimed position",
     )
     .or(0.0),
+    number(
+        "time_offset_s",
+        -1e9,
+        1e9,
+        "s",
+        "time that its signals claim ahead of GPS time, in whole seconds: orbits, messages and code phases are those of \
+         that time; not with replay_s",
+    )
+    .or(0.0),
+    texts(
+        "navigation",
+        "a path, or an array of paths",
+        "its own RINEX navigation files: orbits, clocks, health and messages; they must cover the claimed time",
+    )
+    .or_else("the scene's"),
+    time(
+        "navigation_moved_to",
+        "day to which the first day of its files is moved, as navigation.moved_to; for claimed times without data",
+    )
+    .or_else("that of the scene's files"),
+    number(
+        "leap_seconds",
+        -128.0,
+        127.0,
+        "s",
+        "GPS time minus UTC that its messages state, a whole number, before and after their last or next leap second",
+    )
+    .or_else("the true number at the claimed time"),
     word(
         "osnma",
         spoofed_names,

@@ -52,7 +52,13 @@ fn sent(text: &str, files: &[(&str, String)]) -> (Result<Common, String>, Vec<St
     files.iter().for_each(|(name, content)| std::fs::write(room.path().join(name), content).unwrap());
     let text = if names.is_empty() { text.to_owned() } else { format!("{text}\n[navigation]\nfile = {names:?}\n") };
     let (scenario, overrides, mut warnings) = (parse(&text).unwrap(), Overrides::default(), Vec::new());
-    let all = parts::navigation(&scenario, room.path(), &overrides, &mut warnings).unwrap();
+    let all = parts::navigation(
+        &scenario,
+        scenario.start,
+        &Files { directory: room.path(), overrides: &overrides },
+        &mut warnings,
+    )
+    .unwrap();
     let here = Files { directory: room.path(), overrides: &overrides };
     let sky = parts::sky(&scenario, &all, &here, scenario.duration_s, &mut warnings);
     (sky.map(|sky| sky.common).map_err(|error| error.to_string()), warnings)
@@ -157,7 +163,9 @@ fn a_file_moved_to_another_day_has_the_same_sky_at_the_same_hour_and_says_the_ne
     // UTC is that of the new day: 18 s, not the 15 s of the file.
     let leap_s = |text: &str| {
         let scenario = parse(text).unwrap();
-        let read = parts::navigation(&scenario, Path::new("."), &Overrides::default(), &mut Vec::new());
+        let overrides = Overrides::default();
+        let files = Files { directory: Path::new("."), overrides: &overrides };
+        let read = parts::navigation(&scenario, scenario.start, &files, &mut Vec::new());
         parts::utc(&scenario, &read.unwrap()).leap_s
     };
     assert_eq!((leap_s(&base), leap_s(&moved)), (15, 18));
