@@ -15,8 +15,9 @@ use gnss::galileo::inav::{self, GST_WEEK, INAV};
 use gnss::message::{Authentication, Common};
 use gnss::satellite::{Sv, System};
 use gnss::time::{Epoch, GST, WEEK_S};
+use osnma::chain::{Hash, MacFunction};
 use osnma::page::{PAGES, SATELLITES, satellite};
-use osnma::provider::{Broadcast, Provider, Published, Transmission, Words};
+use osnma::provider::{Broadcast, Change, Provider, Published, Transition, Transmission, Words};
 use osnma::time::Gst;
 
 /// Provider of OSNMA of a constellation.
@@ -48,6 +49,23 @@ impl Osnma {
     /// Authentication with facts about it.
     pub fn with_facts(self, facts: OsnmaFacts) -> Self {
         Self { facts, ..self }
+    }
+
+    /// Describes the authentication for the plan.
+    pub fn describe(&self) -> String {
+        let settings = self.transmission.provider().settings();
+        let hash = if settings.hash == Hash::Sha256 { "SHA-256" } else { "SHA3-256" };
+        let mac = if settings.mac == MacFunction::HmacSha256 { "HMAC-SHA-256" } else { "CMAC-AES" };
+        let mut text = format!("OSNMA with test keys: {hash}, {mac}, look-up table {}", settings.table);
+        if !settings.without.is_empty() {
+            let names: Vec<String> = settings.without.iter().map(|&number| satellite(number).to_string()).collect();
+            text += &format!("; zeros from {}", names.join(", "));
+        }
+        for Transition { kind, start } in &settings.transitions {
+            let name = Change::NAMES.iter().find(|(_, own)| own == kind).map_or("", |(name, _)| name);
+            text += &format!("; {name} at {start}");
+        }
+        text
     }
 
     /// Keys that a receiver may trust which starts at an instant.

@@ -26,6 +26,9 @@ pub(super) fn models(scene: &Scene, kept: &Kept) -> Vec<Model> {
         add("message fault", false, "no [[message_fault]]".to_owned());
     }
     scene.message_faults.iter().for_each(|fault| add("message fault", true, fault.describe(scene.clock.start)));
+    if let Some(osnma) = &scene.osnma {
+        add("authentication", true, osnma.describe());
+    }
     for name in ["ionosphere", "troposphere"] {
         if !scene.effects.iter().any(|effect| effect.name() == name) {
             add(name, false, format!("the scenario has no [{name}]"));

@@ -154,6 +154,7 @@ fn a_hot_start_authenticates_after_two_sub_frames_whatever_the_functions() {
     for more in ["", "chain_hash = \"sha3_256\"\nmac_function = \"cmac_aes\"\nmaclt = 35\nstatus = \"test\"\n"] {
         let scenario = scenario(&format!("[osnma]\nwithout = [\"E13\"]\n{more}"));
         let scene = scenario.scene().unwrap();
+        assert!(scene.osnma.as_ref().unwrap().describe().contains("zeros from E13"));
         let pages = pages(&scene, 0, 0..24);
         let anchor = scenario.osnma_anchor(&Overrides::default()).unwrap().unwrap();
         let (own, reports) = verified(anchor.hot().unwrap(), &pages);
