@@ -53,7 +53,7 @@ pub fn kinds() -> Vec<Kind> {
             "first authentic data later",
             "s",
             Some(0.2),
-            30.0,
+            40.0,
             &["time to first authentic data"],
             Verified,
             |rx, s| {

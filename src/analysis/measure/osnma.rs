@@ -5,8 +5,8 @@
 //! at a spoofer that does not send the true bits; if it came so late, by a replay or by the receiver's own
 //! clock, that its key could have been known; or if a fault changed the words that it covers. A tag is true
 //! if its sender and the satellite of its data were followed at their own signals, with no fault of their
-//! messages. Tags of mixed sub-frames are neither. Limits: a spoofer whose signal lies within 30 m of the
-//! true one counts as followed if it is the stronger one.
+//! messages. Tags of mixed sub-frames are neither. Limits: each fault of a parameter counts as one of I/NAV;
+//! a spoofer whose signal lies within 30 m of the true one counts as followed if it is the stronger one.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -199,7 +199,7 @@ impl Judge<'_> {
             let acts = if all_through {
                 // Wrong bits at random may spare a sub-frame, and one bit may be elsewhere.
                 matches!(fault.kind, FaultKind::Parameter | FaultKind::Health)
-                    && fault.from_s <= from_s
+                    && fault.from_s <= from_s.max(0.0)
                     && to_s <= end_s
             } else {
                 fault.from_s < to_s && from_s < end_s

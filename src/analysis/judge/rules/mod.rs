@@ -62,11 +62,11 @@ impl Verdict {
         verdict.excused(run, errors)?;
         verdict.losses(run, &receiver, slips)?;
         verdict.about(Group::Messages).reception(summary);
+        verdict.osnma(summary);
         verdict.about(Group::Tracking).cn0(run, summary);
         verdict.about(Group::Samples).spectrum(run)?;
         verdict.about(Group::Interference).interference(summary);
         verdict.spoofing(run, summary)?;
-        verdict.osnma(summary);
         verdict.about(Group::Tables).tables(run, errors)?;
         verdict.hint(run);
         Ok(verdict)

@@ -15,6 +15,7 @@ use crate::error::JudgeError;
 use crate::judge::judgement::{Status, number};
 use crate::judge::schema;
 use crate::judge::verdict::Verdict;
+use crate::measure::osnma::Osnma;
 use crate::read::Run;
 use crate::show::document::{Cell, Forms, Item, Report, Side, Table, Tone};
 use crate::show::plot::canvas::Failure;
@@ -204,6 +205,7 @@ fn facts(judged: &Judged<'_>) -> Result<Vec<(String, String)>, JudgeError> {
         ("elevation mask", scene.mask_deg.map(|mask| format!("{mask}°"))),
         ("interference", (!scene.interference.is_empty()).then(|| format!("{} sources", scene.interference.len()))),
         ("spoofer", summary.spoofing.map(|_| "yes".to_owned())),
+        ("authentication", summary.osnma.as_ref().map(authentication)),
     ];
     let found = format!("{} in view, {} acquired, {} used", satellites.in_view, satellites.acquired, satellites.used);
     facts.push(("satellites", Some(found)));
@@ -216,6 +218,20 @@ fn facts(judged: &Judged<'_>) -> Result<Vec<(String, String)>, JudgeError> {
     let [loops, positions] = front::receiver(&judged.run.receiver);
     facts.extend([("loops", loops), ("positions", positions)]);
     Ok(facts.into_iter().filter_map(|(name, value)| Some((name.to_owned(), value?))).collect())
+}
+
+/// Counts of a receiver's verification in words.
+fn authentication(osnma: &Osnma) -> String {
+    let first = osnma.first_authentic_s.map_or("none".to_owned(), |s| format!("the first after {} s", number(s)));
+    format!(
+        "{} start: {} tags authentic ({} false), {first}; {} refused ({} true), {} open",
+        osnma.start,
+        osnma.tags_authentic,
+        osnma.false_accepted,
+        osnma.tags_refused,
+        osnma.true_refused,
+        osnma.tags_open
+    )
 }
 
 /// The antenna's motion in words.
