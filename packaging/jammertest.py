@@ -189,9 +189,9 @@ def static(sources):
     return keys
 
 
-def longer(duration_s):
+def longer(duration_s, begin_s=30):
     """Keys of a scene that lasts longer than the base scene."""
-    interval = {"from_s": 30, "to_s": duration_s, "losses": "any", "fix": "any", "errors": "any",
+    interval = {"from_s": begin_s, "to_s": duration_s, "losses": "any", "fix": "any", "errors": "any",
                 "reason": "the jammer, and what is lost after it"}
     return {"duration_s": duration_s, "expect": {"interval": [interval]}}
 
@@ -417,11 +417,14 @@ def power_of(test, distance_m):
     # 25 dBm is the power of most, and of those that leave it open.
     top = dbw(float(test["max_power_w"]) or 0.316) + 30
     low_high = re.search(r"(-\d+) ?dBm to \+?(\d+) ?dBm", description)
+    if "uW to mW" in description:
+        growth = {"power_start_db": over_db(-30, distance_m), "power_db": over_db(0, distance_m), "ramp_s": 16}
+        return [{"on_s": BEGIN_S} | growth], ["the power grows evenly within 16 s"]
     if low_high and "ramp" in f"{name} {description}":
         low, high = (int(dbm) for dbm in low_high.groups())
         growth = {"power_start_db": over_db(low, distance_m), "power_db": over_db(high, distance_m), "ramp_s": 16}
         return [{"on_s": BEGIN_S} | growth], ["the power grows evenly within 16 s"]
-    if "ramp" in name or "uW to mW" in description:
+    if "ramp" in name:
         growth = {"power_start_db": over_db(top - 40, distance_m), "power_db": over_db(top, distance_m), "ramp_s": 16}
         return [{"on_s": BEGIN_S} | growth], ["the power grows evenly by 40 dB within 16 s"]
     if "power jump" in name:
@@ -485,7 +488,8 @@ def spoofed(test, known):
     if "Nav data manip" in name or "Nav. data manip" in name:
         clock = "clock" in name
         faults = [{"kind": "parameter", "spoofer": number + 1, "satellites": IN_VIEW[:4] if clock else IN_VIEW,
-                   "parameter": "af0_s" if clock else "eccentricity", "add": 1e-6 if clock else 0.3, "on_s": BEGIN_S + 4}
+                   "parameter": "af0_s" if clock else "eccentricity", "add": 1e-6 if clock else 0.3,
+                   "on_s": BEGIN_S + 4}
                   for number in range(len(spoofers))]
         notes.append("clocks of four satellites 1 µs off" if clock else "an eccentricity that is 0.3 too large")
     keys = {"spoofer": [one | common | ({"motion": motion} if motion else {}) for one in spoofers]}
@@ -501,6 +505,8 @@ def spoofed(test, known):
     elif ("jamming" in name or "initial jamming" in description) and "No jamming" not in description:
         keys["interference"] = timed([jammer], 26, BEGIN_S)
         notes.append("6 s of jamming before it")
+    if "interference" in keys and scene != "drive.toml":
+        keys |= longer(75, 26)
     return keys, "; ".join(notes)
 
 
@@ -513,7 +519,8 @@ def ring(test, known, notes):
     sources = []
     for ident in [ident for ident in test["equipment"] if re.fullmatch(r"H\d\.\d", ident)]:
         narrow = ident in ("H1.6", "H1.7") or "NB. HIGH" in description
-        found, _ = of_jammer(known, ident, " NB HIGH PWR" if narrow else "CHIRP HIGH PWR", 150 if "A150, B150 and C150, with" in description else 50)
+        mode = " NB HIGH PWR" if narrow else "CHIRP HIGH PWR"
+        found, _ = of_jammer(known, ident, mode, 150 if "A150, B150 and C150, with" in description else 50)
         sources += found or []
     if not sources:
         return {}
@@ -539,8 +546,8 @@ def together(test, growth):
             source |= {"on_s": BEGIN_S + last_s * number, "off_s": BEGIN_S + last_s * (number + 1) + 1}
         return sources, [f"{last_s} s an emitter, one second of both between"]
     if "Switching" in name:
-        switched = [meaconer(RX1_M, top_w, BEGIN_S, BEGIN_S + 8), spoofer | {"on_s": BEGIN_S + 8, "off_s": BEGIN_S + 16}]
-        return switched, ["8 s of each"]
+        second = spoofer | {"on_s": BEGIN_S + 8, "off_s": BEGIN_S + 16}
+        return [meaconer(RX1_M, top_w, BEGIN_S, BEGIN_S + 8), second], ["8 s of each"]
     if "community house" in name:
         return [meaconer(RX1_M, top_w), meaconer(RX2_M, top_w) | growth], []
     if "three emitters" in test["description"]:
@@ -548,7 +555,7 @@ def together(test, growth):
     return [meaconer(RX1_M, top_w), spoofer], [ROUTES["driving"][3]]
 
 
-def meaconed(test):
+def meaconed(test, _known):
     """Keys and what they leave out: tests of meaconing, where a spoofer is at a receiver's position and late."""
     name, description, code = test["name"], test["description"], test["test_code"]
     top_w, at = float(test["max_power_w"]) or 10, meaconer
@@ -597,7 +604,8 @@ def meaconed(test):
         jammer = {"kind": "noise", "bandwidth_hz": 3e6, "center_hz": L1_HZ, "distance_m": HIGH_POWER_M,
                   "eirp_dbw": 0 if "30 dBm" in description else 17}
         pulses = [(BEGIN_S + 4 * number + 2, BEGIN_S + 4 * number + 4) for number in range(4)]
-        pauses = pulses if "pulsed" in name else [(BEGIN_S + 4, BEGIN_S + 8), (BEGIN_S + 12, BEGIN_S + 16)] if "in breaks" in name else [(26, BEGIN_S)]
+        breaks = [(BEGIN_S + 4, BEGIN_S + 8), (BEGIN_S + 12, BEGIN_S + 16)]
+        pauses = pulses if "pulsed" in name else breaks if "in breaks" in name else [(26, BEGIN_S)]
         keys["interference"] = [one for pause in pauses for one in timed([jammer], *pause)]
         notes.append("jamming of some seconds")
     return keys, "; ".join(notes)
@@ -630,8 +638,8 @@ def manifest():
                 code, name = test["test_code"], " ".join(test["name"].split())
                 reason, keys, note = reason_of(test), None, ""
                 if reason is None:
-                    tell = {1: lambda test: jammed(test, known), 2: lambda test: spoofed(test, known), 3: meaconed}[kind["type_id"]]
-                    keys, note = tell(test)
+                    tell = {1: jammed, 2: spoofed, 3: meaconed}[kind["type_id"]]
+                    keys, note = tell(test, known)
                     reason = note if keys is None else None
                 head = f"name = {toml(code)}\ngroup = {toml(title)}\n"
                 if keys is None:
@@ -647,7 +655,8 @@ def manifest():
         'title = "Jammertest: the catalogue of tests as scenes of GPS L1"\n'
         'like = "Jammertest 2024 of the Norwegian Public Roads Administration and others. Times are compressed to '
         f'scenes of a minute, distances are assumed where the catalogue has none ({LOW_POWER_M} m, {HIGH_POWER_M} m '
-        'for F8.1, 30 m in a motorcade and on a ship), and sources outside the band of GPS L1 are left out. Routes, and the times between which sources switch, are assumed and stated in each entry."\n'
+        'for F8.1, 30 m in a motorcade and on a ship), and sources outside the band of GPS L1 are left out. Routes, and the '
+        'times between which sources switch, are assumed and stated in each entry."\n'
         'source = "testcatalog.json and equipment.json of NPRA\'s jammertest-plan"\n'
         'licence = "MIT, copyright 2024 Norwegian Public Roads Administration (data/LICENSE-jammertest-plan.txt)"\n'
         'about = "Jammers have the centre, bandwidth, period and power that the catalogue has measured. The scene '

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use gnss::record::{
     AcquisitionRow, ClockRow, Event, EventRow, Fix, Geographic, InterferenceRow, IonosphereModel, IonosphereRow,
-    LineRow, NavigationRow, Observation, PassEnd, PassRow, RayRow, SightRow, SkyRow, TrackingRow, TrajectoryRow,
+    LineRow, NavigationRow, Observation, PassEnd, PassRow, RayRow, SightRow, SkyRow, TagRow, TrackingRow, TrajectoryRow,
 };
 use gnss::satellite::Sv;
 use gnss::signal::Signal;
@@ -104,6 +104,8 @@ cells! {
     f64: Float, |x: &f64| *x;
     i64: Signed, |x: &i64| *x;
     u64: Unsigned, |x: &u64| *x;
+    u8: Unsigned, |x: &u8| u64::from(*x);
+    u16: Unsigned, |x: &u16| u64::from(*x);
     u32: Unsigned, |x: &u32| u64::from(*x);
     usize: Unsigned, |x: &usize| *x as u64;
     bool: Truth, |x: &bool| *x;
@@ -205,6 +207,7 @@ mod fields {
             tap_spacing_chips }
         NavigationRow { sv, issue, parameter, raw, message }
         EventRow { sample, sv, signal, event }
+        TagRow { gst_week, tow_s, sender, satellite, adkd, position, result, reason }
         FrontEnd { front_end }
         Spoofer { spoofer }
     }

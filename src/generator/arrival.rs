@@ -87,7 +87,7 @@ pub(super) fn seen_near(
 ) -> Result<Option<Seen>, OrbitError> {
     let find = || {
         let (time, elapsed_s, motion) = received(scene, from, local);
-        let emission = emission_near(from.catalogue(scene), sv, time, &motion, guess_s)?;
+        let emission = emission_near(scene.catalogue_of(from), sv, time, &motion, guess_s)?;
         let bias_s = from.ahead(local).since(time) - from.clock_s(elapsed_s);
         Ok(emission.map(|emission| Arriving { emission, bias_s, gain: from.gain(elapsed_s) }))
     };
@@ -133,12 +133,14 @@ fn arriving(
     Arriving { emission, bias_s, gain }: Arriving,
 ) -> Seen {
     let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
+    let now = from.in_scene(&emission.sight);
+    let sight = now.as_ref().unwrap_or(&emission.sight);
     for effect in &scene.effects {
-        effect.act(&emission.sight, signal, &mut rays);
+        effect.act(sight, signal, &mut rays);
     }
     // Small numbers only: no clock time enters a sum of seconds.
     let sent = emission.sight.received.plus_s(-emission.travel_s);
-    let ahead_s = from.catalogue(scene).signal_clock_s(emission.sight.sv, sent, signal);
+    let ahead_s = scene.catalogue_of(from).signal_clock_s(emission.sight.sv, sent, signal);
     let satellite_clock_s = emission.satellite_clock_s + ahead_s;
     let common_s = bias_s + emission.travel_s - satellite_clock_s;
     let counted_s = common_s - from.replay_s;
@@ -180,5 +182,5 @@ pub fn in_view_from(scene: &Scene, from: &Constellation, sv: Sv, local: Epoch) -
 /// Errors of the orbit.
 pub fn presence_from(scene: &Scene, from: &Constellation, sv: Sv, local: Epoch) -> Result<Presence, OrbitError> {
     let (time, _, motion) = received(scene, from, local);
-    presence_in(scene, from.catalogue(scene), sv, time, &motion)
+    presence_in(scene, scene.catalogue_of(from), sv, time, &motion)
 }

@@ -237,7 +237,7 @@ fn spoofed(scene: &Scene, kept: &Kept, from: &Constellation) -> Result<Spoofed, 
             continue;
         }
         let local = scene.clock.epoch(sample);
-        for sv in from.satellites(scene) {
+        for sv in scene.satellites_of(from) {
             if !arrival::in_view_from(scene, from, sv, local)? {
                 continue;
             }

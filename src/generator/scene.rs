@@ -133,6 +133,18 @@ impl Scene {
         self.satellites().filter(|sv| self.signals_of(*sv).next().is_some())
     }
 
+    /// Ephemerides, orbits and clocks of a constellation's satellites.
+    pub fn catalogue_of<'s>(&'s self, from: &'s Constellation) -> &'s Catalogue {
+        from.sky.as_ref().map_or(&self.catalogue, |own| &own.catalogue)
+    }
+
+    /// Satellites that a constellation may send, in order.
+    pub fn satellites_of(&self, from: &Constellation) -> Vec<Sv> {
+        let excluded = from.sky.as_ref().map_or(&self.excluded, |own| &own.excluded);
+        let all = self.catalogue_of(from).satellites();
+        all.filter(|sv| !excluded.contains(sv) && from.sends(*sv)).collect()
+    }
+
     /// Satellites with an ephemeris that the scene does not exclude.
     pub fn satellites(&self) -> impl Iterator<Item = Sv> {
         self.catalogue.satellites().filter(|sv| !self.excluded.contains(sv))

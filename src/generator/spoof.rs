@@ -2,10 +2,11 @@
 //!
 //! A spoofer sends what would arrive from the true satellites at a claimed position and by a clock of its
 //! own, with the same messages; every signal of it goes through the machinery of the true ones. It may begin
-//! on top of them (claiming the antenna's true motion) and drag the position off smoothly. Limits: its
+//! on top of them (claiming the antenna's true motion) and drag the position off smoothly. One that claims
+//! another time, or has ephemerides of its own, sends their satellites, messages and code phases. Limits: its
 //! carriers are those of the claimed geometry (no phase of its own), its own path's delay is taken as
-//! compensated, it knows the victim's motion and the true orbits without error, and repeats no fault of a
-//! satellite's clock or message.
+//! compensated, it knows the victim's motion and the orbits without error, atmosphere and surroundings are
+//! those of the scene's time, and it repeats no fault of a satellite's clock or message.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -14,7 +15,7 @@ use nalgebra::Vector3;
 
 use crate::catalogue::Catalogue;
 use crate::clock::ReceiverClock;
-use crate::scene::Scene;
+use crate::ray::Sight;
 use crate::vehicle::{Motion, Trajectory};
 use gnss::satellite::Sv;
 use gnss::time::{Epoch, SampleClock};
@@ -180,16 +181,11 @@ impl Constellation {
         if self.ahead_s == 0 { at } else { Epoch::new(at.seconds() + self.ahead_s, at.fraction()) }
     }
 
-    /// Ephemerides, orbits and clocks of its satellites.
-    pub fn catalogue<'s>(&'s self, scene: &'s Scene) -> &'s Catalogue {
-        self.sky.as_ref().map_or(&scene.catalogue, |own| &own.catalogue)
-    }
-
-    /// Satellites that it may send, in order.
-    pub fn satellites(&self, scene: &Scene) -> Vec<Sv> {
-        let excluded = self.sky.as_ref().map_or(&scene.excluded, |own| &own.excluded);
-        let all = self.catalogue(scene).satellites();
-        all.filter(|sv| !excluded.contains(sv) && self.sends(*sv)).collect()
+    /// Sight at the scene's time, whose atmosphere and surroundings act on it; `None` where it is of that
+    /// time.
+    pub fn in_scene(&self, sight: &Sight) -> Option<Sight> {
+        let received = Epoch::new(sight.received.seconds() - self.ahead_s, sight.received.fraction());
+        (self.ahead_s != 0).then(|| Sight { received, ..sight.clone() })
     }
 
     /// Factor on the power of every ray.

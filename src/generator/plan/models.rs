@@ -25,7 +25,11 @@ pub(super) fn models(scene: &Scene, kept: &Kept) -> Vec<Model> {
     if scene.message_faults.is_empty() {
         add("message fault", false, "no [[message_fault]]".to_owned());
     }
-    scene.message_faults.iter().for_each(|fault| add("message fault", true, fault.describe(scene.clock.start)));
+    for fault in &scene.message_faults {
+        let spoofer = scene.spoofers.iter().find(|spoofer| spoofer.number == fault.constellation);
+        let start = spoofer.map_or(scene.clock.start, |spoofer| spoofer.replayed(scene.clock.start));
+        add("message fault", true, fault.describe(start));
+    }
     if let Some(osnma) = &scene.osnma {
         add("authentication", true, osnma.describe());
     }

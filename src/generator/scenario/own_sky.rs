@@ -20,7 +20,7 @@ pub(super) struct Own {
     pub number: usize,
     /// Ephemerides of its own; `None` for the scene's.
     pub sky: Option<OwnSky>,
-    /// What its messages contain besides ephemerides; `None` for the scene's.
+    /// Content of its messages besides ephemerides; `None` for the scene's.
     common: Option<Common>,
 }
 
@@ -86,7 +86,7 @@ impl Scenario {
         }
     }
 
-    /// What the messages of spoofers contain besides ephemerides, where it is not what the true ones contain.
+    /// Content of spoofers' messages besides ephemerides, where it is not that of the true ones.
     pub(super) fn spoofed_messages(
         &self,
         common: &Common,

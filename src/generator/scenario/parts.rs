@@ -38,8 +38,9 @@ pub(super) struct Sky {
     pub excluded: Vec<Sv>,
 }
 
-/// The navigation files that the scenario names, or the embedded one of the day of `near`. What is not an ephemeris is taken from
-/// the file of the scene's day, or else from the nearest that has it, whatever their order in the list.
+/// The navigation files that the scenario names, or the embedded one of the day of `near`. What is not an
+/// ephemeris is taken from the file of the scene's day, or else from the nearest that has it, whatever their
+/// order in the list.
 pub(super) fn navigation(
     scenario: &Scenario,
     near: Epoch,

@@ -224,7 +224,7 @@ pub(crate) fn transmitters(scene: &Scene, edge: Edge<'_>) -> Result<Vec<Transmit
     let mut found = Vec::new();
     let authentic = Arc::new(Constellation::authentic());
     for from in std::iter::once(&authentic).chain(&scene.spoofers) {
-        for sv in from.satellites(scene) {
+        for sv in scene.satellites_of(from) {
             for signal in scene.signals_of(sv) {
                 found.extend(Transmitter::of(scene, Arc::clone(from), sv, signal, edge)?);
             }

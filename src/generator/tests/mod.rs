@@ -7,6 +7,7 @@ mod edges;
 mod exchange;
 mod fronts;
 mod levels;
+mod other_time;
 mod plan;
 mod presence;
 mod signals;

@@ -261,7 +261,7 @@ impl Transmitter {
     fn orbit(&self, scene: &Scene, span: u64) -> Result<Option<sky::Arc>, OrbitError> {
         let samples = self.roots_of_span(scene) * self.root_samples();
         let [from, to] = [span, span + 1].map(|span| self.from.replayed(scene.clock.epoch(span * samples)));
-        let arc = sky::Arc::through(self.from.catalogue(scene), self.sv, from, to)?;
+        let arc = sky::Arc::through(scene.catalogue_of(&self.from), self.sv, from, to)?;
         // Where the motion begins, which a replay knows as well.
         let first_m = scene.trajectory.composed_for().position_m;
         Ok(arc.map(|arc| if scene.trajectory.grown().is_some() { arc.near(&first_m) } else { arc }))

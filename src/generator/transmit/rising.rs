@@ -70,7 +70,7 @@ pub(super) fn rising<E>(
         let Presence::InView(emission) = presence(second)? else { break };
         // Its clock may have lengthened a leap by less than a second.
         let earliest = second.saturating_sub(leap.seconds(&emission.sight).saturating_sub(1));
-        let sent = earliest < second && from.catalogue(scene).sent_throughout(sv, time(earliest), time(second));
+        let sent = earliest < second && scene.catalogue_of(from).sent_throughout(sv, time(earliest), time(second));
         let reached = if sent { earliest } else { second };
         since = Some(reached);
         next = reached.checked_sub(1);

@@ -66,7 +66,7 @@ impl Symbols {
     ) -> Result<(), GenerateError> {
         let own = |fault: &&MessageFault| fault.constellation == from.number;
         let faults: Vec<MessageFault> = scene.message_faults.iter().filter(own).cloned().collect();
-        let catalogue = from.catalogue(scene);
+        let catalogue = scene.catalogue_of(from);
         let messages = scene.messages.of_constellation(from.number);
         for (message, units) in &mut self.units {
             let Some(sender) = messages.of(message) else { continue };

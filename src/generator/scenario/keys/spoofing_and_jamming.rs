@@ -72,8 +72,8 @@ pub(crate) const SPOOFER: &[Key] = &[
         -1e9,
         1e9,
         "s",
-        "time that its signals claim ahead of GPS time, in whole seconds: orbits, messages and code phases are those of \
-         that time; not with replay_s",
+        "time that its signals claim ahead of GPS time, in whole seconds: orbits, messages and code phases are those \
+         of that time; not with replay_s",
     )
     .or(0.0),
     texts(

@@ -172,8 +172,15 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
                 ("expect", "interval" | "position_within_m") => {
                     cases.push((with("expect", &format!("{key} = 1")), table, key));
                 }
+                ("message_fault", "spoofer") => {
+                    let fault = "kind = \"bit_errors\"\nrate = 0.1\nspoofer = 1";
+                    cases.push((with("message_fault", fault), table, key));
+                }
                 ("osnma", "transition") => cases.push((with("osnma", "transition = 1"), table, key)),
-                ("spoofer", "motion" | "drag") => {
+                (
+                    "spoofer",
+                    "motion" | "drag" | "time_offset_s" | "navigation" | "navigation_moved_to" | "leap_seconds",
+                ) => {
                     cases.push((with("spoofer", &format!("power_db = 6\n{key} = 1")), table, key));
                 }
                 ("ionosphere" | "troposphere", key) if line_of(&full, table, key).is_none() => {
