@@ -13,6 +13,7 @@ use toml::{Table, Value};
 use crate::acquire::{AcquireError, AcquisitionSettings};
 use crate::described::described;
 use crate::position::PositionSettings;
+use crate::position::protection::IntegritySettings;
 use crate::track::{TrackingSettings, TrackingSettingsError};
 use gnss::place::{Keys, hint, nearest};
 use gnss::time::{Epoch, TimeError};
@@ -29,6 +30,9 @@ pub struct Settings {
     pub position: PositionSettings,
     /// Main loop.
     pub operation: OperationSettings,
+    /// Protection levels; absent: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub integrity: Option<IntegritySettings>,
 }
 
 described! {
@@ -270,7 +274,8 @@ impl Settings {
             ("operation.repeated_false_alarm_share", operation.repeated_false_alarm_share, 1e-6, 1.0),
             ("operation.frame_limit_s", operation.frame_limit_s, 12.0, 86_400.0),
         ];
-        for (key, value, low, high) in ranges {
+        let of_levels = self.integrity.as_ref().map(IntegritySettings::ranges).into_iter().flatten();
+        for (key, value, low, high) in ranges.into_iter().chain(of_levels) {
             if !(low..=high).contains(&value) {
                 let expected = format!("{low} to {high}");
                 return Err(SettingsError::Range {
@@ -383,7 +388,8 @@ fn several(mut faults: Vec<SettingsError>) -> SettingsError {
 
 /// The keys of the defaults, with their defaults.
 fn known() -> Table {
-    Table::try_from(Settings::default()).unwrap_or_default()
+    let all = Settings { integrity: Some(IntegritySettings::default()), ..Settings::default() };
+    Table::try_from(all).unwrap_or_default()
 }
 
 /// Takes the keys that `known` does not have out of `table`, by walking both, and returns their errors.

@@ -8,6 +8,7 @@ use toml::{Table, Value};
 use super::{OperationSettings, Settings};
 use crate::acquire::AcquisitionSettings;
 use crate::position::PositionSettings;
+use crate::position::protection::IntegritySettings;
 use crate::track::TrackingSettings;
 
 /// One key of the receiver's settings.
@@ -30,9 +31,10 @@ pub fn tables() -> Vec<(String, Vec<Described>)> {
         ("tracking", TrackingSettings::MEANINGS),
         ("position", PositionSettings::MEANINGS),
         ("operation", OperationSettings::MEANINGS),
+        ("integrity", IntegritySettings::MEANINGS),
     ];
     // A structure of numbers, words and truth values is a table.
-    let defaults = Table::try_from(Settings::default()).unwrap_or_default();
+    let defaults = super::known();
     let described = |section: &str, name: &str, default: &Value| {
         let meaning = meanings.iter().find(|(table, _)| *table == section).and_then(|(_, keys)| {
             keys.iter().find(|(key, _)| *key == name).map(|(_, lines)| lines.iter().map(|line| line.trim()))
