@@ -4,8 +4,9 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 
 use gnss::record::{
-    AcquisitionRow, ClockRow, Event, EventRow, Fix, Geographic, InterferenceRow, IonosphereModel, IonosphereRow,
-    LineRow, NavigationRow, Observation, PassEnd, PassRow, RayRow, SightRow, SkyRow, TagRow, TrackingRow, TrajectoryRow,
+    AcquisitionRow, ClockRow, Event, EventRow, Fix, Geographic, IntegrityRow, InterferenceRow, IonosphereModel,
+    IonosphereRow, LineRow, NavigationRow, Observation, PassEnd, PassRow, RayRow, SightRow, SkyRow, TagRow,
+    TrackingRow, TrajectoryRow,
 };
 use gnss::satellite::Sv;
 use gnss::signal::Signal;
@@ -200,6 +201,8 @@ mod fields {
         SightRow { sample, sv, azimuth_deg, elevation_deg, used }
         ClockRow { sample, time_scale, clock_bias_s, sigma_clock_m }
         IonosphereRow { sample, sv, delay_m, sigma_m }
+        IntegrityRow { sample, gps_s, gps_fraction_s, method, hpl_m, vpl_m, emt_m, sigma_v_acc_m, satellites,
+            detected, excluded, available, reason }
         AcquisitionRow { sample, sv, signal, acquired, statistic, threshold, doppler_hz, code_phase_chips, cn0_dbhz }
         LineRow { sample, frequency_hz, jn0_dbhz, js_db, statistic, threshold, lines, resolution_hz }
         TrackingRow { sample, sv, signal, prompt_i, prompt_q, dll_discriminator_chips, pll_discriminator_cycles,

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use generator::truth::{self, TruthError};
 use gnss::record::{
-    AcquisitionRow, ClockRow, EventRow, Fix, Geographic, InterferenceRow, IonosphereRow, LineRow, NavigationRow,
-    Observation, PassRow, RayRow, SightRow, SkyRow, TagRow, TrackingRow, TrajectoryRow,
+    AcquisitionRow, ClockRow, EventRow, Fix, Geographic, IntegrityRow, InterferenceRow, IonosphereRow, LineRow,
+    NavigationRow, Observation, PassRow, RayRow, SightRow, SkyRow, TagRow, TrackingRow, TrajectoryRow,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -79,6 +79,7 @@ pub struct Received {
     clocks: Table<ClockRow>,
     sights: Table<SightRow>,
     ionosphere: Table<IonosphereRow>,
+    integrity: Table<IntegrityRow>,
     interference: Table<(LineRow, FrontEnd)>,
     osnma: Table<TagRow>,
     /// Parameters so far: those of one issue are reported once.
@@ -110,6 +111,7 @@ impl output::Sink for Received {
             output::Record::Sights(rows) => rows.iter().for_each(|row| self.sights.push(row)),
             output::Record::Ionosphere(rows) => rows.iter().for_each(|row| self.ionosphere.push(row)),
             output::Record::Tag(row) => self.osnma.push(&row),
+            output::Record::Integrity(row) => self.integrity.push(&*row),
             output::Record::Interference { front_end, row } => self.interference.push(&(row, FrontEnd { front_end })),
         }
         Ok(())
@@ -126,8 +128,8 @@ impl Received {
     pub fn drain<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         tables!(
             self, py;
-            acquisition, tracking, events, observations, navigation, fixes, clocks, sights, ionosphere, interference,
-            osnma
+            acquisition, tracking, events, observations, navigation, fixes, clocks, sights, ionosphere, integrity,
+            interference, osnma
         )
     }
 

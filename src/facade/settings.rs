@@ -1,11 +1,12 @@
 //! Settings of the receiver, with defaults for all of them.
 //!
 //! [`Settings`] has four groups: [`AcquisitionSettings`], [`TrackingSettings`], [`PositionSettings`] and
-//! [`OperationSettings`]:
+//! [`OperationSettings`], and [`IntegritySettings`] where fixes are to have protection levels:
 //!
 //! ```
 //! use gnss_twin::settings::{
-//!     AcquisitionSettings, OperationSettings, PositionSettings, Settings, TrackingSettings,
+//!     AcquisitionSettings, IntegritySettings, OperationSettings, PositionSettings, Settings,
+//!     TrackingSettings,
 //! };
 //!
 //! let settings = Settings {
@@ -13,6 +14,7 @@
 //!     tracking: TrackingSettings { pll_bandwidth_hz: 10.0, ..Default::default() },
 //!     position: PositionSettings { mask_deg: 15.0, ..Default::default() },
 //!     operation: OperationSettings { measurement_interval_ms: 200, ..Default::default() },
+//!     integrity: Some(IntegritySettings { p_const: 1e-8, ..Default::default() }),
 //! };
 //! settings.validate("own")?;
 //! assert_ne!(settings, Settings::default());
@@ -23,7 +25,8 @@
 //!
 //! ```
 //! use gnss_twin::settings::{
-//!     CodeDiscriminator, IonosphereChoice, SbasChoice, Settings, SystemClocks, TroposphereChoice,
+//!     CodeDiscriminator, IntegrityMethod, IonosphereChoice, Operation, SbasChoice, Settings, SystemClocks,
+//!     TroposphereChoice,
 //! };
 //!
 //! let mut settings = Settings::default();
@@ -32,6 +35,7 @@
 //! settings.position.troposphere = TroposphereChoice::None;
 //! settings.tracking.dll_discriminator = CodeDiscriminator::DotProduct;
 //! let (_, _): (SbasChoice, SystemClocks) = (settings.position.sbas, settings.position.system_clocks);
+//! assert_ne!(IntegrityMethod::Araim.name(), format!("{:?}", Operation::Approach));
 //! let text = "position = { ionosphere = \"none\", troposphere = \"none\" }\n\
 //!             tracking = { dll_discriminator = \"dot_product\" }\n";
 //! assert_eq!(settings, Settings::parse(text, "own.toml")?);
@@ -50,6 +54,8 @@
 
 #[doc(inline)]
 pub use ::receiver::acquire::AcquisitionSettings;
+#[doc(inline)]
+pub use ::receiver::position::protection::{IntegritySettings, Method as IntegrityMethod, Operation};
 #[doc(inline)]
 pub use ::receiver::position::{IonosphereChoice, PositionSettings, SbasChoice, SystemClocks, TroposphereChoice};
 #[doc(inline)]

@@ -329,6 +329,37 @@ pub struct IonosphereRow {
     pub sigma_m: f64,
 }
 
+/// Protection levels of a fix: `rx/integrity.csv`, for receivers whose settings ask for them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct IntegrityRow {
+    /// Sample number of the fix.
+    pub sample: u64,
+    /// GPS time of the fix, whole seconds since 1980.
+    pub gps_s: i64,
+    /// Fraction of that time, in seconds.
+    pub gps_fraction_s: f64,
+    /// Name of the method: araim, sbas or raim.
+    pub method: String,
+    /// Horizontal protection level in metres; absent where there is none.
+    pub hpl_m: Option<f64>,
+    /// Vertical protection level in metres; absent where there is none.
+    pub vpl_m: Option<f64>,
+    /// Effective monitor threshold in metres; absent of methods that have none.
+    pub emt_m: Option<f64>,
+    /// Vertical standard deviation for accuracy, in metres.
+    pub sigma_v_acc_m: Option<f64>,
+    /// Satellites in the fix.
+    pub satellites: u32,
+    /// True if a test showed a fault.
+    pub detected: bool,
+    /// Satellites that the residual test left out, separated by blanks.
+    pub excluded: String,
+    /// True if the fix has levels, no unexcluded fault shows, and all limits of the operation are kept.
+    pub available: bool,
+    /// Reason for which the fix is not available; empty where it is.
+    pub reason: String,
+}
+
 /// Offset of the receiver's clock from one time scale: `rx/clocks.csv`, for fixes with a scale other than GPS
 /// time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

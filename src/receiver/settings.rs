@@ -14,6 +14,7 @@ use toml::{Table, Value};
 use crate::acquire::{AcquireError, AcquisitionSettings};
 use crate::described::described;
 use crate::position::PositionSettings;
+use crate::position::protection::IntegritySettings;
 use crate::track::{TrackingSettings, TrackingSettingsError};
 use gnss::place::{Keys, hint, nearest};
 use gnss::time::{Epoch, TimeError};
@@ -34,6 +35,9 @@ pub struct Settings {
     /// Verification of Galileo's message authentication; `None` for none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub osnma: Option<OsnmaSettings>,
+    /// Protection levels; absent: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub integrity: Option<IntegritySettings>,
 }
 
 described! {
@@ -275,7 +279,8 @@ impl Settings {
             ("operation.repeated_false_alarm_share", operation.repeated_false_alarm_share, 1e-6, 1.0),
             ("operation.frame_limit_s", operation.frame_limit_s, 12.0, 86_400.0),
         ];
-        for (key, value, low, high) in ranges {
+        let of_levels = self.integrity.as_ref().map(IntegritySettings::ranges).into_iter().flatten();
+        for (key, value, low, high) in ranges.into_iter().chain(of_levels) {
             if !(low..=high).contains(&value) {
                 let expected = format!("{low} to {high}");
                 return Err(SettingsError::Range {
@@ -396,7 +401,11 @@ fn several(mut faults: Vec<SettingsError>) -> SettingsError {
 
 /// The keys of the defaults, with their defaults. Tables that are off by default are among them.
 fn known() -> Table {
-    let settings = Settings { osnma: Some(OsnmaSettings::default()), ..Settings::default() };
+    let settings = Settings {
+        osnma: Some(OsnmaSettings::default()),
+        integrity: Some(IntegritySettings::default()),
+        ..Settings::default()
+    };
     // A structure of numbers, words and truth values is a table.
     Table::try_from(settings).unwrap_or_default()
 }

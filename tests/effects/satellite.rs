@@ -257,6 +257,7 @@ fn bits_are_wrong_as_often_as_asked_and_where_the_samples_say() {
     let set: Ephemeris = catalogue.sent_at(sv, start).unwrap().clone();
     let broadcast = Broadcast::new(day.klobuchar, 15, std::slice::from_ref(&set), start).unwrap();
     let fault = MessageFault {
+        constellation: 0,
         satellites: None,
         on: start..start.plus_s(6000.0),
         kind: Kind::BitErrors { rate: 2e-3, stream },
@@ -311,7 +312,7 @@ fn one_bit_given_by_its_place_costs_the_word_that_it_is_in_and_no_other_subframe
     let set = catalogue.sent_at(sv, start).unwrap();
     let broadcast = Broadcast::new(day.klobuchar, 15, std::slice::from_ref(set), start).unwrap();
     let on = start..start.plus_s(1e6);
-    let fault = |kind| [MessageFault { satellites: Some(vec![sv]), on: on.clone(), kind }];
+    let fault = |kind| [MessageFault { constellation: 0, satellites: Some(vec![sv]), on: on.clone(), kind }];
     let bit = fault(Kind::Bit { subframe: 2, word: 4, bit: 7 });
     let decoded = |faults: &[MessageFault], sv: Sv, number: i64| {
         let set = Ephemeris { sv, ..set.clone() };

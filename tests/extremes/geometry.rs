@@ -238,6 +238,7 @@ fn ranges(sky: &[(f64, f64)]) -> Vec<Range> {
             noise_m: 1.0,
             cn0_hz: 1e4,
             is_combined: false,
+            augmented_m: None,
         }
     };
     sky.iter().zip(1..).map(range).collect()

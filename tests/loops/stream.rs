@@ -48,6 +48,7 @@ fn scene(rate_hz: f64, duration_s: f64, format: Format, center_hz: f64, inverted
         trajectory: Trajectory::fixed(Geodetic::from_degrees(26.5, 80.2, 120.0).to_ecef()),
         catalogue: Arc::new(catalogue),
         messages: Arc::new(Senders::new(&common, &[&L1_CA]).unwrap()),
+        osnma: None,
         message_faults: Vec::new(),
         satellite_clocks: Arc::default(),
         signals: vec![&L1_CA],

@@ -2,7 +2,8 @@
 //! module has the content of each block, its meaning, and the knowledge of a network of ground stations.
 //!
 //! Source: RTCA DO-229D, A.4.4.1 to A.4.4.10. Satellites go by their position in the mask of type 1, points
-//! of the grid by theirs in the mask of type 18. Limits: types 10, 17, 27 and 28 are not among them.
+//! of the grid by theirs in the mask of type 18. What bounds the corrections beyond their indicators
+//! (types 10, 27 and 28) and the system's own satellites (type 17) is in `bounds`.
 
 use std::fmt;
 
@@ -10,7 +11,10 @@ use crate::time::Epoch;
 use accuracy::NOT_MONITORED;
 
 pub mod accuracy;
+mod bounds;
 pub mod grid;
+
+pub use bounds::{Almanac, Almanacs, Covariance, Covariances, Factors, LARGEST_REGIONS, Region, Service};
 
 /// Largest number for which a mask of satellites has a bit.
 pub const NUMBERS: u8 = 210;
@@ -167,6 +171,14 @@ pub enum Content {
     GridMask(GridMask),
     /// Type 26.
     Delays(Box<Delays>),
+    /// Type 10.
+    Factors(Box<Factors>),
+    /// Type 17.
+    Almanacs(Box<Almanacs>),
+    /// Type 27.
+    Service(Box<Service>),
+    /// Type 28.
+    Covariances(Box<Covariances>),
 }
 
 impl Half {
@@ -226,6 +238,10 @@ pub trait Network: fmt::Debug + Send + Sync {
     fn satellite(&self, number: u8, at: Epoch) -> Known;
     /// Bands of the grid with the numbers of the points that it has delays of, in ascending order.
     fn bands(&self) -> &[(u8, Vec<u8>)];
+    /// Degradation of the corrections, which type 10 sends; `None` if it is not sent.
+    fn factors(&self) -> Option<Factors> {
+        None
+    }
     /// Vertical delay on L1 at a point of a band and the bound of its error, both in metres.
     fn vertical_m(&self, band: u8, point: u8, at: Epoch) -> Option<(f64, f64)>;
 }

@@ -19,8 +19,8 @@ use serde::Serialize;
 use thiserror::Error;
 
 use gnss::record::{
-    AcquisitionRow, ClockRow, EventRow, Fix, Geographic, IonosphereRow, LineRow, NavigationRow, Observation, SightRow,
-    TagRow, TrackingRow,
+    AcquisitionRow, ClockRow, EventRow, Fix, Geographic, IntegrityRow, IonosphereRow, LineRow, NavigationRow,
+    Observation, SightRow, TagRow, TrackingRow,
 };
 use gnss::time::GPST;
 pub use json::JsonLines;
@@ -75,6 +75,8 @@ pub enum Record {
     Ionosphere(Vec<IonosphereRow>),
     /// Result of a tag of Galileo's message authentication.
     Tag(TagRow),
+    /// Protection levels of the fix before, where they are asked for.
+    Integrity(Box<IntegrityRow>),
     /// A line in the spectrum of a front end's samples; front ends count from 0.
     Interference {
         /// The front end's index, from 0 on.
@@ -213,6 +215,8 @@ pub struct Output {
     ionosphere: Option<Sheet>,
     /// File of the results of tags, which exists where authentication is verified.
     tags: Option<TagTable>,
+    /// File of the protection levels, which exists once a fix has a row of them.
+    integrity: Option<Sheet>,
     /// Parameters written so far: those of one issue are written once.
     parameters: BTreeSet<NavigationRow>,
 }
@@ -264,6 +268,21 @@ const FIXES: [&str; 31] = [
 ];
 const CLOCKS: [&str; 4] = ["sample", "time_scale", "clock_bias_s", "sigma_clock_m"];
 const IONOSPHERE: [&str; 4] = ["sample", "sv", "delay_m", "sigma_m"];
+const INTEGRITY: [&str; 13] = [
+    "sample",
+    "gps_s",
+    "gps_fraction_s",
+    "method",
+    "hpl_m",
+    "vpl_m",
+    "emt_m",
+    "sigma_v_acc_m",
+    "satellites",
+    "detected",
+    "excluded",
+    "available",
+    "reason",
+];
 const ACQUISITION: [&str; 9] =
     ["sample", "sv", "signal", "acquired", "statistic", "threshold", "doppler_hz", "code_phase_chips", "cn0_dbhz"];
 const TRACKING: [&str; 16] = [
@@ -297,7 +316,7 @@ impl Output {
     /// [`OutputError::Create`] with the path that cannot be made.
     pub fn create(directory: &Path) -> Result<Self, OutputError> {
         // Of another run, where this one may have none.
-        for name in ["clocks.csv", "ionosphere.csv"] {
+        for name in ["clocks.csv", "ionosphere.csv", "integrity.csv"] {
             let path = directory.join(name);
             if path.exists() {
                 fs::remove_file(&path).map_err(|error| write_error(&path, error))?;
@@ -316,6 +335,7 @@ impl Output {
             clocks: None,
             ionosphere: None,
             tags: None,
+            integrity: None,
             parameters: BTreeSet::new(),
         })
     }
@@ -339,6 +359,7 @@ impl Output {
         self.clocks.as_mut().map_or(Ok(()), Sheet::flush)?;
         self.ionosphere.as_mut().map_or(Ok(()), Sheet::flush)?;
         self.tags.as_mut().map_or(Ok(()), |tags| tags.0.flush())?;
+        self.integrity.as_mut().map_or(Ok(()), Sheet::flush)?;
         self.interference_of.values_mut().try_for_each(Sheet::flush)
     }
 
@@ -369,6 +390,14 @@ impl Output {
             None => TagTable::create(&self.directory)?,
         };
         Ok(self.tags.insert(tags))
+    }
+
+    /// Writes the protection levels of a fix.
+    fn integrity(&mut self, row: &IntegrityRow) -> Result<(), OutputError> {
+        if self.integrity.is_none() {
+            self.integrity = Some(Sheet::create(&self.directory, "integrity.csv", &INTEGRITY)?);
+        }
+        self.integrity.as_mut().map_or(Ok(()), |sheet| sheet.write(row))
     }
 
     /// Writes a line of a front end's spectrum.
@@ -412,6 +441,7 @@ impl Sink for Output {
             }
             Record::Clocks(rows) => self.clocks(&rows),
             Record::Ionosphere(rows) => self.ionosphere(&rows),
+            Record::Integrity(row) => self.integrity(&row),
             // It follows from the fix and the ephemerides.
             Record::Sights(_) => Ok(()),
             Record::Tag(row) => self.tags()?.write(&row),
@@ -471,6 +501,8 @@ mod tests {
         assert_eq!(header(&row), TagRow::COLUMNS.join(","));
         let row = IonosphereRow { sample: 0, sv, delay_m: 0.0, sigma_m: 0.0 };
         assert_eq!(header(&row), IONOSPHERE.join(","));
+        let row: IntegrityRow = from_csv(&INTEGRITY, "0,0,0,raim,,,,,4,false,,true,");
+        assert_eq!(header(&row), INTEGRITY.join(","));
         let row: LineRow = from_csv(&INTERFERENCE, &zero(8));
         assert_eq!(header(&row), INTERFERENCE.join(","));
     }

@@ -3,18 +3,22 @@
 //! Source: RTCA DO-229D, A.4.4.1 (test mode), A.4.4.3 (fast corrections and their rate), A.4.4.4 (integrity),
 //! A.4.4.5 and A.4.5.1.1 (ageing), A.4.4.7 (long-term corrections), A.4.4.9 and A.4.4.10 (grid), table A-25
 //! (time-outs, those of precision approach). Each satellite of such a system has a store of its own; the one
-//! with most corrections in force serves, so that no two networks are mixed. Limits: of the degradation the
-//! part of fast corrections counts alone, as type 10 is not read; ranges of other systems than GPS and of
-//! other signals than L1 C/A have no corrections. No protection levels follow from the variances.
+//! with most corrections in force serves, so that no two networks are mixed. Weights of ranges have the part
+//! of fast corrections of the degradation alone; bounds for protection levels have all of it, and types 10,
+//! 27 and 28 (`degradation`). Limits: ranges of other systems than GPS and of other signals than L1 C/A
+//! have no corrections.
 
 use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
+use super::degradation::{self, Age, LongTermAge, UNKNOWN_M};
 use super::least_squares::Range;
 use gnss::augmentation::accuracy::{DO_NOT_USE, NOT_MONITORED, ageing_of, delay_variance_m2, range_variance_m2};
 use gnss::augmentation::grid::{Point, Vertical, pierce, points, vertical};
-use gnss::augmentation::{ALARM, Content, DELAY_SLOTS, Delays, FAST_SLOTS, Fast, Half, LongTerm, Mask};
+use gnss::augmentation::{
+    ALARM, Content, Covariance, DELAY_SLOTS, Delays, FAST_SLOTS, Factors, Fast, Half, LongTerm, Mask, Service,
+};
 use gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
 use gnss::klobuchar::L1_HZ;
 use gnss::satellite::Sv;
@@ -28,6 +32,10 @@ const LONG_TERM_S: f64 = 240.0;
 const MASK_S: f64 = 600.0;
 /// Validity of a delay of the grid, seconds (table A-25).
 const DELAY_S: f64 = 600.0;
+/// Validity of degradation factors, in types 7 and 10, and of covariances, seconds (table A-25).
+const FACTORS_S: f64 = 240.0;
+/// Validity of service messages, seconds (table A-25).
+const SERVICE_S: f64 = 86_400.0;
 /// Seconds for which a satellite that has sent type 0 is not used (A.4.4.1).
 const TEST_S: f64 = 60.0;
 /// Number of long-term corrections of a satellite that are kept: those of the ephemeris before and of the
@@ -69,6 +77,7 @@ impl Correction {
         corrected.clock.offset_s += self.clock_s;
         corrected.clock.drift += self.drift;
         corrected.noise_m = libm::hypot(range.noise_m, self.sigma_m);
+        corrected.augmented_m = Some(self.sigma_m);
         corrected
     }
 }
@@ -80,8 +89,8 @@ struct Quick {
     iodf: u8,
     correction_m: f64,
     at: Epoch,
-    /// The one before.
-    before: Option<(f64, Epoch)>,
+    /// The one before, and its issue.
+    before: Option<(f64, Epoch, u8)>,
     /// The indicator may be newer.
     udrei: u8,
     indicated: Epoch,
@@ -100,11 +109,23 @@ struct Band {
 pub(super) struct Store {
     mask: Option<(Mask, Epoch)>,
     quick: BTreeMap<u8, Quick>,
-    long: BTreeMap<u8, Vec<(LongTerm, Epoch)>>,
+    long: BTreeMap<u8, Vec<Slow>>,
     /// Latency, and indicators of ageing by satellite.
-    ageing: Option<(u8, BTreeMap<u8, u8>)>,
+    ageing: Option<(u8, BTreeMap<u8, u8>, Epoch)>,
     bands: BTreeMap<u8, Band>,
     closed: Option<Epoch>,
+    factors: Option<(Factors, Epoch)>,
+    /// Service messages of one issue by their numbers.
+    services: BTreeMap<u8, (Service, Epoch)>,
+    covariances: BTreeMap<u8, (Covariance, Epoch)>,
+}
+
+/// A long-term correction.
+#[derive(Clone, Copy, Debug)]
+struct Slow {
+    long: LongTerm,
+    since: Epoch,
+    is_moving: bool,
 }
 
 /// Messages of all augmentation satellites.
@@ -139,7 +160,7 @@ impl Store {
             Content::Mask(mask) => {
                 if self.mask.as_ref().is_some_and(|(old, _)| old != mask) {
                     // Positions mean other satellites from here on.
-                    (self.quick, self.long, self.ageing) = Default::default();
+                    (self.quick, self.long, self.ageing, self.covariances) = Default::default();
                 }
                 self.mask = Some((mask.clone(), sent));
             }
@@ -163,7 +184,7 @@ impl Store {
             Content::Degradation(said) => {
                 let Some((mask, _)) = self.mask.as_ref().filter(|(mask, _)| mask.iodp == said.iodp) else { return };
                 let each = mask.numbers.iter().copied().zip(said.indicators).collect();
-                self.ageing = Some((said.latency_s, each));
+                self.ageing = Some((said.latency_s, each, sent));
             }
             Content::GridMask(mask) => {
                 let all = points(mask.band);
@@ -175,6 +196,22 @@ impl Store {
                 }
             }
             Content::Delays(delays) => self.take_delays(delays, sent),
+            Content::Factors(factors) => self.factors = Some((**factors, sent)),
+            Content::Service(service) => {
+                self.services.retain(|_, (old, _)| old.iods == service.iods);
+                self.services.insert(service.message, (**service, sent));
+            }
+            Content::Covariances(said) => {
+                let numbers = self.masked(said.iodp).to_vec();
+                for one in &said.both {
+                    let place = usize::from(one.place).checked_sub(1);
+                    if let Some(number) = place.and_then(|place| numbers.get(place)) {
+                        self.covariances.insert(*number, (*one, sent));
+                    }
+                }
+            }
+            // Almanacs tell where to search.
+            Content::Almanacs(_) => {}
         }
     }
 
@@ -187,7 +224,7 @@ impl Store {
             self.masked(fast.iodp).iter().skip(usize::from(fast.part) * FAST_SLOTS).copied().collect();
         let said = fast.correction_m.into_iter().zip(fast.udrei).take(slots);
         for (number, (correction_m, udrei)) in numbers.into_iter().zip(said) {
-            let before = self.quick.get(&number).map(|old| (old.correction_m, old.at));
+            let before = self.quick.get(&number).map(|old| (old.correction_m, old.at, old.iodf));
             let (part, iodf) = (fast.part, fast.iodf);
             self.quick.insert(number, Quick { part, iodf, correction_m, at: sent, before, udrei, indicated: sent });
         }
@@ -198,8 +235,8 @@ impl Store {
         for one in half.each() {
             let Some(number) = numbers.get(usize::from(one.place) - 1) else { continue };
             let own = self.long.entry(*number).or_default();
-            own.retain(|(old, _)| old.iode != one.iode);
-            own.push((*one, sent));
+            own.retain(|old| old.long.iode != one.iode);
+            own.push(Slow { long: *one, since: sent, is_moving: matches!(half, Half::Moving { .. }) });
             if own.len() > SETS {
                 own.remove(0);
             }
@@ -242,10 +279,7 @@ impl Store {
 
     fn correction(&self, number: u8, iode: u16, quick: &Quick, at: Epoch) -> Option<Correction> {
         let variance_m2 = (quick.udrei < NOT_MONITORED).then(|| range_variance_m2(quick.udrei))??;
-        let (latency_s, indicator) = match &self.ageing {
-            Some((latency_s, each)) => (f64::from(*latency_s), each.get(&number).copied().unwrap_or(FASTEST)),
-            None => (0.0, FASTEST),
-        };
+        let (latency_s, indicator) = self.ageing_of(number);
         let ageing = ageing_of(indicator);
         let age_s = at.since(quick.at);
         if age_s > ageing.timeout_s {
@@ -253,20 +287,19 @@ impl Store {
         }
         // Corrections that do not age have no rate (A.4.4.3).
         let rate_mps = match quick.before {
-            Some((before_m, before)) if indicator > 0 && (1.0..=ageing.timeout_s).contains(&quick.at.since(before)) => {
+            Some((before_m, before, _))
+                if indicator > 0 && (1.0..=ageing.timeout_s).contains(&quick.at.since(before)) =>
+            {
                 (quick.correction_m - before_m) / quick.at.since(before)
             }
             _ => 0.0,
         };
         let own = self.long.get(&number)?.iter();
-        let fits =
-            |(long, since): &&(LongTerm, Epoch)| u16::from(long.iode) == iode & 0xFF && at.since(*since) <= LONG_TERM_S;
-        let (long, _) = own.rev().find(fits)?;
+        let fits = |slow: &&Slow| u16::from(slow.long.iode) == iode & 0xFF && at.since(slow.since) <= LONG_TERM_S;
+        let Slow { long, .. } = own.rev().find(fits)?;
         let since_s = match long.velocity_mps {
             [0.0, 0.0, 0.0] if long.af1_sps == 0.0 => 0.0,
-            _ => {
-                (at.seconds() as f64 + at.fraction() - long.second_of_day + DAY_S / 2.0).rem_euclid(DAY_S) - DAY_S / 2.0
-            }
+            _ => since_reference_s(long, at),
         };
         let velocity_mps = Vector3::from(long.velocity_mps);
         let aged_s = at.since(quick.indicated) + latency_s;
@@ -280,29 +313,112 @@ impl Store {
         })
     }
 
+    /// Latency in seconds, and a satellite's indicator of ageing.
+    fn ageing_of(&self, number: u8) -> (f64, u8) {
+        match &self.ageing {
+            Some((latency_s, each, _)) => (f64::from(*latency_s), each.get(&number).copied().unwrap_or(FASTEST)),
+            None => (0.0, FASTEST),
+        }
+    }
+
+    /// Factors of degradation in force.
+    fn factors(&self, at: Epoch) -> Option<&Factors> {
+        self.factors.as_ref().filter(|(_, since)| at.since(*since) <= FACTORS_S).map(|(factors, _)| factors)
+    }
+
+    /// Standard deviation in metres of orbit and clock of a corrected range that bounds them for integrity;
+    /// `None` where the system states none.
+    pub fn bound_m(&self, range: &Range, place_m: &Vector3<f64>) -> Option<f64> {
+        let (number, at) = (range.sv.prn(), range.emitted);
+        let (quick, udrei) = self.indicator(number, at)?;
+        let sigma_m = range_variance_m2(udrei)?.sqrt() * self.delta(number, range, place_m);
+        let is_known = self.ageing.as_ref().is_some_and(|(_, _, since)| at.since(*since) <= FACTORS_S);
+        let Some(factors) = self.factors(at).filter(|_| is_known) else { return Some(sigma_m + UNKNOWN_M) };
+        let (latency_s, indicator) = self.ageing_of(number);
+        // Of several long-term corrections the one in use came last, or its error was taken when it came.
+        let slow = self.long.get(&number)?.last()?;
+        let long_term = match slow.is_moving {
+            true => LongTermAge::Moving(since_reference_s(&slow.long, at)),
+            false => LongTermAge::Steady(at.since(slow.since)),
+        };
+        let age = Age {
+            accuracy_s: at.since(quick.indicated) + latency_s,
+            fast_s: at.since(quick.at),
+            before: quick.before.map(|(_, before, iodf)| (quick.at.since(before), iodf, quick.iodf)),
+            long_term,
+        };
+        Some(degradation::corrected_m(sigma_m, factors, &ageing_of(indicator), &age))
+    }
+
+    /// Factor of a satellite's bound: by its covariance, else by the service's regions, else one.
+    fn delta(&self, number: u8, range: &Range, place_m: &Vector3<f64>) -> f64 {
+        let at = range.emitted;
+        if let Some((covariance, _)) = self.covariances.get(&number).filter(|(_, since)| at.since(*since) <= FACTORS_S)
+        {
+            let c_covariance = self.factors(at).map_or(0.0, |factors| factors.c_covariance);
+            return covariance.delta(&(range.satellite.position_m - place_m).normalize(), c_covariance);
+        }
+        let place = Geodetic::from_ecef(place_m);
+        let young = self.services.values().filter(|(_, since)| at.since(*since) <= SERVICE_S);
+        let services: Vec<&Service> = young.map(|(service, _)| service).collect();
+        let holding = services.iter().filter(|service| service.holds(place));
+        // Of the highest priority the smallest factor (A.4.4.13).
+        let inside = holding.map(|service| (std::cmp::Reverse(service.priority), service.factor_inside()));
+        let first = inside.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let outside = || services.iter().map(|service| service.factor_outside()).fold(1.0, f64::max);
+        first.map_or_else(outside, |(_, factor)| factor)
+    }
+
     /// The grid's delays that are in force; `None` where there are none.
     pub fn grid(&self, at: Epoch) -> Option<Grid> {
         let all = self.bands.values().flat_map(|band| &band.delays);
-        let young = all.filter(|(_, (_, since))| at.since(*since) <= DELAY_S);
-        let points: BTreeMap<Point, Vertical> = young.map(|(point, (vertical, _))| (*point, *vertical)).collect();
-        (!points.is_empty()).then_some(Grid { points })
+        let young: Vec<(Point, Vertical, Epoch)> = all
+            .filter(|(_, (_, since))| at.since(*since) <= DELAY_S)
+            .map(|(point, (vertical, since))| (*point, *vertical, *since))
+            .collect();
+        let points: BTreeMap<Point, Vertical> = young.iter().map(|(point, vertical, _)| (*point, *vertical)).collect();
+        let bounds = self.factors(at).map(|factors| {
+            let grown = |(point, (delay_m, variance_m2), since): &(Point, Vertical, Epoch)| {
+                let sigma_m = degradation::delay_m(variance_m2.sqrt(), factors, at.since(*since));
+                (*point, (*delay_m, sigma_m * sigma_m))
+            };
+            young.iter().map(grown).collect()
+        });
+        (!points.is_empty()).then_some(Grid { points, bounds })
     }
+}
+
+/// Seconds from the reference time of a long-term correction.
+fn since_reference_s(long: &LongTerm, at: Epoch) -> f64 {
+    (at.seconds() as f64 + at.fraction() - long.second_of_day + DAY_S / 2.0).rem_euclid(DAY_S) - DAY_S / 2.0
 }
 
 /// Delays of the ionosphere at the points of a grid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     points: BTreeMap<Point, Vertical>,
+    /// Points with variances that have grown with age, where the system states how.
+    bounds: Option<BTreeMap<Point, Vertical>>,
 }
 
 impl Grid {
     /// Slant delay in metres on a carrier, and its standard deviation; `None` where the grid has nothing.
     pub fn slant_m(&self, user: Geodetic, look: Look, carrier_hz: f64) -> Option<(f64, f64)> {
-        let at = pierce(user, look);
-        let (delay_m, variance_m2) = vertical(at, |point| self.points.get(&point).copied())?;
-        let scale = at.obliquity * (L1_HZ / carrier_hz) * (L1_HZ / carrier_hz);
-        Some((scale * delay_m, scale * variance_m2.sqrt()))
+        slant(&self.points, user, look, carrier_hz)
     }
+
+    /// Standard deviation in metres that bounds the error of a slant delay for integrity.
+    pub fn slant_bound_m(&self, user: Geodetic, look: Look, carrier_hz: f64) -> Option<f64> {
+        slant(self.bounds.as_ref().unwrap_or(&self.points), user, look, carrier_hz).map(|(_, sigma_m)| sigma_m)
+    }
+}
+
+/// Slant delay by the delays at points, and its standard deviation, in metres.
+fn slant(points: &BTreeMap<Point, Vertical>, user: Geodetic, look: Look, carrier_hz: f64) -> Option<(f64, f64)> {
+    let at = pierce(user, look);
+    let (delay_m, variance_m2) = vertical(at, |point| points.get(&point).copied())?;
+    let scale = at.obliquity * (L1_HZ / carrier_hz) * (L1_HZ / carrier_hz);
+    Some((scale * delay_m, scale * variance_m2.sqrt()))
 }
 
 /// Deviation of a model's slant delay where the grid has nothing: a fifth of the delay, or a vertical one by

@@ -66,6 +66,9 @@ pub struct Range {
     pub cn0_hz: f64,
     /// True if two carriers were combined, so that the range is free of the ionosphere.
     pub is_combined: bool,
+    /// Standard deviation of orbit and clock in metres that an augmentation system states of a range that it
+    /// corrects, where it is part of the noise, or of its own satellite.
+    pub augmented_m: Option<f64>,
 }
 
 /// Knowledge about the ionosphere.

@@ -21,7 +21,7 @@ use gnss::augmentation::Content;
 use gnss::earth::Geodetic;
 use gnss::ionosphere::{Coefficients, Model, NAVIC_HZ};
 use gnss::klobuchar::{L1_HZ, NOMINAL};
-use gnss::record::{ClockRow, Fix, IonosphereModel, IonosphereRow, Observation, SightRow};
+use gnss::record::{ClockRow, Fix, IntegrityRow, IonosphereModel, IonosphereRow, Observation, SightRow};
 use gnss::satellite::Sv;
 use gnss::signal::Signal;
 use gnss::time::{Epoch, Rate, SampleClock, TimePolynomial, TimeScale};
@@ -29,11 +29,13 @@ use gnss::time::{Epoch, Rate, SampleClock, TimePolynomial, TimeScale};
 mod air;
 pub mod augmentation;
 pub mod combination;
+mod degradation;
 mod dispersion;
 mod electrons;
 pub mod exclusion;
 pub mod ionosphere;
 pub mod least_squares;
+pub mod protection;
 mod ranges;
 mod records;
 mod reduced;
@@ -50,6 +52,7 @@ use electrons::Electrons;
 pub use exclusion::{Consistent, chi_square_threshold, consistent, without_faults};
 use ionosphere::{DelayError, Delays, NOMINAL_ERROR};
 use least_squares::{COORDINATES, Corrections, Ionosphere, LARGEST_CONDITION, Range, SPACE_M, freedom, scales};
+use protection::IntegritySettings;
 use records::{clocks, fix, sights};
 use reduced::InShort;
 pub use sets::Sets;
@@ -326,6 +329,8 @@ pub struct Solved {
     pub sights: Vec<SightRow>,
     /// The ionosphere of satellites with two bands.
     pub ionosphere: Vec<IonosphereRow>,
+    /// Protection levels, where they are asked for.
+    pub integrity: Option<IntegrityRow>,
     /// Satellites in it.
     pub used: Vec<Sv>,
     /// Satellites that the residual test left out, with their distance from the others' solution.
@@ -351,6 +356,8 @@ pub struct Solver {
     ahead: Vec<(&'static TimeScale, TimePolynomial)>,
     /// Messages of augmentation systems.
     augmentation: Augmentation,
+    /// Choices of protection levels, where they are asked for.
+    integrity: Option<IntegritySettings>,
 }
 
 impl Solver {
@@ -373,6 +380,7 @@ impl Solver {
             reduced: BTreeMap::new(),
             ahead: Vec::new(),
             augmentation: Augmentation::default(),
+            integrity: None,
         }
     }
 
@@ -482,7 +490,8 @@ impl Solver {
         let fix = fix(sample, clock, &solution, velocity_mps, drift, counts, &excluded, model);
         let clocks = clocks(sample, &solution);
         sights.iter_mut().for_each(|sight| sight.used = used.contains(&sight.sv));
-        Ok(Solved { fix, clocks, sights, ionosphere: measured, used, excluded })
+        let integrity = self.protected(&kept, &solution, &fix, &corrections.ionosphere);
+        Ok(Solved { fix, clocks, sights, ionosphere: measured, integrity, used, excluded })
     }
 
     /// Ionospheric correction near a position, and its name in a fix.

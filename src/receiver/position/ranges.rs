@@ -89,6 +89,8 @@ impl Solver {
                 }
             }?;
             let range = self.on_one_time(range);
+            let stated_m = (range.sv.system == System::Sbas).then(|| accuracy_m(set.ura_index));
+            let range = Range { augmented_m: stated_m, ..range };
             let iode = set.iode;
             let range = match in_short.filter(|_| whole.is_none()) {
                 Some(short) => Range { noise_m: libm::hypot(range.noise_m, short.sigma_m), ..range },
@@ -190,6 +192,12 @@ impl Solver {
     }
 }
 
+/// Nominal accuracy of an index as satellites send it, in metres (IS-GPS-200N, 20.3.3.3.1.3).
+fn accuracy_m(index: u8) -> f64 {
+    let power = if index <= 6 { 1.0 + 0.5 * f64::from(index) } else { f64::from(index) - 2.0 };
+    libm::exp2(power)
+}
+
 /// Range with the satellite's position at transmission; `None` when its ephemeris is stale or no orbit.
 fn range(
     observation: &Observation,
@@ -226,5 +234,6 @@ fn range(
         noise_m,
         cn0_hz,
         is_combined: false,
+        augmented_m: None,
     })
 }

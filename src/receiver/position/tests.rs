@@ -65,6 +65,7 @@ pub(super) fn ranges_at(sky: &[(f64, f64, f64)], bias_s: f64) -> Vec<Range> {
                 noise_m: 1.0,
                 cn0_hz: 1e4,
                 is_combined: false,
+                augmented_m: None,
             }
         })
         .collect()
@@ -296,6 +297,7 @@ mod with_real_orbits {
                 noise_m: 1.0,
                 cn0_hz: 1e4,
                 is_combined: false,
+                augmented_m: None,
             });
         }
         assert!(ranges.len() >= 6);

@@ -75,6 +75,9 @@ impl Session {
                 sink.take(Record::Clocks(solved.clocks))?;
                 sink.take(Record::Sights(solved.sights))?;
                 sink.take(Record::Ionosphere(solved.ionosphere))?;
+                if let Some(row) = solved.integrity {
+                    sink.take(Record::Integrity(Box::new(row)))?;
+                }
                 let condition = solved.fix.condition;
                 shared.worst_condition = Some(shared.worst_condition.map_or(condition, |worst| worst.max(condition)));
                 shared.fixes += 1;

@@ -78,12 +78,16 @@ impl Shared {
         (start, week_reference): (Option<Epoch>, Epoch),
         authentic: Option<Authentic>,
     ) -> Self {
+        let mut solver = Solver::new(&settings.position, noises.clone(), rate);
+        if let Some(integrity) = &settings.integrity {
+            solver.set_integrity(integrity);
+        }
         Self {
             settings: settings.clone(),
             week_reference,
             start,
             timebase: Timebase::new(rate, start),
-            solver: Solver::new(&settings.position, noises.clone(), rate),
+            solver,
             noises,
             ephemerides: Sets::default(),
             ionosphere_model: settings.position.ionosphere.model(&settings.acquisition.signals()),

@@ -9,6 +9,7 @@ use super::osnma::OsnmaSettings;
 use super::{OperationSettings, Settings};
 use crate::acquire::AcquisitionSettings;
 use crate::position::PositionSettings;
+use crate::position::protection::IntegritySettings;
 use crate::track::TrackingSettings;
 
 /// One key of the receiver's settings.
@@ -32,6 +33,7 @@ pub fn tables() -> Vec<(String, Vec<Described>)> {
         ("position", PositionSettings::MEANINGS),
         ("operation", OperationSettings::MEANINGS),
         ("osnma", OsnmaSettings::MEANINGS),
+        ("integrity", IntegritySettings::MEANINGS),
     ];
     let defaults = super::known();
     let described = |section: &str, name: &str, default: &Value| {

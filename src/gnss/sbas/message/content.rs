@@ -1,13 +1,16 @@
-//! Content of the correction blocks, encoded and decoded by the tables of [`super::corrections`].
+//! Content of the correction blocks, encoded and decoded by the tables of [`super::corrections`] and
+//! [`super::bounds`].
 //!
-//! Source: RTCA DO-229D, A.4.4.1 to A.4.4.10.
+//! Source: RTCA DO-229D, A.4.4.1 to A.4.4.16.
 
 use super::DATA_BITS;
+use super::bounds::{ALMANACS, COVARIANCES, FACTORS, SERVICE};
 use super::corrections::{
     AGEING, DELAYS, FAST, GRID_MASK, HALF_MOVING, HALF_STEADY, INTEGRITY, MASK, MIXED, VELOCITY_CODE,
 };
 use crate::augmentation::{
-    Content, Degradation, Delays, Fast, GridMask, Half, Integrity, LongTerm, MASKED, Mask, Mixed,
+    Almanacs, Content, Covariances, Degradation, Delays, Factors, Fast, GridMask, Half, Integrity, LongTerm, MASKED,
+    Mask, Mixed, Service,
 };
 use crate::bits::{Element, FieldError, integers, read_all, write_all};
 use crate::message::Parameters;
@@ -100,6 +103,10 @@ impl Content {
             Self::Mixed(_) => 24,
             Self::LongTerm(_) => 25,
             Self::Delays(_) => 26,
+            Self::Factors(_) => 10,
+            Self::Almanacs(_) => 17,
+            Self::Service(_) => 27,
+            Self::Covariances(_) => 28,
         }
     }
 
@@ -116,6 +123,10 @@ impl Content {
             Self::Degradation(degradation) => write(&AGEING, degradation, bits),
             Self::GridMask(mask) => write(&GRID_MASK, mask, bits),
             Self::Delays(delays) => write(&DELAYS, delays, bits),
+            Self::Factors(factors) => write(&FACTORS, factors, bits),
+            Self::Almanacs(almanacs) => write(&ALMANACS, almanacs, bits),
+            Self::Service(service) => write(&SERVICE, service, bits),
+            Self::Covariances(both) => write(&COVARIANCES, both, bits),
             Self::Mixed(mixed) => {
                 write(&MIXED, &mixed.fast, bits)?;
                 mixed.half.write(bits, 1)
@@ -148,6 +159,10 @@ impl Content {
             }
             25 => Self::LongTerm(Box::new([0, 1].map(|half| Half::read(&half_of(bits, half))))),
             26 => Self::Delays(Box::new(read(&DELAYS, bits, Delays::default()))),
+            10 => Self::Factors(Box::new(read(&FACTORS, bits, Factors::default()))),
+            17 => Self::Almanacs(Box::new(read(&ALMANACS, bits, Almanacs::default()))),
+            27 => Self::Service(Box::new(read(&SERVICE, bits, Service::default()))),
+            28 => Self::Covariances(Box::new(read(&COVARIANCES, bits, Covariances::default()))),
             _ => return None,
         })
     }
@@ -164,6 +179,10 @@ impl Content {
             24 => raw(&MIXED, bits).into_iter().chain(Half::raw(&half_of(bits, 1))).collect(),
             25 => [0, 1].into_iter().flat_map(|half| Half::raw(&half_of(bits, half))).collect(),
             26 => raw(&DELAYS, bits),
+            10 => raw(&FACTORS, bits),
+            17 => raw(&ALMANACS, bits),
+            27 => raw(&SERVICE, bits),
+            28 => raw(&COVARIANCES, bits),
             _ => Parameters::new(),
         }
     }

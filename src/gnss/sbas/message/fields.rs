@@ -91,5 +91,5 @@ pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
         ("type 9", GEO.iter().map(|element| &element.field).collect()),
         ("type 12", TIME.iter().map(|element| &element.field).collect()),
     ];
-    own.into_iter().chain(super::corrections::tables()).collect()
+    own.into_iter().chain(super::corrections::tables()).chain(super::bounds::tables()).collect()
 }
