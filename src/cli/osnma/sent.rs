@@ -28,10 +28,11 @@ pub fn execute(arguments: &Pages) -> Result<(), CliError> {
     })?;
     let number = arguments.spoofer.unwrap_or(0);
     if number > scene.spoofers.len() || arguments.spoofer == Some(0) {
-        let count = scene.spoofers.len();
-        return Err(CliError::usage(format!(
-            "--spoofer {number}: expected a number from 1 to {count}, those of the scene"
-        )));
+        let expected = match scene.spoofers.len() {
+            0 => "nothing, because the scene has no spoofer".to_owned(),
+            count => format!("a number from 1 to {count}, those of the scene"),
+        };
+        return Err(CliError::usage(format!("--spoofer {number}: expected {expected}")));
     }
     let begin = GST.label(scene.clock.start);
     let end = GST.label(scene.clock.epoch(scene.samples));
