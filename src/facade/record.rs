@@ -18,8 +18,8 @@
 //!
 //! The receiver's rows are [`AcquisitionRow`], [`TrackingRow`], [`EventRow`] with its [`Event`],
 //! [`NavigationRow`], [`ClockRow`], [`SightRow`], [`IonosphereRow`], [`IntegrityRow`] and [`LineRow`]. The
-//! truth's rows are [`TrajectoryRow`], [`SkyRow`], [`RayRow`], [`InterferenceRow`] and [`PassRow`]. Tables that
-//! the program wrote are read back as these types:
+//! truth's rows are [`TrajectoryRow`], [`SkyRow`], [`RayRow`], [`InterferenceRow`] and [`PassRow`]. Tables
+//! that the program wrote are read back as these types:
 //!
 //! ```
 //! use gnss_twin::record::{Event, EventRow};

@@ -5,7 +5,8 @@
 //!
 //! ```
 //! use gnss_twin::settings::{
-//!     AcquisitionSettings, IntegritySettings, OperationSettings, PositionSettings, Settings, TrackingSettings,
+//!     AcquisitionSettings, IntegritySettings, OperationSettings, PositionSettings, Settings,
+//!     TrackingSettings,
 //! };
 //!
 //! let settings = Settings {

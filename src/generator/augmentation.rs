@@ -19,7 +19,7 @@ use crate::ray::{Effect, Ray, Sight};
 use crate::sky::emission;
 use gnss::augmentation::accuracy::{DO_NOT_USE, NOT_MONITORED, udrei_of};
 use gnss::augmentation::grid::{BANDS, EDGE_DEG, Point, points};
-use gnss::augmentation::{Known, LongTerm, Network};
+use gnss::augmentation::{Factors, Known, LongTerm, Network};
 use gnss::broadcast::{Ephemeris, State};
 use gnss::earth::{Geodetic, Look, SPEED_OF_LIGHT_MPS};
 use gnss::gps::l1ca::L1_CA;
@@ -48,6 +48,26 @@ const GRID_DEG: f64 = 20.0;
 const SHELL_SHARE: f64 = 0.1;
 /// A satellite above a point of the grid.
 const ABOVE_M: f64 = 2.02e7;
+/// Degradation of the corrections: what is left of each, until the next one comes, is in its indicator, and
+/// each step more of their steps of 12.5 cm and of the intervals of table A-25 costs as much again.
+const FACTORS: Factors = Factors {
+    b_rrc_m: STEP_M,
+    c_ltc_lsb_m: STEP_M,
+    c_ltc_v1_mps: 0.001,
+    i_ltc_v1_s: LONG_S,
+    c_ltc_v0_m: STEP_M,
+    i_ltc_v0_s: LONG_S,
+    c_geo_lsb_m: 0.0,
+    c_geo_v_mps: 0.0,
+    i_geo_s: LONG_S,
+    c_er_m: 0.5,
+    c_iono_step_m: STEP_M,
+    i_iono_s: 300.0,
+    c_iono_ramp_mps: 0.0,
+    is_squared: false,
+    is_delay_squared: false,
+    c_covariance: 0.0,
+};
 /// Seconds over which differences of orbits and of clocks are taken.
 const ORBIT_STEP_S: f64 = 60.0;
 const CLOCK_STEP_S: f64 = 1.0;
@@ -88,6 +108,8 @@ pub struct Ground {
     pub is_test: bool,
     /// Satellites that an operator has declared unusable.
     pub do_not_use: Vec<Sv>,
+    /// True if the network sends how its corrections degrade.
+    pub sends_factors: bool,
     /// Ionosphere; absent means that there is none, and no grid either.
     pub ionosphere: Option<Arc<dyn Effect>>,
 }
@@ -219,6 +241,10 @@ impl Network for GroundNetwork {
 
     fn bands(&self) -> &[(u8, Vec<u8>)] {
         &self.bands
+    }
+
+    fn factors(&self) -> Option<Factors> {
+        self.ground.sends_factors.then_some(FACTORS)
     }
 
     fn vertical_m(&self, band: u8, point: u8, at: Epoch) -> Option<(f64, f64)> {

@@ -16,6 +16,7 @@ mod fixes;
 mod foreign;
 mod links;
 mod observations;
+mod protection;
 mod rinex;
 mod run;
 mod spectrum;
@@ -53,6 +54,7 @@ fn kinds() -> Vec<Kind> {
         files::kinds(),
         excused::kinds(),
         early::kinds(),
+        protection::kinds(),
     ]
     .into_iter()
     .flatten()

@@ -231,7 +231,8 @@ fn points_of_printed_masks_of_the_grid_lie_where_the_bands_have_them() {
 }
 
 /// Fields fill the 212 bits of a block but for the spare ones that documents name: of type 6 none, of type 7
-/// two, of type 18 one, of type 24 four in its first half, of type 26 seven, of half a block one or none.
+/// two, of type 10 eighty-one, of type 18 one, of type 24 four in its first half, of type 26 seven, of
+/// type 27 fifteen, of half a block one or none.
 #[test]
 fn fields_of_corrections_fill_their_blocks_and_none_lies_on_another() {
     for (name, first, bits, spare) in [
@@ -244,6 +245,10 @@ fn fields_of_corrections_fill_their_blocks_and_none_lies_on_another() {
         ("types 24 and 25, half with velocity code 0", 0, 106, 1),
         ("types 24 and 25, half with velocity code 1", 0, 106, 0),
         ("type 26", 14, 212, 7),
+        ("type 10", 14, 212, 81),
+        ("type 17", 14, 212, 0),
+        ("type 27", 14, 212, 15),
+        ("type 28", 14, 212, 0),
     ] {
         let (_, fields) = tables().into_iter().find(|(other, _)| *other == name).unwrap();
         let mut taken = vec![false; first + bits];
@@ -257,5 +262,55 @@ fn fields_of_corrections_fill_their_blocks_and_none_lies_on_another() {
         let free = taken.iter().skip(first).filter(|bit| !**bit).count();
         assert_eq!(free - code, spare, "{name}");
         assert!(taken.iter().take(first).all(|bit| !bit), "{name}");
+    }
+}
+
+/// Bits of a whole block, printed in hexadecimal digits with six bits of padding.
+fn received(digits: &str) -> Vec<bool> {
+    let bits = digits.chars().flat_map(|digit| {
+        let value = digit.to_digit(16).unwrap();
+        (0..4).rev().map(move |place| value >> place & 1 == 1)
+    });
+    bits.take(250).collect()
+}
+
+/// Real blocks of GAGAN (PRN 128) and MSAS (PRN 137), week 2286, 525602 s to 525609 s. Source: CSSRlib's
+/// sample data (MIT licence), file `308c_sbas.txt`. Their checks are right, writing gives the bits again, and
+/// values keep the ranges that the standard prints.
+#[test]
+fn real_blocks_of_degradation_and_covariances_are_read_and_written_again() {
+    let factors = received("9a28360984c80130644dc53800ddc4b00000000000000000000000001005f7c0");
+    assert_eq!((gnss::crc::crc24q(factors.iter().copied()), number(&factors[8..14])), (0, 10));
+    let content = Content::read(10, &factors[..226].to_vec()).unwrap();
+    let mut again = factors[..14].to_vec();
+    again.resize(226, false);
+    content.write(&mut again).unwrap();
+    assert_eq!(again, factors[..226]);
+    let Content::Factors(said) = content else { panic!("no type 10") };
+    // Ten bits a field from bit 14 on: 216 steps of 2 mm, 76 of 2 mm, 200 of 0.05 mm/s, then 2 s.
+    let raw = |first: usize, bits: usize| number(&factors[first..first + bits]) as f64;
+    assert!((said.b_rrc_m - 0.002 * raw(14, 10)).abs() < 1e-9 && said.b_rrc_m < 2.047);
+    assert!((said.c_ltc_v1_mps - 0.000_05 * raw(34, 10)).abs() < 1e-9 && said.c_ltc_v1_mps < 0.0512);
+    assert_eq!((said.i_ltc_v1_s, said.i_ltc_v0_s), (raw(44, 9), raw(63, 9)));
+    assert!((said.c_iono_ramp_mps - 0.000_005 * raw(126, 10)).abs() < 1e-12);
+    for digits in [
+        "c67364c45046a087f1d401c1a7fa2e365cb4e7184059d8fa7db445dd3a79d280",
+        "c67330844241108009fb808027fc0600000000000000000000000000190a1600",
+    ] {
+        let block = received(digits);
+        assert_eq!((gnss::crc::crc24q(block.iter().copied()), number(&block[8..14])), (0, 28));
+        let content = Content::read(28, &block[..226].to_vec()).unwrap();
+        let mut again = block[..14].to_vec();
+        again.resize(226, false);
+        content.write(&mut again).unwrap();
+        assert_eq!(again, block[..226]);
+        let Content::Covariances(said) = content else { panic!("no type 28") };
+        for one in said.both.iter().filter(|one| one.place > 0) {
+            assert!(one.place <= 51 && one.diagonal.iter().any(|element| *element > 0), "{one:?}");
+            // Towards the Earth a bound is of the size of one: it multiplies that of the worst user.
+            let sight = nalgebra::Vector3::new(0.6, 0.0, 0.8);
+            let delta = one.delta(&sight, 0.0);
+            assert!(delta.is_finite() && delta < 1e3, "{one:?} {delta}");
+        }
     }
 }

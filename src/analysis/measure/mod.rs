@@ -7,7 +7,8 @@
 //! the spectrum of the samples, [`peaks`] their correlation with the codes, [`lines`] compares the continuous
 //! waves that the receiver reported with those that there were, [`spoofing`] measures how far a spoofer moved
 //! the fixes, [`ionosphere`] what two bands showed of it. [`independent`] says how many independent values a
-//! correlated series is worth.
+//! correlated series is worth. [`protection`] compares errors with the protection levels that the receiver
+//! states.
 
 pub mod allan;
 pub mod clock;
@@ -19,6 +20,7 @@ pub mod ionosphere;
 pub mod jitter;
 pub mod lines;
 pub mod peaks;
+pub mod protection;
 pub mod psd;
 pub mod slips;
 pub mod spectrum;

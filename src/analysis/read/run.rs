@@ -16,14 +16,15 @@ use super::files::{believable, each, each_of_any, json, missing, optional, rows,
 use crate::error::JudgeError;
 use crate::read::fixes::Fixes;
 use crate::read::levels::{LevelFinder, Levels};
+use crate::read::protection::Level;
 use crate::read::spill_store::{Finder, SpillStore};
 use crate::read::table::Table;
 use crate::statistics::{mean, median};
 use crate::waveform::Sampler;
 use gnss::facts::{FrontEndFacts, SceneFacts};
 use gnss::record::{
-    AcquisitionRow, ClockRow, EventRow, Fix, InterferenceRow, IonosphereRow, LineRow, NavigationRow, Observation,
-    RayRow, SkyRow, TrackingRow, TrajectoryRow,
+    AcquisitionRow, ClockRow, EventRow, Fix, IntegrityRow, InterferenceRow, IonosphereRow, LineRow, NavigationRow,
+    Observation, RayRow, SkyRow, TrackingRow, TrajectoryRow,
 };
 use gnss::satellite::Sv;
 use gnss::signal::described::registered;
@@ -136,6 +137,8 @@ pub struct Run {
     pub front_ends: BTreeMap<&'static Signal, usize>,
     /// The ionosphere that it measured with two bands; none without.
     pub ionosphere: SpillStore<Sv, IonosphereRow>,
+    /// Protection levels of the fixes; empty of a receiver that states none.
+    pub levels: Table<Level>,
     /// Clock of the receiver against each time scale, by the scales' names; empty for a receiver of GPS time
     /// alone.
     pub clocks: SpillStore<&'static str, ClockRow>,
@@ -207,6 +210,7 @@ impl Run {
         })?;
         read.update_s = updates.median();
         each_of_any(&rx.join("ionosphere.csv"), |_, row: IonosphereRow| read.ionosphere.push(row.sv, &row))?;
+        each_of_any(&rx.join("integrity.csv"), |_, row: IntegrityRow| read.levels.push(row.into()))?;
         let clocks = rx.join("clocks.csv");
         each_of_any(&clocks, |line, row: ClockRow| {
             // A signal that a program adds may bring a time of its own.
@@ -344,6 +348,7 @@ impl Run {
             update_s: None,
             front_ends: BTreeMap::new(),
             ionosphere: SpillStore::new(directory),
+            levels: Table::new(directory),
             clocks: SpillStore::new(directory),
             navigation: Vec::new(),
             events: Vec::new(),
@@ -398,6 +403,7 @@ impl Run {
         self.observations.sound()?;
         self.tracking.sound()?;
         self.ionosphere.sound()?;
+        self.levels.sound()?;
         self.cn0_sums_hz.sound()?;
         self.cn0_most_hz.sound()?;
         self.trajectory.sound()?;

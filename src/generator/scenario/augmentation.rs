@@ -20,6 +20,8 @@ pub struct SbasSpec {
     pub test: bool,
     /// Satellites that it states must not be used.
     pub do_not_use: Vec<Sv>,
+    /// True if it sends how its corrections degrade (type 10).
+    pub degradation: bool,
 }
 
 pub(super) fn sbas(table: &Table<'_>) -> Result<SbasSpec, ScenarioError> {
@@ -27,7 +29,8 @@ pub(super) fn sbas(table: &Table<'_>) -> Result<SbasSpec, ScenarioError> {
     if do_not_use.iter().any(|sv| sv.system != System::Gps) {
         return Err(table.bad("do_not_use", "satellites of GPS, which are those that SBAS corrects here"));
     }
-    Ok(SbasSpec { test: table.flag("test")?.unwrap_or(false), do_not_use })
+    let degradation = table.flag("degradation")?.unwrap_or(false);
+    Ok(SbasSpec { test: table.flag("test")?.unwrap_or(false), do_not_use, degradation })
 }
 
 impl Scenario {
@@ -52,6 +55,7 @@ impl Scenario {
             start: self.start,
             is_test: spec.test,
             do_not_use: spec.do_not_use.clone(),
+            sends_factors: spec.degradation,
             // The first of the effects, where there is one.
             ionosphere: self.ionosphere.as_ref().and_then(|_| effects.first().cloned()),
         };

@@ -1,9 +1,8 @@
-//! What bounds corrections beyond their indicators: how they degrade (type 10), where a service is assured
-//! (type 27), and in which directions a satellite's errors lie (type 28); and the almanacs of the system's own
-//! satellites (type 17).
+//! Bounds of corrections beyond their indicators: degradation (type 10), regions of a service (type 27), and
+//! directions of a satellite's errors (type 28). Beside them, almanacs of the system's satellites (type 17).
 //!
-//! Source: RTCA DO-229D, A.4.4.6 (table A-9), A.4.4.12 (table A-17), A.4.4.13 (tables ), A.4.4.16
-//! (table A-23), and A.4.5.1 for their use.
+//! Source: RTCA DO-229D, A.4.4.6 (table A-9), A.4.4.12 (table A-17), A.4.4.13 (tables ),
+//! A.4.4.16 (table A-23), and A.4.5.1 for their use.
 
 use nalgebra::{Matrix4, Vector3, Vector4};
 
@@ -30,7 +29,7 @@ pub struct Factors {
     pub c_ltc_v0_m: f64,
     /// Time between long-term corrections without rates, in seconds.
     pub i_ltc_v0_s: f64,
-    /// Rounding of the places of the system's own satellites, in metres.
+    /// Rounding of the positions of the system's own satellites, in metres.
     pub c_geo_lsb_m: f64,
     /// Growth of their error, in m/s.
     pub c_geo_v_mps: f64,
@@ -52,7 +51,7 @@ pub struct Factors {
     pub c_covariance: f64,
 }
 
-/// Place of one of the system's own satellites (type 17).
+/// Almanac of one of the system's own satellites (type 17).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Almanac {
     /// Data set: 0.
@@ -67,7 +66,7 @@ pub struct Almanac {
     pub velocity_mps: [f64; 3],
 }
 
-/// Places of three of the system's own satellites (type 17).
+/// Almanacs of three of the system's own satellites (type 17).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Almanacs {
     /// The satellites.
@@ -89,7 +88,7 @@ pub struct Region {
 }
 
 impl Region {
-    /// True if a place lies in it.
+    /// True if a position lies in it.
     pub fn holds(&self, place: Geodetic) -> bool {
         let ([north_1, east_1], [north_2, east_2]) = (self.first_deg, self.second_deg);
         let around = |east: f64| (east - east_1 + 180.0).rem_euclid(360.0) - 180.0;
@@ -124,7 +123,7 @@ pub struct Service {
 }
 
 impl Service {
-    /// True if one of the regions holds a place.
+    /// True if one of the regions holds a position.
     pub fn holds(&self, place: Geodetic) -> bool {
         self.regions.iter().take(usize::from(self.count)).any(|region| region.holds(place))
     }

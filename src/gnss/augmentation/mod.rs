@@ -238,6 +238,10 @@ pub trait Network: fmt::Debug + Send + Sync {
     fn satellite(&self, number: u8, at: Epoch) -> Known;
     /// Bands of the grid with the numbers of the points that it has delays of, in ascending order.
     fn bands(&self) -> &[(u8, Vec<u8>)];
+    /// Degradation of the corrections, which type 10 sends; `None` if it is not sent.
+    fn factors(&self) -> Option<Factors> {
+        None
+    }
     /// Vertical delay on L1 at a point of a band and the bound of its error, both in metres.
     fn vertical_m(&self, band: u8, point: u8, at: Epoch) -> Option<(f64, f64)>;
 }

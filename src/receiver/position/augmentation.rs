@@ -4,8 +4,8 @@
 //! A.4.4.5 and A.4.5.1.1 (ageing), A.4.4.7 (long-term corrections), A.4.4.9 and A.4.4.10 (grid), table A-25
 //! (time-outs, those of precision approach). Each satellite of such a system has a store of its own; the one
 //! with most corrections in force serves, so that no two networks are mixed. Weights of ranges have the part
-//! of fast corrections of the degradation alone; bounds for protection levels have all of it, and types 10, 27
-//! and 28 ([`super::degradation`]). Limits: ranges of other systems than GPS and of other signals than L1 C/A
+//! of fast corrections of the degradation alone; bounds for protection levels have all of it, and types 10,
+//! 27 and 28 (`degradation`). Limits: ranges of other systems than GPS and of other signals than L1 C/A
 //! have no corrections.
 
 use std::collections::BTreeMap;

@@ -1,12 +1,12 @@
 //! Growth of the bounds of SBAS corrections while they age, or newer ones are lost.
 //!
-//! Source: RTCA DO-229D, A.4.5.1 (corrections), A.4.5.2 (ionosphere) and J.2.2. Limits: corrections are not used
-//! beyond their time-outs, so that the term of users en route who do (ε_er) is zero.
+//! Source: RTCA DO-229D, A.4.5.1 (corrections), A.4.5.2 (ionosphere) and J.2.2. Limits: corrections are not
+//! used beyond their time-outs, so that the term of users en route who do (ε_er) is zero.
 
 use gnss::augmentation::accuracy::Ageing;
 use gnss::augmentation::{ALARM, Factors};
 
-/// What a bound grows by where how corrections degrade was not received, in metres (J.2.2).
+/// Growth of a bound in metres where no factors of degradation were received (J.2.2).
 pub const UNKNOWN_M: f64 = 8.0;
 
 /// Age of a satellite's corrections.
@@ -25,9 +25,9 @@ pub struct Age {
 /// Age of a long-term correction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LongTermAge {
-    /// Without rates: seconds since it came.
+    /// Seconds since it came, of one without rates.
     Steady(f64),
-    /// With rates: seconds since its reference time, negative before it.
+    /// Seconds since its reference time, of one with rates: negative before it.
     Moving(f64),
 }
 

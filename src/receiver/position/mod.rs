@@ -52,7 +52,7 @@ use electrons::Electrons;
 pub use exclusion::{Consistent, chi_square_threshold, consistent, without_faults};
 use ionosphere::{DelayError, Delays, NOMINAL_ERROR};
 use least_squares::{COORDINATES, Corrections, Ionosphere, LARGEST_CONDITION, Range, SPACE_M, freedom, scales};
-use protection::{Fixed, IntegritySettings};
+use protection::IntegritySettings;
 use records::{clocks, fix, sights};
 use reduced::InShort;
 pub use sets::Sets;
@@ -384,11 +384,6 @@ impl Solver {
         }
     }
 
-    /// Gives every fix protection levels by these settings.
-    pub fn set_integrity(&mut self, settings: &IntegritySettings) {
-        self.integrity = Some(settings.clone());
-    }
-
     /// States by how much the carrier's Doppler exceeds the code's, in hertz of the carrier: smoothing and
     /// velocity leave it out, so that the clock's drift is that of the code, whose bias the position has.
     /// `signals` are those of one front end.
@@ -495,11 +490,7 @@ impl Solver {
         let fix = fix(sample, clock, &solution, velocity_mps, drift, counts, &excluded, model);
         let clocks = clocks(sample, &solution);
         sights.iter_mut().for_each(|sight| sight.used = used.contains(&sight.sv));
-        let integrity = self.integrity.as_ref().map(|settings| {
-            let store = kept.first().and_then(|range| self.augmentation.serving(range.emitted));
-            let (ranges, ionosphere, false_alarm) = (&kept, &corrections.ionosphere, self.settings.false_alarm);
-            Fixed { ranges, solution: &solution, fix: &fix, ionosphere, store, false_alarm }.protect(settings)
-        });
+        let integrity = self.protected(&kept, &solution, &fix, &corrections.ionosphere);
         Ok(Solved { fix, clocks, sights, ionosphere: measured, integrity, used, excluded })
     }
 

@@ -31,6 +31,7 @@ pub(crate) const ORBITS: &[Key] = &[
 pub(crate) const SBAS: &[Key] = &[
     flag("test", "broadcast test mode: not for safety-of-life use"),
     words("do_not_use", SATELLITES, "GPS satellites flagged as do-not-use, whatever their true state"),
+    flag("degradation", "broadcast how corrections degrade (type 10), which protection levels of SBAS need"),
 ];
 
 const fn on() -> Key {

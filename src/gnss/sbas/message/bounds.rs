@@ -1,6 +1,6 @@
 //! The field tables of the blocks that bound corrections, and of almanacs: positions count from 0, the first
-//! bit of a block (RTCA DO-229D, A.4.4.6, A.4.4.12, A.4.4.13 and A.4.4.16). Steps that are no powers of two are
-//! counted by their fields.
+//! bit of a block (RTCA DO-229D, A.4.4.6, A.4.4.12, A.4.4.13 and A.4.4.16). Steps that are no powers of two
+//! are counted by their fields.
 
 use crate::augmentation::{Almanacs, Covariances, Factors, Service};
 use crate::bits::Kind::{Signed, Unsigned, Whole};

@@ -7,8 +7,9 @@
 //! table A-25). Only type 12 states which second of the week it is. Where a network knows something of other
 //! satellites, the rest of a round has its corrections (`schedule`), else type 63 (nothing).
 //!
-//! Limits: types 17, 27 and 28 are sent by no network of the generator. Health is the accuracy, of which 15 states that the satellite is not to be ranged to. Of UTC
-//! nothing is said.
+//! Limits: types 17, 27 and 28 are read and can be written, but no network of the generator sends them.
+//! Health is the accuracy, of which 15 states that the satellite is not to be ranged to. Of UTC nothing is
+//! said.
 
 mod bounds;
 mod content;

@@ -3,8 +3,8 @@
 //! Of each round of six seconds the first two have types 12 and 9. Then come the fast corrections of all
 //! satellites of the mask, as each six seconds at least there is an indicator of their accuracy; of a last
 //! part of six satellites or fewer, type 24 has them. The rest of the round takes turns: the masks, the
-//! long-term corrections, how corrections age, the grid, integrity. While a satellite's alarm is new, the
-//! last second of each round states the integrity of all (type 6).
+//! long-term corrections, how corrections age, the grid, integrity, and type 10 where it is sent. While a
+//! satellite's alarm is new, the last second of each round states the integrity of all (type 6).
 //!
 //! The tests hold the longest intervals of RTCA DO-229D, table A-25: 6 s for accuracies, 120 s for the mask
 //! and long-term corrections, 300 s for the grid. Limits: where most of more than 26 satellites have rates, a
@@ -37,6 +37,7 @@ enum Turn {
     Mask,
     LongTerm(usize),
     Degradation,
+    Factors,
     GridMask(usize),
     Delays(usize, usize),
     Integrity,
@@ -60,6 +61,7 @@ fn turns(network: &dyn Network, halves: usize) -> Vec<Turn> {
         .chain((0..bands.len()).map(Turn::GridMask))
         .chain(delays)
         .chain([Turn::Degradation, Turn::Integrity])
+        .chain(network.factors().map(|_| Turn::Factors))
         .collect()
 }
 
@@ -85,6 +87,7 @@ pub(super) fn said(network: &dyn Network, start: Epoch) -> Option<Content> {
             Some(Content::LongTerm(Box::new([0, 1].map(half))))
         }
         Turn::Degradation => Some(at.degradation()),
+        Turn::Factors => network.factors().map(|factors| Content::Factors(Box::new(factors))),
         Turn::GridMask(place) => at.grid_mask(place),
         Turn::Delays(place, part) => at.delays(place, part),
         Turn::Integrity => Some(at.integrity()),

@@ -21,8 +21,8 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use thiserror::Error;
 
 use super::augmentation::Store;
-use super::chi_square_threshold;
 use super::least_squares::{COORDINATES, Ionosphere, Range, Solution, freedom};
+use super::{Solver, chi_square_threshold};
 use geometry::Geometry;
 use gnss::earth::{Geodetic, look};
 use gnss::record::{Fix, IntegrityRow};
@@ -75,22 +75,43 @@ fn major_m(covariance: &DMatrix<f64>) -> f64 {
     (0.5 * (east + north) + libm::hypot(0.5 * (east - north), both)).max(0.0).sqrt()
 }
 
+impl Solver {
+    /// Gives every fix protection levels by these settings.
+    pub fn set_integrity(&mut self, settings: &IntegritySettings) {
+        self.integrity = Some(settings.clone());
+    }
+
+    /// Protection levels of a fix, where they are asked for.
+    pub(super) fn protected(
+        &self,
+        ranges: &[Range],
+        solution: &Solution,
+        fix: &Fix,
+        ionosphere: &Ionosphere,
+    ) -> Option<IntegrityRow> {
+        let settings = self.integrity.as_ref()?;
+        let store = ranges.first().and_then(|range| self.augmentation.serving(range.emitted));
+        let false_alarm = self.settings.false_alarm;
+        Some(Fixed { ranges, solution, fix, ionosphere, store, false_alarm }.protect(settings))
+    }
+}
+
 /// A fix and the ranges that it is made of.
-pub(super) struct Fixed<'a> {
-    pub ranges: &'a [Range],
-    pub solution: &'a Solution,
-    pub fix: &'a Fix,
+struct Fixed<'a> {
+    ranges: &'a [Range],
+    solution: &'a Solution,
+    fix: &'a Fix,
     /// Ionosphere by which the ranges were corrected.
-    pub ionosphere: &'a Ionosphere,
+    ionosphere: &'a Ionosphere,
     /// Messages of the augmentation system that serves, if there is one.
-    pub store: Option<&'a Store>,
+    store: Option<&'a Store>,
     /// Probability that the residual test raises a false alarm.
-    pub false_alarm: f64,
+    false_alarm: f64,
 }
 
 impl Fixed<'_> {
     /// Protection levels of the fix as a row.
-    pub fn protect(&self, settings: &IntegritySettings) -> IntegrityRow {
+    fn protect(&self, settings: &IntegritySettings) -> IntegrityRow {
         let found = self.levels(settings);
         let (hpl_m, vpl_m) = found.as_ref().map_or((None, None), |levels| (levels.hpl_m, levels.vpl_m));
         let (emt_m, sigma_m) = found.as_ref().map_or((None, None), |levels| (levels.emt_m, levels.sigma_v_acc_m));

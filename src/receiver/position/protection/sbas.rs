@@ -1,9 +1,9 @@
 //! Protection levels of SBAS: deviations of what its messages bound, and of the air at the receiver.
 //!
 //! Source: RTCA DO-229D, appendix J (J.1 for approaches with vertical guidance and J.2.1 for the factors,
-//! J.2.2 corrections, J.2.3 ionosphere, J.2.4 receiver and multipath, J.2.5 troposphere), A.4.2.5 and A.4.5.1.
-//! The fix has the receiver's own weights, and its levels are those of its own estimator. Limits: the noise of
-//! the receiver is what it states, not the largest of a class.
+//! J.2.2 corrections, J.2.3 ionosphere, J.2.4 receiver and multipath, J.2.5 troposphere), A.4.2.5 and
+//! A.4.5.1. The fix has the receiver's own weights, and its levels are those of its own estimator. Limits:
+//! the noise of the receiver is what it states, not the largest of a class.
 
 use super::geometry::Geometry;
 use super::{Levels, Unprotected, major_m};

@@ -11,7 +11,7 @@ use crate::position::protection::araim::Budget;
 pub enum Method {
     /// Multiple hypotheses and separations of their solutions.
     Araim,
-    /// What an SBAS bounds.
+    /// Bounds that an SBAS sends.
     Sbas,
     /// The residual test.
     Raim,
@@ -58,8 +58,8 @@ pub struct IntegritySettings {
     pub b_nom_m: f64,
     /// Probability that a satellite is faulty (P_sat). 0: satellites have no faults.
     pub p_sat: f64,
-    /// Probability that a whole constellation is faulty (P_const). A receiver of one constellation has no test
-    /// for it, and has levels only where this is far below phmi_vertical, such as 1e-8.
+    /// Probability that a whole constellation is faulty (P_const). A receiver of one constellation has no
+    /// test for it, and has levels only where this is far below phmi_vertical, such as 1e-8.
     pub p_const: f64,
     /// Probability of a vertical error beyond its level. Method sbas has its own, 1e-7.
     pub phmi_vertical: f64,
