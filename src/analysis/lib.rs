@@ -41,6 +41,7 @@ use measure::consistency::Consistency;
 use measure::elevation::Elevations;
 use measure::errors::Errors;
 use measure::jitter::Jitter;
+use measure::protection::Protection;
 use measure::slips::Slips;
 use read::Run;
 use show::document::Forms;
@@ -116,6 +117,7 @@ struct Measured {
     errors: Errors,
     clock: Clock,
     consistency: Consistency,
+    protection: Protection,
     slips: Slips,
     jitter: Jitter,
     summary: Summary,
@@ -130,6 +132,8 @@ fn measure(read: Run, run: &Path, limits: Option<&Limits>) -> Result<Measured, J
     let slips = Slips::find(&read, &errors)?;
     let jitter = Jitter::measure(&read, &errors, &summary.details.stated)?;
     summary.add(&consistency, &slips, &jitter);
+    let protection = Protection::measure(&read, &errors)?;
+    summary.protection.clone_from(&protection.figures);
     let not_json = |source| JudgeError::Json { path: run.join("summary.json"), source };
     let verdict = Verdict::of(&read, &errors, &slips, &summary)?;
     summary.details.verdict = match limits {
@@ -139,16 +143,17 @@ fn measure(read: Run, run: &Path, limits: Option<&Limits>) -> Result<Measured, J
     summary.not_judged.clone_from(&summary.details.verdict.not_judged);
     read.sound()?;
     errors.sound()?;
-    Ok(Measured { read, errors, clock, consistency, slips, jitter, summary })
+    Ok(Measured { read, errors, clock, consistency, protection, slips, jitter, summary })
 }
 
 fn find(run: &Path, limits: Option<&Limits>, forms: Forms) -> Result<Found, JudgeError> {
     let measured = measure(Run::read(run)?, run, limits)?;
-    let Measured { read, errors, clock, consistency, slips, jitter, summary } = measured;
+    let Measured { read, errors, clock, consistency, protection, slips, jitter, summary } = measured;
     let elevations = Elevations::measure(&read, &errors, &summary.details.stated)?;
     let detail = Detail::Paper;
+    let (consistency, protection) = (&consistency, &protection);
     let judged =
-        Judged { run: &read, errors: &errors, clock: &clock, consistency: &consistency, summary: &summary, detail };
+        Judged { run: &read, errors: &errors, clock: &clock, consistency, protection, summary: &summary, detail };
     tables::write_measured(run, &judged, &elevations, &slips, &jitter)?;
     tables::write(run, &judged)?;
     let sketches = plot::sketches(&judged, forms.html)?;

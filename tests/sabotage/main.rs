@@ -17,6 +17,7 @@ mod foreign;
 mod links;
 mod observations;
 mod osnma;
+mod protection;
 mod rinex;
 mod run;
 mod spectrum;
@@ -55,6 +56,7 @@ fn kinds() -> Vec<Kind> {
         excused::kinds(),
         early::kinds(),
         osnma::kinds(),
+        protection::kinds(),
     ]
     .into_iter()
     .flatten()

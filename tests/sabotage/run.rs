@@ -187,6 +187,16 @@ impl Rx {
         self.receiver.get_or_insert_with(|| serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap())
     }
 
+    /// A table of the truth to read.
+    pub fn truth(&self, name: &str) -> Table {
+        Table::read(&self.from.join(format!("truth/{name}.csv")))
+    }
+
+    /// Adds a file that the receiver did not write.
+    pub fn add(&self, name: &str, text: &str) {
+        fs::write(self.to.join("rx").join(name), text).unwrap();
+    }
+
     /// The spectrum of the samples to edit.
     pub fn psd(&mut self) -> &mut Table {
         let path = self.from.join("psd.csv");

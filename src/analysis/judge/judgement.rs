@@ -68,6 +68,8 @@ pub enum Group {
     Clock,
     /// Sigmas that the receiver states.
     Sigmas,
+    /// Protection levels that the receiver states.
+    Protection,
     /// Level and spectrum of the samples.
     Samples,
     /// Interference and spoofing.
@@ -87,6 +89,7 @@ impl Group {
             Self::Position => "position and velocity",
             Self::Clock => "clock",
             Self::Sigmas => "stated sigmas",
+            Self::Protection => "protection levels",
             Self::Samples => "samples",
             Self::Interference => "interference and spoofing",
             Self::Tables => "consistency of the tables",

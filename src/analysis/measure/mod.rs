@@ -7,7 +7,8 @@
 //! the spectrum of the samples, [`peaks`] their correlation with the codes, [`lines`] compares the continuous
 //! waves that the receiver reported with those that there were, [`spoofing`] measures how far a spoofer moved
 //! the fixes, [`osnma`] which tags it took for authentic, [`ionosphere`] what two bands showed of it.
-//! [`independent`] says how many independent values a correlated series is worth.
+//! [`protection`] compares errors with the protection levels that the receiver states. [`independent`] says
+//! how many independent values a correlated series is worth.
 
 pub mod allan;
 pub mod clock;
@@ -20,6 +21,7 @@ pub mod jitter;
 pub mod lines;
 pub mod osnma;
 pub mod peaks;
+pub mod protection;
 pub mod psd;
 pub mod slips;
 pub mod spectrum;

@@ -16,6 +16,7 @@ use super::files::{believable, each, each_of_any, json, missing, optional, rows,
 use crate::error::JudgeError;
 use crate::read::fixes::Fixes;
 use crate::read::levels::{LevelFinder, Levels};
+use crate::read::protection::Level;
 use crate::read::spill_store::{Finder, SpillStore};
 use crate::read::table::Table;
 use crate::statistics::{mean, median};
@@ -23,8 +24,8 @@ use crate::waveform::Sampler;
 use gnss::facts::{FrontEndFacts, SceneFacts};
 use gnss::galileo::e1::E1;
 use gnss::record::{
-    AcquisitionRow, ClockRow, EventRow, Fix, InterferenceRow, IonosphereRow, LineRow, NavigationRow, Observation,
-    RayRow, SkyRow, TagRow, TrackingRow, TrajectoryRow,
+    AcquisitionRow, ClockRow, EventRow, Fix, IntegrityRow, InterferenceRow, IonosphereRow, LineRow, NavigationRow,
+    Observation, RayRow, SkyRow, TagRow, TrackingRow, TrajectoryRow,
 };
 use gnss::satellite::Sv;
 use gnss::signal::described::registered;
@@ -139,6 +140,8 @@ pub struct Run {
     pub front_ends: BTreeMap<&'static Signal, usize>,
     /// The ionosphere that it measured with two bands; none without.
     pub ionosphere: SpillStore<Sv, IonosphereRow>,
+    /// Protection levels of the fixes; empty of a receiver that states none.
+    pub levels: Table<Level>,
     /// Clock of the receiver against each time scale, by the scales' names; empty for a receiver of GPS time
     /// alone.
     pub clocks: SpillStore<&'static str, ClockRow>,
@@ -210,6 +213,7 @@ impl Run {
         })?;
         read.update_s = updates.median();
         each_of_any(&rx.join("ionosphere.csv"), |_, row: IonosphereRow| read.ionosphere.push(row.sv, &row))?;
+        each_of_any(&rx.join("integrity.csv"), |_, row: IntegrityRow| read.levels.push(row.into()))?;
         let clocks = rx.join("clocks.csv");
         each_of_any(&clocks, |line, row: ClockRow| {
             // A signal that a program adds may bring a time of its own.
@@ -348,6 +352,7 @@ impl Run {
             update_s: None,
             front_ends: BTreeMap::new(),
             ionosphere: SpillStore::new(directory),
+            levels: Table::new(directory),
             clocks: SpillStore::new(directory),
             navigation: Vec::new(),
             events: Vec::new(),
@@ -402,6 +407,7 @@ impl Run {
         self.observations.sound()?;
         self.tracking.sound()?;
         self.ionosphere.sound()?;
+        self.levels.sound()?;
         self.cn0_sums_hz.sound()?;
         self.cn0_most_hz.sound()?;
         self.trajectory.sound()?;

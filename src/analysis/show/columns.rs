@@ -6,6 +6,8 @@ pub const CLOCK: &str = "sample,time_s,estimate_s,truth_s,error_s,detrended_s";
 pub const ALLAN: &str = "series,deviation,tau_s,value,low,high,terms,alpha,freedom";
 /// `consistency.csv`.
 pub const CONSISTENCY: &str = "sample,time_s,east_m,north_m,up_m,sigma_east_m,sigma_north_m,sigma_up_m,nees";
+/// `protection.csv`.
+pub const PROTECTION: &str = "sample,time_s,horizontal_m,vertical_m,hpl_m,vpl_m,available,detected";
 /// `position.csv`.
 pub const POSITION: &str = "\
     sample,time_s,east_m,north_m,up_m,clock_m,velocity_east_mps,velocity_north_mps,velocity_up_mps,\

@@ -112,6 +112,9 @@ pub(crate) fn write_measured(
     write_read_rows(&directory.join("clock.csv"), columns::CLOCK, judged.clock.rows.cursor())?;
     write_rows(&directory.join("allan.csv"), columns::ALLAN, judged.clock.stability())?;
     write_read_rows(&directory.join("consistency.csv"), columns::CONSISTENCY, judged.consistency.rows.cursor())?;
+    if judged.protection.figures.is_some() {
+        write_read_rows(&directory.join("protection.csv"), columns::PROTECTION, judged.protection.rows.cursor())?;
+    }
     write_rows(&directory.join("satellites.csv"), columns::SATELLITES, elevations.satellites.iter())?;
     write_rows(&directory.join("elevation.csv"), columns::ELEVATION, elevations.bands.iter())?;
     write_slips(directory, slips)?;

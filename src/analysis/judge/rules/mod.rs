@@ -19,6 +19,7 @@ mod motion;
 mod osnma;
 mod own_fixes;
 mod position;
+mod protection;
 mod reception;
 mod scales;
 mod spectrum;
@@ -57,6 +58,7 @@ impl Verdict {
         verdict.about(Group::Position).values(run, errors, summary)?;
         let places = errors.positions.map(|error| (error.time_s, error.enu_m.norm()))?;
         verdict.within(&run.scene.expect, places.into_iter());
+        verdict.about(Group::Protection).protection(summary);
         verdict.about(Group::Tracking).tracking(run, summary);
         verdict.links(run, errors, summary)?;
         verdict.excused(run, errors)?;

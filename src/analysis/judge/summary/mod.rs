@@ -21,6 +21,7 @@ use crate::measure::ionosphere::Ionosphere;
 use crate::measure::jitter::{Jitter as LoopJitter, Loop, Pooled};
 use crate::measure::lines::Lines;
 use crate::measure::osnma::Osnma;
+use crate::measure::protection;
 use crate::measure::slips::{Cause, Slips};
 use crate::measure::spoofing::Spoofing;
 use crate::read::{Numbers, Run, Speed};
@@ -75,6 +76,9 @@ pub struct Summary {
     /// The ionosphere that two bands showed; absent without a satellite that has them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ionosphere: Option<Ionosphere>,
+    /// Errors against the protection levels; absent of a receiver that states none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub protection: Option<protection::Figures>,
     /// Figures that the verdict does not judge, each with the reason.
     pub not_judged: Vec<String>,
     /// Speed of the stages.
@@ -347,6 +351,7 @@ impl Summary {
             spoofing: Spoofing::of(run)?,
             osnma: Osnma::of(run)?,
             ionosphere: Ionosphere::of(run)?,
+            protection: None,
             jammed: !run.scene.interference.is_empty(),
             not_judged: Vec::new(),
             speed: run.speed,

@@ -4,6 +4,7 @@ use crate::judge::summary::Summary;
 use crate::measure::clock::Clock;
 use crate::measure::consistency::Consistency;
 use crate::measure::errors::Errors;
+use crate::measure::protection::Protection;
 use crate::read::Run;
 use crate::show::plot::chart::{Axis, Chart, Mark, Series};
 use crate::show::plot::sketch::Sketch;
@@ -23,6 +24,7 @@ pub(crate) struct Judged<'a> {
     pub errors: &'a Errors,
     pub clock: &'a Clock,
     pub consistency: &'a Consistency,
+    pub protection: &'a Protection,
     pub summary: &'a Summary,
     pub detail: Detail,
 }

@@ -4,7 +4,7 @@
 //! what is drawn, as a sketch that holds all it needs: a run's rows are gone before the first picture is
 //! drawn. A picture with nothing to show is drawn with empty axes, so that a script finds the files it
 //! expects; only `psd.png` and `peaks.png` depend on `psd.csv` and `peaks.csv` being there, `spoofing.png` on
-//! a spoofer and `multipath.png` on `truth/rays.csv`.
+//! a spoofer, `multipath.png` on `truth/rays.csv` and `stanford.png` on `rx/integrity.csv`.
 
 pub mod canvas;
 pub mod chart;
@@ -22,6 +22,7 @@ mod marks;
 mod multipath;
 mod peaks;
 mod position;
+mod protection;
 mod series;
 mod signals;
 pub mod sketch;
@@ -55,7 +56,7 @@ pub(crate) struct Picture {
 }
 
 /// The pictures in the order of the report, where a tall one and a low one share a page.
-pub(crate) const PICTURES: [Picture; 18] = [
+pub(crate) const PICTURES: [Picture; 19] = [
     Picture {
         name: "sky",
         title: "sky",
@@ -203,6 +204,15 @@ pub(crate) const PICTURES: [Picture; 18] = [
         caption: "Where the fixes went between the truth and what the spoofer claims.",
         numbers: &["position.csv", "truth/claimed.csv"],
         sketch: position::spoofing,
+    },
+    Picture {
+        name: "stanford",
+        title: "protection levels",
+        caption: "Protection level of every fix over its error (Stanford diagram). Below the line through the origin \
+                  the error is larger than the level: misleading information, and hazardous to the right of the alert \
+                  limit. Above the alert limit the fix is not available.",
+        numbers: &["protection.csv"],
+        sketch: protection::stanford,
     },
 ];
 

@@ -16,6 +16,7 @@ const MOST_EVENTS: usize = 30;
 pub(super) fn add(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeError> {
     report.heading("Accuracy");
     accuracy(report, judged);
+    protection(report, judged);
     signals(report, judged);
     loops(report, judged);
     satellites(report, judged)?;
@@ -62,6 +63,49 @@ fn accuracy(report: &mut Report, judged: &Judged<'_>) {
     row("position up", "m", details.up_m);
     row("clock, as a distance", "m", details.clock_m);
     row("velocity, magnitude", "m/s", details.velocity_mps);
+    report.table(table);
+}
+
+/// Adds availability, continuity and the regions of the Stanford diagrams, of a receiver with levels.
+fn protection(report: &mut Report, judged: &Judged<'_>) {
+    let Some(found) = &judged.summary.protection else { return };
+    let columns = [
+        ("axis", Side::Left),
+        ("mean level (m)", Side::Right),
+        ("limit (m)", Side::Right),
+        ("nominal", Side::Right),
+        ("misleading", Side::Right),
+        ("hazardous", Side::Right),
+        ("unavailable", Side::Right),
+        ("and misleading", Side::Right),
+        ("largest error over level", Side::Right),
+    ];
+    let mut table = Table::new(
+        format!(
+            "Protection levels ({}): {} % of {} fixes available, {} interruptions, {} of the windows of 15 s \
+             without one. Fixes by the regions of the Stanford diagram.",
+            found.method.as_deref().unwrap_or("of an unnamed method"),
+            fixed(Some(100.0 * found.available_share), 2),
+            found.fixes,
+            found.interruptions,
+            found.continuity.map_or_else(|| "no whole one".to_owned(), |share| format!("{} %", number(100.0 * share))),
+        ),
+        columns,
+    );
+    for (name, diagram) in [("horizontal", &found.horizontal), ("vertical", &found.vertical)] {
+        let Some(of) = diagram else { continue };
+        table.row([
+            name.to_owned(),
+            fixed(Some(of.level_mean_m), 2),
+            shown(of.alert_limit_m),
+            of.nominal.to_string(),
+            of.misleading.to_string(),
+            of.hazardous.to_string(),
+            of.unavailable.to_string(),
+            of.unavailable_misleading.to_string(),
+            fixed(Some(of.ratio_max), 3),
+        ]);
+    }
     report.table(table);
 }
 
