@@ -40,6 +40,8 @@ START = {"base.toml": datetime(2010, 7, 1, 8, 5, 58), "drive.toml": datetime(201
          "base_e1.toml": datetime(2020, 11, 29, 12, 50, 30)}
 # Satellites in view of base.toml, whose spoofed messages are wrong.
 IN_VIEW = ["G07", "G10", "G05", "G13", "G08", "G16", "G02", "G23"]
+# Reason for which the verdict of a test with another claimed time is recorded and not held against the pack.
+OTHER_SKY = "the judge holds observations against the true sky, and a captured receiver has those of the claimed time"
 # Loss of a jammer's power through the body of a car, and through the decks of a ship.
 LOSS_DB = 20
 # The first pattern that is in a test's code, name or description says why no scene says it.
@@ -648,7 +650,10 @@ def manifest():
                 text = f"{name} ({note})" if note else name
                 scene = keys.pop("scene", "base.toml")
                 lines = "".join(f"set.{key} = {toml(value)}\n" for key, value in keys.items())
-                entries.append(f"[[entry]]\n{head}description = {toml(text)}\nscene = {toml(scene)}\n{lines}")
+                verdict = ""
+                if any("time_offset_s" in spoofer for spoofer in keys.get("spoofer", [])):
+                    verdict = f'verdict = "any"\nreason = {toml(OTHER_SKY)}\n'
+                entries.append(f"[[entry]]\n{head}description = {toml(text)}\nscene = {toml(scene)}\n{verdict}{lines}")
     top = (
         "# Made by `packaging/jammertest.py --write` from data/jammertest: edit the script, not this file.\n"
         'name = "jammertest"\n'
