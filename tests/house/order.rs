@@ -115,6 +115,7 @@ pub const ORDER: Order<'static> = &[
             &["rinex_obs", "nmea", "delay", "emission", "levels", "protection", "rows", "table"],
             &["common", "fixes"],
             &["run"],
+            &["sky"],
         ],
     ),
     (

@@ -18,6 +18,7 @@ mod protection;
 pub mod rinex_obs;
 mod rows;
 mod run;
+mod sky;
 pub mod spill_store;
 pub mod table;
 mod word_file;

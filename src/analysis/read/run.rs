@@ -17,15 +17,14 @@ use crate::error::JudgeError;
 use crate::read::fixes::Fixes;
 use crate::read::levels::{LevelFinder, Levels};
 use crate::read::protection::Level;
-use crate::read::spill_store::{Finder, SpillStore};
+use crate::read::spill_store::SpillStore;
 use crate::read::table::Table;
 use crate::statistics::{mean, median};
 use crate::waveform::Sampler;
 use gnss::facts::{FrontEndFacts, SceneFacts};
-use gnss::galileo::e1::E1;
 use gnss::record::{
     AcquisitionRow, ClockRow, EventRow, Fix, IntegrityRow, InterferenceRow, IonosphereRow, LineRow, NavigationRow,
-    Observation, RayRow, SkyRow, TagRow, TrackingRow, TrajectoryRow,
+    Observation, RayRow, SkyRow, TrackingRow, TrajectoryRow,
 };
 use gnss::satellite::Sv;
 use gnss::signal::described::registered;
@@ -123,7 +122,7 @@ pub struct Run {
     /// whose name they count: until its message says who a satellite is, a receiver takes either name.
     pub alike: BTreeMap<Link, Sv>,
     /// Directory of the truth's tables.
-    truth_place: PathBuf,
+    pub(super) truth_place: PathBuf,
     /// Directory of the receiver's tables; `None` for a truth alone.
     pub rx: Option<PathBuf>,
     /// The receiver's observations.
@@ -180,7 +179,8 @@ fn named(alike: &BTreeMap<Link, Sv>, link: Link) -> Sv {
 }
 
 const TRUTH: &str = "the generator writes it: make the run again with `gnss-twin run`, or `gnss-twin generate`";
-const RECEIVER: &str = "the receiver writes it: `gnss-twin receive FILE --out RUN/rx`, or make the run again";
+pub(super) const RECEIVER: &str =
+    "the receiver writes it: `gnss-twin receive FILE --out RUN/rx`, or make the run again";
 
 impl Run {
     /// Reads a run's directory. `psd.csv`, `peaks.csv`, `speed.json`, `scenario.toml` and `rx/receiver.json`
@@ -365,36 +365,6 @@ impl Run {
         })
     }
 
-    /// Satellites that are in the sky at some time.
-    pub fn in_the_sky(&self) -> BTreeSet<Sv> {
-        self.sky.keys().map(|link| link.sv).collect()
-    }
-
-    /// Values of `of` for the rows of a satellite in the sky. The rows are those of its signal that is there
-    /// longest. A satellite's direction is equal for all of its signals.
-    ///
-    /// # Errors
-    ///
-    /// [`JudgeError::Read`] where spilled rows cannot be read.
-    pub fn seen<U>(&self, sv: Sv, of: impl FnMut(SkyRow) -> U) -> Result<Vec<U>, JudgeError> {
-        self.seen_longest(sv).map_or(Ok(Vec::new()), |link| self.sky.map(link, of))
-    }
-
-    /// Rows of a satellite in the sky, found by their samples.
-    ///
-    /// # Errors
-    ///
-    /// Same as [`SpillStore::finder`].
-    pub fn seen_at(&self, sv: Sv) -> Result<Option<Finder<'_, Link, SkyRow>>, JudgeError> {
-        self.seen_longest(sv).map(|link| self.sky.finder(link)).transpose()
-    }
-
-    fn seen_longest(&self, sv: Sv) -> Option<Link> {
-        let own = self.sky.keys().filter(|link| link.sv == sv);
-        // Of equal ones the first.
-        own.rev().max_by_key(|link| self.sky.count(link))
-    }
-
     /// Checks that all rows which were looked up by their samples could be read.
     ///
     /// # Errors
@@ -478,30 +448,6 @@ impl Run {
         let center_hz = first.carrier_hz() - sign(scene.inverted ^ mirrored) * rest_hz(first_hz).abs();
         (scene.inverted, scene.center_hz) = (scene.inverted ^ mirrored, Some(center_hz));
         Ok(())
-    }
-
-    /// Results of the tags of a receiver that verifies Galileo's authentication.
-    ///
-    /// # Errors
-    /// A table that is missing or cannot be read.
-    pub fn tags(&self) -> Result<Vec<TagRow>, JudgeError> {
-        self.rx.as_ref().map_or(Ok(Vec::new()), |rx| rows(&rx.join("osnma.csv"), RECEIVER))
-    }
-
-    /// Observations of a spoofer's signals on E1 alone, by satellite and sample; spoofers count from 1.
-    ///
-    /// # Errors
-    /// A table that cannot be read.
-    pub fn spoofed(&self, number: usize) -> Result<BTreeMap<(Sv, u64), Observation>, JudgeError> {
-        let suffix = if number > 1 { format!("_{number}") } else { String::new() };
-        let mut all = BTreeMap::new();
-        each_of_any(&self.truth_place.join(format!("spoofed{suffix}.csv")), |_, row: Observation| {
-            if row.signal == &E1 {
-                all.insert((row.sv, row.sample), row);
-            }
-            Ok(())
-        })?;
-        Ok(all)
     }
 
     /// A number among the receiver's tracking settings, if they name it.
