@@ -91,6 +91,12 @@ impl Page {
         Ok(Self::new(number as u8, Gst::new(week as u16, tow_s), joined(even), joined(odd)))
     }
 
+    /// Row of a recording, as [`Self::from_row`] reads it.
+    pub fn row(&self) -> String {
+        let Self { sender, start, even, odd } = self;
+        format!("{},{},{sender},{even:030X}{odd:030X}", start.tow_s(), start.week())
+    }
+
     /// Holds the page to its form and its check of 24 bits (OS SIS ICD 2.1, 5.1.9.4).
     ///
     /// # Errors
@@ -152,7 +158,7 @@ mod tests {
         let page = Page::from_row(ROW).unwrap();
         assert_eq!((page.sender, page.start, page.index()), (2, Gst::new(1251, 277_201), 0));
         assert_eq!(page.check(), Ok(()));
-        assert_eq!(page.word() >> 122, 2);
+        assert_eq!((page.word() >> 122, page.row().as_str()), (2, ROW));
         let changed = Page::from_row(&ROW.replace("277201,1251,2,0213", "277201,1251,2,0212")).unwrap();
         assert_eq!(changed.check(), Err(PageError::Checksum));
         let swapped = Page { even: page.odd, odd: page.even, ..page };

@@ -41,6 +41,31 @@ fn key_file(id: u8) -> String {
     )
 }
 
+#[test]
+fn a_scene_s_pages_are_authentic_with_the_keys_that_its_truth_has() {
+    let here = tempfile::tempdir().unwrap();
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/osnma.toml");
+    let scene = scene.to_str().unwrap();
+    let run = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_gnss-twin"));
+        command.args(arguments).current_dir(here.path()).stdin(Stdio::null()).output().unwrap()
+    };
+    let made = run(&["generate", scene, "--samples", "4096", "--out", "some.sigmf-data", "--quiet"]);
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    let pages = run(&["osnma", "pages", scene]);
+    // Nine satellites, and the pages of 100 s.
+    assert_eq!(pages.stdout.iter().filter(|&&byte| byte == b'\n').count(), 9 * 50);
+    fs::write(here.path().join("pages.csv"), pages.stdout).unwrap();
+    let key = ["--public-key", "some.truth/osnma_test_public_key.xml"];
+    let kroot = ["--kroot", "some.truth/osnma_test_kroot.hex", "--json"];
+    let (code, text, said) = twin(here.path(), &[&["pages.csv"][..], &key, &kroot].concat());
+    assert_eq!((code, said.as_str()), (Some(0), ""));
+    let object: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!((&object["start"], &object["first_authentic_after_s"]), (&"hot".into(), &120.into()));
+    let refused = run(&["osnma", "pages", scene, "--spoofer", "1"]);
+    assert_eq!(refused.status.code(), Some(2));
+}
+
 /// A directory with a recording, a public key, and the digits of the tree's root.
 fn bench() -> (tempfile::TempDir, String) {
     let here = tempfile::tempdir().unwrap();

@@ -16,6 +16,24 @@ pub struct Osnma {
 pub enum OsnmaAction {
     /// Verify a recording of I/NAV pages: keys, signatures and tags
     Verify(Verify),
+    /// Print the I/NAV pages that a scene's satellites send on E1-B, for `osnma verify` and other verifiers
+    Pages(Pages),
+}
+
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:\n  gnss-twin osnma pages scenarios/osnma.toml >pages.csv\n  gnss-twin osnma pages \
+                        spoofed.toml --spoofer 1 >spoofed.csv\n\nRows: TOW,WN,SV,page as 60 hexadecimal digits, of all \
+                        satellites of the scene whether they are in view or not, with the scene's message faults")]
+pub struct Pages {
+    /// Scene with a table [osnma]
+    #[arg(value_name = "SCENARIO.toml")]
+    pub scenario: PathBuf,
+    /// Pages of a spoofer by its number, from 1 [default: those of the satellites]
+    #[arg(long, value_name = "N")]
+    pub spoofer: Option<usize>,
+    /// Seed, overrides the scene's
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
 }
 
 #[derive(Args, Debug)]

@@ -2,6 +2,7 @@
 
 pub mod args;
 mod pages;
+mod sent;
 mod summary;
 mod verify;
 
@@ -12,5 +13,6 @@ use args::{Osnma, OsnmaAction};
 pub fn execute(arguments: &Osnma) -> Result<(), CliError> {
     match &arguments.action {
         OsnmaAction::Verify(arguments) => verify::execute(arguments),
+        OsnmaAction::Pages(arguments) => sent::execute(arguments),
     }
 }
