@@ -28,7 +28,7 @@ fn plant(rx: &mut Rx, of: impl Fn(usize, [f64; 2]) -> Option<[f64; 2]>) {
     let fixes = rx.table("fixes");
     for row in 0..fixes.rows.len() {
         let enu_m = axes * (Vector3::from(["x_m", "y_m", "z_m"].map(|axis| fixes.get(row, axis))) - true_m);
-        let errors_m = [enu_m.x.hypot(enu_m.y), enu_m.z.abs()];
+        let errors_m = [libm::hypot(enu_m.x, enu_m.y), enu_m.z.abs()];
         if let Some([hpl_m, vpl_m]) = of(row, errors_m) {
             let sample = fixes.text(row, "sample");
             writeln!(text, "{sample},0,0,araim,{hpl_m},{vpl_m},,,8,false,,true,").unwrap();

@@ -61,6 +61,9 @@ pub struct OsnmaSpec {
     pub transitions: Vec<(Change, f64)>,
 }
 
+/// Number of a spoofer, and the authentication in its messages; `None` for zeros.
+pub(super) type OfSpoofer = (usize, Option<Arc<dyn Authentication>>);
+
 pub(crate) fn hashes() -> Vec<&'static str> {
     HASHES.map(|(name, _)| name).to_vec()
 }
@@ -175,8 +178,8 @@ impl Scenario {
         catalogue: &Arc<Catalogue>,
         common: &Common,
         seed: u64,
-    ) -> Result<Vec<(usize, Option<Arc<dyn Authentication>>)>, ScenarioError> {
-        let mut found: Vec<(usize, Option<Arc<dyn Authentication>>)> = Vec::new();
+    ) -> Result<Vec<OfSpoofer>, ScenarioError> {
+        let mut found: Vec<OfSpoofer> = Vec::new();
         for (number, spoofer) in (1..).zip(&self.spoofers) {
             match (&self.osnma, spoofer.osnma) {
                 (Some(spec), Spoofed::OwnKeys) => {

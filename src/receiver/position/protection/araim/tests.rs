@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::*;
 
 /// East, north, up, constellation, C_int and C_acc in m² of each satellite: appendix D, equations 79 to 84.
-const SKY: [(f64, f64, f64, usize, f64, f64); 10] = [
+const SKY: [Satellite; 10] = [
     (0.0225, 0.9951, -0.0966, 0, 3.2899, 2.9774),
     (0.6750, -0.6900, -0.2612, 0, 1.2792, 0.9667),
     (0.0723, -0.6601, -0.7477, 0, 0.7901, 0.4776),
@@ -29,10 +29,12 @@ const LPV_200: Budget = Budget {
     p_const: 1e-4,
 };
 
-fn geometry(sky: &[(f64, f64, f64, usize, f64, f64)]) -> Geometry {
-    let diagonal = |of: fn(&(f64, f64, f64, usize, f64, f64)) -> f64| {
-        DMatrix::from_diagonal(&DVector::from_iterator(sky.len(), sky.iter().map(of)))
-    };
+/// Row of the printed table: geometry (east, north, up), constellation, and its columns of integrity and accuracy.
+type Satellite = (f64, f64, f64, usize, f64, f64);
+
+fn geometry(sky: &[Satellite]) -> Geometry {
+    let diagonal =
+        |of: fn(&Satellite) -> f64| DMatrix::from_diagonal(&DVector::from_iterator(sky.len(), sky.iter().map(of)));
     Geometry {
         rows: DMatrix::from_fn(sky.len(), 5, |row, column| match column {
             0 => sky[row].0,
