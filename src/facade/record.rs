@@ -17,9 +17,9 @@
 //! ```
 //!
 //! The receiver's rows are [`AcquisitionRow`], [`TrackingRow`], [`EventRow`] with its [`Event`],
-//! [`NavigationRow`], [`ClockRow`], [`SightRow`], [`IonosphereRow`], [`IntegrityRow`] and [`LineRow`]. The
-//! truth's rows are [`TrajectoryRow`], [`SkyRow`], [`RayRow`], [`InterferenceRow`] and [`PassRow`]. Tables
-//! that the program wrote are read back as these types:
+//! [`NavigationRow`], [`ClockRow`], [`SightRow`], [`IonosphereRow`] and [`LineRow`]. The truth's rows are
+//! [`TrajectoryRow`], [`SkyRow`], [`RayRow`], [`InterferenceRow`] and [`PassRow`]. Tables that the program
+//! wrote are read back as these types:
 //!
 //! ```
 //! use gnss_twin::record::{Event, EventRow};
@@ -33,6 +33,6 @@
 
 #[doc(inline)]
 pub use ::gnss::record::{
-    AcquisitionRow, ClockRow, Event, EventRow, Fix, IntegrityRow, InterferenceRow, IonosphereRow, LineRow,
-    NavigationRow, Observation, PassRow, RayRow, SightRow, SkyRow, TrackingRow, TrajectoryRow,
+    AcquisitionRow, ClockRow, Event, EventRow, Fix, InterferenceRow, IonosphereRow, LineRow, NavigationRow,
+    Observation, PassRow, RayRow, SightRow, SkyRow, TrackingRow, TrajectoryRow,
 };

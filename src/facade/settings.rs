@@ -1,12 +1,11 @@
 //! Settings of the receiver, with defaults for all of them.
 //!
 //! [`Settings`] has four groups: [`AcquisitionSettings`], [`TrackingSettings`], [`PositionSettings`] and
-//! [`OperationSettings`], and [`IntegritySettings`] where fixes are to have protection levels:
+//! [`OperationSettings`]:
 //!
 //! ```
 //! use gnss_twin::settings::{
-//!     AcquisitionSettings, IntegritySettings, OperationSettings, PositionSettings, Settings,
-//!     TrackingSettings,
+//!     AcquisitionSettings, OperationSettings, PositionSettings, Settings, TrackingSettings,
 //! };
 //!
 //! let settings = Settings {
@@ -14,7 +13,7 @@
 //!     tracking: TrackingSettings { pll_bandwidth_hz: 10.0, ..Default::default() },
 //!     position: PositionSettings { mask_deg: 15.0, ..Default::default() },
 //!     operation: OperationSettings { measurement_interval_ms: 200, ..Default::default() },
-//!     integrity: Some(IntegritySettings { p_const: 1e-8, ..Default::default() }),
+//!     ..Settings::default()
 //! };
 //! settings.validate("own")?;
 //! assert_ne!(settings, Settings::default());
@@ -25,8 +24,7 @@
 //!
 //! ```
 //! use gnss_twin::settings::{
-//!     CodeDiscriminator, IntegrityMethod, IonosphereChoice, Operation, SbasChoice, Settings, SystemClocks,
-//!     TroposphereChoice,
+//!     CodeDiscriminator, IonosphereChoice, SbasChoice, Settings, SystemClocks, TroposphereChoice,
 //! };
 //!
 //! let mut settings = Settings::default();
@@ -35,10 +33,19 @@
 //! settings.position.troposphere = TroposphereChoice::None;
 //! settings.tracking.dll_discriminator = CodeDiscriminator::DotProduct;
 //! let (_, _): (SbasChoice, SystemClocks) = (settings.position.sbas, settings.position.system_clocks);
-//! assert_ne!(IntegrityMethod::Araim.name(), format!("{:?}", Operation::Approach));
 //! let text = "position = { ionosphere = \"none\", troposphere = \"none\" }\n\
 //!             tracking = { dll_discriminator = \"dot_product\" }\n";
 //! assert_eq!(settings, Settings::parse(text, "own.toml")?);
+//! # Ok::<(), gnss_twin::settings::SettingsError>(())
+//! ```
+//!
+//! Authentication and protection levels have tables that a text sets:
+//!
+//! ```
+//! use gnss_twin::settings::Settings;
+//!
+//! let settings = Settings::parse("[integrity]\nmethod = \"raim\"\n", "own.toml")?;
+//! assert!(settings.integrity.is_some() && settings.osnma.is_none());
 //! # Ok::<(), gnss_twin::settings::SettingsError>(())
 //! ```
 //!
@@ -54,8 +61,6 @@
 
 #[doc(inline)]
 pub use ::receiver::acquire::AcquisitionSettings;
-#[doc(inline)]
-pub use ::receiver::position::protection::{IntegritySettings, Method as IntegrityMethod, Operation};
 #[doc(inline)]
 pub use ::receiver::position::{IonosphereChoice, PositionSettings, SbasChoice, SystemClocks, TroposphereChoice};
 #[doc(inline)]

@@ -15,7 +15,7 @@
 //! Hilferty 1931); z is that of the false alarm over the number of slices or bins. Nothing is added for an
 //! error of the expectation. Bins that a line or the edge of a noise's band fills, those 40 dB below the
 //! peak, and of real samples the ends of the band are left out. Limits: [`excuse`] names what is not judged,
-//! and sweeps longer than [`sweep::SEGMENTS`] segments are not.
+//! and sweeps longer than `sweep::SEGMENTS` segments are not.
 
 use crate::error::JudgeError;
 use crate::expect::front_end::FrontEnd;

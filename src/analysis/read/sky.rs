@@ -32,7 +32,7 @@ impl Run {
     ///
     /// # Errors
     ///
-    /// Same as [`SpillStore::finder`].
+    /// Same as [`crate::read::spill_store::SpillStore::finder`].
     pub fn seen_at(&self, sv: Sv) -> Result<Option<Finder<'_, Link, SkyRow>>, JudgeError> {
         self.seen_longest(sv).map(|link| self.sky.finder(link)).transpose()
     }

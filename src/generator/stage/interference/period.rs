@@ -3,7 +3,7 @@
 //! A sweep that repeats has lines at the multiples of its rate. Those in the band, of a transform of one
 //! period, make a waveform without anything that folds; the interpolator of recordings reads it at each
 //! sample. Cost: 64 products a sample in place of a sine. Limits: the band's edges are as steep as lines are
-//! apart; sweeps of more than [`MOST_CYCLES`] cycles have none, and cross the edges so slowly that a gate by
+//! apart; sweeps of more than `MOST_CYCLES` cycles have none, and cross the edges so slowly that a gate by
 //! the momentary frequency is as good.
 
 use fft::{Complex, Planner};

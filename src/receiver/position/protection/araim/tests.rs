@@ -29,7 +29,7 @@ const LPV_200: Budget = Budget {
     p_const: 1e-4,
 };
 
-/// Row of the printed table: geometry (east, north, up), constellation, and its columns of integrity and accuracy.
+/// Row of the printed table: geometry (east, north, up), constellation, columns of integrity and accuracy.
 type Satellite = (f64, f64, f64, usize, f64, f64);
 
 fn geometry(sky: &[Satellite]) -> Geometry {
