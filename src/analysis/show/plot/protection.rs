@@ -44,11 +44,12 @@ pub fn stanford(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
             || format!("{name}: no levels"),
             |found| {
                 format!(
-                    "{name}: {} nominal, {} misleading, {} hazardous, {} unavailable",
+                    "{name}: {} nominal, {} misleading, {} hazardous, {} unavailable, {} without a level",
                     found.nominal,
                     found.misleading + found.unavailable_misleading,
                     found.hazardous,
-                    found.unavailable + found.unavailable_misleading
+                    found.unavailable + found.unavailable_misleading,
+                    figures.fixes.saturating_sub(found.fixes)
                 )
             },
         );
