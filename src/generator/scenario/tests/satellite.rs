@@ -12,7 +12,7 @@ use gnss::time::GST;
 /// Every key of the tables.
 pub(super) const FAULTS: &str = "[orbits]\nsp3 = [\"a.sp3\", \"b.sp3.gz\"]\nantenna_offset_m = 0.7\n\
                                  antenna_offsets_m = { G13 = 1.5 }\n\
-    [sbas]\ntest = true\ndo_not_use = [\"G03\"]\n\
+    [sbas]\ntest = true\ndo_not_use = [\"G03\"]\ndegradation = true\n\
     [[satellite_fault]]\nkind = \"clock_step\"\nsatellites = [\"G13\"]\nstep_s = 1e-7\non_s = 3\noff_s = 5\n\
     [[satellite_fault]]\nkind = \"clock_ramp\"\nsatellites = [\"G13\"]\ndrift_sps = 1e-9\n\
     [[satellite_fault]]\nkind = \"clock_noise\"\noscillator = \"rubidium1\"\n\
