@@ -12,8 +12,8 @@ use serde::Serialize;
 use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use gnss::gps::l1ca::L1_CA;
 use gnss::record::{
-    AcquisitionRow, Event, EventRow, Fix, IonosphereModel, IonosphereRow, LineRow, NavigationRow, Observation, SkyRow,
-    TrackingRow, TrajectoryRow,
+    AcquisitionRow, Event, EventRow, Fix, IntegrityRow, IonosphereModel, IonosphereRow, LineRow, NavigationRow,
+    Observation, SkyRow, TrackingRow, TrajectoryRow,
 };
 use gnss::satellite::Sv;
 use gnss::time::Epoch;
@@ -302,6 +302,28 @@ pub(crate) fn two_bands(run: &Path, error_m: impl Fn(u64) -> f64) {
         sigma_m: 0.05,
     };
     write(&run.join("rx/ionosphere.csv"), &(0..41).map(row).collect::<Vec<_>>());
+}
+
+/// Adds protection levels of 20 and 30 m by ARAIM to every fix of a run.
+pub(crate) fn protected(run: &Path) {
+    let fixes: Vec<Fix> =
+        csv::Reader::from_path(run.join("rx/fixes.csv")).unwrap().into_deserialize().map(Result::unwrap).collect();
+    let row = |fix: &Fix| IntegrityRow {
+        sample: fix.sample,
+        gps_s: fix.gps_s,
+        gps_fraction_s: fix.gps_fraction_s,
+        method: "araim".to_owned(),
+        hpl_m: Some(20.0),
+        vpl_m: Some(30.0),
+        emt_m: Some(8.0),
+        sigma_v_acc_m: Some(1.2),
+        satellites: fix.satellites,
+        detected: false,
+        excluded: String::new(),
+        available: true,
+        reason: String::new(),
+    };
+    write(&run.join("rx/integrity.csv"), &fixes.iter().map(row).collect::<Vec<_>>());
 }
 
 /// Makes the receiver of a run one that verifies Galileo's authentication, from TOW 375 150 of week 566 of

@@ -127,6 +127,7 @@ fn recorded_pages_come_through_symbols_and_decoders_bit_for_bit_and_their_tags_a
     let (Some(pages), Some(key)) = (external(pages), external(key)) else { return };
     let text = String::from_utf8(inflate(&fs::read(pages).unwrap(), 1 << 24).unwrap()).unwrap();
     let pages: Vec<Page> = text.lines().map(|row| Page::from_row(row).unwrap()).collect();
+    let key = fs::canonicalize(key).unwrap();
     let mut settings = OsnmaSettings { public_key: key.to_string_lossy().into_owned(), ..OsnmaSettings::default() };
     settings.read_files(Path::new("/"), "rx.toml", "").unwrap();
     let first = pages.iter().map(|page| page.start).min().unwrap();

@@ -174,7 +174,6 @@ impl Covariance {
     /// satellite in ECEF, and the rounding of the elements is `c_covariance` steps (A.4.5.1.4.1).
     pub fn delta(&self, sight: &Vector3<f64>, c_covariance: f64) -> f64 {
         let line = Vector4::new(sight.x, sight.y, sight.z, 1.0);
-        let line = planted!("gnss.sbas.covariance", line, Vector4::new(sight.x, sight.y, sight.z, -1.0));
         (self.factor() * line).norm() + c_covariance * self.scale()
     }
 }

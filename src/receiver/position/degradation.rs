@@ -35,7 +35,7 @@ pub enum LongTermAge {
 pub fn corrected_m(sigma_m: f64, factors: &Factors, ageing: &Ageing, age: &Age) -> f64 {
     let fast_m = 0.5 * ageing.acceleration_mps2 * age.accuracy_s * age.accuracy_s;
     let terms = [fast_m, rate_m(factors, ageing, age), long_term_m(factors, age.long_term)];
-    grown_m(sigma_m, &terms, planted!("receiver.sbas.squared", factors.is_squared, true))
+    grown_m(sigma_m, &terms, factors.is_squared)
 }
 
 /// Standard deviation in metres of a vertical delay that came so many seconds ago.

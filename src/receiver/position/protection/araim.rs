@@ -128,8 +128,8 @@ pub fn levels(geometry: &Geometry, budget: &Budget) -> Result<Levels, Unprotecte
     let emt = modes.iter().filter(|mode| mode.probability >= budget.p_emt).map(|mode| mode.thresholds_m[UP]);
     let horizontal_m = libm::hypot(level(0), level(1));
     Ok(Levels {
-        hpl_m: Some(planted!("receiver.araim.level", horizontal_m, 0.5 * horizontal_m)),
-        vpl_m: Some(planted!("receiver.araim.level", level(UP), 0.5 * level(UP))),
+        hpl_m: Some(horizontal_m),
+        vpl_m: Some(level(UP)),
         emt_m: Some(emt.fold(0.0, f64::max)),
         sigma_v_acc_m: Some(all.sigmas_m(&geometry.accuracy)[UP]),
         is_contradicted: modes.iter().any(|mode| mode.is_separated),
