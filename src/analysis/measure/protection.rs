@@ -216,7 +216,7 @@ struct Counts {
 impl Counts {
     fn add(&mut self, error_m: f64, level_m: Option<f64>, limit_m: Option<f64>, available: bool) {
         let Some(level_m) = level_m else { return };
-        let is_beyond = planted!("analysis.protection.beyond", error_m > level_m, error_m > 10.0 * level_m);
+        let is_beyond = error_m > level_m;
         let region = match (is_beyond, limit_m) {
             (false, _) => 0,
             (true, Some(limit_m)) if error_m > limit_m => 2,
