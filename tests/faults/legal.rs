@@ -98,6 +98,10 @@ const NUMBERS: &[Row] = &[
     ("tracking", "fll_assist_bandwidth_hz dll_pull_in_s phase_unlock_threshold cn0_threshold_dbhz", Yes, No),
     ("position", "mask_deg smoothing_s ionosphere_wait_s ionosphere_error_share", Yes, No),
     ("position", "false_alarm model_sigma_m", No, No),
+    // No fault, no bias, no error of a satellite; a level needs a limit and a promise.
+    ("integrity", "sigma_ura_m sigma_ure_m b_nom_m p_sat p_const p_emt", Yes, No),
+    ("integrity", "phmi_vertical phmi_horizontal false_alarm_vertical false_alarm_horizontal p_threshold", No, No),
+    ("integrity", "missed_detection hal_m val_m emt_limit_m sigma_v_acc_limit_m", No, No),
     ("operation", "search_interval_s reacquisition_interval_s repeated_false_alarm_share frame_limit_s", No, No),
     // A study's own tables; a scene has none of these names.
     ("measure", "settle_s", Yes, No),
