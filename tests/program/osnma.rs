@@ -53,15 +53,15 @@ fn a_scene_s_pages_are_authentic_with_the_keys_that_its_truth_has() {
     let made = run(&["generate", scene, "--samples", "4096", "--out", "some.sigmf-data", "--quiet"]);
     assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
     let pages = run(&["osnma", "pages", scene]);
-    // Nine satellites, and the pages of 100 s.
-    assert_eq!(pages.stdout.iter().filter(|&&byte| byte == b'\n').count(), 9 * 50);
+    // Nine satellites, and the pages of 150 s.
+    assert_eq!(pages.stdout.iter().filter(|&&byte| byte == b'\n').count(), 9 * 75);
     fs::write(here.path().join("pages.csv"), pages.stdout).unwrap();
     let key = ["--public-key", "some.truth/osnma_test_public_key.xml"];
     let kroot = ["--kroot", "some.truth/osnma_test_kroot.hex", "--json"];
     let (code, text, said) = twin(here.path(), &[&["pages.csv"][..], &key, &kroot].concat());
     assert_eq!((code, said.as_str()), (Some(0), ""));
     let object: serde_json::Value = serde_json::from_str(&text).unwrap();
-    assert_eq!((&object["start"], &object["first_authentic_after_s"]), (&"hot".into(), &120.into()));
+    assert_eq!((&object["start"], &object["first_authentic_after_s"]), (&"hot".into(), &91.into()));
     let refused = run(&["osnma", "pages", scene, "--spoofer", "1"]);
     assert_eq!(refused.status.code(), Some(2));
 }
@@ -101,8 +101,8 @@ fn a_signed_recording_is_authentic_from_each_start_and_packed_or_not() {
     let warm = object(&["pages.csv", "--public-key", "key.xml", "--json"]);
     assert_eq!((&warm["start"], &warm["keys"]["verified"]), (&"warm".into(), &24.into()));
     let hot = object(&["pages.csv", "--public-key", "key.xml", "--kroot", "cold/kroot.hex", "--json"]);
-    assert_eq!((&hot["start"], &hot["first_authentic_after_s"]), (&"hot".into(), &90.into()));
-    assert!(warm["first_authentic_after_s"].as_u64() > Some(90));
+    assert_eq!((&hot["start"], &hot["first_authentic_after_s"]), (&"hot".into(), &89.into()));
+    assert!(warm["first_authentic_after_s"].as_u64() > Some(89));
 }
 
 #[test]

@@ -13,6 +13,7 @@ use num_complex::Complex64;
 use crate::response::Response;
 use crate::waveform::{Sampler, Waveform};
 use gnss::facts::{FilterShape, FilterSpec};
+use gnss::signal::phasor;
 
 /// Steps of the integral over half the band of the samples: 5 kHz at 10 Msps, far below what a response or a
 /// lag of a chip turns in.
@@ -84,11 +85,6 @@ pub fn code_delay_s(filter: &FilterSpec, code: &Waveform, samplers: [&Sampler; 2
         if late_wins(at_s) { low_s = at_s } else { high_s = at_s }
     }
     0.5 * (low_s + high_s)
-}
-
-fn phasor(radians: f64) -> Complex64 {
-    let (sin, cos) = libm::sincos(radians);
-    Complex64::new(cos, sin)
 }
 
 #[cfg(test)]

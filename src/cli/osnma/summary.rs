@@ -42,7 +42,7 @@ impl<'a> Summary<'a> {
     }
 
     fn after_s(&self, time: Option<Gst>) -> Option<i64> {
-        time.map(|time| time.since_s(self.first.subframe()))
+        time.map(|time| time.since_s(self.first))
     }
 
     /// Number of tags of a kind, or of all, with a result of that name.

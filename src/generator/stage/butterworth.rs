@@ -10,6 +10,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use gnss::signal::phasor;
 use num_complex::Complex64;
 
 use crate::low_pass::kaiser;
@@ -112,11 +113,6 @@ pub(super) fn taps(filter: &Analogue, middle: f64, real: bool) -> (Vec<Complex64
     let first = taps.iter().position(counts).unwrap_or(0);
     taps.drain(..first);
     (taps, REACH as f64 - first as f64 + part + filter.delay())
-}
-
-fn phasor(radians: f64) -> Complex64 {
-    let (sin, cos) = libm::sincos(radians);
-    Complex64::new(cos, sin)
 }
 
 #[cfg(test)]

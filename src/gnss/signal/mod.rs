@@ -31,7 +31,7 @@ mod table_tests;
 mod tone;
 
 pub use peak::PeakTable;
-pub use shape::{Shape, chip_kinds, sinc, sinc_squared};
+pub use shape::{Shape, chip_kinds, phasor, sinc, sinc_squared};
 pub use tone::Tone;
 
 /// The built-in signals.

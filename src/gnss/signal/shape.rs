@@ -76,8 +76,7 @@ impl Shape {
 pub(super) fn chip(layers: &[Layer], index: usize, steps: usize) -> Vec<Complex64> {
     let mut wave = vec![Complex64::ZERO; steps];
     for layer in layers.iter().filter(|layer| layer.covers(index)) {
-        let (sin, cos) = libm::sincos(TAU * layer.phase_cycles);
-        let amplitude = Complex64::new(cos, sin) * layer.weight;
+        let amplitude = phasor(TAU * layer.phase_cycles) * layer.weight;
         let each = steps / layer.pulse.len().max(1);
         let signs = layer.pulse.iter().flat_map(|&sign| std::iter::repeat_n(f64::from(sign), each));
         wave.iter_mut().zip(signs).for_each(|(step, sign)| *step += amplitude * sign);
@@ -102,6 +101,12 @@ pub fn chip_kinds(layers: &[Layer]) -> (Vec<Vec<Complex64>>, Vec<usize>) {
     };
     let pattern = (0..pattern).map(&mut kind).collect();
     (kinds, pattern)
+}
+
+/// e^{jx} of an angle in radians.
+pub fn phasor(radians: f64) -> Complex64 {
+    let (sin, cos) = libm::sincos(radians);
+    Complex64::new(cos, sin)
 }
 
 /// sin πx / πx.

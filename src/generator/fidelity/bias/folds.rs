@@ -19,7 +19,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use gnss::signal::{Component, chip_kinds, sinc};
+use gnss::signal::{Component, chip_kinds, phasor, sinc};
 use num_complex::Complex64;
 
 use crate::fidelity::CodeEdge;
@@ -156,7 +156,7 @@ impl Folds {
         let reach = self.lines.len() as i32 / 2;
         for [one, other] in (0..kinds).flat_map(pairs) {
             for chips in (1 - reach..reach).filter(|chips| *chips != 0) {
-                let swapped = Complex64::from_polar(1.0, -TAU * (turn * f64::from(chips)).fract());
+                let swapped = phasor(-TAU * (turn * f64::from(chips)).fract());
                 let pair = at([one, other], chips) + swapped * at([other, one], -chips);
                 variance += 0.5 * self.share([one, other], chips) * pair.norm_sqr();
             }
@@ -192,7 +192,7 @@ impl Folds {
         let count = by_class.len() as f64;
         let of_chips = |chips: usize| {
             // Classes are the middles of their parts.
-            let [turn, mut at] = [1.0, 0.5].map(|part| Complex64::from_polar(1.0, TAU * part * chips as f64 / count));
+            let [turn, mut at] = [1.0, 0.5].map(|part| phasor(TAU * part * chips as f64 / count));
             let mut sum = Complex64::ZERO;
             for value in &by_class {
                 sum += value * at;

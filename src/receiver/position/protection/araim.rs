@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 
 use super::geometry::{AXES, Estimator, Geometry};
 use super::normal::{beyond, quantile};
+use super::settings::IntegritySettings;
 use super::{Levels, Unprotected};
 
 /// Steps of the search for a level end within this, on the safe side (TOL_PL).
@@ -21,28 +22,6 @@ const LARGEST_ORDER: usize = 3;
 /// Most combinations of faults that are monitored.
 const LARGEST_COUNT: usize = 3000;
 const UP: usize = 2;
-
-/// Promise of the levels and what is stated of faults: part of the integrity support message, and the
-/// constants of an operation.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Budget {
-    /// Probability of a vertical error beyond its level.
-    pub phmi_vertical: f64,
-    /// Probability of a horizontal error beyond its level.
-    pub phmi_horizontal: f64,
-    /// Probability of a false alarm of the vertical test.
-    pub false_alarm_vertical: f64,
-    /// Probability of a false alarm of the horizontal tests.
-    pub false_alarm_horizontal: f64,
-    /// Largest probability of faults that are not monitored (P_THRES).
-    pub p_threshold: f64,
-    /// Faults of at least this probability count for the effective monitor threshold (P_EMT).
-    pub p_emt: f64,
-    /// Probability of a satellite's fault.
-    pub p_sat: f64,
-    /// Probability of a fault of a whole constellation.
-    pub p_const: f64,
-}
 
 /// A set of ranges under a fault and its probability.
 struct Mode {
@@ -54,7 +33,7 @@ struct Mode {
 }
 
 /// Faults that may happen, each with the ranges that it concerns.
-fn events(geometry: &Geometry, budget: &Budget) -> Vec<(f64, Vec<usize>)> {
+fn events(geometry: &Geometry, budget: &IntegritySettings) -> Vec<(f64, Vec<usize>)> {
     let groups = |of: &[usize], probability: f64| {
         let mut all: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
         of.iter().enumerate().for_each(|(range, group)| all.entry(*group).or_default().push(range));
@@ -105,7 +84,7 @@ fn combined(geometry: &Geometry, events: &[(f64, Vec<usize>)], order: usize) -> 
 ///
 /// # Errors
 /// [`Unprotected`] where faults that no test sees are likelier than the promise, or the geometry is singular.
-pub fn levels(geometry: &Geometry, budget: &Budget) -> Result<Levels, Unprotected> {
+pub fn levels(geometry: &Geometry, budget: &IntegritySettings) -> Result<Levels, Unprotected> {
     let all = geometry.of_all().ok_or(Unprotected::Singular)?;
     let (modes, missed) = modes(geometry, budget, &all)?;
     let promised = budget.phmi_vertical + budget.phmi_horizontal;
@@ -137,7 +116,7 @@ pub fn levels(geometry: &Geometry, budget: &Budget) -> Result<Levels, Unprotecte
 }
 
 /// Faults that are monitored, and the probability of the others.
-fn modes(geometry: &Geometry, budget: &Budget, all: &Estimator) -> Result<(Vec<Mode>, f64), Unprotected> {
+fn modes(geometry: &Geometry, budget: &IntegritySettings, all: &Estimator) -> Result<(Vec<Mode>, f64), Unprotected> {
     let events = events(geometry, budget);
     let order = (0..=LARGEST_ORDER).find(|order| more_than(*order, &events) <= budget.p_threshold);
     let promised = budget.phmi_vertical + budget.phmi_horizontal;

@@ -152,7 +152,7 @@ impl Fixed<'_> {
                 let biases_m = vec![settings.b_nom_m; self.ranges.len()];
                 geometry.integrity += self.of_satellites(&geometry, settings.sigma_ura_m);
                 geometry.accuracy += self.of_satellites(&geometry, settings.sigma_ure_m);
-                araim::levels(&Geometry { biases_m, ..geometry }, &settings.budget())
+                araim::levels(&Geometry { biases_m, ..geometry }, settings)
             }
             Method::Sbas => {
                 geometry.integrity = self.bounded()?;

@@ -3,7 +3,6 @@
 use serde::{Deserialize, Serialize};
 
 use crate::described::described;
-use crate::position::protection::araim::Budget;
 
 /// Method of the protection levels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -132,19 +131,5 @@ impl IntegritySettings {
             ("integrity.emt_limit_m", self.emt_limit_m, 0.1, 1e6),
             ("integrity.sigma_v_acc_limit_m", self.sigma_v_acc_limit_m, 0.01, 1e6),
         ]
-    }
-
-    /// Probabilities of method araim.
-    pub fn budget(&self) -> Budget {
-        Budget {
-            phmi_vertical: self.phmi_vertical,
-            phmi_horizontal: self.phmi_horizontal,
-            false_alarm_vertical: self.false_alarm_vertical,
-            false_alarm_horizontal: self.false_alarm_horizontal,
-            p_threshold: self.p_threshold,
-            p_emt: self.p_emt,
-            p_sat: self.p_sat,
-            p_const: self.p_const,
-        }
     }
 }

@@ -18,16 +18,20 @@ const SKY: [Satellite; 10] = [
     (0.6622, 0.6958, -0.2780, 1, 1.2166, 0.9041),
 ];
 
-const LPV_200: Budget = Budget {
-    phmi_vertical: 9.8e-8,
-    phmi_horizontal: 2e-9,
-    false_alarm_vertical: 3.9e-6,
-    false_alarm_horizontal: 9e-8,
-    p_threshold: 8e-8,
-    p_emt: 1e-5,
-    p_sat: 1e-5,
-    p_const: 1e-4,
-};
+/// Promise and faults of the printed example, in its own figures.
+fn lpv_200() -> IntegritySettings {
+    IntegritySettings {
+        phmi_vertical: 9.8e-8,
+        phmi_horizontal: 2e-9,
+        false_alarm_vertical: 3.9e-6,
+        false_alarm_horizontal: 9e-8,
+        p_threshold: 8e-8,
+        p_emt: 1e-5,
+        p_sat: 1e-5,
+        p_const: 1e-4,
+        ..IntegritySettings::default()
+    }
+}
 
 /// Row of the printed table: geometry (east, north, up), constellation, columns of integrity and accuracy.
 type Satellite = (f64, f64, f64, usize, f64, f64);
@@ -60,12 +64,12 @@ fn rounded(value: Option<f64>, digits: i32) -> f64 {
 /// Appendix D prints VPL 18.3 m, HPL 13.45 m, σ_v,acc 1.3694 m, K_fa,3 5.1083 and EMT 7.2998 m.
 #[test]
 fn the_worked_example_has_its_printed_digits() {
-    let levels = levels(&geometry(&SKY), &LPV_200).unwrap();
+    let levels = levels(&geometry(&SKY), &lpv_200()).unwrap();
     assert_eq!((rounded(levels.vpl_m, 1), rounded(levels.hpl_m, 2)), (18.3, 13.45));
     assert_eq!(rounded(levels.sigma_v_acc_m, 4), 1.3694);
     assert!(!levels.is_contradicted);
     // Ten satellites and two constellations.
-    let factor = quantile(LPV_200.false_alarm_vertical / 24.0);
+    let factor = quantile(lpv_200().false_alarm_vertical / 24.0);
     assert_eq!(rounded(Some(factor), 4), 5.1083);
     // 7.2997: the printed geometry has four decimals, see below.
     assert!((levels.emt_m.unwrap() - 7.2998).abs() < 1e-4, "{:?}", levels.emt_m);
@@ -75,7 +79,7 @@ fn the_worked_example_has_its_printed_digits() {
 /// less than half of its last printed digit gives what is printed.
 #[test]
 fn the_last_digit_of_the_printed_monitor_threshold_lies_within_the_rounding_of_the_printed_geometry() {
-    let emt_m = |sky: &[_]| levels(&geometry(sky), &LPV_200).unwrap().emt_m.unwrap();
+    let emt_m = |sky: &[_]| levels(&geometry(sky), &lpv_200()).unwrap().emt_m.unwrap();
     let here_m = emt_m(&SKY);
     assert!((here_m - 7.299_717).abs() < 1e-6);
     let mut explained = 0;
@@ -93,12 +97,12 @@ fn the_last_digit_of_the_printed_monitor_threshold_lies_within_the_rounding_of_t
 
 #[test]
 fn a_promise_ten_times_as_rare_takes_larger_levels_and_one_of_lighter_faults_smaller_ones() {
-    let of = |budget: &Budget| levels(&geometry(&SKY), budget).unwrap();
-    let (here, rarer) = (of(&LPV_200), of(&Budget { phmi_vertical: 5e-8, ..LPV_200 }));
-    let lighter = of(&Budget { p_sat: 1e-6, p_const: 1e-6, ..LPV_200 });
+    let of = |budget: &IntegritySettings| levels(&geometry(&SKY), budget).unwrap();
+    let (here, rarer) = (of(&lpv_200()), of(&IntegritySettings { phmi_vertical: 5e-8, ..lpv_200() }));
+    let lighter = of(&IntegritySettings { p_sat: 1e-6, p_const: 1e-6, ..lpv_200() });
     assert!(rarer.vpl_m > here.vpl_m && lighter.vpl_m < here.vpl_m && lighter.hpl_m < here.hpl_m);
     // Without a fault there is the noise alone: two sides of a normal, and the bias.
-    let none = of(&Budget { p_sat: 0.0, p_const: 0.0, ..LPV_200 });
+    let none = of(&IntegritySettings { p_sat: 0.0, p_const: 0.0, ..lpv_200() });
     let whole = geometry(&SKY);
     let all = whole.of_all().unwrap();
     let alone_m = all.biases_m(&whole.biases_m)[2] + all.sigmas_m(&whole.integrity)[2] * quantile(4.9e-8);
@@ -108,15 +112,15 @@ fn a_promise_ten_times_as_rare_takes_larger_levels_and_one_of_lighter_faults_sma
 #[test]
 fn faults_of_the_only_constellation_are_seen_by_no_test() {
     let one = geometry(&SKY[5..]);
-    let refused = levels(&one, &LPV_200).unwrap_err();
+    let refused = levels(&one, &lpv_200()).unwrap_err();
     assert!(matches!(refused, Unprotected::Unmonitored { probability, .. } if probability > 9e-5), "{refused:?}");
-    let levels = levels(&one, &Budget { p_const: 1e-8, ..LPV_200 });
+    let levels = levels(&one, &IntegritySettings { p_const: 1e-8, ..lpv_200() });
     assert!(levels.is_ok_and(|levels| levels.vpl_m > Some(10.0)));
 }
 
 #[test]
 fn more_faults_at_once_are_monitored_where_single_ones_are_not_enough() {
-    let many = Budget { p_sat: 1e-4, ..LPV_200 };
+    let many = IntegritySettings { p_sat: 1e-4, ..lpv_200() };
     let events = events(&geometry(&SKY), &many);
     assert!(more_than(1, &events) > many.p_threshold && more_than(2, &events) < many.p_threshold);
     let sets = combined(&geometry(&SKY), &events, 2).unwrap();
@@ -127,7 +131,7 @@ fn more_faults_at_once_are_monitored_where_single_ones_are_not_enough() {
     let of_two = (10.0 * 1e-4 + 2e-4) + 45.0 * 1e-8 + 20.0 * 1e-8 + 1e-8;
     assert!((sum / of_two - 1.0).abs() < 1e-9);
     let found = levels(&geometry(&SKY), &many).unwrap();
-    assert!(found.vpl_m > levels(&geometry(&SKY), &LPV_200).unwrap().vpl_m);
+    assert!(found.vpl_m > levels(&geometry(&SKY), &lpv_200()).unwrap().vpl_m);
 }
 
 #[test]
@@ -144,7 +148,7 @@ fn a_fault_of_one_range_separates_the_solution_without_it() {
     });
     faulty.residuals_m = &whole * fault;
     assert!((&all.0 * &faulty.residuals_m).norm() < 1e-9);
-    assert!(levels(&faulty, &LPV_200).unwrap().is_contradicted);
+    assert!(levels(&faulty, &lpv_200()).unwrap().is_contradicted);
     faulty.residuals_m *= 0.1;
-    assert!(!levels(&faulty, &LPV_200).unwrap().is_contradicted);
+    assert!(!levels(&faulty, &lpv_200()).unwrap().is_contradicted);
 }
