@@ -64,7 +64,19 @@ fn a_receiver_of_a_further_sink_finds_its_place_again_and_the_first_sink_misses_
     let all = fs::read(bench.path("first.ci8")).unwrap();
     assert_eq!(all.len(), 2 * 7_800_000);
     assert!(bench.replayed("flight") == all, "the first sink misses samples");
-    assert!(all.starts_with(&begun) && all.ends_with(&rest) && rest.len() < all.len() - begun.len());
+    // A client that the machine keeps from reading loses more, and still gets the rest in its order.
+    assert!(all.starts_with(&begun) && is_in_order(&rest, &all[begun.len()..]) && rest.len() < all.len() - begun.len());
+}
+
+/// True if bytes are parts of a whole in the order of the whole, each of 64 bytes at least.
+fn is_in_order(mut parts: &[u8], mut whole: &[u8]) -> bool {
+    while !parts.is_empty() {
+        let key = &parts[..parts.len().min(64)];
+        let Some(at) = whole.windows(key.len()).position(|window| window == key) else { return false };
+        let same = parts.iter().zip(&whole[at..]).take_while(|(own, other)| own == other).count();
+        (parts, whole) = (&parts[same..], &whole[at + same..]);
+    }
+    true
 }
 
 /// A live run that may have so many files open.
