@@ -1,0 +1,222 @@
+//! Runs of every case from a drawn time and place, and what the judge counts in them.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use analysis::measure::errors::Errors;
+use analysis::measure::protection::{Protected, Protection};
+use analysis::read::Run;
+use generator::scenario::{Overrides, Scenario};
+use gnss::satellite::Sv;
+use receiver::output::Output;
+use receiver::settings::Settings;
+use serde::Serialize;
+
+const SCENE: &str = include_str!("scene.toml");
+/// Sizes of a fault: between these distances of light, of either sign.
+const FAULTS_M: [f64; 2] = [2.0, 12.0];
+const LIGHT_MPS: f64 = 299_792_458.0;
+/// Difference of two Dopplers, but for whole kilohertz, from which on two codes hardly disturb each other.
+const APART_HZ: f64 = 5.0;
+/// Every so manieth fix is a point of the picture.
+const SHOWN: usize = 150;
+
+/// A method and a number of faulty satellites.
+pub struct Case {
+    pub method: &'static str,
+    pub faults: usize,
+}
+
+/// Cases that every start runs.
+pub const CASES: [Case; 5] = [
+    Case { method: "raim", faults: 0 },
+    Case { method: "raim", faults: 1 },
+    Case { method: "raim", faults: 2 },
+    Case { method: "araim", faults: 0 },
+    Case { method: "araim", faults: 1 },
+];
+
+/// Counts of one case from one start: a line of `protection.csv`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Counts {
+    pub method: &'static str,
+    pub faults: usize,
+    pub start: String,
+    pub latitude_deg: f64,
+    pub longitude_deg: f64,
+    /// Faulty satellites with their steps, in metres.
+    pub steps_m: String,
+    pub fixes: usize,
+    /// Fixes in which a test showed a fault.
+    pub detected: usize,
+    /// Fixes whose satellites have all their Dopplers apart, and those of them in which a test showed a fault.
+    pub fixes_apart: usize,
+    pub detected_apart: usize,
+    /// Fixes with a horizontal or a vertical level, and those with an error beyond it.
+    pub horizontal_levels: usize,
+    pub horizontal_beyond: usize,
+    pub vertical_levels: usize,
+    pub vertical_beyond: usize,
+    pub horizontal_level_sum_m: f64,
+    pub vertical_level_sum_m: f64,
+    /// Largest error over its level.
+    pub horizontal_ratio_max: f64,
+    pub vertical_ratio_max: f64,
+}
+
+/// Counts of a case from one start, and some of its fixes.
+pub struct Found {
+    pub counts: Counts,
+    pub shown: Vec<Protected>,
+}
+
+/// Random numbers of a start (Steele, Lea and Flood, Fast splittable pseudorandom number generators, 2014).
+struct Random(u64);
+
+impl Random {
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+}
+
+/// All cases from one start: an hour of 2010-07-01 and a place up to 75 degrees from the equator, evenly over
+/// the surface.
+pub fn start(number: u64) -> Vec<Found> {
+    let mut random = Random(number << 32);
+    let second = random.between(2.0 * 3600.0, 21.0 * 3600.0) as u64;
+    let start = format!("2010-07-01T{:02}:{:02}:{:02}", second / 3600, second / 60 % 60, second % 60);
+    let sine = random.between(-0.966, 0.966);
+    let place = [libm::asin(sine).to_degrees(), random.between(-180.0, 180.0)].map(|deg| (100.0 * deg).round() / 100.0);
+    let draws: [f64; 6] = std::array::from_fn(|_| random.unit());
+    let mut satellites: Vec<Sv> = Vec::new();
+    let mut all = Vec::new();
+    for (seed, case) in (1 + 10 * number..).zip(&CASES) {
+        let steps: Vec<(Sv, f64)> = drawn(satellites.clone(), &draws).take(case.faults).collect();
+        let (found, in_view) = run(case, seed, &start, place, &steps);
+        satellites = in_view;
+        all.push(found);
+    }
+    all
+}
+
+/// Faulty satellites and the steps of their clocks, in metres.
+fn drawn(mut satellites: Vec<Sv>, draws: &[f64; 6]) -> impl Iterator<Item = (Sv, f64)> {
+    draws
+        .chunks_exact(3)
+        .map_while(move |draw| {
+            let at = (draw[0] * satellites.len() as f64) as usize;
+            let sv = (at < satellites.len()).then(|| satellites.remove(at))?;
+            let size_m = FAULTS_M[0] + (FAULTS_M[1] - FAULTS_M[0]) * draw[1];
+            Some((sv, if draw[2] < 0.5 { -size_m } else { size_m }))
+        })
+        .collect::<Vec<_>>()
+        .into_iter()
+}
+
+fn run(case: &Case, seed: u64, start: &str, place: [f64; 2], steps: &[(Sv, f64)]) -> (Found, Vec<Sv>) {
+    let [latitude_deg, longitude_deg] = place;
+    let mut text = SCENE
+        .replace("%start%", start)
+        .replace("%seed%", &seed.to_string())
+        .replace("%latitude_deg%", &latitude_deg.to_string())
+        .replace("%longitude_deg%", &longitude_deg.to_string())
+        .replace("%method%", case.method);
+    for (sv, step_m) in steps {
+        let step_s = step_m / LIGHT_MPS;
+        text +=
+            &format!("\n[[satellite_fault]]\nkind = \"clock_step\"\nsatellites = [\"{sv}\"]\nstep_s = {step_s:e}\n");
+    }
+    let scenario = Scenario::parse(&text, "protection").unwrap();
+    let (scenes, _) = scenario.compose_all(Path::new("."), &Overrides::default()).unwrap();
+    let settings = Settings::of_scenario(&text, "protection").unwrap();
+    let here = tempfile::tempdir().unwrap();
+    let [truth_path, rx_path] = ["truth", "rx"].map(|name| here.path().join(name));
+    [&truth_path, &rx_path].map(|path| std::fs::create_dir(path).unwrap());
+    let mut truth = generator::truth::Writer::create(&truth_path).unwrap();
+    let mut output = Output::create(&rx_path).unwrap();
+    twin::run(&scenes, &settings, &mut truth, &mut output).unwrap();
+    drop((truth, output));
+    let run = Run::read_parts(here.path(), &truth_path, &rx_path).unwrap();
+    let errors = Errors::measure(&run).unwrap();
+    let protection = Protection::measure(&run, &errors).unwrap();
+    let in_view = run.in_view_at_start.iter().copied().collect();
+    let steps_m: Vec<String> = steps.iter().map(|(sv, step_m)| format!("{sv} {step_m:.2}")).collect();
+    let counts = Counts {
+        method: case.method,
+        faults: case.faults,
+        start: start.to_owned(),
+        latitude_deg,
+        longitude_deg,
+        steps_m: steps_m.join(", "),
+        fixes: 0,
+        detected: 0,
+        fixes_apart: 0,
+        detected_apart: 0,
+        horizontal_levels: 0,
+        horizontal_beyond: 0,
+        vertical_levels: 0,
+        vertical_beyond: 0,
+        horizontal_level_sum_m: 0.0,
+        vertical_level_sum_m: 0.0,
+        horizontal_ratio_max: 0.0,
+        vertical_ratio_max: 0.0,
+    };
+    (counted(counts, &protection, &near(&run)), in_view)
+}
+
+/// Tenths of a second in which two satellites have one Doppler but for whole kilohertz, which the lines of
+/// C/A are apart.
+fn near(run: &Run) -> HashMap<u64, bool> {
+    let mut dopplers: HashMap<u64, Vec<f64>> = HashMap::new();
+    for link in run.truth.keys() {
+        run.truth.each(link, |row| dopplers.entry(tenth(row.sample)).or_default().push(row.doppler_hz)).unwrap();
+    }
+    let is_near = |all: &Vec<f64>| {
+        let pairs = all.iter().enumerate().flat_map(|(at, one)| all[..at].iter().map(move |other| one - other));
+        pairs.into_iter().any(|hz| (hz - 1000.0 * (hz / 1000.0).round()).abs() < APART_HZ)
+    };
+    dopplers.iter().map(|(at, all)| (*at, is_near(all))).collect()
+}
+
+/// Tenth of a second of a sample.
+fn tenth(sample: u64) -> u64 {
+    (sample + 130_000) / 260_000
+}
+
+fn counted(mut counts: Counts, protection: &Protection, near: &HashMap<u64, bool>) -> Found {
+    let mut shown = Vec::new();
+    protection
+        .rows
+        .each(|row| {
+            let is_apart = near.get(&tenth(row.sample)) == Some(&false);
+            if counts.fixes % SHOWN == 0 {
+                shown.push(row);
+            }
+            counts.fixes += 1;
+            counts.detected += usize::from(row.detected);
+            counts.fixes_apart += usize::from(is_apart);
+            counts.detected_apart += usize::from(is_apart && row.detected);
+            if let Some(level_m) = row.hpl_m {
+                counts.horizontal_levels += 1;
+                counts.horizontal_beyond += usize::from(row.horizontal_m > level_m);
+                counts.horizontal_level_sum_m += level_m;
+                counts.horizontal_ratio_max = counts.horizontal_ratio_max.max(row.horizontal_m / level_m);
+            }
+            if let Some(level_m) = row.vpl_m {
+                counts.vertical_levels += 1;
+                counts.vertical_beyond += usize::from(row.vertical_m > level_m);
+                counts.vertical_level_sum_m += level_m;
+                counts.vertical_ratio_max = counts.vertical_ratio_max.max(row.vertical_m / level_m);
+            }
+        })
+        .unwrap();
+    Found { counts, shown }
+}
