@@ -65,6 +65,15 @@ fn promised(case: &Case) -> String {
     }
 }
 
+/// Promised share of false alarms: of the residual test, and for ARAIM of its tests in two axes too.
+fn alarms(case: &Case) -> String {
+    match (case.method, case.faults) {
+        (_, 1..) => "–".to_owned(),
+        ("araim", _) => format!("{} at most", short(3.0 * PROMISE)),
+        _ => short(PROMISE),
+    }
+}
+
 fn name(case: &Case) -> String {
     let faults = ["no fault", "one fault", "two faults"];
     format!("{}, {}", case.method.to_uppercase(), faults[case.faults])
@@ -79,7 +88,7 @@ pub fn write(directory: &Path, found: &[Found]) {
          {}.\n\n\
          A receiver of GPS L1 C/A is at rest at {starts} drawn times and places of 2010-07-01, at the level of correlations. It has thermal \
          noise and no other error, and its promises are so weak that they can be refuted: a false alarm of {PROMISE:e}, a missed detection \
-         of {PROMISE:e}, and {PROMISE:e} for an error beyond a level. A fault is a step of a satellite's clock by 2 to 12 m, from the \
+         of {PROMISE:e}, and {PROMISE:e} for an error beyond a level. A fault is a step of a satellite's clock by 0.5 to 6 m, from the \
          beginning. Intervals (95 %) are exact ones of as many independent fixes as the scatter between starts leaves.\n\n\
          ![Errors and levels](protection.png)\n\n",
         machine::machine()
@@ -112,7 +121,7 @@ pub fn write(directory: &Path, found: &[Found]) {
         );
     }
     text.push_str(
-        "\nRAIM has no promise for two faults. The steps are small: large ones are excluded, and the levels of the rest hold.\n\n\
+        "\nRAIM has no promise for two faults.\n\n\
          ## Tests\n\n\
          Share of fixes in which a test shows a fault. Without a fault it is the rate of false alarms: of the residual test, and for ARAIM of its \
          own tests too. Codes of GPS L1 C/A disturb each other where the Dopplers of two satellites differ by whole kilohertz. This moves \
@@ -130,7 +139,7 @@ pub fn write(directory: &Path, found: &[Found]) {
             words(share(&rows, |row| (row.detected, row.fixes))),
             words(share(&rows, |row| (row.detected_apart, row.fixes_apart))),
             rows.iter().map(|row| row.fixes_apart).sum::<usize>(),
-            if case.faults == 0 { short(PROMISE) } else { "–".to_owned() },
+            alarms(case),
         );
     }
     std::fs::write(directory.join("protection.md"), text).unwrap();

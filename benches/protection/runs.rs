@@ -14,12 +14,12 @@ use serde::Serialize;
 
 const SCENE: &str = include_str!("scene.toml");
 /// Sizes of a fault: between these distances of light, of either sign.
-const FAULTS_M: [f64; 2] = [2.0, 12.0];
+const FAULTS_M: [f64; 2] = [0.5, 6.0];
 const LIGHT_MPS: f64 = 299_792_458.0;
 /// Difference of two Dopplers, but for whole kilohertz, from which on two codes hardly disturb each other.
 const APART_HZ: f64 = 5.0;
-/// Every so manieth fix is a point of the picture.
-const SHOWN: usize = 150;
+/// Fixes for each that is a point of the picture.
+const SHOWN: usize = 50;
 
 /// A method and a number of faulty satellites.
 pub struct Case {
@@ -139,7 +139,7 @@ fn run(case: &Case, seed: u64, start: &str, place: [f64; 2], steps: &[(Sv, f64)]
     let settings = Settings::of_scenario(&text, "protection").unwrap();
     let here = tempfile::tempdir().unwrap();
     let [truth_path, rx_path] = ["truth", "rx"].map(|name| here.path().join(name));
-    [&truth_path, &rx_path].map(|path| std::fs::create_dir(path).unwrap());
+    [&truth_path, &rx_path].into_iter().for_each(|path| std::fs::create_dir(path).unwrap());
     let mut truth = generator::truth::Writer::create(&truth_path).unwrap();
     let mut output = Output::create(&rx_path).unwrap();
     twin::run(&scenes, &settings, &mut truth, &mut output).unwrap();
