@@ -1,7 +1,7 @@
 //! Fills `reports/protection.md`, `.csv` and `.png`: false alarms, missed faults and errors beyond protection
 //! levels of RAIM and ARAIM, over 10^5 fixes a case.
 //!
-//! `cargo bench --bench protection` runs every case from [`STARTS`] times and places at the level of
+//! `cargo bench --bench protection` runs every case from [`STARTS`] times and positions at the level of
 //! correlations, a quarter of an hour of two cores. `-- --starts N` takes the first N of them.
 
 #[path = "../shared/machine.rs"]
@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
-/// Times and places of a receiver.
+/// Times and positions of a receiver.
 const STARTS: u64 = 100;
 
 fn main() {

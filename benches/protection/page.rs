@@ -60,7 +60,9 @@ fn short(value: f64) -> String {
 fn promised(case: &Case) -> String {
     match (case.method, case.faults) {
         (_, 0) | ("raim", 1) => short(PROMISE),
-        ("araim", 1) => format!("{}, its {} over the fault's {}", short(PROMISE / PRIOR), short(PROMISE), short(PRIOR)),
+        ("araim", 1) => {
+            format!("{}, its {} over the fault's {}", short(PROMISE / PRIOR), short(PROMISE), short(PRIOR))
+        }
         _ => "none".to_owned(),
     }
 }
@@ -84,12 +86,14 @@ pub fn write(directory: &Path, found: &[Found]) {
     let starts = found.len() / CASES.len();
     let mut text = format!(
         "# Protection levels\n\n\
-         Whether RAIM and ARAIM keep their promises. `cargo bench --bench protection` makes this page, its table and its picture.\n\n\
+         Whether RAIM and ARAIM keep their promises. `cargo bench --bench protection` makes this page, its table and \
+         its picture.\n\n\
          {}.\n\n\
-         A receiver of GPS L1 C/A is at rest at {starts} drawn times and places of 2010-07-01, at the level of correlations. It has thermal \
-         noise and no other error, and its promises are so weak that they can be refuted: a false alarm of {PROMISE:e}, a missed detection \
-         of {PROMISE:e}, and {PROMISE:e} for an error beyond a level. A fault is a step of a satellite's clock by 0.5 to 6 m, from the \
-         beginning. Intervals (95 %) are exact ones of as many independent fixes as the scatter between starts leaves.\n\n\
+         A receiver of GPS L1 C/A is at rest at {starts} drawn times and positions of 2010-07-01, at the level of \
+         correlations. It has thermal noise and no other error, and its promises are so weak that they can be \
+         refuted: a false alarm of {PROMISE:e}, a missed detection of {PROMISE:e}, and {PROMISE:e} for an error \
+         beyond a level. A fault is a step of a satellite's clock by 0.5 to 6 m, from the beginning. Intervals (95 %) \
+         are exact ones of as many independent fixes as the scatter between starts leaves.\n\n\
          ![Errors and levels](protection.png)\n\n",
         machine::machine()
     );
@@ -99,7 +103,8 @@ pub fn write(directory: &Path, found: &[Found]) {
     };
     text.push_str(
         "## Errors beyond their level\n\n\
-         | case | fixes | beyond the horizontal level | beyond the vertical level | promised | mean levels (m) | largest error over level |\n\
+         | case | fixes | beyond the horizontal level | beyond the vertical level | promised | mean levels (m) | \
+         largest error over level |\n\
          | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     for case in &CASES {
@@ -123,10 +128,10 @@ pub fn write(directory: &Path, found: &[Found]) {
     text.push_str(
         "\nRAIM has no promise for two faults.\n\n\
          ## Tests\n\n\
-         Share of fixes in which a test shows a fault. Without a fault it is the rate of false alarms: of the residual test, and for ARAIM of its \
-         own tests too. Codes of GPS L1 C/A disturb each other where the Dopplers of two satellites differ by whole kilohertz. This moves \
-         a range by up to a metre for seconds, which no covariance has. So fixes are counted apart in which no two satellites are \
-         nearer than 5 Hz to that.\n\n\
+         Share of fixes in which a test shows a fault. Without a fault it is the rate of false alarms: of the residual \
+         test, and for ARAIM of its own tests too. Codes of GPS L1 C/A disturb each other where the Dopplers of two \
+         satellites differ by whole kilohertz. This moves a range by up to a metre for seconds, which no covariance \
+         has. So fixes are counted apart in which no two satellites are nearer than 5 Hz to that.\n\n\
          | case | all fixes | fixes without disturbance | promised |\n\
          | --- | --- | --- | --- |\n",
     );

@@ -1,4 +1,4 @@
-//! Runs of every case from a drawn time and place, and what the judge counts in them.
+//! Runs of every case from a drawn time and position, and what the judge counts in them.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -49,7 +49,7 @@ pub struct Counts {
     pub fixes: usize,
     /// Fixes in which a test showed a fault.
     pub detected: usize,
-    /// Fixes whose satellites have all their Dopplers apart, and those of them in which a test showed a fault.
+    /// Fixes whose satellites have all their Dopplers apart, and how many of them a test showed a fault in.
     pub fixes_apart: usize,
     pub detected_apart: usize,
     /// Fixes with a horizontal or a vertical level, and those with an error beyond it.
@@ -87,8 +87,8 @@ impl Random {
     }
 }
 
-/// All cases from one start: an hour of 2010-07-01 and a place up to 75 degrees from the equator, evenly over
-/// the surface.
+/// All cases from one start: an hour of 2010-07-01 and a position up to 75 degrees from the equator, evenly
+/// over the surface.
 pub fn start(number: u64) -> Vec<Found> {
     let mut random = Random(number << 32);
     let second = random.between(2.0 * 3600.0, 21.0 * 3600.0) as u64;
