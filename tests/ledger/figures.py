@@ -216,6 +216,21 @@ def counts():
     yield Figure("validation.levels.differences", "figures of the verdict that differ between samples and correlations, all scenes", "",
                  make.Page("reports/levels.md", "cargo bench --bench levels", pattern=r"^\*\*\d+ scenes.*: (\d+) differences"),
                  (*ALL_SAMPLES, "src/twin", "src/analysis/measure", "benches/levels"), "= 0")
+    page, command = "reports/protection.md", "cargo bench --bench protection"
+    rooms = ("src/gnss", "src/generator", "src/receiver", "src/twin", "src/analysis/measure", "benches/protection")
+    yield Figure("integrity.fixes", "fixes of a case without a fault, RAIM", "",
+                 make.Page(page, command, pattern=r"^\| RAIM, no fault \| (\d+) \|", runs="100"), rooms, "≥ 100000")
+    share = r"\d+: (\S+) \((\S+) to (\S+)\)"
+    for name, case in [("raim", "RAIM"), ("araim", "ARAIM")]:
+        for faults, words in [("sound", "no fault"), ("faulty", "one fault")]:
+            for axis, skipped in [("horizontal", ""), ("vertical", r"[^|]*\| ")]:
+                pattern = rf"^\| {case}, {words} \| \d+ \| {skipped}{share}"
+                yield Figure(f"integrity.{name}.{faults}.{axis}", f"{case}, {words}: share of {axis} errors beyond their level, with its interval",
+                             "of 1", make.Page(page, command, pattern=pattern, text=r"\1 (\2 to \3)", runs="100"), rooms)
+        yield Figure(f"integrity.{name}.alarms", f"{case}, no fault: share of fixes with a false alarm, with its interval", "of 1",
+                     make.Page(page, command, pattern=rf"^\| {case}, no fault \| {share} \| \d+: ", text=r"\1 (\2 to \3)", runs="100"), rooms)
+        yield Figure(f"integrity.{name}.alarms_apart", f"{case}, no fault: the same where no two codes disturb each other", "of 1",
+                     make.Page(page, command, pattern=rf"^\| {case}, no fault \| [^|]*\| {share} of \d+ \|", text=r"\1 (\2 to \3)", runs="100"), rooms)
     faults = "GNSS_TWIN_LONG=1 GNSS_TWIN_WRITE_ROBUSTNESS=$PWD/reports/robustness.md cargo test --test faults -- --test-threads 1"
     rooms = ("tests/faults", "src/cli", "src/receiver/source")
     for name, what, column in [("cases", "cases of damaged input and of a failing machine", 1), ("failures", "of them failed", 5)]:
