@@ -197,7 +197,7 @@ fn counted(mut counts: Counts, protection: &Protection, near: &HashMap<u64, bool
         .rows
         .each(|row| {
             let is_apart = near.get(&tenth(row.sample)) == Some(&false);
-            if counts.fixes % SHOWN == 0 {
+            if counts.fixes.is_multiple_of(SHOWN) {
                 shown.push(row);
             }
             counts.fixes += 1;
