@@ -358,6 +358,8 @@ pub struct Solver {
     augmentation: Augmentation,
     /// Choices of protection levels, where they are asked for.
     integrity: Option<IntegritySettings>,
+    /// Latest residual test of all ranges: weighted sum of squares and degrees of freedom.
+    tested: Option<(f64, usize)>,
 }
 
 impl Solver {
@@ -381,7 +383,14 @@ impl Solver {
             ahead: Vec::new(),
             augmentation: Augmentation::default(),
             integrity: None,
+            tested: None,
         }
+    }
+
+    /// Residual test of all ranges in the latest solution, before any was left out: the weighted sum of
+    /// squares, and its degrees of freedom. `None` without one since it was asked for last.
+    pub fn take_tested(&mut self) -> Option<(f64, usize)> {
+        self.tested.take()
     }
 
     /// States by how much the carrier's Doppler exceeds the code's, in hertz of the carrier: smoothing and
@@ -478,6 +487,8 @@ impl Solver {
             least_squares::position(&visible, first.position_m, &corrections)?
         };
         self.air.compare(&visible, &all, &corrections, all.position_m);
+        self.tested =
+            usize::try_from(freedom(&visible)).ok().filter(|free| *free > 0).map(|free| (all.chi_square, free));
         let (kept, solution, excluded) = without_faults(visible, all, &corrections, self.settings.false_alarm)?;
         let (velocity_mps, drift) = least_squares::velocity(&kept, &solution)?;
         self.last_m = Some(solution.position_m);
