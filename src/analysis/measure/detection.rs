@@ -448,7 +448,8 @@ mod tests {
         let found = summary.detection.unwrap();
         assert_eq!((found.attacks, found.attacks_detected, found.interval_s), (1, 1, Some(1.0)));
         let ratio = &found.detectors["correlation_ratio"];
-        // Tests of seconds 36 to 46 are attacked, those to 59 remember it; alarms are at 5, 15, 25, 35, 45 and 55 s.
+        // Tests of seconds 36 to 46 are attacked, those to 59 remember it. Alarms are at 5, 15, 25, 35, 45
+        // and 55 s.
         assert_eq!((ratio.clean_tests, ratio.false_alarms, ratio.attacked_tests), (35, 4, 11));
         assert!((ratio.time_to_detect_s.unwrap() - 9.8).abs() < 1e-9);
         assert_eq!(found.detectors["level"].attacks_detected, 0);

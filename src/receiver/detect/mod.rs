@@ -1,13 +1,13 @@
 //! Detectors of jamming and spoofing: numbers with thresholds of a stated false-alarm probability.
 //!
 //! [`level`] watches the power of the samples, [`shapes`] the correlation and the C/N0 of every signal,
-//! [`divergence`] code against carrier, [`jumps`] positions and clock against velocity and drift; the residual
-//! test of a fix ([`crate::position::exclusion`]) is the detector `raim`. The sums that they need are gathered as
-//! the receiver works, and an interval is tested as a whole at its end. Each module derives the law of its
-//! statistic under a clean sky, and [`law`] has the thresholds. Levels, C/N0 and shapes are compared with
-//! the intervals before, without those that raised an alarm. Without `[detection]` in the settings nothing
-//! is gathered. Limits: what is stated holds for one test. A sky of the first intervals that is spoofed already
-//! is taken for clean by the detectors that compare.
+//! [`divergence`] code against carrier, [`jumps`] positions and clock against velocity and drift; the
+//! residual test of a fix ([`crate::position::exclusion`]) is the detector `raim`. The sums that they need
+//! are gathered as the receiver works, and an interval is tested as a whole at its end. Each module derives
+//! the law of its statistic under a clean sky, and [`law`] has the thresholds. Levels, C/N0 and shapes are
+//! compared with the intervals before, without those that raised an alarm. Without `[detection]` in the
+//! settings nothing is gathered. Limits: what is stated holds for one test. A sky of the first intervals that
+//! is spoofed already is taken for clean by the detectors that compare.
 
 pub mod divergence;
 pub mod jumps;
@@ -46,8 +46,6 @@ const COORDINATES: u32 = 3;
 pub struct Detection {
     settings: DetectionSettings,
     noises: Noises,
-    /// True if code loops are of order 1.
-    is_first_order: bool,
     rate: Rate,
     /// Number of the running interval.
     number: u64,
@@ -68,7 +66,6 @@ impl Detection {
         Some(Self {
             settings: settings.detection.clone()?,
             noises,
-            is_first_order: settings.tracking.dll_order == 1,
             rate,
             number: 1,
             levels: (0..front_ends).map(|_| Level::default()).collect(),
@@ -176,12 +173,12 @@ impl Detection {
     /// Tests every signal by itself, and all for a common fall.
     fn test_shapes(&mut self, rows: &mut Vec<Test>) {
         let (least, most) = self.reference();
-        let shapes = std::mem::take(&mut self.shapes);
-        let first_order = self.is_first_order;
-        let tested: Vec<(Link, Shape, Tested)> = (shapes.into_iter())
+        let ended = std::mem::take(&mut self.shapes);
+        let interval_s = self.settings.interval_s;
+        let tested: Vec<(Link, Shape, Tested)> = (ended.into_iter())
+            .filter(|(_, shape)| shapes::is_whole(shape, interval_s))
             .map(|(link, shape)| {
-                let loop_hz = self.noise(link.signal).filter(|_| first_order).map(|noise| noise.bandwidth_hz);
-                let tested = self.signals.entry(link).or_default().test(&shape, least, loop_hz);
+                let tested = self.signals.entry(link).or_default().test(&shape, least);
                 (link, shape, tested)
             })
             .collect();

@@ -19,7 +19,7 @@ pub struct Counted {
     pub first_alarm_s: Option<f64>,
 }
 
-/// What the detectors of jamming and spoofing found.
+/// Tests and alarms of the detectors of jamming and spoofing.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Detected {
     /// Probability that one test raises a false alarm.

@@ -9,29 +9,34 @@
 //! With the prompt's amplitude y of an update, x is early plus late along the prompt's phase (ratio) or early
 //! less late across it (phase). A front end gives x a share r of y, which the reference shows. z = x − r·y
 //! has no part of the signal. Its noise is that of early and late without their correlation with the prompt,
-//! so the prompt's sign is independent of it, and updates are independent of each other. The mean of n values
-//! over its standard deviation is Student's with n − 1 degrees of freedom. The standard deviation is that of
-//! the interval itself, so the level of the noise does not matter, and has a part for the error of r.
+//! so the prompt's sign is independent of it, and updates are independent of each other. Correlations with
+//! the codes of other satellites are not: where Dopplers differ by nearly whole kilohertz they come and go
+//! within seconds. Therefore the mean of z over an interval is compared with those of the M intervals of the
+//! reference. Its difference from their mean over their standard deviation and √(1 + 1/M) is Student's with M
+//! − 1 degrees of freedom.
+//!
+//! C/N0 of an interval of n updates is (ȳ² − v/n)/(2·v·T) with the variance v of the amplitudes; its
+//! logarithm is compared with those of the reference in the same way. A fall is counted if more than half of
+//! the signals show it: the middle one of the normalised falls has the law of an order statistic, and one
+//! signal behind an obstacle hardly changes it.
 //!
 //! Early less late along the prompt (delta) is what the code loop drives to zero. The sum of n errors of a
 //! loop of order 1 is the change of its code over its gain K: n updates have 2(1 − (1 − K)ⁿ)/(n·K·(2 − K)) of
-//! the variance of as many independent ones. The same number shows slow changes as a range in `code_carrier`.
+//! the variance of as many independent ones, 0.43 of it for a second of a loop of 0.5 Hz. The scatter of the
+//! reference has it. Slow changes are seen as a range in `code_carrier`.
 //!
-//! C/N0 of an interval is (ȳ² − v/n)/(2·v·T) with the variance v of the amplitudes; its logarithm has the
-//! variance 4v/(n·ȳ²) + 2/(n − 1). A fall is counted if more than half of the signals show it: the middle one
-//! of the normalised falls has the law of an order statistic, and one signal behind an obstacle hardly
-//! changes it.
-//!
-//! Limits: reflections distort a correlation as a spoofer does. A code loop of order 2 has no test of delta.
-//! At 35 dB-Hz the noncoherent discriminator leaves the delta some per cent more variance.
+//! Limits: reflections distort a correlation as a spoofer does. Codes of two satellites that meet for one or
+//! two intervals are no normal scatter. Only intervals in which a signal was followed throughout are tested.
 
 use std::collections::VecDeque;
 
 use super::law::normal_of_student;
-use crate::track::shape::{Line, Shape};
+use crate::track::shape::Shape;
 
-/// Fewest updates of a tested interval.
-const LEAST_UPDATES: f64 = 20.0;
+/// Fewest intervals of a reference.
+const LEAST_INTERVALS: usize = 3;
+/// Share of an interval that has to have updates for it to be whole.
+const WHOLE_SHARE: f64 = 0.9;
 
 /// Statistics of one signal in an interval. Each is standard normal.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -53,31 +58,18 @@ pub struct Signal {
 }
 
 impl Signal {
-    /// Tests an interval against a reference of at least `least` intervals. `loop_hz` is the bandwidth of a
-    /// code loop of order 1.
-    pub fn test(&self, shape: &Shape, least: usize, loop_hz: Option<f64>) -> Tested {
-        if shape.count < LEAST_UPDATES {
+    /// Tests an interval against a reference of at least `least` intervals.
+    pub fn test(&self, shape: &Shape, least: usize) -> Tested {
+        let alike: Vec<&Shape> = self.reference.iter().filter(|own| own.update_s == shape.update_s).collect();
+        if alike.len() < least.max(LEAST_INTERVALS) {
             return Tested::default();
         }
-        let delta = loop_hz.and_then(|hz| delta(shape, hz));
-        let alike = self.reference.iter().filter(|own| own.update_s == shape.update_s);
-        if alike.clone().count() < least {
-            return Tested { delta, ..Tested::default() };
-        }
-        let before = alike.fold(Shape::default(), |sum, own| sum.with(own));
-        Tested {
-            ratio: distortion(shape, &before, 0),
-            phase: distortion(shape, &before, 2),
-            delta,
-            fall: fall(shape, &before),
-        }
+        let [ratio, delta, phase] = [0, 1, 2].map(|number| distortion(shape, &alike, number));
+        Tested { ratio, phase, delta, fall: fall(shape, &alike) }
     }
 
     /// Makes an interval a part of a reference of `most` intervals.
     pub fn keep(&mut self, shape: Shape, most: usize) {
-        if shape.count < LEAST_UPDATES {
-            return;
-        }
         self.reference.push_back(shape);
         while self.reference.len() > most {
             self.reference.pop_front();
@@ -85,44 +77,43 @@ impl Signal {
     }
 }
 
-/// Mean of a line less `share` of the amplitude, and the variance of one value about it.
-fn rest(shape: &Shape, line: &Line, share: f64) -> (f64, f64) {
-    let mean = (line.sum - share * shape.amplitude) / shape.count;
-    let square = line.square - 2.0 * share * line.product + share * share * shape.square;
-    (mean, (square - shape.count * mean * mean) / (shape.count - 1.0))
+/// True if a signal was followed throughout an interval.
+pub fn is_whole(shape: &Shape, interval_s: f64) -> bool {
+    shape.count * shape.update_s > WHOLE_SHARE * interval_s
 }
 
-fn distortion(shape: &Shape, before: &Shape, number: usize) -> Option<f64> {
-    let (line, old) = (&shape.lines[number], &before.lines[number]);
-    let share = old.sum / before.amplitude;
-    let ((mean, variance), (_, old_variance)) = (rest(shape, line, share), rest(before, old, share));
-    let scaled = shape.amplitude / shape.count / (before.amplitude / before.count);
-    let of_mean = variance / shape.count + scaled * scaled * old_variance / before.count;
-    (of_mean > 0.0).then(|| normal_of_student(mean / of_mean.sqrt(), shape.count - 1.0))
+/// Standard normal value of a number that has the law of the others, by their mean and their scatter.
+fn among(value: f64, others: &[f64]) -> Option<f64> {
+    let count = others.len() as f64;
+    let mean = others.iter().sum::<f64>() / count;
+    let variance = others.iter().map(|other| (other - mean) * (other - mean)).sum::<f64>() / (count - 1.0);
+    let sigma = (variance * (1.0 + 1.0 / count)).sqrt();
+    (sigma > 0.0).then(|| normal_of_student((value - mean) / sigma, count - 1.0))
 }
 
-fn delta(shape: &Shape, loop_hz: f64) -> Option<f64> {
-    let (mean, variance) = rest(shape, &shape.lines[1], 0.0);
-    // Gain of a loop of order 1 whose one-sided noise bandwidth is B: B·T = K/(2(2 − K)).
-    let product = loop_hz * shape.update_s;
-    let gain = 4.0 * product / (1.0 + 2.0 * product);
-    let kept = 1.0 - libm::pow(1.0 - gain, shape.count);
-    let of_mean = variance * 2.0 * kept / (shape.count * shape.count * gain * (2.0 - gain));
-    (of_mean > 0.0).then(|| normal_of_student(mean / of_mean.sqrt(), shape.count - 1.0))
+fn distortion(shape: &Shape, before: &[&Shape], number: usize) -> Option<f64> {
+    let (sum, amplitude) = before
+        .iter()
+        .fold((0.0, 0.0), |(sum, amplitude), own| (sum + own.lines[number].sum, amplitude + own.amplitude));
+    let share = sum / amplitude;
+    let rest = |own: &Shape| (own.lines[number].sum - share * own.amplitude) / own.count;
+    among(rest(shape), &before.iter().map(|own| rest(own)).collect::<Vec<f64>>())
 }
 
-/// Logarithm of C/N0 times a constant, and its variance.
-fn strength(shape: &Shape) -> Option<(f64, f64)> {
+/// Logarithm of C/N0 times a constant.
+fn strength(shape: &Shape) -> Option<f64> {
     let (count, mean) = (shape.count, shape.amplitude / shape.count);
     let variance = (shape.square - count * mean * mean) / (count - 1.0);
     let power = mean * mean - variance / count;
-    let spread = 4.0 * variance / (count * mean * mean) + 2.0 / (count - 1.0);
-    (power > 0.0 && variance > 0.0).then(|| (libm::log(power / variance), spread))
+    (power > 0.0 && variance > 0.0).then(|| libm::log(power / variance))
 }
 
-fn fall(shape: &Shape, before: &Shape) -> Option<f64> {
-    let ((now, variance), (old, old_variance)) = (strength(shape)?, strength(before)?);
-    Some((old - now) / (variance + old_variance).sqrt())
+fn fall(shape: &Shape, before: &[&Shape]) -> Option<f64> {
+    let others: Vec<f64> = before.iter().filter_map(|own| strength(own)).collect();
+    if others.len() < before.len() {
+        return None;
+    }
+    Some(-among(strength(shape)?, &others)?)
 }
 
 #[cfg(test)]
@@ -176,7 +167,7 @@ mod tests {
         (0..intervals)
             .map(|_| {
                 let shape = channel.interval(amplitude, 250, bend);
-                let tested = signal.test(&shape, 5, Some(0.5));
+                let tested = signal.test(&shape, 5);
                 signal.keep(shape, 20);
                 tested
             })
@@ -204,9 +195,9 @@ mod tests {
 
     #[test]
     fn a_second_peak_in_phase_moves_the_ratio_and_one_across_leaves_it() {
-        // 3 % of the amplitude at both sides is 0.06 · 15.9 over 0.87/√250: 17 of Student's law, 13.8 normal.
+        // 3 % of the amplitude at both sides is 0.06 · 15.9 over 0.87/√250: 17 of Student's law, 7.3 normal.
         let ratio = |bend: Complex64| run(1, bend)[0].ratio.unwrap();
-        assert!((ratio(Complex64::new(0.03, 0.0)) - 13.8).abs() < 4.0);
+        assert!((ratio(Complex64::new(0.03, 0.0)) - 7.3).abs() < 1.5);
         assert!(ratio(Complex64::new(0.0, 0.03)).abs() < 4.0);
     }
 
@@ -218,9 +209,10 @@ mod tests {
             signal.keep(channel.interval(15.9, 250, Complex64::ZERO), 20);
         }
         let shape = channel.interval(15.9 * libm::pow(10.0, -0.15), 250, Complex64::ZERO);
-        // 0.69 over 0.094 in the logarithm.
-        assert!((signal.test(&shape, 5, None).fall.unwrap() - 7.3).abs() < 4.0);
-        // Too few updates are no test.
-        assert_eq!(signal.test(&channel.interval(15.9, 10, Complex64::ZERO), 5, None), Tested::default());
+        // 0.69 over 0.094 in the logarithm, 7.3 of Student's law, is 5.1 normal.
+        assert!((signal.test(&shape, 5).fall.unwrap() - 5.1).abs() < 1.5);
+        // Half of an interval is none, and a reference of two is none.
+        assert!(is_whole(&shape, 1.0) && !is_whole(&shape, 2.0));
+        assert_eq!(signal.test(&shape, 21), Tested::default());
     }
 }

@@ -387,12 +387,6 @@ impl Solver {
         }
     }
 
-    /// Residual test of all ranges in the latest solution, before any was left out: the weighted sum of
-    /// squares, and its degrees of freedom. `None` without one since it was asked for last.
-    pub fn take_tested(&mut self) -> Option<(f64, usize)> {
-        self.tested.take()
-    }
-
     /// States by how much the carrier's Doppler exceeds the code's, in hertz of the carrier: smoothing and
     /// velocity leave it out, so that the clock's drift is that of the code, whose bias the position has.
     /// `signals` are those of one front end.
@@ -487,8 +481,7 @@ impl Solver {
             least_squares::position(&visible, first.position_m, &corrections)?
         };
         self.air.compare(&visible, &all, &corrections, all.position_m);
-        self.tested =
-            usize::try_from(freedom(&visible)).ok().filter(|free| *free > 0).map(|free| (all.chi_square, free));
+        self.tested = exclusion::tested(&visible, &all);
         let (kept, solution, excluded) = without_faults(visible, all, &corrections, self.settings.false_alarm)?;
         let (velocity_mps, drift) = least_squares::velocity(&kept, &solution)?;
         self.last_m = Some(solution.position_m);

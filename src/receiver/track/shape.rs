@@ -2,8 +2,7 @@
 //!
 //! Of each update the real part of the prompt, with the sign of its symbol taken off, is the amplitude. Early
 //! and late give three lines of numbers beside it: their sum and their difference along the prompt's phase,
-//! and their difference across it. First and second moments of all are kept, so that detectors can remove the
-//! share of the amplitude later. A wrong sign at a weak signal turns both numbers alike. Limits: sums hold
+//! and their difference across it. A wrong sign at a weak signal turns all numbers alike. Limits: sums hold
 //! for one duration of the updates, and begin again when it changes.
 
 use num_complex::Complex64;
@@ -18,8 +17,6 @@ pub struct Line {
     pub sum: f64,
     /// Sum of their squares.
     pub square: f64,
-    /// Sum of their products with the amplitude.
-    pub product: f64,
 }
 
 /// Sums of an interval.
@@ -52,23 +49,7 @@ impl Shape {
         for (line, value) in self.lines.iter_mut().zip([sum.re, difference.re, difference.im]) {
             line.sum += value;
             line.square += value * value;
-            line.product += value * amplitude;
         }
-    }
-
-    /// Sums of this interval and another one of updates as long.
-    pub fn with(&self, other: &Self) -> Self {
-        let mut both = *self;
-        both.update_s = other.update_s;
-        both.count += other.count;
-        both.amplitude += other.amplitude;
-        both.square += other.square;
-        for (line, own) in both.lines.iter_mut().zip(&other.lines) {
-            line.sum += own.sum;
-            line.square += own.square;
-            line.product += own.product;
-        }
-        both
     }
 }
 
@@ -77,30 +58,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn symbols_change_nothing_and_intervals_add_up() {
+    fn symbols_change_nothing_and_another_duration_is_another_interval() {
         let of = |sign: f64, k: u32| {
             let at = f64::from(k);
-            let prompt = Complex64::new(sign * (10.0 + at), sign * 0.3);
             let early = Complex64::new(sign * 8.0, sign * (0.1 + at));
-            (prompt, [early, Complex64::new(sign * 7.0, sign * 0.2)])
+            (Complex64::new(sign * (10.0 + at), sign * 0.3), [early, Complex64::new(sign * 7.0, sign * 0.2)])
         };
-        let (mut plain, mut signed, mut first, mut second) =
-            (Shape::default(), Shape::default(), Shape::default(), Shape::default());
+        let (mut plain, mut signed) = (Shape::default(), Shape::default());
         for k in 0..10 {
             let (prompt, sides) = of(1.0, k);
             plain.add(prompt, sides, 4e-3);
-            if k < 4 {
-                first.add(prompt, sides, 4e-3)
-            } else {
-                second.add(prompt, sides, 4e-3)
-            }
             let (prompt, sides) = of(if k % 3 == 0 { -1.0 } else { 1.0 }, k);
             signed.add(prompt, sides, 4e-3);
         }
         assert_eq!(plain, signed);
-        let both = first.with(&second);
-        assert!((both.count - 10.0).abs() < 1e-12 && (both.lines[2].product - plain.lines[2].product).abs() < 1e-9);
-        // Another duration is another interval.
+        assert_eq!((plain.count, plain.amplitude, plain.lines[0].sum), (10.0, 145.0, 150.0));
         let (prompt, sides) = of(1.0, 0);
         plain.add(prompt, sides, 1e-3);
         assert_eq!((plain.count, plain.update_s), (1.0, 1e-3));

@@ -25,7 +25,7 @@ pub fn detection(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
         let points = Shown::among(shown.len(), Mark::Dots, |see| {
             run.tests.each(|test| {
                 if test.detector == *detector {
-                    let ratio = libm::log10(test.statistic.abs() / test.threshold);
+                    let ratio = libm::log10(test.statistic.max(0.0) / test.threshold);
                     see(run.time_s(test.sample), ratio.clamp(ENDS.0, ENDS.1));
                 }
             })
