@@ -18,7 +18,7 @@ mod outcome;
 mod random;
 pub mod shapes;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use crate::output::{OutputError, Record, Sink};
 use crate::position::{CodeNoise, Noises};
@@ -52,6 +52,8 @@ pub struct Detection {
     levels: Vec<Level>,
     signals: BTreeMap<Link, shapes::Signal>,
     shapes: BTreeMap<Link, Shape>,
+    /// Middle falls of C/N0 in the intervals before.
+    falls: VecDeque<f64>,
     codes: BTreeMap<Link, Divergence>,
     jumps: Jumps,
     /// Latest residual test: its sum of squares and their degrees of freedom.
@@ -71,6 +73,7 @@ impl Detection {
             levels: (0..front_ends).map(|_| Level::default()).collect(),
             signals: BTreeMap::new(),
             shapes: BTreeMap::new(),
+            falls: VecDeque::new(),
             codes: BTreeMap::new(),
             jumps: Jumps::default(),
             residuals: None,
@@ -184,13 +187,8 @@ impl Detection {
             .collect();
         let mut falls: Vec<f64> = tested.iter().filter_map(|(_, _, tested)| tested.fall).collect();
         falls.sort_by(|a, b| b.total_cmp(a));
-        let rank = falls.len() / 2 + 1;
-        let mut fell = false;
-        if falls.len() >= LEAST_SIGNALS {
-            let (statistic, limit) = (falls[rank - 1], law::of_ranked(self.settings.false_alarm, falls.len(), rank));
-            rows.push((Detector::Cn0Fall, (String::new(), String::new()), statistic, limit));
-            fell = statistic > limit;
-        }
+        let middle = falls.get(falls.len() / 2).copied().filter(|_| falls.len() >= LEAST_SIGNALS);
+        let fell = middle.is_some_and(|middle| self.test_fall(middle, rows));
         let threshold = law::two_sided(self.settings.false_alarm);
         type Of = fn(&Tested) -> Option<f64>;
         let each: [(Detector, Of); 3] = [
@@ -209,6 +207,21 @@ impl Detection {
                 self.signals.entry(link).or_default().keep(shape, most);
             }
         }
+    }
+
+    /// Compares the middle fall of C/N0 with those of the intervals before; true if it raises an alarm.
+    fn test_fall(&mut self, middle: f64, rows: &mut Vec<Test>) -> bool {
+        let ((least, most), limit) = (self.reference(), law::quantile(self.settings.false_alarm));
+        let tested = if self.falls.len() < least { None } else { law::among(middle, self.falls.make_contiguous()) };
+        rows.extend(tested.map(|statistic| (Detector::Cn0Fall, (String::new(), String::new()), statistic, limit)));
+        let fell = tested.is_some_and(|statistic| statistic > limit);
+        if !fell {
+            self.falls.push_back(middle);
+            while self.falls.len() > most {
+                self.falls.pop_front();
+            }
+        }
+        fell
     }
 
     fn test_codes(&mut self, rows: &mut Vec<Test>) {

@@ -15,10 +15,11 @@
 //! reference. Its difference from their mean over their standard deviation and √(1 + 1/M) is Student's with M
 //! − 1 degrees of freedom.
 //!
-//! C/N0 of an interval of n updates is (ȳ² − v/n)/(2·v·T) with the variance v of the amplitudes; its
-//! logarithm is compared with those of the reference in the same way. A fall is counted if more than half of
-//! the signals show it: the middle one of the normalised falls has the law of an order statistic, and one
-//! signal behind an obstacle hardly changes it.
+//! C/N0 of an interval of n updates is (ȳ² − v/n)/(2·v·T) with the variance v of the amplitudes; its logarithm
+//! is compared with those of the reference in the same way. The middle one of the signals' normalised falls
+//! shows what more than half of them share, and one signal behind an obstacle hardly moves it. It is compared
+//! with the middle falls of the intervals before, once more in the same way, because signals whose codes meet
+//! fall together.
 //!
 //! Early less late along the prompt (delta) is what the code loop drives to zero. The sum of n errors of a
 //! loop of order 1 is the change of its code over its gain K: n updates have 2(1 − (1 − K)ⁿ)/(n·K·(2 − K)) of
@@ -30,7 +31,7 @@
 
 use std::collections::VecDeque;
 
-use super::law::normal_of_student;
+use super::law::among;
 use crate::track::shape::Shape;
 
 /// Fewest intervals of a reference.
@@ -80,15 +81,6 @@ impl Signal {
 /// True if a signal was followed throughout an interval.
 pub fn is_whole(shape: &Shape, interval_s: f64) -> bool {
     shape.count * shape.update_s > WHOLE_SHARE * interval_s
-}
-
-/// Standard normal value of a number that has the law of the others, by their mean and their scatter.
-fn among(value: f64, others: &[f64]) -> Option<f64> {
-    let count = others.len() as f64;
-    let mean = others.iter().sum::<f64>() / count;
-    let variance = others.iter().map(|other| (other - mean) * (other - mean)).sum::<f64>() / (count - 1.0);
-    let sigma = (variance * (1.0 + 1.0 / count)).sqrt();
-    (sigma > 0.0).then(|| normal_of_student((value - mean) / sigma, count - 1.0))
 }
 
 fn distortion(shape: &Shape, before: &[&Shape], number: usize) -> Option<f64> {

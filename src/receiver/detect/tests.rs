@@ -43,9 +43,8 @@ fn a_fall_that_most_signals_share_is_reported_while_it_lasts_and_that_of_one_is_
     let fallen = |second: u64| if (30..50).contains(&second) { 11.3 } else { 15.9 };
     let most = alarms(Detector::Cn0Fall, |number, second| if number < 5 { fallen(second) } else { 15.9 });
     assert_eq!(most, (30..50).collect::<Vec<_>>());
-    // Three of the six others have to be beyond 1.6: in 20 tests 0.06 times.
     let few = alarms(Detector::Cn0Fall, |number, second| if number < 2 { fallen(second) } else { 15.9 });
-    assert!(few.len() < 2, "{few:?}");
+    assert!(few.is_empty(), "{few:?}");
 }
 
 #[test]
