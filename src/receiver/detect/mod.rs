@@ -138,8 +138,8 @@ impl Detection {
     pub fn close(&mut self, sample: u64, sink: &mut dyn Sink) -> Result<(), OutputError> {
         self.number = (self.rate.elapsed_s(sample) / self.settings.interval_s) as u64 + 1;
         let mut rows = Vec::new();
-        self.test_levels(&mut rows);
-        self.test_shapes(&mut rows);
+        let is_loud = self.test_levels(&mut rows);
+        self.test_shapes(is_loud, &mut rows);
         self.test_codes(&mut rows);
         self.test_fixes(&mut rows);
         for (detector, (sv, signal), statistic, threshold) in rows {
@@ -162,19 +162,23 @@ impl Detection {
         (most.div_ceil(2), most)
     }
 
-    fn test_levels(&mut self, rows: &mut Vec<Test>) {
+    /// Tests the level of every front end; true if one raises an alarm.
+    fn test_levels(&mut self, rows: &mut Vec<Test>) -> bool {
         let (threshold, reference) = (law::two_sided(self.settings.false_alarm), self.reference());
-        let several = self.levels.len() > 1;
+        let (several, mut is_loud) = (self.levels.len() > 1, false);
         for (number, level) in self.levels.iter_mut().enumerate() {
             if let Some(statistic) = level.close(reference, threshold) {
                 let name = if several { format!("front end {}", number + 1) } else { String::new() };
+                is_loud |= statistic > threshold;
                 rows.push((Detector::Level, (String::new(), name), statistic, threshold));
             }
         }
+        is_loud
     }
 
-    /// Tests every signal by itself, and all for a common fall.
-    fn test_shapes(&mut self, rows: &mut Vec<Test>) {
+    /// Tests every signal by itself, and all for a common fall. Nothing becomes a part of the references where
+    /// the level raised an alarm.
+    fn test_shapes(&mut self, is_loud: bool, rows: &mut Vec<Test>) {
         let (least, most) = self.reference();
         let ended = std::mem::take(&mut self.shapes);
         let interval_s = self.settings.interval_s;
@@ -188,7 +192,7 @@ impl Detection {
         let mut falls: Vec<f64> = tested.iter().filter_map(|(_, _, tested)| tested.fall).collect();
         falls.sort_by(|a, b| b.total_cmp(a));
         let middle = falls.get(falls.len() / 2).copied().filter(|_| falls.len() >= LEAST_SIGNALS);
-        let fell = middle.is_some_and(|middle| self.test_fall(middle, rows));
+        let fell = middle.is_some_and(|middle| self.test_fall(middle, is_loud, rows));
         let threshold = law::two_sided(self.settings.false_alarm);
         type Of = fn(&Tested) -> Option<f64>;
         let each: [(Detector, Of); 3] = [
@@ -203,19 +207,19 @@ impl Detection {
         }
         for (link, shape, tested) in tested {
             let is_bent = each.iter().any(|(_, of)| of(&tested).is_some_and(|statistic| statistic.abs() > threshold));
-            if !fell && !is_bent {
+            if !fell && !is_loud && !is_bent {
                 self.signals.entry(link).or_default().keep(shape, most);
             }
         }
     }
 
     /// Compares the middle fall of C/N0 with those of the intervals before; true if it raises an alarm.
-    fn test_fall(&mut self, middle: f64, rows: &mut Vec<Test>) -> bool {
+    fn test_fall(&mut self, middle: f64, is_loud: bool, rows: &mut Vec<Test>) -> bool {
         let ((least, most), limit) = (self.reference(), law::quantile(self.settings.false_alarm));
         let tested = if self.falls.len() < least { None } else { law::among(middle, self.falls.make_contiguous()) };
         rows.extend(tested.map(|statistic| (Detector::Cn0Fall, (String::new(), String::new()), statistic, limit)));
         let fell = tested.is_some_and(|statistic| statistic > limit);
-        if !fell {
+        if !fell && !is_loud {
             self.falls.push_back(middle);
             while self.falls.len() > most {
                 self.falls.pop_front();
