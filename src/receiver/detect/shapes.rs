@@ -15,11 +15,11 @@
 //! reference. Its difference from their mean over their standard deviation and √(1 + 1/M) is Student's with M
 //! − 1 degrees of freedom.
 //!
-//! C/N0 of an interval of n updates is (ȳ² − v/n)/(2·v·T) with the variance v of the amplitudes; its logarithm
-//! is compared with those of the reference in the same way. The middle one of the signals' normalised falls
-//! shows what more than half of them share, and one signal behind an obstacle hardly moves it. It is compared
-//! with the middle falls of the intervals before, once more in the same way, because signals whose codes meet
-//! fall together.
+//! C/N0 of an interval of n updates is (ȳ² − v/n)/(2·v·T) with the variance v of the amplitudes; its
+//! logarithm is compared with those of the reference in the same way. The middle one of the signals'
+//! normalised falls shows what more than half of them share, and one signal behind an obstacle hardly moves
+//! it. It is compared with the middle falls of the intervals before, once more in the same way, because
+//! signals whose codes meet fall together.
 //!
 //! Early less late along the prompt (delta) is what the code loop drives to zero. The sum of n errors of a
 //! loop of order 1 is the change of its code over its gain K: n updates have 2(1 − (1 − K)ⁿ)/(n·K·(2 − K)) of
