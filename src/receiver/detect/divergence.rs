@@ -2,7 +2,7 @@
 //!
 //! A spoofer that drags the code without the carrier, or loops that sit between two peaks of which one moves,
 //! separate both (D. S. De Lorenzo et al.; RTCA DO-253, monitor of code-carrier divergence). The ionosphere
-//! separates them by twice its rate, which is bounded by [`IONOSPHERE_MPS`] and taken off first. The error of
+//! separates them by twice its rate, which is bounded by `IONOSPHERE_MPS` and taken off first. The error of
 //! a code loop of order 1 and bandwidth B has the correlation exp(−4·B·t), so that its mean over an interval
 //! T has 2(x − 1 + e⁻ˣ)/x² of its variance, x = 4·B·T. The difference of two means far apart over its
 //! standard deviation is standard normal; with what is taken off, the probability of a false alarm is at most

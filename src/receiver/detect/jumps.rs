@@ -3,8 +3,8 @@
 //! A receiver that changes from the sky to a copy of it jumps by what the copy is late or claims (P.
 //! Papadimitratos and A. Jovanovic, Protection and Fundamental Vulnerability of GNSS, IWSSC 2008). The
 //! velocity summed over all fixes is taken off the change of the position, the drift off that of the clock.
-//! The covariance is the sum of those of both fixes, of velocities ([`VELOCITY_MPS`], times the dilution) and
-//! of accelerations up to [`ACCELERATION_MPS2`] between fixes. Errors of both fixes that are alike cancel, as
+//! The covariance is the sum of those of both fixes, of velocities (`VELOCITY_MPS`, times the dilution) and
+//! of accelerations up to `ACCELERATION_MPS2` between fixes. Errors of both fixes that are alike cancel, as
 //! those of smoothed ranges do, so the statistics lie below chi-square with three degrees of freedom and the
 //! modulus of a normal value: the probability of a false alarm is at most the stated one. Limits: a position
 //! that is dragged with its velocity passes.

@@ -4,7 +4,7 @@
 //! Spoofing Detection via Automatic Gain Control, Navigation 59 (2012)). Block by block the mean power of
 //! some samples is taken. Under noise of one density block powers are independent, and nearly normal as sums
 //! of thousands of samples. The difference of two means over its standard deviation, which the scatter within
-//! the intervals shows, is Student's. Satellites rise and set and gains drift, so that [`TOLERANCE`] is taken
+//! the intervals shows, is Student's. Satellites rise and set and gains drift, so that `TOLERANCE` is taken
 //! off first: the probability of a false alarm is at most the stated one. Limits: a gain control before the
 //! samples hides a change of level, and so does a converter of one bit; a change that comes more slowly than
 //! the reference moves on is not seen.
