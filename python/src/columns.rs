@@ -4,9 +4,9 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 
 use gnss::record::{
-    AcquisitionRow, ClockRow, Event, EventRow, Fix, Geographic, IntegrityRow, InterferenceRow, IonosphereModel,
-    IonosphereRow, LineRow, NavigationRow, Observation, PassEnd, PassRow, RayRow, SightRow, SkyRow, TagRow,
-    TrackingRow, TrajectoryRow,
+    AcquisitionRow, ClockRow, DetectionRow, Detector, Event, EventRow, Fix, Geographic, IntegrityRow, InterferenceRow,
+    IonosphereModel, IonosphereRow, LineRow, NavigationRow, Observation, PassEnd, PassRow, RayRow, SightRow, SkyRow,
+    TagRow, TrackingRow, TrajectoryRow,
 };
 use gnss::satellite::Sv;
 use gnss::signal::Signal;
@@ -136,6 +136,7 @@ texts! {
     String: |x| x.as_str().into();
     &'static Signal: |x| x.name.into();
     Sv: |x| x.to_string().into();
+    Detector: |x| x.name().into();
     Event: |x| word(x).into();
     IonosphereModel: |x| word(x).into();
     PassEnd: |x| word(x).into();
@@ -203,6 +204,7 @@ mod fields {
         IonosphereRow { sample, sv, delay_m, sigma_m }
         IntegrityRow { sample, gps_s, gps_fraction_s, method, hpl_m, vpl_m, emt_m, sigma_v_acc_m, satellites,
             detected, excluded, available, reason }
+        DetectionRow { sample, detector, sv, signal, statistic, threshold, alarm }
         AcquisitionRow { sample, sv, signal, acquired, statistic, threshold, doppler_hz, code_phase_chips, cn0_dbhz }
         LineRow { sample, frequency_hz, jn0_dbhz, js_db, statistic, threshold, lines, resolution_hz }
         TrackingRow { sample, sv, signal, prompt_i, prompt_q, dll_discriminator_chips, pll_discriminator_cycles,

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use generator::truth::{self, TruthError};
 use gnss::record::{
-    AcquisitionRow, ClockRow, EventRow, Fix, Geographic, IntegrityRow, InterferenceRow, IonosphereRow, LineRow,
-    NavigationRow, Observation, PassRow, RayRow, SightRow, SkyRow, TagRow, TrackingRow, TrajectoryRow,
+    AcquisitionRow, ClockRow, DetectionRow, EventRow, Fix, Geographic, IntegrityRow, InterferenceRow, IonosphereRow,
+    LineRow, NavigationRow, Observation, PassRow, RayRow, SightRow, SkyRow, TagRow, TrackingRow, TrajectoryRow,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -80,6 +80,7 @@ pub struct Received {
     sights: Table<SightRow>,
     ionosphere: Table<IonosphereRow>,
     integrity: Table<IntegrityRow>,
+    detection: Table<DetectionRow>,
     interference: Table<(LineRow, FrontEnd)>,
     osnma: Table<TagRow>,
     /// Parameters so far: those of one issue are reported once.
@@ -112,6 +113,7 @@ impl output::Sink for Received {
             output::Record::Ionosphere(rows) => rows.iter().for_each(|row| self.ionosphere.push(row)),
             output::Record::Tag(row) => self.osnma.push(&row),
             output::Record::Integrity(row) => self.integrity.push(&*row),
+            output::Record::Detection(row) => self.detection.push(&row),
             output::Record::Interference { front_end, row } => self.interference.push(&(row, FrontEnd { front_end })),
         }
         Ok(())
@@ -129,7 +131,7 @@ impl Received {
         tables!(
             self, py;
             acquisition, tracking, events, observations, navigation, fixes, clocks, sights, ionosphere, integrity,
-            interference, osnma
+            detection, interference, osnma
         )
     }
 

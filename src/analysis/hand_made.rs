@@ -12,8 +12,8 @@ use serde::Serialize;
 use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
 use gnss::gps::l1ca::L1_CA;
 use gnss::record::{
-    AcquisitionRow, Event, EventRow, Fix, IntegrityRow, IonosphereModel, IonosphereRow, LineRow, NavigationRow,
-    Observation, SkyRow, TrackingRow, TrajectoryRow,
+    AcquisitionRow, DetectionRow, Detector, Event, EventRow, Fix, IntegrityRow, IonosphereModel, IonosphereRow,
+    LineRow, NavigationRow, Observation, SkyRow, TrackingRow, TrajectoryRow,
 };
 use gnss::satellite::Sv;
 use gnss::time::Epoch;
@@ -324,6 +324,30 @@ pub(crate) fn protected(run: &Path) {
         reason: String::new(),
     };
     write(&run.join("rx/integrity.csv"), &fixes.iter().map(row).collect::<Vec<_>>());
+}
+
+/// Adds tests of two detectors to a run, one a second; every tenth of the second one raises an alarm.
+pub(crate) fn detected(run: &Path) {
+    let path = run.join("rx/receiver.json");
+    let mut receiver: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    receiver["settings"]["detection"] = serde_json::json!({"false_alarm": 0.1, "interval_s": 1.0, "reference_s": 20.0});
+    fs::write(&path, receiver.to_string()).unwrap();
+    let row = |second: u64, detector: Detector| {
+        let statistic = if detector == Detector::CorrelationRatio && second % 10 == 5 { 2.5 } else { 1.0 };
+        let sv = if detector == Detector::Level { String::new() } else { Sv::gps(PRNS[0]).to_string() };
+        DetectionRow {
+            sample: second * RATE_HZ,
+            detector,
+            signal: if sv.is_empty() { String::new() } else { L1_CA.name.to_owned() },
+            sv,
+            statistic,
+            threshold: 1.645,
+            alarm: statistic > 1.645,
+        }
+    };
+    let both = [Detector::Level, Detector::CorrelationRatio];
+    let rows: Vec<DetectionRow> = (1..60).flat_map(|second| both.map(|detector| row(second, detector))).collect();
+    write(&run.join("rx/detection.csv"), &rows);
 }
 
 /// Makes the receiver of a run one that verifies Galileo's authentication, from TOW 375 150 of week 566 of

@@ -38,6 +38,7 @@ pub use judge::summary::Summary;
 use judge::verdict::Verdict;
 use measure::clock::Clock;
 use measure::consistency::Consistency;
+use measure::detection::Detection;
 use measure::elevation::Elevations;
 use measure::errors::Errors;
 use measure::jitter::Jitter;
@@ -118,6 +119,7 @@ struct Measured {
     clock: Clock,
     consistency: Consistency,
     protection: Protection,
+    detection: Detection,
     slips: Slips,
     jitter: Jitter,
     summary: Summary,
@@ -134,6 +136,8 @@ fn measure(read: Run, run: &Path, limits: Option<&Limits>) -> Result<Measured, J
     summary.add(&consistency, &slips, &jitter);
     let protection = Protection::measure(&read, &errors)?;
     summary.protection.clone_from(&protection.figures);
+    let detection = Detection::measure(&read)?;
+    summary.detection.clone_from(&detection.figures);
     let not_json = |source| JudgeError::Json { path: run.join("summary.json"), source };
     let verdict = Verdict::of(&read, &errors, &slips, &summary)?;
     summary.details.verdict = match limits {
@@ -143,17 +147,25 @@ fn measure(read: Run, run: &Path, limits: Option<&Limits>) -> Result<Measured, J
     summary.not_judged.clone_from(&summary.details.verdict.not_judged);
     read.sound()?;
     errors.sound()?;
-    Ok(Measured { read, errors, clock, consistency, protection, slips, jitter, summary })
+    Ok(Measured { read, errors, clock, consistency, protection, detection, slips, jitter, summary })
 }
 
 fn find(run: &Path, limits: Option<&Limits>, forms: Forms) -> Result<Found, JudgeError> {
     let measured = measure(Run::read(run)?, run, limits)?;
-    let Measured { read, errors, clock, consistency, protection, slips, jitter, summary } = measured;
+    let Measured { read, errors, clock, consistency, protection, detection, slips, jitter, summary } = measured;
     let elevations = Elevations::measure(&read, &errors, &summary.details.stated)?;
     let detail = Detail::Paper;
     let (consistency, protection) = (&consistency, &protection);
-    let judged =
-        Judged { run: &read, errors: &errors, clock: &clock, consistency, protection, summary: &summary, detail };
+    let judged = Judged {
+        run: &read,
+        errors: &errors,
+        clock: &clock,
+        consistency,
+        protection,
+        detection: &detection,
+        summary: &summary,
+        detail,
+    };
     tables::write_measured(run, &judged, &elevations, &slips, &jitter)?;
     tables::write(run, &judged)?;
     let sketches = plot::sketches(&judged, forms.html)?;

@@ -7,6 +7,7 @@ use thiserror::Error;
 
 use crate::acquire::AcquireError;
 use crate::authentic::{AnchorError, Authenticity};
+use crate::detect::Detected;
 use crate::diagnosis::{Diagnosis, duration};
 use crate::gap::Jump;
 use crate::output::OutputError;
@@ -98,6 +99,8 @@ pub struct Outcome {
     pub parted: Option<Parted>,
     /// Verification of Galileo's authentication, if the settings ask for it.
     pub osnma: Option<Authenticity>,
+    /// Tests of the detectors of jamming and spoofing, if the settings ask for them.
+    pub detection: Option<Detected>,
     /// Gaps and repetitions in the samples.
     pub jumps: Vec<Jump>,
     /// Margins to what is refused.
@@ -169,6 +172,7 @@ impl fmt::Display for Outcome {
         self.interfered.as_ref().map_or(Ok(()), |seen| write!(f, "; {seen}"))?;
         self.parted.as_ref().map_or(Ok(()), |parted| write!(f, "; {parted}"))?;
         self.osnma.as_ref().map_or(Ok(()), |osnma| write!(f, "; {osnma}"))?;
+        self.detection.as_ref().map_or(Ok(()), |detected| write!(f, "; {detected}"))?;
         self.jumps.iter().try_for_each(|jump| write!(f, "; {jump}"))
     }
 }

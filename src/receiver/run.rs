@@ -455,6 +455,9 @@ fn summary(
     if let Some(osnma) = &outcome.osnma {
         summary["osnma"] = json!(osnma);
     }
+    if let Some(detection) = &outcome.detection {
+        summary["detection"] = json!(detection);
+    }
     if metadata.len() > 1 {
         let each = metadata.iter().zip(signals).map(|(metadata, signals)| {
             let mut front_end = of(metadata);

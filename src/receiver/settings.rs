@@ -4,6 +4,7 @@
 //! All errors of a text are reported at once, in its order. The known keys are those of the defaults
 //! themselves, so the list cannot go stale.
 
+pub mod detection;
 pub mod osnma;
 pub mod reference;
 
@@ -16,6 +17,7 @@ use crate::described::described;
 use crate::position::PositionSettings;
 use crate::position::protection::IntegritySettings;
 use crate::track::{TrackingSettings, TrackingSettingsError};
+use detection::DetectionSettings;
 use gnss::place::{Keys, hint, nearest};
 use gnss::time::{Epoch, TimeError};
 use osnma::OsnmaSettings;
@@ -38,6 +40,9 @@ pub struct Settings {
     /// Protection levels; absent: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub integrity: Option<IntegritySettings>,
+    /// Detectors of jamming and spoofing; absent: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub detection: Option<DetectionSettings>,
 }
 
 described! {
@@ -280,7 +285,8 @@ impl Settings {
             ("operation.frame_limit_s", operation.frame_limit_s, 12.0, 86_400.0),
         ];
         let of_levels = self.integrity.as_ref().map(IntegritySettings::ranges).into_iter().flatten();
-        for (key, value, low, high) in ranges.into_iter().chain(of_levels) {
+        let of_detectors = self.detection.as_ref().map(DetectionSettings::ranges).into_iter().flatten();
+        for (key, value, low, high) in ranges.into_iter().chain(of_levels).chain(of_detectors) {
             if !(low..=high).contains(&value) {
                 let expected = format!("{low} to {high}");
                 return Err(SettingsError::Range {
@@ -404,6 +410,7 @@ fn known() -> Table {
     let settings = Settings {
         osnma: Some(OsnmaSettings::default()),
         integrity: Some(IntegritySettings::default()),
+        detection: Some(DetectionSettings::default()),
         ..Settings::default()
     };
     // A structure of numbers, words and truth values is a table.

@@ -87,7 +87,7 @@ pub const ORDER: Order<'static> = &[
             &["followed"],
             &["diagnosis"],
             &["output"],
-            &["authentic"],
+            &["authentic", "detect"],
             &["outcome"],
             &["session"],
             &["run"],
@@ -112,10 +112,10 @@ pub const ORDER: Order<'static> = &[
         &[
             &["facts", "fault", "files", "word_file"],
             &["numbers", "spill_store"],
-            &["rinex_obs", "nmea", "delay", "emission", "levels", "protection", "rows", "table"],
+            &["rinex_obs", "nmea", "delay", "detection", "emission", "levels", "protection", "rows", "table"],
             &["common", "fixes"],
             &["run"],
-            &["sky"],
+            &["attacks", "sky"],
         ],
     ),
     (
@@ -140,7 +140,7 @@ pub const ORDER: Order<'static> = &[
         &[
             &["allan", "errors", "independent", "ionosphere", "lines", "osnma", "peaks", "psd", "spectrum", "spoofing"],
             &["clock", "consistency", "elevation", "jitter", "protection"],
-            &["slips"],
+            &["detection", "slips"],
         ],
     ),
     (
@@ -187,6 +187,7 @@ pub const ORDER: Order<'static> = &[
                 "clock",
                 "consistency",
                 "delays",
+                "detection",
                 "jitter",
                 "peaks",
                 "position",

@@ -9,6 +9,7 @@
 //! `GNSS_TWIN_WRITE_SABOTAGE=$PWD/reports/sabotage.md` makes a run write the table.
 #![cfg(all(feature = "cli", feature = "pdf"))]
 
+mod detection;
 mod early;
 mod excused;
 mod files;
@@ -57,6 +58,7 @@ fn kinds() -> Vec<Kind> {
         early::kinds(),
         osnma::kinds(),
         protection::kinds(),
+        detection::kinds(),
     ]
     .into_iter()
     .flatten()

@@ -7,12 +7,14 @@
 //! the spectrum of the samples, [`peaks`] their correlation with the codes, [`lines`] compares the continuous
 //! waves that the receiver reported with those that there were, [`spoofing`] measures how far a spoofer moved
 //! the fixes, [`osnma`] which tags it took for authentic, [`ionosphere`] what two bands showed of it.
-//! [`protection`] compares errors with the protection levels that the receiver states. [`independent`] says
+//! [`protection`] compares errors with the protection levels that the receiver states, [`detection`] the
+//! alarms of its detectors with the jammers and spoofers that there were. [`independent`] says
 //! how many independent values a correlated series is worth.
 
 pub mod allan;
 pub mod clock;
 pub mod consistency;
+pub mod detection;
 pub mod elevation;
 pub mod errors;
 pub mod independent;

@@ -256,8 +256,12 @@ impl Counts {
 
 /// Exact interval of a probability of which `count` of `all` trials were seen.
 pub fn interval(count: usize, all: usize) -> (f64, f64) {
+    interval_of(count as f64, all as f64)
+}
+
+/// [`interval`] of numbers of trials that need not be whole, as those that correlated trials are worth.
+pub fn interval_of(count: f64, all: f64) -> (f64, f64) {
     let tail = 0.5 * (1.0 - CONFIDENCE);
-    let (count, all) = (count as f64, all as f64);
     // In closed form at the ends, where the distribution's inverse is not defined.
     let low = match count {
         0.0 => 0.0,

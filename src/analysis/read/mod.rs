@@ -5,8 +5,10 @@
 //! are the formats in which a receiver that this project did not write hands over its results. This room
 //! decides nothing: it refuses what is not a table, a number or a time, and knows no theory.
 
+pub mod attacks;
 mod common;
 mod delay;
+pub mod detection;
 mod emission;
 mod fault;
 mod files;

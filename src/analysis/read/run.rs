@@ -14,6 +14,7 @@ use super::common::Common;
 use super::emission::{self, Emission, MeanSignal};
 use super::files::{believable, each, each_of_any, json, missing, optional, rows, text};
 use crate::error::JudgeError;
+use crate::read::detection::Test;
 use crate::read::fixes::Fixes;
 use crate::read::levels::{LevelFinder, Levels};
 use crate::read::protection::Level;
@@ -23,8 +24,8 @@ use crate::statistics::{mean, median};
 use crate::waveform::Sampler;
 use gnss::facts::{FrontEndFacts, SceneFacts};
 use gnss::record::{
-    AcquisitionRow, ClockRow, EventRow, Fix, IntegrityRow, InterferenceRow, IonosphereRow, LineRow, NavigationRow,
-    Observation, RayRow, SkyRow, TrackingRow, TrajectoryRow,
+    AcquisitionRow, ClockRow, DetectionRow, EventRow, Fix, IntegrityRow, InterferenceRow, IonosphereRow, LineRow,
+    NavigationRow, Observation, RayRow, SkyRow, TrackingRow, TrajectoryRow,
 };
 use gnss::satellite::Sv;
 use gnss::signal::described::registered;
@@ -141,6 +142,10 @@ pub struct Run {
     pub ionosphere: SpillStore<Sv, IonosphereRow>,
     /// Protection levels of the fixes; empty of a receiver that states none.
     pub levels: Table<Level>,
+    /// Tests of the receiver's detectors of jamming and spoofing; empty of a receiver without them.
+    pub tests: Table<Test>,
+    /// Satellites and signals of those tests; both empty for a test of the whole receiver.
+    pub tested: Vec<[String; 2]>,
     /// Clock of the receiver against each time scale, by the scales' names; empty for a receiver of GPS time
     /// alone.
     pub clocks: SpillStore<&'static str, ClockRow>,
@@ -214,6 +219,7 @@ impl Run {
         read.update_s = updates.median();
         each_of_any(&rx.join("ionosphere.csv"), |_, row: IonosphereRow| read.ionosphere.push(row.sv, &row))?;
         each_of_any(&rx.join("integrity.csv"), |_, row: IntegrityRow| read.levels.push(row.into()))?;
+        each_of_any(&rx.join("detection.csv"), |_, row: DetectionRow| read.take_test(row))?;
         let clocks = rx.join("clocks.csv");
         each_of_any(&clocks, |line, row: ClockRow| {
             // A signal that a program adds may bring a time of its own.
@@ -353,6 +359,8 @@ impl Run {
             front_ends: BTreeMap::new(),
             ionosphere: SpillStore::new(directory),
             levels: Table::new(directory),
+            tests: Table::new(directory),
+            tested: Vec::new(),
             clocks: SpillStore::new(directory),
             navigation: Vec::new(),
             events: Vec::new(),
@@ -363,6 +371,18 @@ impl Run {
             peaks: Vec::new(),
             speed: Speed::default(),
         })
+    }
+
+    /// Adds a row of `detection.csv`.
+    fn take_test(&mut self, row: DetectionRow) -> Result<(), JudgeError> {
+        let DetectionRow { sample, detector, sv, signal, statistic, threshold, alarm } = row;
+        let name = [sv, signal];
+        let known = self.tested.iter().position(|own| *own == name);
+        let link = known.unwrap_or(self.tested.len()) as u32;
+        if known.is_none() {
+            self.tested.push(name);
+        }
+        self.tests.push(Test { sample, detector, link, statistic, threshold, alarm })
     }
 
     /// Checks that all rows which were looked up by their samples could be read.
@@ -378,6 +398,7 @@ impl Run {
         self.tracking.sound()?;
         self.ionosphere.sound()?;
         self.levels.sound()?;
+        self.tests.sound()?;
         self.cn0_sums_hz.sound()?;
         self.cn0_most_hz.sound()?;
         self.trajectory.sound()?;

@@ -8,6 +8,10 @@ pub const ALLAN: &str = "series,deviation,tau_s,value,low,high,terms,alpha,freed
 pub const CONSISTENCY: &str = "sample,time_s,east_m,north_m,up_m,sigma_east_m,sigma_north_m,sigma_up_m,nees";
 /// `protection.csv`.
 pub const PROTECTION: &str = "sample,time_s,horizontal_m,vertical_m,hpl_m,vpl_m,available,detected";
+/// Judge's `detection.csv`.
+pub const DETECTION: &str = "sample,time_s,detector,sv,signal,statistic,threshold,alarm,label";
+/// `roc.csv`.
+pub const ROC: &str = "detector,threshold_ratio,false_alarm_share,detection_share";
 /// `position.csv`.
 pub const POSITION: &str = "\
     sample,time_s,east_m,north_m,up_m,clock_m,velocity_east_mps,velocity_north_mps,velocity_up_mps,\

@@ -115,6 +115,14 @@ pub(crate) fn write_measured(
     if judged.protection.figures.is_some() {
         write_read_rows(&directory.join("protection.csv"), columns::PROTECTION, judged.protection.rows.cursor())?;
     }
+    if judged.detection.figures.is_some() {
+        let (path, run) = (directory.join("detection.csv"), judged.run);
+        let labelled = run.tests.cursor().map(|test| test.map(|test| judged.detection.labelled(run, &test)));
+        write_read_rows(&path, columns::DETECTION, labelled)?;
+    }
+    if !judged.detection.roc.is_empty() {
+        write_rows(&directory.join("roc.csv"), columns::ROC, judged.detection.roc.iter())?;
+    }
     write_rows(&directory.join("satellites.csv"), columns::SATELLITES, elevations.satellites.iter())?;
     write_rows(&directory.join("elevation.csv"), columns::ELEVATION, elevations.bands.iter())?;
     write_slips(directory, slips)?;

@@ -19,8 +19,8 @@ use serde::Serialize;
 use thiserror::Error;
 
 use gnss::record::{
-    AcquisitionRow, ClockRow, EventRow, Fix, Geographic, IntegrityRow, IonosphereRow, LineRow, NavigationRow,
-    Observation, SightRow, TagRow, TrackingRow,
+    AcquisitionRow, ClockRow, DetectionRow, EventRow, Fix, Geographic, IntegrityRow, IonosphereRow, LineRow,
+    NavigationRow, Observation, SightRow, TagRow, TrackingRow,
 };
 use gnss::time::GPST;
 pub use json::JsonLines;
@@ -77,6 +77,8 @@ pub enum Record {
     Tag(TagRow),
     /// Protection levels of the fix before, where they are asked for.
     Integrity(Box<IntegrityRow>),
+    /// Test of a detector of jamming or spoofing, where detection is asked for.
+    Detection(DetectionRow),
     /// A line in the spectrum of a front end's samples; front ends count from 0.
     Interference {
         /// The front end's index, from 0 on.
@@ -217,6 +219,8 @@ pub struct Output {
     tags: Option<TagTable>,
     /// File of the protection levels, which exists once a fix has a row of them.
     integrity: Option<Sheet>,
+    /// File of the detectors' tests, which exists once there is one.
+    detection: Option<Sheet>,
     /// Parameters written so far: those of one issue are written once.
     parameters: BTreeSet<NavigationRow>,
 }
@@ -283,6 +287,7 @@ const INTEGRITY: [&str; 13] = [
     "available",
     "reason",
 ];
+const DETECTION: [&str; 7] = ["sample", "detector", "sv", "signal", "statistic", "threshold", "alarm"];
 const ACQUISITION: [&str; 9] =
     ["sample", "sv", "signal", "acquired", "statistic", "threshold", "doppler_hz", "code_phase_chips", "cn0_dbhz"];
 const TRACKING: [&str; 16] = [
@@ -316,7 +321,7 @@ impl Output {
     /// [`OutputError::Create`] with the path that cannot be made.
     pub fn create(directory: &Path) -> Result<Self, OutputError> {
         // Of another run, where this one may have none.
-        for name in ["clocks.csv", "ionosphere.csv", "integrity.csv"] {
+        for name in ["clocks.csv", "ionosphere.csv", "integrity.csv", "detection.csv"] {
             let path = directory.join(name);
             if path.exists() {
                 fs::remove_file(&path).map_err(|error| write_error(&path, error))?;
@@ -336,6 +341,7 @@ impl Output {
             ionosphere: None,
             tags: None,
             integrity: None,
+            detection: None,
             parameters: BTreeSet::new(),
         })
     }
@@ -360,6 +366,7 @@ impl Output {
         self.ionosphere.as_mut().map_or(Ok(()), Sheet::flush)?;
         self.tags.as_mut().map_or(Ok(()), |tags| tags.0.flush())?;
         self.integrity.as_mut().map_or(Ok(()), Sheet::flush)?;
+        self.detection.as_mut().map_or(Ok(()), Sheet::flush)?;
         self.interference_of.values_mut().try_for_each(Sheet::flush)
     }
 
@@ -398,6 +405,14 @@ impl Output {
             self.integrity = Some(Sheet::create(&self.directory, "integrity.csv", &INTEGRITY)?);
         }
         self.integrity.as_mut().map_or(Ok(()), |sheet| sheet.write(row))
+    }
+
+    /// Writes a test of a detector.
+    fn detection(&mut self, row: &DetectionRow) -> Result<(), OutputError> {
+        if self.detection.is_none() {
+            self.detection = Some(Sheet::create(&self.directory, "detection.csv", &DETECTION)?);
+        }
+        self.detection.as_mut().map_or(Ok(()), |sheet| sheet.write(row))
     }
 
     /// Writes a line of a front end's spectrum.
@@ -442,6 +457,7 @@ impl Sink for Output {
             Record::Clocks(rows) => self.clocks(&rows),
             Record::Ionosphere(rows) => self.ionosphere(&rows),
             Record::Integrity(row) => self.integrity(&row),
+            Record::Detection(row) => self.detection(&row),
             // It follows from the fix and the ephemerides.
             Record::Sights(_) => Ok(()),
             Record::Tag(row) => self.tags()?.write(&row),
@@ -503,6 +519,8 @@ mod tests {
         assert_eq!(header(&row), IONOSPHERE.join(","));
         let row: IntegrityRow = from_csv(&INTEGRITY, "0,0,0,raim,,,,,4,false,,true,");
         assert_eq!(header(&row), INTEGRITY.join(","));
+        let row: DetectionRow = from_csv(&DETECTION, "0,cn0_fall,,,0.1,3.2,false");
+        assert_eq!(header(&row), DETECTION.join(","));
         let row: LineRow = from_csv(&INTERFERENCE, &zero(8));
         assert_eq!(header(&row), INTERFERENCE.join(","));
     }

@@ -17,8 +17,8 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::NoFix;
 use super::least_squares::{self, Corrections, Range, Solution, freedom};
+use super::{NoFix, Solver};
 use gnss::satellite::Sv;
 
 /// Sets of one size that are tried: all five of twelve satellites, all four of thirteen.
@@ -97,6 +97,21 @@ pub fn without_faults(
         return Ok((without(&ranges, &set), solution, excluded));
     }
     Err(NoFix::Inconsistent { chi_square: all.chi_square, threshold })
+}
+
+/// Weighted sum of squared residuals of a solution of all ranges, and its degrees of freedom; `None` without
+/// any.
+pub(super) fn tested(ranges: &[Range], all: &Solution) -> Option<(f64, usize)> {
+    let freedom = usize::try_from(freedom(ranges)).ok().filter(|freedom| *freedom > 0)?;
+    Some((all.chi_square, freedom))
+}
+
+impl Solver {
+    /// Residual test of all ranges in the latest solution, before any was left out: the weighted sum of
+    /// squares, and its degrees of freedom. `None` without one since it was asked for last.
+    pub fn take_tested(&mut self) -> Option<(f64, usize)> {
+        self.tested.take()
+    }
 }
 
 /// The ranges but for those of an ascending set.

@@ -358,6 +358,8 @@ pub struct Solver {
     augmentation: Augmentation,
     /// Choices of protection levels, where they are asked for.
     integrity: Option<IntegritySettings>,
+    /// Latest residual test of all ranges: weighted sum of squares and degrees of freedom.
+    tested: Option<(f64, usize)>,
 }
 
 impl Solver {
@@ -381,6 +383,7 @@ impl Solver {
             ahead: Vec::new(),
             augmentation: Augmentation::default(),
             integrity: None,
+            tested: None,
         }
     }
 
@@ -478,6 +481,7 @@ impl Solver {
             least_squares::position(&visible, first.position_m, &corrections)?
         };
         self.air.compare(&visible, &all, &corrections, all.position_m);
+        self.tested = exclusion::tested(&visible, &all);
         let (kept, solution, excluded) = without_faults(visible, all, &corrections, self.settings.false_alarm)?;
         let (velocity_mps, drift) = least_squares::velocity(&kept, &solution)?;
         self.last_m = Some(solution.position_m);

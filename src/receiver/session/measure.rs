@@ -63,13 +63,21 @@ impl Session {
         let observations: Vec<Observation> = observed.into_iter().map(|one| one.observation).collect();
         let verified = shared.authentic.as_ref().filter(|authentic| authentic.is_required());
         let (sets, ionosphere) = verified.map_or((&shared.ephemerides, shared.ionosphere), Authentic::data);
-        match shared.solver.solve(tick, clock, &observations, sets, ionosphere) {
+        let solved = shared.solver.solve(tick, clock, &observations, sets, ionosphere);
+        if let Some(detection) = &mut shared.detection {
+            detection.take_observations(&observations);
+            detection.take_residuals(shared.solver.take_tested());
+        }
+        match solved {
             Ok(solved) => {
                 if let Some(first) = self.front_ends.first_mut()
                     && first.clock_jumped(&solved.fix, shared, sink)?
                 {
                     self.keep_step();
                     return Ok(());
+                }
+                if let Some(detection) = &mut shared.detection {
+                    detection.take_fix(&solved.fix);
                 }
                 sink.take(Record::Fix(solved.fix.clone()))?;
                 sink.take(Record::Clocks(solved.clocks))?;

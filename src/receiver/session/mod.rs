@@ -2,12 +2,13 @@
 //! solver.
 //!
 //! Every [`FrontEnd`] searches and follows in its own samples: [`search`] starts and ends channels, [`plan`]
-//! aims, [`part`] measures how code and carrier part, [`gap`] watches for lost samples. What they find is
-//! [`Shared`]: [`decode`] takes in messages, [`measure`] observes and solves with the signals of all. Records
-//! count samples of the first front end ([`step`]).
+//! aims, [`part`] measures how code and carrier part, [`gap`] watches for lost samples, [`detect`] tests for
+//! jamming and spoofing. What they find is [`Shared`]: [`decode`] takes in messages, [`measure`] observes and
+//! solves with the signals of all. Records count samples of the first front end ([`step`]).
 
 use crate::authentic::Authentic;
 use crate::correlate::layers_refusal;
+use crate::detect::Detection;
 use crate::diagnosis::Stage;
 use crate::lead::{lead, refusal};
 use crate::outcome::{Conditioning, Outcome, ReceiveError};
@@ -24,6 +25,7 @@ use step::{Step, Tick};
 pub(super) use suited::held;
 
 mod decode;
+mod detect;
 mod front_end;
 mod gap;
 mod measure;
@@ -86,10 +88,11 @@ impl Session {
             Some(osnma) => Some(Authentic::new(osnma, &settings.acquisition.signals(), start, first.rate)?),
             None => None,
         };
+        let detection = Detection::new(settings, noises.clone(), first.rate, metadata.len());
         let loops = settings.tracking.least_margins(noises.iter().filter_map(|(signal, _)| lead(signal)));
         Ok(Self {
             front_ends,
-            shared: Shared::new(settings, noises, first.rate, (start, week_reference), authentic),
+            shared: Shared::new(settings, noises, first.rate, (start, week_reference), (authentic, detection)),
             next_tick: 0,
             loops,
         })
@@ -132,6 +135,7 @@ impl Session {
             }
         }
         self.decode(None, sink)?;
+        self.detect(blocks, sink)?;
         for (front_end, block) in self.front_ends.iter_mut().zip(blocks) {
             front_end.close(block, &mut self.shared, sink)?;
         }
@@ -198,6 +202,7 @@ impl Session {
             interfered: strongest.max_by(|a, b| a.strongest.jn0_dbhz.total_cmp(&b.strongest.jn0_dbhz)),
             parted: self.front_ends.iter().find_map(|front_end| front_end.parted(shared)),
             osnma: shared.authentic.as_ref().map(Authentic::outcome),
+            detection: shared.detection.as_ref().map(Detection::outcome),
             jumps: self.front_ends.iter().flat_map(|front_end| front_end.gap.jumps.iter().copied()).collect(),
             warnings: self.warnings(),
             conditioning: Conditioning {

@@ -18,6 +18,7 @@ use crate::output::{Record, Sink};
 use crate::parting::Line;
 use crate::position::least_squares::UNKNOWNS;
 use crate::source::{Gathered, Stretch};
+use crate::track::shape::Shape;
 use crate::track::{Channel, Report};
 use gnss::record::{AcquisitionRow, Event, EventRow};
 use gnss::satellite::Sv;
@@ -276,7 +277,7 @@ impl FrontEnd {
                 line: Line::default(),
                 watched: Watched::default(),
                 decoder: shared.decoder(hit.signal, hit.sv),
-                report: Report::default(),
+                report: Report { shape: shared.detection.as_ref().map(|_| Shape::default()), ..Report::default() },
                 since,
                 cn0_dbhz: hit.cn0_dbhz,
                 found_dbhz: hit.cn0_dbhz,

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::authentic::Authentic;
 use crate::decode::Decoder;
+use crate::detect::Detection;
 use crate::diagnosis::{Refusal, Stage};
 use crate::observe::Timebase;
 use crate::position::least_squares::UNKNOWNS;
@@ -47,6 +48,8 @@ pub(super) struct Shared {
     pub ionosphere_model: Option<Model>,
     /// Verification of Galileo's authentication, if the settings ask for it.
     pub authentic: Option<Authentic>,
+    /// Detectors of jamming and spoofing, if the settings ask for them.
+    pub detection: Option<Detection>,
     /// Coefficients of that model.
     pub ionosphere: Option<Coefficients>,
     pub last_fix: Option<LastFix>,
@@ -76,7 +79,7 @@ impl Shared {
         noises: Noises,
         rate: Rate,
         (start, week_reference): (Option<Epoch>, Epoch),
-        authentic: Option<Authentic>,
+        (authentic, detection): (Option<Authentic>, Option<Detection>),
     ) -> Self {
         let mut solver = Solver::new(&settings.position, noises.clone(), rate);
         if let Some(integrity) = &settings.integrity {
@@ -93,6 +96,7 @@ impl Shared {
             ionosphere_model: settings.position.ionosphere.model(&settings.acquisition.signals()),
             ionosphere: None,
             authentic,
+            detection,
             last_fix: None,
             latest: None,
             dopplers: BTreeMap::new(),

@@ -5,6 +5,7 @@
 
 use toml::{Table, Value};
 
+use super::detection::DetectionSettings;
 use super::osnma::OsnmaSettings;
 use super::{OperationSettings, Settings};
 use crate::acquire::AcquisitionSettings;
@@ -34,6 +35,7 @@ pub fn tables() -> Vec<(String, Vec<Described>)> {
         ("operation", OperationSettings::MEANINGS),
         ("osnma", OsnmaSettings::MEANINGS),
         ("integrity", IntegritySettings::MEANINGS),
+        ("detection", DetectionSettings::MEANINGS),
     ];
     let defaults = super::known();
     let described = |section: &str, name: &str, default: &Value| {

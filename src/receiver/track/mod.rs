@@ -3,10 +3,12 @@
 //! A [`Channel`] takes consecutive blocks of samples and gives the state of its replica at requested samples,
 //! message symbols, rows for the judge and events. Its loops ([`loops`]) are designed in the discrete domain
 //! and closed in [`closed`]; detectors are in [`lock`], [`cn0`] and `sync`, the pull-in of weak signals in
-//! `pull_in`, the secondary code of pilots in `secondary_code`, both sidebands of a sub-carrier in `sides`.
-//! Limits: loops follow the component that leads, a code period is at least as long as a few samples.
+//! `pull_in`, the secondary code of pilots in `secondary_code`, both sidebands of a sub-carrier in `sides`,
+//! sums for detectors of distorted correlations in [`shape`]. Limits: loops follow the component that leads,
+//! a code period is at least as long as a few samples.
 
 use gnss::record::{Event, TrackingRow};
+use shape::Shape;
 
 mod bits;
 mod channel;
@@ -22,6 +24,7 @@ pub mod model;
 mod pull_in;
 mod secondary_code;
 pub mod settings;
+pub mod shape;
 pub mod side;
 mod sides;
 #[cfg(test)]
@@ -51,6 +54,8 @@ pub struct Report {
     pub rows: Vec<TrackingRow>,
     /// Events with the sample at which they were noticed.
     pub events: Vec<(u64, Event)>,
+    /// Shape of the correlation since it was taken last; `None` where nobody asks for it.
+    pub shape: Option<Shape>,
 }
 
 /// The state of a channel's replica at a requested sample.

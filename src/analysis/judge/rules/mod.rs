@@ -7,6 +7,7 @@
 
 mod availability;
 mod cases;
+mod detection;
 mod dispersion;
 mod excused;
 mod foreign;
@@ -69,6 +70,7 @@ impl Verdict {
         verdict.about(Group::Samples).spectrum(run)?;
         verdict.about(Group::Interference).interference(summary);
         verdict.spoofing(run, summary)?;
+        verdict.detection(summary);
         verdict.about(Group::Tables).tables(run, errors)?;
         verdict.hint(run);
         Ok(verdict)

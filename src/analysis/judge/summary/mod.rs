@@ -17,6 +17,7 @@ use crate::measure::allan::Deviation;
 use crate::measure::clock;
 use crate::measure::clock::{Of, Series};
 use crate::measure::consistency::{Calibration, Consistency};
+use crate::measure::detection;
 use crate::measure::errors::{Errors, Link, SignalError};
 use crate::measure::ionosphere::Ionosphere;
 use crate::measure::jitter::{Jitter as LoopJitter, Loop, Pooled};
@@ -81,6 +82,9 @@ pub struct Summary {
     /// Errors against the protection levels; absent of a receiver that states none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub protection: Option<protection::Figures>,
+    /// Alarms of the detectors of jamming and spoofing; absent of a receiver without them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub detection: Option<detection::Figures>,
     /// Figures that the verdict does not judge, each with the reason.
     pub not_judged: Vec<String>,
     /// Speed of the stages.
@@ -288,6 +292,7 @@ impl Summary {
             osnma: Osnma::of(run)?,
             ionosphere: Ionosphere::of(run)?,
             protection: None,
+            detection: None,
             jammed: !run.scene.interference.is_empty(),
             not_judged: Vec::new(),
             speed: run.speed,

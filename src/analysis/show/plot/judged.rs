@@ -3,6 +3,7 @@
 use crate::judge::summary::Summary;
 use crate::measure::clock::Clock;
 use crate::measure::consistency::Consistency;
+use crate::measure::detection::Detection;
 use crate::measure::errors::Errors;
 use crate::measure::protection::Protection;
 use crate::read::Run;
@@ -25,6 +26,7 @@ pub(crate) struct Judged<'a> {
     pub clock: &'a Clock,
     pub consistency: &'a Consistency,
     pub protection: &'a Protection,
+    pub detection: &'a Detection,
     pub summary: &'a Summary,
     pub detail: Detail,
 }

@@ -4,7 +4,8 @@
 //! what is drawn, as a sketch that holds all it needs: a run's rows are gone before the first picture is
 //! drawn. A picture with nothing to show is drawn with empty axes, so that a script finds the files it
 //! expects; only `psd.png` and `peaks.png` depend on `psd.csv` and `peaks.csv` being there, `spoofing.png` on
-//! a spoofer, `multipath.png` on `truth/rays.csv` and `stanford.png` on `rx/integrity.csv`.
+//! a spoofer, `multipath.png` on `truth/rays.csv`, `stanford.png` on `rx/integrity.csv` and
+//! `detection.png` on `rx/detection.csv`.
 
 pub mod canvas;
 pub mod chart;
@@ -12,6 +13,7 @@ mod clip;
 mod clock;
 mod consistency;
 mod delays;
+mod detection;
 pub(crate) mod dome;
 pub mod drawing;
 mod elevation;
@@ -56,7 +58,7 @@ pub(crate) struct Picture {
 }
 
 /// The pictures in the order of the report, where a tall one and a low one share a page.
-pub(crate) const PICTURES: [Picture; 19] = [
+pub(crate) const PICTURES: [Picture; 20] = [
     Picture {
         name: "sky",
         title: "sky",
@@ -213,6 +215,15 @@ pub(crate) const PICTURES: [Picture; 19] = [
                   limit. Above the alert limit the fix is not available.",
         numbers: &["protection.csv"],
         sketch: protection::stanford,
+    },
+    Picture {
+        name: "detection",
+        title: "detection of jamming and spoofing",
+        caption: "Statistic of every test of the receiver's detectors over its threshold: points above the line are \
+                  alarms. Below, where the scene has an attack, the share of attacked tests with an alarm over that \
+                  of clean ones, for thresholds from high to low.",
+        numbers: &["detection.csv"],
+        sketch: detection::detection,
     },
 ];
 

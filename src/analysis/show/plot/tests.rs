@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use super::*;
-use crate::hand_made::{Draw, RATE_HZ, planted, protected};
+use crate::hand_made::{Draw, RATE_HZ, detected, planted, protected};
 use crate::judge;
 use crate::measure::psd::Psd;
 use crate::read::PeakRow;
@@ -32,6 +32,7 @@ fn every_picture_is_a_png_that_is_not_blank_and_its_numbers_are_in_a_table() {
     let peaks: Vec<PeakRow> = [3, 7].into_iter().flat_map(|sv| (-9..=9).map(move |k| at(sv, k))).collect();
     tables::write_peaks(&run.path().join("peaks.csv"), &peaks).unwrap();
     protected(run.path());
+    detected(run.path());
     judge(run.path()).unwrap();
     let only_elsewhere = ["multipath", "spoofing"];
     for picture in PICTURES.iter().filter(|picture| !only_elsewhere.contains(&picture.name)) {

@@ -17,6 +17,7 @@ pub(super) fn add(report: &mut Report, judged: &Judged<'_>) -> Result<(), JudgeE
     report.heading("Accuracy");
     accuracy(report, judged);
     protection(report, judged);
+    detection(report, judged);
     signals(report, judged);
     loops(report, judged);
     satellites(report, judged)?;
@@ -104,6 +105,53 @@ fn protection(report: &mut Report, judged: &Judged<'_>) {
             of.unavailable.to_string(),
             of.unavailable_misleading.to_string(),
             fixed(Some(of.ratio_max), 3),
+        ]);
+    }
+    report.table(table);
+}
+
+/// Adds false alarms, detections and delays of the detectors, of a receiver that has them.
+fn detection(report: &mut Report, judged: &Judged<'_>) {
+    let Some(found) = &judged.summary.detection else { return };
+    let columns = [
+        ("detector", Side::Left),
+        ("clean tests", Side::Right),
+        ("false alarms", Side::Right),
+        ("share", Side::Right),
+        ("95 % interval", Side::Right),
+        ("an hour", Side::Right),
+        ("attacked tests", Side::Right),
+        ("detected share", Side::Right),
+        ("attacks detected", Side::Right),
+        ("after (s)", Side::Right),
+        ("ROC area", Side::Right),
+    ];
+    let mut table = Table::new(
+        format!(
+            "Detection of jamming and spoofing: stated probability of a false alarm {} a test of {} s; {} s without an \
+             attack, {} attacks, {} of them detected.",
+            shown(found.stated_false_alarm),
+            shown(found.interval_s),
+            number(found.clean_s),
+            found.attacks,
+            found.attacks_detected,
+        ),
+        columns,
+    );
+    for (name, of) in &found.detectors {
+        let ends = of.false_alarm_low.zip(of.false_alarm_high);
+        table.row([
+            (*name).to_owned(),
+            of.clean_tests.to_string(),
+            of.false_alarms.to_string(),
+            shown(of.false_alarm_share),
+            ends.map_or_else(String::new, |(low, high)| format!("{} to {}", number(low), number(high))),
+            fixed(of.false_alarms_per_hour, 1),
+            of.attacked_tests.to_string(),
+            fixed(of.detection_share, 3),
+            of.attacks_detected.to_string(),
+            fixed(of.time_to_detect_s, 1),
+            fixed(of.roc_area, 3),
         ]);
     }
     report.table(table);

@@ -92,6 +92,9 @@ impl Channel {
         }
         if self.accumulator.periods >= self.periods_per_update() {
             self.update();
+            if let Some(shape) = report.shape.as_mut().filter(|_| self.is_at_rest()) {
+                shape.add(self.last.prompt, self.last.sides, self.last.integration_s);
+            }
             self.accumulator.clear(self.nco.first);
         }
         self.keep_to_symbols(number);
@@ -134,6 +137,12 @@ impl Channel {
         if has_symbols && confirmed && !is_in_bit {
             report.symbols.push(Symbol { first_period, end: first, soft: (sum.re / length.sqrt()) as f32 });
         }
+    }
+
+    /// True while all loops follow a signal whose symbols are known, with their final bandwidths.
+    fn is_at_rest(&self) -> bool {
+        let tracks = matches!(self.stage, Stage::Tracking(_)) && self.detectors.lock.is_locked();
+        tracks && self.signs.confirmed && !self.held && !self.moved && !self.pull_in.is_wide
     }
 
     /// Closes the loops with the sums of an integration.
