@@ -30,8 +30,8 @@ pub struct Edge {
     along: Vector3<f64>,
     /// Length in metres.
     length_m: f64,
-    /// Normal of the region at the other side of the edge, if there is one.
-    pub beyond: Option<Vector3<f64>>,
+    /// Number and normal of the region at the other side of the edge, if there is one.
+    pub beyond: Option<(u32, Vector3<f64>)>,
 }
 
 /// Plane region of a wall or roof.
@@ -45,6 +45,8 @@ pub struct Facet {
     pub bounds: Bounds,
     /// Kind of its first polygon.
     pub kind: Kind,
+    /// Number of the region, by which edges name it.
+    pub region: u32,
     origin_m: Vector3<f64>,
     across: [Vector3<f64>; 2],
     edges: Vec<Edge>,
@@ -127,7 +129,7 @@ impl Edge {
 
     /// True if the edge bounds what a ray along `along` sees: its two regions do not face the ray alike.
     pub fn is_outline(&self, normal: &Vector3<f64>, along: &Vector3<f64>) -> bool {
-        self.beyond.is_none_or(|beyond| (normal.dot(along) > 0.0) != (beyond.dot(along) > 0.0))
+        self.beyond.is_none_or(|(_, beyond)| (normal.dot(along) > 0.0) != (beyond.dot(along) > 0.0))
     }
 }
 
@@ -187,7 +189,7 @@ pub fn facets(
     let region = |(group, all): (&u32, &Vec<u32>)| {
         let own: Vec<&Polygon> = all.iter().filter_map(|k| polygons.get(*k as usize)).collect();
         let normal = *normals.get(group)?;
-        let edges: Vec<([u32; 2], Option<Vector3<f64>>)> = own
+        let edges: Vec<([u32; 2], Option<(u32, Vector3<f64>)>)> = own
             .iter()
             .flat_map(|polygon| &polygon.edges)
             .filter_map(|&[a, b]| {
@@ -196,11 +198,12 @@ pub fn facets(
                 if others.iter().any(|other| group_of(*other) == *group) {
                     return None;
                 }
-                let beyond = others.first().and_then(|other| normals.get(&group_of(*other)).copied());
+                let beyond = others.first().map(|other| group_of(*other));
+                let beyond = beyond.and_then(|group| Some((group, *normals.get(&group)?)));
                 Some(([a, b], beyond))
             })
             .collect();
-        facet(&edges, &vertices, normal, own.first()?.kind)
+        facet(&edges, &vertices, normal, (own.first()?.kind, *group))
     };
     members.iter().filter_map(region).collect()
 }
@@ -281,10 +284,10 @@ fn grouped(polygons: &[Polygon], owners: &HashMap<[u32; 2], Vec<u32>>) -> Vec<u3
 }
 
 fn facet(
-    edges: &[([u32; 2], Option<Vector3<f64>>)],
+    edges: &[([u32; 2], Option<(u32, Vector3<f64>)>)],
     vertices: &[Vector3<f64>],
     normal: Vector3<f64>,
-    kind: Kind,
+    (kind, region): (Kind, u32),
 ) -> Option<Facet> {
     let at = |k: u32| vertices.get(k as usize).copied();
     let corners: Vec<Vector3<f64>> = edges.iter().filter_map(|([a, _], _)| at(*a)).collect();
@@ -306,7 +309,7 @@ fn facet(
     });
     let edges = edges.collect();
     let bounds = Bounds { low_m, high_m, normal };
-    Some(Facet { normal, offset_m: normal.dot(&origin_m), bounds, kind, origin_m, across, edges })
+    Some(Facet { normal, offset_m: normal.dot(&origin_m), bounds, kind, region, origin_m, across, edges })
 }
 
 #[cfg(test)]
@@ -365,7 +368,8 @@ mod tests {
     #[test]
     fn an_edge_between_two_faces_that_a_ray_enters_is_no_outline() {
         let wall = &all()[0];
-        let roof = wall.edges.iter().find(|edge| edge.beyond == Some(Vector3::z())).unwrap();
+        let roof =
+            wall.edges.iter().find(|edge| edge.beyond.is_some_and(|(_, normal)| normal == Vector3::z())).unwrap();
         // From below the roof is behind the wall's top; from above both are entered.
         assert!(roof.is_outline(&wall.normal, &Vector3::new(0.0, 0.8, 0.6)));
         assert!(!roof.is_outline(&wall.normal, &Vector3::new(0.0, 0.8, -0.6)));

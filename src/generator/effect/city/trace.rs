@@ -32,6 +32,8 @@ const OWN_M: f64 = 1e-6;
 /// Ways shorter than this count as this for Fresnel's zones, in wavelengths: nearer the formula does not
 /// hold.
 const NEAREST_WAVES: f64 = 1.0;
+/// Height above a mirror's plane from which on its echo is whole, in wavelengths.
+const GRAZING_WAVES: f64 = 2.0;
 
 /// Mirrors of a way: the last one before the antenna, and the one before that, if there are two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -175,22 +177,25 @@ impl Walls {
         self.passed(worst)
     }
 
-    /// ν of the shadow of a surface on a leg: positive within it. `None` where the leg does not cross its
-    /// plane.
+    /// ν of the shadow of a surface on a leg: positive within it. `None` of a mirror at an end of the leg,
+    /// whose edges count where it reflects.
     fn shadow_nu(&self, leg: &Leg, number: u32, carrier: &Carrier) -> Option<f64> {
         if leg.own.contains(&Some(number)) {
             return None;
         }
         let facet = self.facet(number)?;
-        let rise = facet.normal.dot(&leg.along);
-        let ahead_m = -facet.above_m(&leg.from_m) / rise;
-        if !(ahead_m > OWN_M && ahead_m < leg.length_m - OWN_M) {
-            return None;
-        }
-        let is_outline = |edge: &Edge| edge.is_outline(&facet.normal, &leg.along);
-        let nu = |distance_m: f64, ahead_m: f64| carrier.nu(distance_m, leg.behind_m + ahead_m);
-        let nearest = facet.nearest(&leg.from_m, &leg.along, is_outline, nu);
-        Some(if facet.holds(&(leg.from_m + leg.along * ahead_m)) { nearest } else { -nearest })
+        let regions = leg.own.map(|own| own.and_then(|own| self.facet(own)).map(|mirror| mirror.region));
+        let counts = |edge: &Edge| {
+            let is_mirror_s = edge.beyond.is_some_and(|(region, _)| regions.contains(&Some(region)));
+            !is_mirror_s && edge.is_outline(&facet.normal, &leg.along)
+        };
+        // An edge beside or behind the leg's ends is none.
+        let nu = |aside_m: f64, ahead_m: f64| match ahead_m > 0.0 && ahead_m < leg.length_m {
+            true => carrier.nu(aside_m, leg.behind_m + ahead_m),
+            false => f64::INFINITY,
+        };
+        let nearest = facet.nearest(&leg.from_m, &leg.along, counts, nu);
+        Some(if self.crosses(number, &leg.from_m, &leg.along, leg.length_m) { nearest } else { -nearest })
     }
 
     /// True if no surface lies across the straight line between two positions, mirrors of `own` apart.
@@ -319,6 +324,9 @@ impl Walls {
             let Some(facet) = self.facet(bounce.surface) else { return 0.0 };
             let nu = |distance_m: f64, ahead_m: f64| carrier.nu(distance_m, bounce.left_m - ahead_m);
             let nearest = facet.nearest(&bounce.at_m, &bounce.onward, |_| true, nu);
+            // Height of what is mirrored above the mirror's plane, behind which there is no echo.
+            let height_m = bounce.left_m * bounce.onward.dot(&facet.normal);
+            share *= smooth(height_m / (GRAZING_WAVES * carrier.wavelength_m));
             share *= self.mirrored(if facet.holds(&bounce.at_m) { nearest } else { -nearest });
             if share < FLOOR[0] {
                 return 0.0;
