@@ -78,8 +78,8 @@ const TABLES: &[(&str, Option<&str>)] = &[
     ("[power]\ncn0_dbhz = 45\n[[interference]]\nkind = \"matched\"\njs_db = 10", None),
     ("[[spoofer]]\npower_db = 3\nclock_bias_s = 1e-6", None),
     (
-        "[city]\nfile = \"scenarios/street.city.json\"\nlatitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 128\norder \
-         = 2",
+        "[city]\nfile = \"scenarios/street.city.json\"\nmaterial = \"metal\"\ncross_polar_db = 0\norder = 2\n\
+         latitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\norigin_m = [0, 95, 1.5]",
         None,
     ),
     ("[noise]", None),
