@@ -19,6 +19,9 @@ const LEAST_AREA_M2: f64 = 0.01;
 const SAME_TURN: f64 = 5e-7;
 const SAME_PLANE_M: f64 = 0.02;
 
+/// Number and normal of a region, if there is one.
+pub type Beyond = Option<(u32, Vector3<f64>)>;
+
 /// Edge of a region.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Edge {
@@ -31,7 +34,7 @@ pub struct Edge {
     /// Length in metres.
     length_m: f64,
     /// Number and normal of the region at the other side of the edge, if there is one.
-    pub beyond: Option<(u32, Vector3<f64>)>,
+    pub beyond: Beyond,
 }
 
 /// Plane region of a wall or roof.
@@ -189,7 +192,7 @@ pub fn facets(
     let region = |(group, all): (&u32, &Vec<u32>)| {
         let own: Vec<&Polygon> = all.iter().filter_map(|k| polygons.get(*k as usize)).collect();
         let normal = *normals.get(group)?;
-        let edges: Vec<([u32; 2], Option<(u32, Vector3<f64>)>)> = own
+        let edges: Vec<([u32; 2], Beyond)> = own
             .iter()
             .flat_map(|polygon| &polygon.edges)
             .filter_map(|&[a, b]| {
@@ -284,7 +287,7 @@ fn grouped(polygons: &[Polygon], owners: &HashMap<[u32; 2], Vec<u32>>) -> Vec<u3
 }
 
 fn facet(
-    edges: &[([u32; 2], Option<(u32, Vector3<f64>)>)],
+    edges: &[([u32; 2], Beyond)],
     vertices: &[Vector3<f64>],
     normal: Vector3<f64>,
     (kind, region): (Kind, u32),

@@ -25,6 +25,9 @@ const STEP_M: f64 = 0.5;
 const STEP_S: f64 = 5.0;
 const SHORTEST_S: f64 = 0.01;
 
+/// Way at an instant, with the phase of its field in cycles and its amplitude.
+pub type Found = (Mirrors, f64, f64);
+
 /// Instants from the scene's start to `end_s` between which the antenna moves [`STEP_M`] at most.
 pub fn instants(trajectory: &Trajectory, end_s: f64) -> Vec<f64> {
     let (mut t_s, mut found) = (0.0, vec![0.0]);
@@ -49,7 +52,7 @@ pub fn ways_now(
     (antenna_m, satellite_m): (&Vector3<f64>, &Vector3<f64>),
     carrier: &Carrier,
     tested: &mut impl FnMut(u32),
-) -> Vec<(Mirrors, f64, f64)> {
+) -> Vec<Found> {
     let sky = (satellite_m - antenna_m).normalize();
     let mut candidates = Vec::new();
     walls.each_mirror(antenna_m, &sky, &mut |last| candidates.push(Mirrors { last, first: None }));
@@ -130,7 +133,7 @@ impl Quest<'_> {
     }
 
     /// Ways of all satellites at an instant.
-    fn at(&self, t_s: f64) -> Result<Vec<(Sv, (Mirrors, f64, f64))>, OrbitError> {
+    fn at(&self, t_s: f64) -> Result<Vec<(Sv, Found)>, OrbitError> {
         let motion = self.trajectory.at(t_s);
         let antenna_m = self.axes.local_m(&motion.position_m);
         let seen = if self.order > 1 { seen_from(self.walls, &antenna_m) } else { Vec::new() };
