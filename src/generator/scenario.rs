@@ -9,6 +9,7 @@ mod attitude;
 mod augmentation;
 mod band;
 mod builder;
+mod city;
 mod compose;
 mod expect;
 mod fidelity;
@@ -44,6 +45,7 @@ use thiserror::Error;
 
 pub use augmentation::SbasSpec;
 pub use builder::{Builder, put};
+pub use city::CitySpec;
 pub use compose::Overrides;
 use files::Files;
 pub use front_end::{FrontEnd, Tuned};
@@ -257,6 +259,8 @@ pub struct Scenario {
     pub obstacles: Vec<Obstacle>,
     /// Scintillation; absent means none.
     pub scintillation: Option<Strength>,
+    /// Walls and roofs; absent means none.
+    pub city: Option<CitySpec>,
     /// The receiver's clock.
     pub receiver_clock: ClockSpec,
     /// True if there is thermal noise.
@@ -369,6 +373,8 @@ impl Scenario {
         let multipath = each(root, "multipath", multipath::echo, refusals);
         refusals.take(multipath::count(root, &multipath));
         let obstacles = each(root, "obstruction", obstruction::obstacle, refusals);
+        let city = refusals.take(root.table("city")).flatten();
+        let city = refusals.take(city.map(|t| city::city(&t)).transpose());
         let interference = each(root, "interference", interference::interference, refusals);
         let spoofers = each(root, "spoofer", interference::spoofer, refusals);
         let expect = expect.map(|t| expect::expect(&t, duration_s.unwrap_or(f64::INFINITY))).transpose();
@@ -400,6 +406,7 @@ impl Scenario {
             message_faults,
             motion: motion?,
             attitude: attitude?,
+            city: city?,
             front_ends: front_ends?,
             power: power?,
             multipath,

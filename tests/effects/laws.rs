@@ -32,9 +32,11 @@ const GALILEO: Base = Base {
 };
 
 impl Base {
-    /// Tables as this base has their satellite and orbits; `None` of those that are about another message.
+    /// Tables as this base has their satellite and orbits; `None` of those that are about another message or
+    /// place.
     fn tables(&self, tables: &str) -> Option<String> {
-        let other = self.satellite != GPS.satellite && tables.contains("word = 7");
+        let is_its_own = tables.contains("word = 7") || tables.contains("street.city.json");
+        let other = self.satellite != GPS.satellite && is_its_own;
         (!other).then(|| tables.replace(GPS.satellite, self.satellite).replace(GPS.orbits, self.orbits))
     }
 
@@ -75,6 +77,11 @@ const TABLES: &[(&str, Option<&str>)] = &[
     ),
     ("[power]\ncn0_dbhz = 45\n[[interference]]\nkind = \"matched\"\njs_db = 10", None),
     ("[[spoofer]]\npower_db = 3\nclock_bias_s = 1e-6", None),
+    (
+        "[city]\nfile = \"scenarios/street.city.json\"\nmaterial = \"metal\"\ncross_polar_db = 0\norder = 2\n\
+         latitude_deg = 26.5\nlongitude_deg = 80.2\nheight_m = 130\norigin_m = [0, 95, 1.5]",
+        None,
+    ),
     ("[noise]", None),
     ("[playback]\nbits = 4", None),
     (

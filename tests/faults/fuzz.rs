@@ -21,9 +21,11 @@ use analysis::measure::slips::Slips;
 use analysis::read::Run;
 use analysis::read::{nmea, rinex_obs};
 use generator::effect::antenna;
+use generator::effect::city::facet::{Facet, facets};
 use generator::scenario::Scenario;
 use generator::vehicle::Trajectory;
 use generator::vehicle::file::{Options, read_csv, read_nmea};
+use gnss::cityjson;
 use gnss::ionex::{Interpolation, Maps};
 use gnss::time::Epoch;
 use gnss::vienna::MappingGrid;
@@ -280,6 +282,19 @@ fn targets() -> Vec<Target<'static>> {
             "antenna, CSV",
             kept(&["antenna.csv"]),
             Box::new(|bytes| antenna::Table::read(bytes, "file").map(hashed).map_err(text)),
+        ),
+        simple(
+            "city model, CityJSON",
+            kept(&["street.city.json"]),
+            Box::new(|bytes| {
+                let model = cityjson::read(bytes, "file", None).map_err(text)?;
+                let all = facets(&model, |vertex| nalgebra::Vector3::from(*vertex), |_, _| true);
+                let fits = |facet: &Facet| (facet.normal.norm() - 1.0).abs() < 1e-9 && facet.offset_m.is_finite();
+                match all.iter().find(|facet| !fits(facet)) {
+                    None => Ok(hashed((&model.surfaces, all.len()))),
+                    Some(facet) => Err(format!("{facet:?}")),
+                }
+            }),
         ),
         simple(
             "scenario, TOML",

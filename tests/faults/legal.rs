@@ -43,6 +43,10 @@ const NUMBERS: &[Row] = &[
     ("multipath", "amplitude excess_m height_m", Yes, No),
     ("multipath", "rate_mps phase_deg azimuth_deg", Yes, Yes),
     ("multipath", "distance_m", No, No),
+    // Vacuum reflects nothing, and no material is thinner.
+    ("city", "radius_m permittivity", No, No),
+    ("city", "conductivity_spm cross_polar_db", Yes, No),
+    ("city", "latitude_deg longitude_deg height_m", Yes, Yes),
     ("ionosphere", "vtec_tecu", Yes, No),
     ("ionosphere", "shell_km", No, No),
     ("troposphere", "height_m temperature_c", Yes, Yes),
@@ -129,6 +133,7 @@ const WHOLE: &[Row] = &[
     ("axis", "count", No, No),
     ("playback adc", "bits", No, No),
     ("filter", "order", No, No),
+    ("city", "order", Yes, No),
     ("message_fault", "subframe word bit", No, No),
     ("message_fault", "health", Yes, No),
     ("acquisition tracking", "coherent_periods noncoherent_sums pll_order fll_order dll_order integration", No, No),

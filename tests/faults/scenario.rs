@@ -238,7 +238,7 @@ fn values_that_contradict_each_other_are_refused_with_the_number_that_decides() 
     let obstruction = |line: &str| add(&format!("[[obstruction]]\n{line}"));
     // A name, the text, and a part of what is said, in a refusal or in a warning.
     #[rustfmt::skip]
-    let table: [(&str, String, &str); 52] = [
+    let table: [(&str, String, &str); 55] = [
         ("an IF beyond the band", add("[front_end]\nsample_rate_hz = 4e6\nif_hz = 3e6"), "2000000"),
         ("a real format at 0 Hz", add("[front_end]\nformat = \"ri8\""), "is real"),
         ("more bits than the format", add("[adc]\nbits = 12"), "at most 8"),
@@ -255,6 +255,9 @@ fn values_that_contradict_each_other_are_refused_with_the_number_that_decides() 
                                             2]"), "ascending"),
         ("elevations too few", obstruction("kind = \"horizon\"\nazimuth_deg = [1, 2]\nelevation_deg = [1]"), "as \
                                                                                                               many as azimuth_deg has: 2"),
+        ("a city without its file", add("[city]\nfile = \"nowhere.city.json\""), "cannot be read"),
+        ("a city of another format", add("[city]\nfile = \"ride.csv\""), "ride.csv:1:1: not CityJSON"),
+        ("a city at no position", add("[city]\nfile = \"street.city.json\""), "no metadata.referenceSystem"),
         ("a pulse longer than its period", jam("kind = \"pulse\"\njs_db = 9\nwidth_s = 0.01\nrate_hz = 1100"), "at \
                                                                                                                 most 9.09"),
         ("a pulse of half a sample", jam("kind = \"pulse\"\njs_db = 9\nwidth_s = 1e-7\nrate_hz = 1100"), "two \

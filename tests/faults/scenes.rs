@@ -239,6 +239,14 @@ max_gap_s = 1.5
 [orbits]
 sp3 = "orbits.sp3"
 antenna_offset_m = 0.7
+[city]
+file = "street.city.json"
+lod = "2"
+radius_m = 200
+material = "brick"
+order = 2
+diffraction = false
+cross_polar_db = 12
 [[multipath]]
 kind = "given"
 amplitude = 0.5
@@ -289,6 +297,14 @@ latitude_deg = 26.51
 longitude_deg = 80.21
 height_m = 130
 speed_mps = 5
+[city]
+file = "street.city.json"
+permittivity = 5
+conductivity_spm = 0.05
+latitude_deg = 26.5
+longitude_deg = 80.2
+height_m = 128
+origin_m = [0, 0, 0]
 [attitude]
 kind = "fixed"
 yaw_deg = 10

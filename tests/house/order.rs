@@ -13,7 +13,7 @@ pub const ORDER: Order<'static> = &[
         &[
             &["plant", "renamed"],
             &["time", "earth", "geoid", "satellite", "crc", "fec", "inflate", "place", "weil"],
-            &["bits", "bdgim", "klobuchar", "nequick", "ionex", "samples", "vienna"],
+            &["bits", "bdgim", "cityjson", "klobuchar", "nequick", "ionex", "projection", "samples", "vienna"],
             &["ionosphere"],
             &["packed", "signal", "vmf3"],
             &["recording"],

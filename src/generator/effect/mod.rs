@@ -2,6 +2,7 @@
 
 pub mod antenna;
 pub mod bdgim;
+pub mod city;
 pub mod ionosphere;
 pub mod link;
 pub mod mapping;

@@ -53,6 +53,9 @@ pub(super) fn models(scene: &Scene, kept: &Kept) -> Vec<Model> {
     if !scene.effects.iter().any(|effect| effect.name() == "obstruction") {
         add("obstruction", false, "the scenario has no [[obstruction]]".to_owned());
     }
+    if !scene.effects.iter().any(|effect| effect.name() == "city") {
+        add("city", false, "the scenario has no [city]".to_owned());
+    }
     let fading = scene.scintillation.as_ref().map(|fading| {
         let strength = &fading.strength;
         let who =

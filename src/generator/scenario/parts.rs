@@ -1,7 +1,7 @@
 //! Parts of a scene: navigation data, orbits, messages, and the effects of propagation.
 
 use super::files::Files;
-use super::{Ionosphere, Scenario, ScenarioError, multipath, satellite};
+use super::{Ionosphere, Scenario, ScenarioError, city, multipath, satellite};
 use crate::catalogue::Catalogue;
 use crate::effect::obstruction::Obstruction;
 use crate::effect::wind_up::WindUp;
@@ -388,6 +388,9 @@ pub(super) fn effects(
         effects.push(Box::new(wind_up));
     }
     effects.push(scenario.power.effect(scenario, trajectory, files.directory, files.overrides)?);
+    if let Some(spec) = &scenario.city {
+        effects.push(Box::new(city::effect(spec, scenario, files, (sky, trajectory), end_s)?));
+    }
     if !scenario.multipath.is_empty() {
         effects.push(Box::new(multipath::effect(scenario, trajectory)?));
     }

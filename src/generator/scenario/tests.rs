@@ -1,3 +1,4 @@
+mod city;
 mod declared;
 mod front_end;
 mod navigation;
@@ -64,6 +65,9 @@ const REST: &str = "[navigation]\nfile = \"brdc.10n\"\ngalileo_ahead_ns = 3\n[sa
     = \"tcxo\"\n[noise]\n\
     [playback]\nbits = 8\nload_sigma = 3\nattenuation_db = 1\n\
     [local_oscillator]\noffset_hz = 10\nphase_noise_rad = 0.1\nphase_noise_bandwidth_hz = 1000\n\
+    [city]\nfile = \"street.city.json\"\nlod = \"2\"\nradius_m = 200\nmaterial = \"glass\"\norder = 2\n\
+    diffraction = false\ncross_polar_db = 20\nlatitude_deg = 26\nlongitude_deg = 80\nheight_m = 128\n\
+    origin_m = [1, 2, 3]\n\
     [filter]\nkind = \"butterworth\"\norder = 4\nbandwidth_hz = 1.8e6\n[iq]\ndc_i_lsb = 0.5\n\
     [adc]\nbits = 2\nstep_sigma = 1\nagc_window_s = 0.001\n\
     [fidelity]\nlevel = \"balanced\"\ncarrier = \"f64\"\nnoise = \"f32\"\ncode_edge = \"nearest\"\n\
@@ -143,6 +147,10 @@ fn every_value_arrives_where_it_belongs_in_si_units() {
     let clock = ClockSpec { bias_s: 1e-4, drift: 1e-7, ageing_per_s: 1e-9 / 86_400.0, per_g: 1e-9, noise: Some(tcxo) };
     assert_eq!(scenario.receiver_clock, clock);
     assert!(scenario.scintillation.is_some_and(|s| s.s4 == 0.5 && s.satellites == Some(vec![Sv::gps(2)])));
+    let city = scenario.city.unwrap();
+    assert_eq!((city.material.name(), city.order, city.diffraction, city.radius_m), ("glass", 2, false, 200.0));
+    let anchor = city.anchor.unwrap();
+    assert_eq!((anchor.origin_m, anchor.position.height_m, city.cross), ([1.0, 2.0, 3.0], 128.0, 0.1));
     let fidelity = scenario.front_ends[0].fidelity;
     assert_eq!((fidelity.code_edge, fidelity.waveform), (Some(CodeEdge::Nearest), Some(Layers::Strongest)));
     assert!(scenario.noise && scenario.truth_interval_s == 0.5);

@@ -173,7 +173,10 @@ pub fn observe_by(
             cycles - cycles.floor()
         },
     });
-    let rays = rays.collect();
+    // A city's list of rays is as long as the scene: those that are silent now would be most rows. One row
+    // says that the satellite has others.
+    let is_listed = !scene.effects.iter().any(|effect| effect.name() == "city");
+    let rays = rays.filter(|row: &RayRow| is_listed || row.ray == 1 || row.amplitude_ratio > 0.0).collect();
     Ok(Some((observation, sky, rays)))
 }
 

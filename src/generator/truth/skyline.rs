@@ -8,7 +8,8 @@ use gnss::earth::{Geodetic, Look};
 /// Azimuth and elevation (degrees) below which a direct ray has lost half of its power at the start, if
 /// anything in the scene is in the way.
 pub(super) fn skyline_deg(scene: &Scene) -> Option<Vec<[f64; 2]>> {
-    let obstruction = scene.effects.iter().find(|effect| effect.name() == "obstruction")?;
+    let in_the_way = || scene.effects.iter().filter(|effect| matches!(effect.name(), "obstruction" | "city"));
+    in_the_way().next()?;
     let (sv, signal) = (scene.catalogue.satellites().next()?, scene.signals.first()?);
     let motion = scene.trajectory.composed_for();
     let user = Geodetic::from_ecef(&motion.position_m);
@@ -26,7 +27,7 @@ pub(super) fn skyline_deg(scene: &Scene) -> Option<Vec<[f64; 2]>> {
             off_nadir_rad: 0.0,
         };
         let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 1.0 }];
-        obstruction.act(&sight, signal, &mut rays);
+        in_the_way().for_each(|effect| effect.act(&sight, signal, &mut rays));
         rays.first().is_some_and(|ray| ray.cn0_hz < 0.5)
     };
     // Steps of 2° and 0.5°, which a picture does not resolve further.

@@ -73,6 +73,7 @@ pub const SCENARIO: &[Key] = &[
         "Attitude of the body that carries the antenna. Absent: the boresight points up, without wind-up.",
     ),
     table("power", satellites::POWER, "Received power of the satellites. Absent: a link budget with its defaults."),
+    table("city", way::CITY, "Walls and roofs around the antenna, which obstruct and reflect. Absent: none."),
     tables("multipath", way::MULTIPATH, "Reflected ray; at most 64."),
     table("ionosphere", way::IONOSPHERE, "True ionosphere, and its broadcast parameters. Absent: none."),
     table("troposphere", way::TROPOSPHERE, "Neutral atmosphere. Absent: none."),

@@ -1,7 +1,8 @@
 //! Keys of propagation between satellites and antenna.
 
 use super::{A_PATH, SATELLITES};
-use crate::scenario::schema::{Key, list, number, numbers, text, time, word, words};
+use crate::effect::city::material::{MATERIALS, Material};
+use crate::scenario::schema::{Key, flag, integer, list, number, numbers, text, time, word, words};
 
 const KLOBUCHAR: &[&str] = &["klobuchar"];
 const SHELL: &[&str] = &["constant_tec", "ionex"];
@@ -102,6 +103,34 @@ pub(crate) const MULTIPATH: &[Key] = &[
     number("height_m", 0.0, 1e4, "m", "height of the antenna above the ground").required().of(&["ground"]),
     number("azimuth_deg", -360.0, 360.0, "deg", "azimuth of the wall").required().of(WALL),
     number("distance_m", 0.01, 1e4, "m", "distance to the wall at the scene's start").required().of(WALL),
+];
+
+/// Names of the materials of walls.
+fn materials() -> Vec<&'static str> {
+    MATERIALS.iter().map(Material::name).collect()
+}
+
+pub(crate) const CITY: &[Key] = &[
+    text("file", A_PATH, "walls and roofs, CityJSON 1.0, 1.1 or 2.0").required(),
+    text("lod", "a level of detail like \"2.2\", or \"2\" for all of 2", "level of detail that is used")
+        .or_else("the highest of each object"),
+    number("radius_m", 1.0, 5_000.0, "m", "distance from the antenna's way within which surfaces are used").or(300.0),
+    word("material", materials, "material of walls and roofs, with the constants of ITU-R P.2040-3")
+        .or_else("concrete"),
+    number("permittivity", 1.0, 100.0, "", "relative permittivity, in place of material; with conductivity_spm"),
+    number("conductivity_spm", 0.0, 1e8, "S/m", "conductivity, in place of material; with permittivity"),
+    integer("order", 0, 2, "largest number of reflections of a ray; 0: walls obstruct and do not reflect").or(1.0),
+    flag("diffraction", "diffraction at edges (ITU-R P.526); false: a ray that is not clear of an edge fades out")
+        .or_else("true"),
+    number("cross_polar_db", 0.0, 100.0, "dB", "attenuation by the antenna of left-hand circular waves").or(10.0),
+    number("latitude_deg", -90.0, 90.0, "deg", "latitude of origin_m, with longitude_deg and height_m")
+        .or_else("by the file's reference system"),
+    number("longitude_deg", -180.0, 180.0, "deg", "longitude of origin_m, with latitude_deg and height_m")
+        .or_else("by the file's reference system"),
+    number("height_m", -1e4, 1e4, "m", "height above the ellipsoid of origin_m, or of the reference system's zero")
+        .or_else("of zero: the geoid's, where the system counts from the sea"),
+    numbers("origin_m", 3, (-1e8, 1e8), "m", "coordinates in the file of the point at latitude_deg and longitude_deg")
+        .or_else("[0, 0, 0]"),
 ];
 
 const HORIZON: &[&str] = &["horizon"];

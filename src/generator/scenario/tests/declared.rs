@@ -176,6 +176,10 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
                     let fault = "kind = \"bit_errors\"\nrate = 0.1\nspoofer = 1";
                     cases.push((with("message_fault", fault), table, key));
                 }
+                ("city", "permittivity" | "conductivity_spm") => {
+                    let own = "file = \"a.json\"\npermittivity = 4\nconductivity_spm = 0.1";
+                    cases.push((with("city", own), table, key));
+                }
                 ("osnma", "transition") => cases.push((with("osnma", "transition = 1"), table, key)),
                 (
                     "spoofer",

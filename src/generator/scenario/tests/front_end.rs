@@ -111,6 +111,8 @@ fn a_front_end_puts_l1_where_the_scenario_says() {
         let text = replaced(&full(), "front_end", "spectrum_inverted", &inverted.to_string());
         let text = text.replace("[navigation]\nfile = \"brdc.10n\"\ngalileo_ahead_ns = 3\n", "");
         let text = text.replace("antenna = \"table\"\nantenna_file = \"gain.csv\"\n", "antenna = \"patch\"\n");
+        let (before, city) = text.split_once("[city]").unwrap();
+        let text = format!("{before}[filter]{}", city.split_once("[filter]").unwrap().1);
         let (scene, warnings) = parse(&text).unwrap().compose(Path::new("."), &Overrides::default()).unwrap();
         assert_eq!(scene.metadata.center_hz, center_hz);
         assert_eq!(scene.metadata.if_hz(scene.signals[0].centre_hz()), 1e6);

@@ -3,7 +3,7 @@
 use super::*;
 
 /// The scenarios that come with the program.
-const SHIPPED: [(&str, &str); 16] = [
+const SHIPPED: [(&str, &str); 17] = [
     ("static", include_str!("../../../../scenarios/static.toml")),
     ("moderate", include_str!("../../../../scenarios/moderate.toml")),
     ("high_dynamics", include_str!("../../../../scenarios/high_dynamics.toml")),
@@ -11,6 +11,7 @@ const SHIPPED: [(&str, &str); 16] = [
     ("trajectory_file", include_str!("../../../../scenarios/trajectory_file.toml")),
     ("ionex", include_str!("../../../../scenarios/ionex.toml")),
     ("canyon", include_str!("../../../../scenarios/canyon.toml")),
+    ("city", include_str!("../../../../scenarios/city.toml")),
     ("urban", include_str!("../../../../scenarios/urban.toml")),
     ("spinning", include_str!("../../../../scenarios/spinning.toml")),
     ("oscillator", include_str!("../../../../scenarios/oscillator.toml")),
