@@ -6,6 +6,7 @@ use std::path::Path;
 use analysis::measure::errors::Errors;
 use analysis::measure::protection::{Protected, Protection};
 use analysis::read::Run;
+use generator::random::mix;
 use generator::scenario::{Overrides, Scenario};
 use gnss::satellite::Sv;
 use receiver::output::Output;
@@ -37,7 +38,7 @@ pub const CASES: [Case; 5] = [
 ];
 
 /// Counts of one case from one start: a line of `protection.csv`.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Counts {
     pub method: &'static str,
     pub faults: usize,
@@ -76,10 +77,7 @@ struct Random(u64);
 impl Random {
     fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        (mix(self.0) >> 11) as f64 / (1u64 << 53) as f64
     }
 
     fn between(&mut self, low: f64, high: f64) -> f64 {
@@ -94,13 +92,14 @@ pub fn start(number: u64) -> Vec<Found> {
     let second = random.between(2.0 * 3600.0, 21.0 * 3600.0) as u64;
     let start = format!("2010-07-01T{:02}:{:02}:{:02}", second / 3600, second / 60 % 60, second % 60);
     let sine = random.between(-0.966, 0.966);
-    let place = [libm::asin(sine).to_degrees(), random.between(-180.0, 180.0)].map(|deg| (100.0 * deg).round() / 100.0);
+    let position =
+        [libm::asin(sine).to_degrees(), random.between(-180.0, 180.0)].map(|deg| (100.0 * deg).round() / 100.0);
     let draws: [f64; 6] = std::array::from_fn(|_| random.unit());
     let mut satellites: Vec<Sv> = Vec::new();
     let mut all = Vec::new();
     for (seed, case) in (1 + 10 * number..).zip(&CASES) {
-        let steps: Vec<(Sv, f64)> = drawn(satellites.clone(), &draws).take(case.faults).collect();
-        let (found, in_view) = run(case, seed, &start, place, &steps);
+        let steps = drawn(&satellites, &draws, case.faults);
+        let (found, in_view) = run(case, seed, &start, position, &steps);
         satellites = in_view;
         all.push(found);
     }
@@ -108,21 +107,19 @@ pub fn start(number: u64) -> Vec<Found> {
 }
 
 /// Faulty satellites and the steps of their clocks, in metres.
-fn drawn(mut satellites: Vec<Sv>, draws: &[f64; 6]) -> impl Iterator<Item = (Sv, f64)> {
-    draws
-        .chunks_exact(3)
-        .map_while(move |draw| {
-            let at = (draw[0] * satellites.len() as f64) as usize;
-            let sv = (at < satellites.len()).then(|| satellites.remove(at))?;
-            let size_m = FAULTS_M[0] + (FAULTS_M[1] - FAULTS_M[0]) * draw[1];
-            Some((sv, if draw[2] < 0.5 { -size_m } else { size_m }))
-        })
-        .collect::<Vec<_>>()
-        .into_iter()
+fn drawn(satellites: &[Sv], draws: &[f64; 6], count: usize) -> Vec<(Sv, f64)> {
+    let mut left = satellites.to_vec();
+    let mut found = Vec::new();
+    for draw in draws.chunks_exact(3).take(count).filter(|_| !satellites.is_empty()) {
+        let sv = left.remove((draw[0] * left.len() as f64) as usize);
+        let size_m = FAULTS_M[0] + (FAULTS_M[1] - FAULTS_M[0]) * draw[1];
+        found.push((sv, if draw[2] < 0.5 { -size_m } else { size_m }));
+    }
+    found
 }
 
-fn run(case: &Case, seed: u64, start: &str, place: [f64; 2], steps: &[(Sv, f64)]) -> (Found, Vec<Sv>) {
-    let [latitude_deg, longitude_deg] = place;
+fn run(case: &Case, seed: u64, start: &str, position: [f64; 2], steps: &[(Sv, f64)]) -> (Found, Vec<Sv>) {
+    let [latitude_deg, longitude_deg] = position;
     let mut text = SCENE
         .replace("%start%", start)
         .replace("%seed%", &seed.to_string())
@@ -156,18 +153,7 @@ fn run(case: &Case, seed: u64, start: &str, place: [f64; 2], steps: &[(Sv, f64)]
         latitude_deg,
         longitude_deg,
         steps_m: steps_m.join(", "),
-        fixes: 0,
-        detected: 0,
-        fixes_apart: 0,
-        detected_apart: 0,
-        horizontal_levels: 0,
-        horizontal_beyond: 0,
-        vertical_levels: 0,
-        vertical_beyond: 0,
-        horizontal_level_sum_m: 0.0,
-        vertical_level_sum_m: 0.0,
-        horizontal_ratio_max: 0.0,
-        vertical_ratio_max: 0.0,
+        ..Counts::default()
     };
     (counted(counts, &protection, &near(&run)), in_view)
 }

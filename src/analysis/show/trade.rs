@@ -210,8 +210,9 @@ fn draw(path: &Path, rows: &[TradeRow]) -> Result<(), JudgeError> {
         Series::new("front", BLUE, Mark::Line, Vec::new()),
         Series::new("0.1 m", ORANGE, Mark::Dash, Vec::new()),
     ];
-    let height = 60 + 420 * charts.len().div_ceil(2) as u32;
-    figure(path, (1280, height), 2, &charts, &legend)
+    let columns = charts.len().clamp(1, 2);
+    let height = 60 + 420 * charts.len().div_ceil(columns) as u32;
+    figure(path, (640 * columns as u32, height), columns, &charts, &legend)
 }
 
 fn chart(rows: &[TradeRow], group: &[usize]) -> Chart {

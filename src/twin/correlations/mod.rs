@@ -97,6 +97,8 @@ pub struct Plan<'a> {
     /// Spectral separations of each of [`Self::made`] in seconds, by the number of a signal of the scene and
     /// its carrier's distance in hertz.
     separations_s: Vec<BTreeMap<(usize, i64), f64>>,
+    /// Shares of the signals' powers that the samples have, which edges of chips reduce.
+    kept: Vec<f64>,
     noise: Stream,
 }
 
@@ -122,7 +124,8 @@ impl<'a> Plan<'a> {
             all
         };
         let separations_s = made.iter().map(from_all).collect();
-        Self { scene, made, separations_s, noise: Stream::new(scene.noise_seed(), "correlations") }
+        let kept = sampled.iter().map(Sampled::power).collect();
+        Self { scene, made, separations_s, kept, noise: Stream::new(scene.noise_seed(), "correlations") }
     }
 
     /// Model over the segment for which signals are prepared; powers are those at the beginning of a
@@ -135,7 +138,8 @@ impl<'a> Plan<'a> {
             sent.iter().map(|one| one.leg(sample).map_or(0.0, |leg| leg.rays.cn0_hz(sample))).collect();
         let rounding = if self.scene.metadata.format == Format::Cf32Le { 0.0 } else { ROUNDING };
         let floor = if self.scene.noise { self.thermal() + rounding } else { 0.0 };
-        let power = 2.0 * floor + 2.0 * self.thermal() * cn0_hz.iter().sum::<f64>() / self.scene.clock.rate.hz();
+        let sampled_hz: f64 = sent.iter().zip(&cn0_hz).map(|(one, hz)| hz * self.kept(one.transmitter.signal)).sum();
+        let power = 2.0 * floor + 2.0 * self.thermal() * sampled_hz / self.scene.clock.rate.hz();
         let places = |link: Link| {
             let is = |(place, one): (usize, &Transmitter)| is_of(one, link).then_some(place);
             transmitters.iter().enumerate().filter_map(is).collect()
@@ -158,6 +162,12 @@ impl<'a> Plan<'a> {
         let all = |one: &Sent| self.made.iter().enumerate().map(|made| known(made, one.transmitter.link())).collect();
         model.known = model.sent.iter().map(all).collect();
         model
+    }
+
+    /// Share of a signal's power that its samples have.
+    fn kept(&self, signal: &Signal) -> f64 {
+        let number = self.scene.signals.iter().position(|one| std::ptr::eq(*one, signal));
+        number.and_then(|number| self.kept.get(number)).copied().unwrap_or(1.0)
     }
 
     /// Variance of the thermal noise of a sample, per component.
@@ -224,7 +234,7 @@ impl Correlations<'_> {
 
     /// Noise in the correlations with a replica of a link.
     fn know(&self, number: usize, made: &Made, link: Link) -> Known {
-        let energy = made.share * made.own.value(0.0);
+        let energy = made.share * made.own(link.sv.number).value(0.0);
         let deviations = self.variance(number, link).map(|variance| (variance * energy).sqrt());
         let stream = self.plan.noise.satellite(link.sv).named(made.signal.name).part(made.index as u64);
         Known { deviations, stream }
@@ -295,7 +305,7 @@ impl Correlations<'_> {
     fn add_near(&self, question: &Question, taps: &[f64], (noise, deviation): (Noise, f64), sums: &mut [Complex64]) {
         self.expect(question, taps, sums);
         let crowd = question.place.and_then(|place| self.crowd(place));
-        question.made.with_taps(taps, |taps| {
+        question.made.with_taps(question.code.link.sv.number, taps, |taps| {
             if let Some(crowd) = crowd {
                 crowd.add(&question.interval, taps, sums);
             }

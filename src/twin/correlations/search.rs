@@ -81,7 +81,8 @@ fn at_doppler(model: &Correlations, sought: &Sought, phase: f64, doppler_hz: f64
         for (dwell, begin) in sought.begins.iter().enumerate() {
             let sums = dwell_sums(model, sought, code, (phase, doppler_hz), (*begin, dwell as u64, bin), &offsets)?;
             let (made, ..) = model.made(code)?;
-            let common = made.own.value(sought.lag_chips) / made.own.value(0.0);
+            let own = made.own(code.link.sv.number);
+            let common = own.value(sought.lag_chips) / own.value(0.0);
             let between = |a: Complex64, b: Complex64| (a + b).norm_sqr() / (2.0 * (1.0 + common));
             let [a, b, c] = sums;
             let own = [a.norm_sqr(), between(a, b), b.norm_sqr(), between(b, c), c.norm_sqr()];
@@ -126,6 +127,6 @@ fn dwell_sums(
     }
     sums.iter_mut().for_each(|sum| *sum /= deviation);
     let stream = known.stream(code).part(SEARCH).part(sought.first).part(dwell).part(bin as u64);
-    made.with_taps(offsets, |taps| Noise { stream, share: 1.0 }.add(taps, 1.0, &mut sums));
+    made.with_taps(code.link.sv.number, offsets, |taps| Noise { stream, share: 1.0 }.add(taps, 1.0, &mut sums));
     Some(sums)
 }

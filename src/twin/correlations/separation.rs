@@ -34,6 +34,11 @@ impl Sampled {
         Self { components: signal.components.iter().map(component).collect() }
     }
 
+    /// Share of the signal's power that its samples have.
+    pub fn power(&self) -> f64 {
+        self.components.iter().map(|(share, _, own)| share * own.value(0.0)).sum()
+    }
+
     /// Spectral separation in seconds from a replica of `chip_rate_hz`, whose correlation with itself is
     /// `own`, for a carrier that is `apart_hz` higher, at `rate_hz`.
     pub fn separation_s(&self, (own, chip_rate_hz): (&PeakTable, f64), apart_hz: f64, rate_hz: f64) -> f64 {

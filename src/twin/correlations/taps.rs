@@ -37,7 +37,7 @@ pub(super) struct Taps {
 
 impl Taps {
     /// Taps in chips, of a replica whose correlation with itself is `own` and with a chip is `pulse`.
-    fn new(chips: &[f64], own: &PeakTable, pulse: &PeakTable) -> Self {
+    pub fn new(chips: &[f64], own: &PeakTable, pulse: &PeakTable) -> Self {
         let mut order: Vec<usize> = (0..chips.len()).collect();
         let away = |index: &usize| chips.get(*index).map_or(0.0, |chips| chips.abs());
         order.sort_by(|a, b| away(a).total_cmp(&away(b)));

@@ -17,6 +17,7 @@ pub use crate::show::plot::chart::{
 };
 use crate::show::plot::clip::Frame;
 pub use crate::show::plot::drawing::{Area, Drawing, FINE, Failure};
+use crate::show::plot::names::{self, Name};
 use crate::show::plot::series;
 use crate::show::plot::ticks::{Tick, Ticks};
 
@@ -85,6 +86,8 @@ const LABEL_PX: i32 = 12;
 const LEAST_LABEL_PX: i32 = 6;
 /// Number of names up to which all are written, however small; of more, every second or third has a label.
 const MANY_NAMES: usize = 24;
+/// Size of a point's name.
+const NAME_PX: i32 = 11;
 /// Least distance in pixels from one label to the next.
 const APART_PX: i32 = 8;
 const TICK_PX: i32 = 5;
@@ -146,21 +149,20 @@ pub fn draw(area: &Area<'_>, chart: &Chart) -> Result<(), Failure> {
     }
     let corners = [(x.from, y.to), (x.from, y.from), (x.to, y.from)].map(at);
     area.draw(&PathElement::new(corners, GREY.stroke_width(FINE as u32)))?;
-    let labels: Vec<((i32, i32), &str)> = chart
-        .labels
-        .iter()
-        .map(|(point, label, above_px)| {
-            let (x, y) = at(*point);
-            ((x - 2 * FINE, y - above_px * FINE), label.as_str())
-        })
-        .collect();
+    let inside = [corners[0], corners[2]];
+    let mut names = Vec::new();
+    for (point, name, above_px) in &chart.labels {
+        let (width, height) = area.estimate_text_size(name, &anchored(NAME_PX, HPos::Left, VPos::Center))?;
+        names.push(Name { at: at(*point), above: above_px * FINE, size: (width as i32, height as i32) });
+    }
+    let positions = names::apart(&names, inside);
     let middle = at((0.5 * (x.from + x.to), y.from + 0.62 * y.span()));
     let frame = Frame::new(x.ends(), y.ends());
     for series in &chart.series {
         series::draw(&mut context, &frame, series)?;
     }
-    for (place, label) in labels {
-        area.draw(&Text::new(label.to_owned(), place, anchored(11, HPos::Left, VPos::Center)))?;
+    for ((_, name, _), position) in chart.labels.iter().zip(positions) {
+        area.draw(&Text::new(name.clone(), position, anchored(NAME_PX, HPos::Left, VPos::Center)))?;
     }
     if is_empty {
         let style = anchored(13, HPos::Center, VPos::Center).color(&GREY);

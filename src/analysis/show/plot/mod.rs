@@ -22,6 +22,7 @@ pub(crate) mod jitter;
 mod judged;
 mod marks;
 mod multipath;
+mod names;
 mod peaks;
 mod position;
 mod protection;
