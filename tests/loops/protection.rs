@@ -1,4 +1,5 @@
-//! Protection levels by SBAS in a closed loop: a satellite that leaves its corrections is detected and withdrawn.
+//! Protection levels by SBAS in a closed loop: a satellite that leaves its corrections is detected and
+//! withdrawn.
 
 use std::collections::BTreeMap;
 use std::path::Path;

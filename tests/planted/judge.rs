@@ -219,7 +219,8 @@ fn damaged_tables_fail_by_the_row_that_names_the_damage() {
     damaged("rx/observations.csv", &slipped, "cycle slips");
 }
 
-/// A jammer sends from 10.35 to 15.25 s, and a detector raises alarms in the six seconds that have a part of it.
+/// A jammer sends from 10.35 to 15.25 s, and a detector raises alarms in the six seconds that have a part of
+/// it.
 #[test]
 fn alarms_in_the_seconds_of_a_jammer_are_detections_and_none_of_them_is_false() {
     let run = copy(|_, text| text);

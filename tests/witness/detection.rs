@@ -10,8 +10,8 @@ fn thresholds_are_those_that_tables_print_for_both_sides() {
     }
 }
 
-/// Table 26.10: with five degrees of freedom Student's value is beyond 4.032 once in a hundred, a normal one beyond
-/// 2.576. The normal value of the law that the receiver takes is right to 0.02 of itself.
+/// Table 26.10: with five degrees of freedom Student's value is beyond 4.032 once in a hundred, a normal one
+/// beyond 2.576. The normal value of the law that the receiver takes is right to 0.02 of itself.
 #[test]
 fn a_number_among_six_others_is_beyond_the_normal_bound_where_the_printed_one_of_student_is() {
     let others = [41.0, 39.0, 41.0, 39.0, 41.0, 39.0];

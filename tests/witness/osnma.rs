@@ -101,8 +101,8 @@ fn every_tag_of_july_is_right_from_the_root_of_the_tree_alone() {
     assert_eq!(verifier.first_root().map(|time| time.tow_s()), Some(346_050));
 }
 
-/// Guidelines 1.3, 4.2: by the receiver's own time and its uncertainty of 15 s a tag has to come within 30 s of its
-/// beginning, before its key is sent, and a tag of the slow MAC within 330 s.
+/// Guidelines 1.3, 4.2: by the receiver's own time and its uncertainty of 15 s a tag has to come within 30 s
+/// of its beginning, before its key is sent, and a tag of the slow MAC within 330 s.
 #[test]
 fn of_a_recording_that_is_replayed_a_minute_later_only_tags_of_the_slow_mac_are_right() {
     let (pages, key) = ("osnma/16_AUG_2023_fixed.csv.gz", "osnma/OSNMA_PublicKey_16_AUG_2023.xml");

@@ -1,11 +1,12 @@
-//! Protection levels of ARAIM and SBAS by what documents print: a worked example, and factors with their formula.
+//! Protection levels of ARAIM and SBAS by what documents print: a worked example, and factors with their
+//! formula.
 
 use nalgebra::{DMatrix, DVector};
 use receiver::position::protection::geometry::Geometry;
 use receiver::position::protection::{IntegritySettings, araim, sbas};
 
-/// East, north, up, constellation, C_int and C_acc in m² of each satellite: ARAIM Reference Airborne Algorithm
-/// Description Document 3.1, appendix D, equations 79 to 84.
+/// East, north, up, constellation, C_int and C_acc in m² of each satellite: ARAIM Reference Airborne
+/// Algorithm Description Document 3.1, appendix D, equations 79 to 84.
 const SKY: [(f64, f64, f64, usize, f64, f64); 10] = [
     (0.0225, 0.9951, -0.0966, 0, 3.2899, 2.9774),
     (0.6750, -0.6900, -0.2612, 0, 1.2792, 0.9667),
@@ -41,8 +42,8 @@ fn geometry(clocks: usize) -> Geometry {
     }
 }
 
-/// Appendix D prints VPL 18.3 m, HPL 13.45 m, σ_v,acc 1.3694 m and EMT 7.2998 m, the last of a geometry with more
-/// decimals than are printed.
+/// Appendix D prints VPL 18.3 m, HPL 13.45 m, σ_v,acc 1.3694 m and EMT 7.2998 m, the last of a geometry with
+/// more decimals than are printed.
 #[test]
 fn the_worked_example_of_araim_has_its_printed_levels() {
     let budget = IntegritySettings {

@@ -4,12 +4,12 @@
 //! interval or shortly before it, and attacked if one lies in it. Alarms of clean tests are false; their
 //! share is compared with the stated probability by its exact binomial interval (Clopper and Pearson 1934).
 //! Tests are not independent: they share references, and codes that meet disturb several signals for seconds.
-//! They count as so many fewer as alarms scatter more between stretches of the reference's length than those
+//! They count as so many fewer as alarms scatter more between segments of the reference's length than those
 //! of independent tests. Residuals of smoothed ranges are correlated: their tests count at most as the
-//! independent ones that would fix a mean as well. The ROC curve has the share of attacked and of clean tests above every multiple of their
-//! thresholds. Limits: tests after an attack count as neither while the receiver's references and filters
-//! remember it; a detector that an attack does not concern, such as the level under a weak spoofer, has a low
-//! share of detection.
+//! independent ones that would fix a mean as well. The ROC curve has the share of attacked and of clean tests
+//! above every multiple of their thresholds. Limits: tests after an attack count as neither while the
+//! receiver's references and filters remember it; a detector that an attack does not concern, such as the
+//! level under a weak spoofer, has a low share of detection.
 
 use std::collections::BTreeMap;
 
@@ -212,23 +212,23 @@ struct Counts {
     delays_s: Vec<Option<f64>>,
     /// Statistics of clean tests that follow each other, where they are correlated.
     groups: Vec<Vec<f64>>,
-    /// Samples of a stretch.
-    stretch: u64,
-    /// Number of the running stretch, and alarms and tests of each that has clean ones.
+    /// Samples of a segment.
+    segment: u64,
+    /// Number of the running segment, and alarms and tests of each that has clean ones.
     running: u64,
-    stretches: Vec<[f64; 2]>,
+    segments: Vec<[f64; 2]>,
 }
 
-/// Number of tests that say as much as one independent test: the scatter of the alarms between stretches over
+/// Number of tests that say as much as one independent test: the scatter of the alarms between segments over
 /// that of independent tests, at least one.
-fn dependence(stretches: &[[f64; 2]]) -> f64 {
-    let (count, all) = stretches.iter().fold((0.0, 0.0), |(count, all), [alarms, tests]| (count + alarms, all + tests));
-    let (share, number) = (count / all, stretches.len() as f64);
+fn dependence(segments: &[[f64; 2]]) -> f64 {
+    let (count, all) = segments.iter().fold((0.0, 0.0), |(count, all), [alarms, tests]| (count + alarms, all + tests));
+    let (share, number) = (count / all, segments.len() as f64);
     let alone = share * (1.0 - share) * all;
     if number < 2.0 || alone <= 0.0 {
         return 1.0;
     }
-    let squares = stretches.iter().map(|[alarms, tests]| (alarms - share * tests) * (alarms - share * tests));
+    let squares = segments.iter().map(|[alarms, tests]| (alarms - share * tests) * (alarms - share * tests));
     (squares.sum::<f64>() * number / (number - 1.0) / alone).max(1.0)
 }
 
@@ -313,16 +313,16 @@ impl Detection {
 }
 
 impl Counts {
-    fn new(attacks: usize, stretch: u64) -> Self {
+    fn new(attacks: usize, segment: u64) -> Self {
         Self {
             found: OfDetector::default(),
             alarms: 0,
             curve: Curve { counts: [[0; BINS]; 2] },
             delays_s: vec![None; attacks],
             groups: vec![Vec::new()],
-            stretch: stretch.max(1),
+            segment: segment.max(1),
             running: u64::MAX,
-            stretches: Vec::new(),
+            segments: Vec::new(),
         }
     }
 
@@ -334,11 +334,11 @@ impl Counts {
                 found.clean_tests += 1;
                 found.false_alarms += usize::from(test.alarm);
                 self.curve.add(test, false);
-                let number = test.sample / self.stretch;
+                let number = test.sample / self.segment;
                 if std::mem::replace(&mut self.running, number) != number {
-                    self.stretches.push([0.0; 2]);
+                    self.segments.push([0.0; 2]);
                 }
-                if let Some([alarms, tests]) = self.stretches.last_mut() {
+                if let Some([alarms, tests]) = self.segments.last_mut() {
                     *alarms += f64::from(u8::from(test.alarm));
                     *tests += 1.0;
                 }
@@ -362,13 +362,13 @@ impl Counts {
     }
 
     fn finish(self, clean_s: f64) -> OfDetector {
-        let Self { mut found, alarms, delays_s, groups, stretches, .. } = self;
+        let Self { mut found, alarms, delays_s, groups, segments, .. } = self;
         let share = |count: usize, all: usize| (all > 0).then(|| count as f64 / all as f64);
         found.false_alarm_share = share(found.false_alarms, found.clean_tests);
         if found.clean_tests > 0 {
             let all = found.clean_tests as f64;
             let effective = Correlated::about_means(&groups).map_or(all, |own| own.independent_of_mean().min(all));
-            let effective = effective.min(all / dependence(&stretches));
+            let effective = effective.min(all / dependence(&segments));
             found.independent_tests = effective;
             let ends = interval_of(found.false_alarms as f64 * effective / all, effective);
             (found.false_alarm_low, found.false_alarm_high) = (Some(ends.0), Some(ends.1));
@@ -491,8 +491,8 @@ mod tests {
         let single = of(|k| k % 150 == 7);
         let pairs = of(|k| k % 300 < 2);
         assert_eq!((single.false_alarms, pairs.false_alarms), (40, 40));
-        // 300 stretches. One alarm or none in each scatters less than by chance, two or none by nearly twice as
-        // much.
+        // 300 segments. One alarm or none in each scatters less than by chance, two or none by nearly twice
+        // as much.
         assert_eq!(single.independent_tests, 6000.0);
         assert!((6000.0 / pairs.independent_tests - 2.0).abs() < 0.2, "{}", pairs.independent_tests);
         assert!(pairs.false_alarm_low < single.false_alarm_low && pairs.false_alarm_high > single.false_alarm_high);

@@ -184,8 +184,8 @@ impl Detection {
         is_loud
     }
 
-    /// Tests every signal whose code meets no other by itself, and all for a common fall. Nothing becomes a part of the references
-    /// where the level raised an alarm.
+    /// Tests every signal whose code meets no other by itself, and all for a common fall. Nothing becomes a
+    /// part of the references where the level raised an alarm.
     fn test_shapes(&mut self, is_loud: bool, rows: &mut Vec<Test>) {
         let (least, most) = self.reference();
         let ended = std::mem::take(&mut self.shapes);

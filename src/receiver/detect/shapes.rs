@@ -10,9 +10,9 @@
 //! less late across it (phase). A front end gives x a share r of y, which the reference shows. z = x − r·y
 //! has no part of the signal. Its noise is that of early and late without their correlation with the prompt,
 //! so the prompt's sign is independent of it, and updates are independent of each other. Correlations with
-//! the codes of other satellites are not: they change within seconds to minutes. Therefore the mean of z over an interval is compared with those of the M intervals of the
-//! reference. Its difference from their mean over their standard deviation and √(1 + 1/M) is Student's with M
-//! − 1 degrees of freedom.
+//! the codes of other satellites are not: they change within seconds to minutes. Therefore the mean of z over
+//! an interval is compared with those of the M intervals of the reference. Its difference from their mean
+//! over their standard deviation and √(1 + 1/M) is Student's with M − 1 degrees of freedom.
 //!
 //! C/N0 of an interval of n updates is (ȳ² − v/n)/(2·v·T) with the variance v of the amplitudes; its
 //! logarithm is compared with those of the reference in the same way. The middle one of the signals'
@@ -26,7 +26,8 @@
 //! reference has it. Slow changes are seen as a range in `code_carrier`.
 //!
 //! Limits: reflections distort a correlation as a spoofer does. The scatter of the intervals before does not
-//! show codes that meet for one or two intervals, which [`super::meeting`] leaves out. Only intervals in which a signal was followed throughout are tested.
+//! show codes that meet for one or two intervals, which [`super::meeting`] leaves out. Only intervals in
+//! which a signal was followed throughout are tested.
 
 use std::collections::VecDeque;
 
