@@ -23,7 +23,10 @@
 //! Early less late along the prompt (delta) is what the code loop drives to zero. The sum of n errors of a
 //! loop of order 1 is the change of its code over its gain K: n updates have 2(1 − (1 − K)ⁿ)/(n·K·(2 − K)) of
 //! the variance of as many independent ones, 0.43 of it for a second of a loop of 0.5 Hz. The scatter of the
-//! reference has it. Slow changes are seen as a range in `code_carrier`.
+//! reference has it. Neighbouring intervals share the error at their common end, a correlation of −0.43, so
+//! that one alarm in twelve is followed by another: a run of many tests scatters a little more than
+//! independent ones, and their mean share is that of the threshold. Slow changes are seen as a range in
+//! `code_carrier`.
 //!
 //! Limits: reflections distort a correlation as a spoofer does. The scatter of the intervals before does not
 //! show codes that meet for one or two intervals, which [`super::meeting`] leaves out. Only intervals in
