@@ -41,7 +41,7 @@ fn a_satellite_beyond_its_corrections_is_detected_at_once_and_withdrawn_within_s
         let (bounded_s, bounded) = first(&|_, row| !row["vpl_m"].is_empty());
         let (open_s, open) = first(&|_, row| row["available"] == "true");
         assert!(*bounded_s < 40.0 && *open_s > *bounded_s && *open_s < 60.0, "{bounded_s} {open_s}");
-        assert!(bounded["vpl_m"].parse::<f64>().unwrap() > 35.0 && open["vpl_m"].parse::<f64>().unwrap() < 8.0);
+        assert!(bounded["vpl_m"].parse::<f64>().unwrap() > 35.0 && open["vpl_m"].parse::<f64>().unwrap() < 10.0);
         let (found_s, found) = first(&|time_s, row| time_s > STEP_S && row["detected"] == "true");
         assert!(found_s - STEP_S < 1.0 && found["excluded"] == "G31", "{found_s} {found:?}");
         let (gone_s, gone) = first(&|time_s, row| time_s > *found_s && row["detected"] == "false");
@@ -51,7 +51,7 @@ fn a_satellite_beyond_its_corrections_is_detected_at_once_and_withdrawn_within_s
         assert!(rows.iter().all(|(time_s, row)| time_s < gone_s || row["detected"] == "false"));
         assert!(rows.iter().all(|(time_s, row)| time_s < open_s || row["available"] == "true"));
         for pointer in ["/protection/horizontal/ratio_max", "/protection/vertical/ratio_max"] {
-            assert!(summary.pointer(pointer).and_then(Value::as_f64).unwrap() < 0.5, "{pointer}");
+            assert!(summary.pointer(pointer).and_then(Value::as_f64).unwrap() < 1.0, "{pointer}");
         }
     }
 }
