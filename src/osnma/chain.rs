@@ -93,6 +93,7 @@ impl Chain {
     /// [`KeyError`] if the sub-frame is not before the key's, or too far before.
     pub fn at(&self, key: &TeslaKey, start: Gst) -> Result<TeslaKey, KeyError> {
         let steps = key.start.since_s(start) / SUBFRAME_S;
+        let steps = planted!("osnma.chain.step", steps, steps - i64::from(steps > 0));
         match steps {
             ..0 => Err(KeyError::BeforeRoot),
             _ if steps > MOST_STEPS => Err(KeyError::TooFar),

@@ -7,6 +7,9 @@
 //! P-256 (P-521 is named and refused); a renewal of the Merkle tree needs its root from outside of the
 //! signal.
 
+#[macro_use(planted)]
+extern crate gnss;
+
 // Tests of the program sign recordings by the same source.
 #[cfg(test)]
 extern crate self as osnma;

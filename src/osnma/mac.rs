@@ -36,7 +36,8 @@ impl Tagged {
     /// Message that the tag covers.
     pub fn message(&self, data: &Row) -> Vec<u8> {
         let mut row = Row::default();
-        if self.position > 1 {
+        let names_satellite = planted!("osnma.mac.satellite", self.position > 1, true);
+        if names_satellite {
             row.push(self.of.into(), 8);
         }
         row.push(self.sender.into(), 8);

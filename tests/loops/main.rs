@@ -7,6 +7,7 @@ mod dual_band;
 mod front_ends;
 #[path = "../common/long.rs"]
 mod long;
+mod protection;
 mod samples;
 mod stream;
 mod systems;

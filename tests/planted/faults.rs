@@ -128,6 +128,14 @@ const JDAM: &str = "judge::damaged_tables_fail_by_the_row_that_names_the_damage"
 const JSPEC: &str = "judge::the_spectrum_of_faultless_samples_keeps_its_limits";
 const SHARES: &str = "bands::what_edges_take_from_a_component_is_not_put_back";
 const POLES: &str = "laws::a_butterworth_filter_passes_half_of_the_power_at_the_edges_of_its_band";
+const TAGS: &str = "witness::osnma::every_tag_of_august_is_right_from_the_public_key_on";
+const LATE: &str = "witness::osnma::of_a_recording_that_is_replayed_a_minute_later_only_tags_of_the_slow_mac_are_right";
+const ARAIM: &str = "witness::protection::the_worked_example_of_araim_has_its_printed_levels";
+const LEVELS: &str = "witness::protection::levels_of_sbas_are_the_printed_factors_times_the_printed_axes";
+const ALARMS: &str = "witness::detection::thresholds_are_those_that_tables_print_for_both_sides";
+const AMONG: &str =
+    "witness::detection::a_number_among_six_others_is_beyond_the_normal_bound_where_the_printed_one_of_student_is";
+const LABELS: &str = "judge::alarms_in_the_seconds_of_a_jammer_are_detections_and_none_of_them_is_false";
 const JALL: &str = "judge::deviations_of_a_clock_are_those_that_sp_1065_prints";
 
 const fn fault(name: &'static str, what: &'static str, check: &'static str) -> Fault {
@@ -212,6 +220,10 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.packed.magnitude", "negative magnitudes are positive", PACKED),
     fault("gnss.packed.middle", "two's complement of a few bits lies below the middle of its step", PACKED),
     fault("gnss.ion.negated", "a negated quadrature part does not mirror the spectrum", BANDS),
+    fault("osnma.tags.time", "tags count whenever they come", LATE),
+    fault("osnma.chain.step", "a key is proved by one step too few", TAGS),
+    fault("osnma.mac.satellite", "the first tag names the satellite of its data", TAGS),
+    fault("osnma.data.issue", "tags cover the words of their own sub-frame", TAGS),
     fault("generator.sky.earth_rotation", "the Earth does not turn during flight", LOOP),
     fault("generator.sky.light_time", "the satellite is where it is on arrival, not where it was on sending", LOOP),
     fault("generator.sky.clock_sign", "satellite clocks with the wrong sign", LOOP),
@@ -273,6 +285,14 @@ pub const FAULTS: &[Fault] = &[
     fault("receiver.position.hdop", "HDOP is of east and up", COV),
     fault("receiver.raim.threshold", "the residual test forgives a hundred times as much", RAIM),
     fault("receiver.raim.choice", "the exclusion tries the least likely satellites first", RAIM),
+    fault("receiver.araim.axis", "vertical separations have the factor of horizontal ones", ARAIM),
+    fault("receiver.araim.ure", "separations have the deviations of integrity", ARAIM),
+    fault("receiver.araim.bias", "the level forgets biases of the solutions without a satellite", ARAIM),
+    fault("receiver.araim.constellations", "no constellation is ever faulty", ARAIM),
+    fault("receiver.sbas.factor", "the vertical level of SBAS has the horizontal factor", LEVELS),
+    fault("receiver.sbas.ellipse", "the error ellipse lies along east or north", LEVELS),
+    fault("receiver.detect.threshold", "thresholds are those of twice the false alarms", ALARMS),
+    fault("receiver.detect.mean", "the mean of a reference has no error", AMONG),
     fault("receiver.smooth.carrier_sign", "smoothing goes against the carrier", LOOP),
     fault("receiver.smooth.variance", "smoothing forgets that code errors are correlated", SMOOTH),
     fault("receiver.velocity.frame", "velocity forgets that the axes turn", EXACT),
@@ -369,5 +389,6 @@ pub const FAULTS: &[Fault] = &[
     fault("analysis.response.poles", "the poles of a Butterworth filter are turned", POLES),
     fault("analysis.theory.pll", "theory of the phase loop has the wrong constant", JIT),
     fault("analysis.theory.dll", "theory of the code loop has the wrong constant", JIT),
+    fault("analysis.detection.label", "tests have the labels of the interval before", LABELS),
     fault("analysis.allan.half", "the Allan variance is not halved", JALL),
 ];

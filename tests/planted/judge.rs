@@ -219,6 +219,37 @@ fn damaged_tables_fail_by_the_row_that_names_the_damage() {
     damaged("rx/observations.csv", &slipped, "cycle slips");
 }
 
+/// A jammer sends from 10.35 to 15.25 s, and a detector raises alarms in the six seconds that have a part of
+/// it.
+#[test]
+fn alarms_in_the_seconds_of_a_jammer_are_detections_and_none_of_them_is_false() {
+    let run = copy(|_, text| text);
+    let read = |name: &str| -> serde_json::Value {
+        serde_json::from_slice(&std::fs::read(run.path().join(name)).unwrap()).unwrap()
+    };
+    let rate_hz = read("truth/scene.json")["sample_rate_hz"].as_f64().unwrap();
+    let sample = |s: f64| (s * rate_hz).round() as u64;
+    let mut receiver = read("rx/receiver.json");
+    receiver["settings"]["detection"] = serde_json::json!({"false_alarm": 1e-3, "interval_s": 1.0, "reference_s": 5.0});
+    std::fs::write(run.path().join("rx/receiver.json"), receiver.to_string()).unwrap();
+    let jammed: String = (0..50).map(|k| format!("{},1,60,1e5\n", sample(10.35 + 0.1 * f64::from(k)))).collect();
+    let head = "sample,source,jn0_dbhz,frequency_hz\n";
+    std::fs::write(run.path().join("truth/interference.csv"), head.to_owned() + &jammed).unwrap();
+    let test = |second: u32| {
+        let is_alarm = (11..=16).contains(&second);
+        let statistic = if is_alarm { 9.0 } else { 0.5 };
+        format!("{},level,,,{statistic},3.29,{is_alarm}\n", sample(f64::from(second)))
+    };
+    let head = "sample,detector,sv,signal,statistic,threshold,alarm\n";
+    let tests: String = (1..31).map(test).collect();
+    std::fs::write(run.path().join("rx/detection.csv"), head.to_owned() + &tests).unwrap();
+    let found = judged(run.path(), NONE).detection.unwrap();
+    let level = &found.detectors["level"];
+    assert_eq!((found.attacks, level.attacked_tests, level.detection_share), (1, 6, Some(1.0)));
+    assert_eq!((level.clean_tests, level.false_alarms), (10, 0));
+    assert!((level.time_to_detect_s.unwrap() - 0.65).abs() < 1e-6, "{level:?}");
+}
+
 #[test]
 fn deviations_of_a_clock_are_those_that_sp_1065_prints() {
     use analysis::measure::allan::Deviation;

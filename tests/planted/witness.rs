@@ -27,6 +27,8 @@ mod codes;
 mod constants;
 #[path = "../witness/data.rs"]
 mod data;
+#[path = "../witness/detection.rs"]
+mod detection;
 #[path = "../witness/fnav.rs"]
 mod fnav;
 #[path = "../witness/galileo_e6.rs"]
@@ -51,6 +53,8 @@ mod osnma;
 mod packed;
 #[path = "../witness/printed.rs"]
 mod printed;
+#[path = "../witness/protection.rs"]
+mod protection;
 #[path = "../witness/pseudorange.rs"]
 mod pseudorange;
 #[path = "../witness/qzss.rs"]

@@ -6,7 +6,8 @@
 //! tables of `rx/` or the spectrum in a copy and has two sizes: one that an evaluator would still call sound,
 //! with which no row may fail, and one a small factor larger, which must fail by a row that names it. Where
 //! no size is sound (a row twice, a week too many) the smaller one is absent.
-//! `GNSS_TWIN_WRITE_SABOTAGE=$PWD/reports/sabotage.md` makes a run write the table.
+//! `GNSS_TWIN_WRITE_SABOTAGE=$PWD/reports/sabotage.md` makes a run write the table, and
+//! `GNSS_TWIN_SABOTAGE_ONLY` names the kinds that are run by a part of their name.
 #![cfg(all(feature = "cli", feature = "pdf"))]
 
 mod detection;
@@ -113,8 +114,10 @@ fn every_kind_of_damage_passes_where_it_is_tolerable_and_fails_by_its_row_where_
     assert_eq!(names.len(), kinds.len(), "two kinds bear one name");
     let both = kinds.iter().filter(|kind| kind.tolerable.is_some()).count();
     assert!(both >= 60, "{both} kinds with two sizes");
-    // Every third each day, all with `GNSS_TWIN_LONG`.
-    if std::env::var_os("GNSS_TWIN_LONG").is_none() {
+    let only = std::env::var("GNSS_TWIN_SABOTAGE_ONLY").unwrap_or_default();
+    kinds.retain(|kind| kind.name.contains(&only));
+    // Every third each day, all with `GNSS_TWIN_LONG` or of those that are asked for.
+    if only.is_empty() && std::env::var_os("GNSS_TWIN_LONG").is_none() {
         let mut number = 0..;
         kinds.retain(|_| number.next().is_some_and(|n: usize| n.is_multiple_of(3)));
     }

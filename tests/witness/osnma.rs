@@ -28,6 +28,11 @@ use super::data::external;
 
 /// Verifier after a whole recording, and the results of all tags.
 fn verified(pages: &str, key: &str) -> Option<(Verifier, Vec<TagReport>)> {
+    verified_after(pages, key, 0.0)
+}
+
+/// Verifier of a recording that is replayed so much later by the receiver's own time.
+fn verified_after(pages: &str, key: &str, later_s: f64) -> Option<(Verifier, Vec<TagReport>)> {
     let (pages, key) = (external(pages)?, external(key)?);
     let text = fs::read_to_string(&key).unwrap();
     let anchor = if key.to_string_lossy().contains("MerkleTree") {
@@ -40,7 +45,7 @@ fn verified(pages: &str, key: &str) -> Option<(Verifier, Vec<TagReport>)> {
     let text = String::from_utf8(inflate(&fs::read(pages).unwrap(), 1 << 24).unwrap()).unwrap();
     for row in text.lines() {
         let page = Page::from_row(row).unwrap();
-        reports.extend(verifier.page(&page, page.start.seconds() as f64));
+        reports.extend(verifier.page(&page, page.start.seconds() as f64 + later_s));
     }
     reports.extend(verifier.finish());
     Some((verifier, reports))
@@ -94,6 +99,19 @@ fn every_tag_of_july_is_right_from_the_root_of_the_tree_alone() {
     only_the_ends_are_open(&reports);
     // The first blocks of the root key are sent from TOW 345990 on.
     assert_eq!(verifier.first_root().map(|time| time.tow_s()), Some(346_050));
+}
+
+/// Guidelines 1.3, 4.2: by the receiver's own time and its uncertainty of 15 s a tag has to come within 30 s
+/// of its beginning, before its key is sent, and a tag of the slow MAC within 330 s.
+#[test]
+fn of_a_recording_that_is_replayed_a_minute_later_only_tags_of_the_slow_mac_are_right() {
+    let (pages, key) = ("osnma/16_AUG_2023_fixed.csv.gz", "osnma/OSNMA_PublicKey_16_AUG_2023.xml");
+    let Some((_, reports)) = verified_after(pages, key, 60.0) else { return };
+    let [ephemeris, timing, slow, _] = right(&reports);
+    assert_eq!((ephemeris, timing), (0, 0));
+    assert!(slow > 2500, "{slow}");
+    let Some((_, reports)) = verified_after(pages, key, 400.0) else { return };
+    assert!(reports.is_empty());
 }
 
 #[test]

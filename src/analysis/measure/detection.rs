@@ -3,11 +3,13 @@
 //! Truth has the times at which jammers and spoofers send. A test is clean if no such time lies in its
 //! interval or shortly before it, and attacked if one lies in it. Alarms of clean tests are false; their
 //! share is compared with the stated probability by its exact binomial interval (Clopper and Pearson 1934).
-//! Residuals of smoothed ranges are correlated: their tests count as the independent ones that would fix a
-//! mean as well. The ROC curve has the share of attacked and of clean tests above every multiple of their
-//! thresholds. Limits: tests after an attack count as neither while the receiver's references and filters
-//! remember it; a detector that an attack does not concern, such as the level under a weak spoofer, has a low
-//! share of detection.
+//! Tests are not independent: they share references, and codes that meet disturb several signals for seconds.
+//! They count as so many fewer as alarms scatter more between segments of the reference's length than those
+//! of independent tests. Residuals of smoothed ranges are correlated: their tests count at most as the
+//! independent ones that would fix a mean as well. The ROC curve has the share of attacked and of clean tests
+//! above every multiple of their thresholds. Limits: tests after an attack count as neither while the
+//! receiver's references and filters remember it; a detector that an attack does not concern, such as the
+//! level under a weak spoofer, has a low share of detection.
 
 use std::collections::BTreeMap;
 
@@ -84,6 +86,9 @@ pub struct OfDetector {
     pub false_alarm_low: Option<f64>,
     /// Upper end.
     pub false_alarm_high: Option<f64>,
+    /// Independent tests as which the clean ones count in the interval.
+    #[serde(skip)]
+    pub independent_tests: f64,
     /// False alarms in an hour; null without a test.
     pub false_alarms_per_hour: Option<f64>,
     /// Tests under attack.
@@ -132,14 +137,16 @@ pub struct Detection {
 #[derive(Debug, Default)]
 struct Labels {
     attacks: Vec<Attack>,
-    /// Samples of a test, and for which an attack is remembered.
+    /// Samples of a test, of a reference, and for which an attack is remembered.
     interval: u64,
+    reference: u64,
     memory: u64,
 }
 
 impl Labels {
     /// Label of the test that ends at a sample.
     fn of(&self, sample: u64) -> Label {
+        let sample = planted!("analysis.detection.label", sample, sample.saturating_sub(self.interval));
         let begin = sample.saturating_sub(self.interval);
         let within = |attack: &&Attack| attack.from <= sample && begin <= attack.to;
         let mut running = self.attacks.iter().filter(within).peekable();
@@ -205,6 +212,24 @@ struct Counts {
     delays_s: Vec<Option<f64>>,
     /// Statistics of clean tests that follow each other, where they are correlated.
     groups: Vec<Vec<f64>>,
+    /// Samples of a segment.
+    segment: u64,
+    /// Number of the running segment, and alarms and tests of each that has clean ones.
+    running: u64,
+    segments: Vec<[f64; 2]>,
+}
+
+/// Number of tests that say as much as one independent test: the scatter of the alarms between segments over
+/// that of independent tests, at least one.
+fn dependence(segments: &[[f64; 2]]) -> f64 {
+    let (count, all) = segments.iter().fold((0.0, 0.0), |(count, all), [alarms, tests]| (count + alarms, all + tests));
+    let (share, number) = (count / all, segments.len() as f64);
+    let alone = share * (1.0 - share) * all;
+    if number < 2.0 || alone <= 0.0 {
+        return 1.0;
+    }
+    let squares = segments.iter().map(|[alarms, tests]| (alarms - share * tests) * (alarms - share * tests));
+    (squares.sum::<f64>() * number / (number - 1.0) / alone).max(1.0)
 }
 
 impl Detection {
@@ -223,6 +248,7 @@ impl Detection {
         let labels = Labels {
             attacks: run.attacks()?,
             interval: (interval_s.unwrap_or(0.0) * rate_hz) as u64,
+            reference: (number("reference_s").unwrap_or(0.0) * rate_hz) as u64,
             memory: (number("reference_s").unwrap_or(0.0).max(REMEMBERED_S) * rate_hz) as u64,
         };
         let mut counts: BTreeMap<Detector, Counts> = BTreeMap::new();
@@ -233,7 +259,8 @@ impl Detection {
                 clean += usize::from(label == Label::Clean);
                 was_clean = label == Label::Clean;
             }
-            let own = counts.entry(test.detector).or_insert_with(|| Counts::new(labels.attacks.len()));
+            let own =
+                counts.entry(test.detector).or_insert_with(|| Counts::new(labels.attacks.len(), labels.reference));
             own.add(&test, label, &labels.attacks, rate_hz);
             if !was_clean && own.groups.last().is_some_and(|group| !group.is_empty()) {
                 own.groups.push(Vec::new());
@@ -286,13 +313,16 @@ impl Detection {
 }
 
 impl Counts {
-    fn new(attacks: usize) -> Self {
+    fn new(attacks: usize, segment: u64) -> Self {
         Self {
             found: OfDetector::default(),
             alarms: 0,
             curve: Curve { counts: [[0; BINS]; 2] },
             delays_s: vec![None; attacks],
             groups: vec![Vec::new()],
+            segment: segment.max(1),
+            running: u64::MAX,
+            segments: Vec::new(),
         }
     }
 
@@ -304,6 +334,14 @@ impl Counts {
                 found.clean_tests += 1;
                 found.false_alarms += usize::from(test.alarm);
                 self.curve.add(test, false);
+                let number = test.sample / self.segment;
+                if std::mem::replace(&mut self.running, number) != number {
+                    self.segments.push([0.0; 2]);
+                }
+                if let Some([alarms, tests]) = self.segments.last_mut() {
+                    *alarms += f64::from(u8::from(test.alarm));
+                    *tests += 1.0;
+                }
                 if test.detector == Detector::Raim
                     && let Some(group) = self.groups.last_mut()
                 {
@@ -324,12 +362,14 @@ impl Counts {
     }
 
     fn finish(self, clean_s: f64) -> OfDetector {
-        let Self { mut found, alarms, delays_s, groups, .. } = self;
+        let Self { mut found, alarms, delays_s, groups, segments, .. } = self;
         let share = |count: usize, all: usize| (all > 0).then(|| count as f64 / all as f64);
         found.false_alarm_share = share(found.false_alarms, found.clean_tests);
         if found.clean_tests > 0 {
             let all = found.clean_tests as f64;
             let effective = Correlated::about_means(&groups).map_or(all, |own| own.independent_of_mean().min(all));
+            let effective = effective.min(all / dependence(&segments));
+            found.independent_tests = effective;
             let ends = interval_of(found.false_alarms as f64 * effective / all, effective);
             (found.false_alarm_low, found.false_alarm_high) = (Some(ends.0), Some(ends.1));
             found.false_alarms_per_hour = (clean_s > 0.0).then(|| found.false_alarms as f64 / (clean_s / 3600.0));
@@ -368,7 +408,12 @@ mod tests {
 
     fn labels() -> Labels {
         let of = |from, to, is_spoofing| Attack { from, to, is_spoofing };
-        Labels { attacks: vec![of(1000, 2000, false), of(5000, 6000, true)], interval: 100, memory: 500 }
+        Labels {
+            attacks: vec![of(1000, 2000, false), of(5000, 6000, true)],
+            interval: 100,
+            reference: 200,
+            memory: 500,
+        }
     }
 
     fn test(sample: u64, statistic: f64) -> Test {
@@ -394,7 +439,7 @@ mod tests {
     #[test]
     fn counts_are_those_of_the_labels_and_the_delay_is_that_of_the_first_alarm() {
         let labels = labels();
-        let mut counts = Counts::new(2);
+        let mut counts = Counts::new(2, 200);
         for k in 1..=100_u64 {
             let sample = 100 * k;
             // One false alarm, and alarms from sample 1500 and from 5000 on.
@@ -422,7 +467,7 @@ mod tests {
         let mut draw = crate::measure::independent::tests::Draw(5);
         let values = draw.remembering(0.97, 2000);
         let of = |detector| {
-            let mut counts = Counts::new(0);
+            let mut counts = Counts::new(0, 20);
             for (k, value) in values.iter().enumerate() {
                 let row = Test { detector, alarm: *value > 2.0, ..test(k as u64, *value) };
                 counts.add(&row, Label::Clean, &[], 1.0);
@@ -432,6 +477,25 @@ mod tests {
         let (raim, level) = (of(Detector::Raim), of(Detector::Level));
         assert_eq!(raim.false_alarms, level.false_alarms);
         assert!(raim.false_alarm_high > level.false_alarm_high && raim.false_alarm_low < level.false_alarm_low);
+    }
+
+    #[test]
+    fn alarms_in_pairs_count_once_and_scattered_ones_each() {
+        let of = |is_alarm: fn(u64) -> bool| {
+            let mut counts = Counts::new(0, 20);
+            for k in 0..6000 {
+                counts.add(&test(k, if is_alarm(k) { 3.0 } else { 1.0 }), Label::Clean, &[], 1.0);
+            }
+            counts.finish(6000.0)
+        };
+        let single = of(|k| k % 150 == 7);
+        let pairs = of(|k| k % 300 < 2);
+        assert_eq!((single.false_alarms, pairs.false_alarms), (40, 40));
+        // 300 segments. One alarm or none in each scatters less than by chance, two or none by nearly twice
+        // as much.
+        assert_eq!(single.independent_tests, 6000.0);
+        assert!((6000.0 / pairs.independent_tests - 2.0).abs() < 0.2, "{}", pairs.independent_tests);
+        assert!(pairs.false_alarm_low < single.false_alarm_low && pairs.false_alarm_high > single.false_alarm_high);
     }
 
     #[test]

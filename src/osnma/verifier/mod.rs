@@ -277,6 +277,9 @@ impl Verifier {
             self.take_key(subframe);
         }
         self.settle();
+        if planted!("osnma.data.issue", false, true) {
+            self.keep_words(&all, start);
+        }
         let words = Arc::new(std::mem::take(&mut self.words));
         for subframe in &signed {
             if self.trusts(subframe) {
@@ -286,11 +289,16 @@ impl Verifier {
             }
         }
         self.words = Arc::unwrap_or_clone(words);
+        self.keep_words(&all, start);
+        self.give_up(|then| start.since_s(then) > PATIENCE_S);
+        self.proved.retain(|then, _| start.since_s(*then) <= PATIENCE_S);
+    }
+
+    /// Keeps the words of a sub-frame of all satellites.
+    fn keep_words(&mut self, all: &BTreeMap<u8, Subframe>, start: Gst) {
         for subframe in all.values() {
             self.words.put(subframe.sender, start, &subframe.words());
         }
-        self.give_up(|then| start.since_s(then) > PATIENCE_S);
-        self.proved.retain(|then, _| start.since_s(*then) <= PATIENCE_S);
     }
 
     /// Takes keys and tags of sub-frames that waited for a root which is known now.

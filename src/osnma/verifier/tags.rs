@@ -242,7 +242,7 @@ impl Waiting {
     /// Result of a tag whose key is proved.
     fn outcome(&self, tag: &Tag, key: &TeslaKey) -> Outcome {
         // MACSEQ has the fast key, whatever the tag's.
-        let is_fast = self.delay_bound_s < FAST_LIMIT_S;
+        let is_fast = planted!("osnma.tags.time", self.delay_bound_s < FAST_LIMIT_S, true);
         if !is_fast && (tag.adkd != Adkd::SlowMac || tag.is_flexible) {
             return Outcome::NotVerifiable(Gap::Time);
         }

@@ -8,7 +8,7 @@ pub use crate::position::protection::normal::quantile;
 
 /// Threshold of the modulus of a standard normal statistic.
 pub fn two_sided(probability: f64) -> f64 {
-    quantile(0.5 * probability)
+    quantile(planted!("receiver.detect.threshold", 0.5, 1.0) * probability)
 }
 
 /// Standard normal value that is exceeded as often as `t` of Student's law with `freedom` degrees of freedom.
@@ -24,7 +24,8 @@ pub fn among(value: f64, others: &[f64]) -> Option<f64> {
     let count = others.len() as f64;
     let mean = others.iter().sum::<f64>() / count;
     let variance = others.iter().map(|other| (other - mean) * (other - mean)).sum::<f64>() / (count - 1.0);
-    let sigma = (variance * (1.0 + 1.0 / count)).sqrt();
+    let new = planted!("receiver.detect.mean", 1.0 + 1.0 / count, 1.0);
+    let sigma = (variance * new).sqrt();
     (sigma > 0.0).then(|| normal_of_student((value - mean) / sigma, count - 1.0))
 }
 

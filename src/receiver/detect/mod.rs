@@ -5,14 +5,16 @@
 //! residual test of a fix ([`crate::position::exclusion`]) is the detector `raim`. The sums that they need
 //! are gathered as the receiver works, and an interval is tested as a whole at its end. Each module derives
 //! the law of its statistic under a clean sky, and [`law`] has the thresholds. Levels, C/N0 and shapes are
-//! compared with the intervals before, without those that raised an alarm. Without `[detection]` in the
-//! settings nothing is gathered. Limits: what is stated holds for one test. A sky of the first intervals that
+//! compared with the intervals before, without those that raised an alarm. A signal is not tested in an
+//! interval in which its code meets another one ([`meeting`]). Without `[detection]` in the settings nothing
+//! is gathered. Limits: what is stated holds for one test. A sky of the first intervals that
 //! is spoofed already is taken for clean by the detectors that compare.
 
 pub mod divergence;
 pub mod jumps;
 pub mod law;
 pub mod level;
+pub mod meeting;
 mod outcome;
 #[cfg(test)]
 mod random;
@@ -52,6 +54,8 @@ pub struct Detection {
     levels: Vec<Level>,
     signals: BTreeMap<Link, shapes::Signal>,
     shapes: BTreeMap<Link, Shape>,
+    /// Doppler of each signal at both ends of the interval.
+    dopplers_hz: BTreeMap<Link, [f64; 2]>,
     /// Middle falls of C/N0 in the intervals before.
     falls: VecDeque<f64>,
     codes: BTreeMap<Link, Divergence>,
@@ -73,6 +77,7 @@ impl Detection {
             levels: (0..front_ends).map(|_| Level::default()).collect(),
             signals: BTreeMap::new(),
             shapes: BTreeMap::new(),
+            dopplers_hz: BTreeMap::new(),
             falls: VecDeque::new(),
             codes: BTreeMap::new(),
             jumps: Jumps::default(),
@@ -92,9 +97,11 @@ impl Detection {
         }
     }
 
-    /// Takes the correlations of a signal's interval.
-    pub fn take_shape(&mut self, link: Link, shape: Shape) {
+    /// Takes the correlations of a signal's interval, and the Doppler at its end.
+    pub fn take_shape(&mut self, link: Link, shape: Shape, doppler_hz: f64) {
         self.shapes.insert(link, shape);
+        let ends_hz = self.dopplers_hz.entry(link).or_insert([doppler_hz; 2]);
+        *ends_hz = [ends_hz[1], doppler_hz];
     }
 
     /// Takes the observations of an instant.
@@ -121,6 +128,7 @@ impl Detection {
     pub fn interrupt(&mut self) {
         self.levels.iter_mut().for_each(Level::interrupt);
         self.shapes.clear();
+        self.dopplers_hz.clear();
         self.codes.clear();
         self.jumps.interrupt();
         self.residuals = None;
@@ -176,14 +184,16 @@ impl Detection {
         is_loud
     }
 
-    /// Tests every signal by itself, and all for a common fall. Nothing becomes a part of the references
-    /// where the level raised an alarm.
+    /// Tests every signal whose code meets no other by itself, and all for a common fall. Nothing becomes a
+    /// part of the references where the level raised an alarm.
     fn test_shapes(&mut self, is_loud: bool, rows: &mut Vec<Test>) {
         let (least, most) = self.reference();
         let ended = std::mem::take(&mut self.shapes);
         let interval_s = self.settings.interval_s;
+        self.dopplers_hz.retain(|link, _| ended.contains_key(link));
+        let met = meeting::meeting(&self.dopplers_hz, interval_s);
         let tested: Vec<(Link, Shape, Tested)> = (ended.into_iter())
-            .filter(|(_, shape)| shapes::is_whole(shape, interval_s))
+            .filter(|(link, shape)| shapes::is_whole(shape, interval_s) && !met.contains(link))
             .map(|(link, shape)| {
                 let tested = self.signals.entry(link).or_default().test(&shape, least);
                 (link, shape, tested)

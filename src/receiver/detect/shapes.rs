@@ -10,10 +10,9 @@
 //! less late across it (phase). A front end gives x a share r of y, which the reference shows. z = x − r·y
 //! has no part of the signal. Its noise is that of early and late without their correlation with the prompt,
 //! so the prompt's sign is independent of it, and updates are independent of each other. Correlations with
-//! the codes of other satellites are not: where Dopplers differ by nearly whole kilohertz they come and go
-//! within seconds. Therefore the mean of z over an interval is compared with those of the M intervals of the
-//! reference. Its difference from their mean over their standard deviation and √(1 + 1/M) is Student's with M
-//! − 1 degrees of freedom.
+//! the codes of other satellites are not: they change within seconds to minutes. Therefore the mean of z over
+//! an interval is compared with those of the M intervals of the reference. Its difference from their mean
+//! over their standard deviation and √(1 + 1/M) is Student's with M − 1 degrees of freedom.
 //!
 //! C/N0 of an interval of n updates is (ȳ² − v/n)/(2·v·T) with the variance v of the amplitudes; its
 //! logarithm is compared with those of the reference in the same way. The middle one of the signals'
@@ -24,10 +23,14 @@
 //! Early less late along the prompt (delta) is what the code loop drives to zero. The sum of n errors of a
 //! loop of order 1 is the change of its code over its gain K: n updates have 2(1 − (1 − K)ⁿ)/(n·K·(2 − K)) of
 //! the variance of as many independent ones, 0.43 of it for a second of a loop of 0.5 Hz. The scatter of the
-//! reference has it. Slow changes are seen as a range in `code_carrier`.
+//! reference has it. Neighbouring intervals share the error at their common end, a correlation of −0.43, so
+//! that one alarm in twelve is followed by another: a run of many tests scatters a little more than
+//! independent ones, and their mean share is that of the threshold. Slow changes are seen as a range in
+//! `code_carrier`.
 //!
-//! Limits: reflections distort a correlation as a spoofer does. Codes of two satellites that meet for one or
-//! two intervals are no normal scatter. Only intervals in which a signal was followed throughout are tested.
+//! Limits: reflections distort a correlation as a spoofer does. The scatter of the intervals before does not
+//! show codes that meet for one or two intervals, which [`super::meeting`] leaves out. Only intervals in
+//! which a signal was followed throughout are tested.
 
 use std::collections::VecDeque;
 

@@ -27,7 +27,8 @@ fn alarms(detector: Detector, of: impl Fn(u8, u64) -> f64) -> Vec<u64> {
         let sample = second * 2_600_000;
         assert!(detection.is_due(sample) && !detection.is_due(sample - 1));
         for number in 1..=7 {
-            detection.take_shape(L1_CA.link(Sv::gps(number)), shape(&mut normal, of(number, second)));
+            let shape = shape(&mut normal, of(number, second));
+            detection.take_shape(L1_CA.link(Sv::gps(number)), shape, 130.0 * f64::from(number));
         }
         detection.close(sample, &mut records).unwrap();
     }

@@ -25,9 +25,9 @@ impl Session {
             return Ok(());
         }
         for track in self.front_ends.iter_mut().flat_map(|front_end| &mut front_end.tracks) {
-            let link = track.channel.link();
+            let (link, doppler_hz) = (track.channel.link(), track.channel.doppler_hz());
             if let Some(shape) = track.report.shape.as_mut() {
-                detection.take_shape(link, std::mem::take(shape));
+                detection.take_shape(link, std::mem::take(shape), doppler_hz);
             }
         }
         Ok(detection.close(end, sink)?)

@@ -20,12 +20,17 @@ impl Verdict {
                 continue;
             };
             let seen = format!("{} of {} tests", found.false_alarms, found.clean_tests);
+            let fewer = found.independent_tests.round();
+            let as_many = match fewer < found.clean_tests as f64 {
+                true => format!(", which count as {fewer} independent ones"),
+                false => String::new(),
+            };
             if let Some(reason) = figures.disturbance {
                 self.not_judged.push(format!("{figure}: {reason}; {seen}, stated {}", number(stated)));
                 continue;
             }
             let source = format!(
-                "stated probability; lower end of the exact 95 % interval, {} to {}, of {seen}",
+                "stated probability; lower end of the exact 95 % interval, {} to {}, of {seen}{as_many}",
                 number(low),
                 number(high)
             );

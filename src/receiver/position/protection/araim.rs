@@ -39,7 +39,8 @@ fn events(geometry: &Geometry, budget: &IntegritySettings) -> Vec<(f64, Vec<usiz
         of.iter().enumerate().for_each(|(range, group)| all.entry(*group).or_default().push(range));
         all.into_values().filter(move |_| probability > 0.0).map(move |ranges| (probability, ranges))
     };
-    groups(&geometry.satellites, budget.p_sat).chain(groups(&geometry.constellations, budget.p_const)).collect()
+    let p_const = planted!("receiver.araim.constellations", budget.p_const, 0.0);
+    groups(&geometry.satellites, budget.p_sat).chain(groups(&geometry.constellations, p_const)).collect()
 }
 
 /// Probability that more than `order` of independent events happen.
@@ -99,7 +100,7 @@ pub fn levels(geometry: &Geometry, budget: &IntegritySettings) -> Result<Levels,
         let mut terms = vec![Term { weight: 2.0, middle_m: biases_m[axis], sigma_m: sigmas_m[axis] }];
         terms.extend(modes.iter().map(|mode| Term {
             weight: mode.probability,
-            middle_m: mode.thresholds_m[axis] + mode.biases_m[axis],
+            middle_m: mode.thresholds_m[axis] + planted!("receiver.araim.bias", mode.biases_m[axis], 0.0),
             sigma_m: mode.sigmas_m[axis],
         }));
         solve(&terms, phmi[axis] * share)
@@ -134,11 +135,13 @@ fn modes(geometry: &Geometry, budget: &IntegritySettings, all: &Estimator) -> Re
     // K_fa of equations for east, north and up: both sides, and half of the horizontal share each.
     let count = found.len() as f64;
     let horizontal = quantile(budget.false_alarm_horizontal / (4.0 * count));
-    let factors = [horizontal, horizontal, quantile(budget.false_alarm_vertical / (2.0 * count))];
+    let vertical = quantile(budget.false_alarm_vertical / (2.0 * count));
+    let factors = [horizontal, horizontal, planted!("receiver.araim.axis", vertical, horizontal)];
+    let apart = planted!("receiver.araim.ure", &geometry.accuracy, &geometry.integrity);
     let mode = |(probability, estimator): (f64, Estimator)| {
         let separation = estimator.less(all);
         let apart_m = &separation.0 * &geometry.residuals_m;
-        let sigmas_m = separation.sigmas_m(&geometry.accuracy);
+        let sigmas_m = separation.sigmas_m(apart);
         let thresholds_m: [f64; AXES] = std::array::from_fn(|axis| factors[axis] * sigmas_m[axis]);
         Mode {
             probability,

@@ -72,6 +72,7 @@ pub enum Unprotected {
 /// Standard deviation along the longer axis of a horizontal error ellipse, in metres.
 fn major_m(covariance: &DMatrix<f64>) -> f64 {
     let (east, north, both) = (covariance[(0, 0)], covariance[(1, 1)], covariance[(0, 1)]);
+    let both = planted!("receiver.sbas.ellipse", both, 0.0);
     (0.5 * (east + north) + libm::hypot(0.5 * (east - north), both)).max(0.0).sqrt()
 }
 

@@ -34,9 +34,10 @@ pub fn levels(geometry: &Geometry, is_approach: bool) -> Result<Levels, Unprotec
     let all = geometry.of_all().ok_or(Unprotected::Singular)?;
     let covariance = all.covariance(&geometry.integrity);
     let horizontal = if is_approach { HORIZONTAL_APPROACH } else { HORIZONTAL_EN_ROUTE };
+    let vertical = planted!("receiver.sbas.factor", VERTICAL, HORIZONTAL_APPROACH);
     Ok(Levels {
         hpl_m: Some(horizontal * major_m(&covariance)),
-        vpl_m: is_approach.then(|| VERTICAL * covariance[(2, 2)].max(0.0).sqrt()),
+        vpl_m: is_approach.then(|| vertical * covariance[(2, 2)].max(0.0).sqrt()),
         emt_m: None,
         sigma_v_acc_m: Some(all.sigmas_m(&geometry.accuracy)[2]),
         is_contradicted: false,
