@@ -11,7 +11,7 @@ use super::runs::Found;
 use super::scenes::{ATTACKS, Case};
 
 /// Least share that is drawn, a common logarithm.
-const LEAST: f64 = -4.5;
+const LEAST: f64 = -4.0;
 /// Points of a ROC curve at most.
 const POINTS: usize = 400;
 
@@ -38,7 +38,7 @@ pub fn draw(path: &Path, found: &[Found]) {
         series.iter().map(|one| Series { points: Vec::new(), ..one.clone() }).collect()
     };
     let mut legend = legend_of(&alarms);
-    let alarms = Chart::new("False alarms in honest scenes", share.clone(), y, alarms);
+    let alarms = Chart::new("False alarms without an attack", share.clone(), y, alarms);
     let spoofers = curves(found, |case| case.kind.jammer().is_none());
     legend.extend(legend_of(&spoofers));
     let detected = || Axis::new("share of attacked tests with an alarm", (0.0, 1.0));
@@ -56,11 +56,11 @@ pub fn draw(path: &Path, found: &[Found]) {
         }
     }
     let lined = |(number, (name, points)): (usize, (&str, Vec<(f64, f64)>))| {
-        Series::lined(format!("cn0_fall, {name}"), number, points)
+        Series::lined(format!("cn0_fall, {name}"), Detector::ALL.len() + number, points)
     };
     let falls: Vec<Series> = falls.into_iter().enumerate().map(lined).collect();
     legend.extend(legend_of(&falls));
-    let falls = Chart::new("cn0_fall under jammers", Axis::new("J/S (dB)", (5.0, 35.0)), detected(), falls);
+    let falls = Chart::new("cn0_fall under jammers", Axis::new("J/S (dB)", (0.0, 30.0)), detected(), falls);
     figure(path, (1280, 1120), 2, &[alarms, spoofers, jammers, falls], &legend).unwrap();
 }
 
@@ -72,8 +72,11 @@ fn at(place: usize) -> f64 {
 /// ROC curves of all detectors over the attacks of a kind.
 fn curves(found: &[Found], is_own: impl Fn(&Case) -> bool) -> Vec<Series> {
     let of = |(number, detector): (usize, &Detector)| {
-        let (clean, attacked) = ratios(&of(found, *detector, |case| !case.kind.is_honest() && is_own(case)));
-        let (points, _) = roc::curve(&clean, &attacked)?;
+        let (clean, attacked) = ratios(&of(found, *detector, |case| !case.kind.is_clean() && is_own(case)));
+        let (mut points, _) = roc::curve(&clean, &attacked)?;
+        // Of the shares without a false alarm the largest.
+        let first = points.iter().take_while(|(clean, _)| *clean == 0.0).count();
+        points.drain(..first.saturating_sub(1));
         let every = points.len().div_ceil(POINTS).max(1);
         let points = points.into_iter().enumerate().filter(|(place, point)| {
             // The left end has few points, of which none may be missing.

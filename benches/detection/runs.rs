@@ -14,7 +14,7 @@ use receiver::settings::Settings;
 use serde::Serialize;
 
 use super::drawn::{Random, Start};
-use super::scenes::{ATTACKS, Case, HONEST, scene};
+use super::scenes::{ATTACKS, CLEAN, Case, scene};
 
 /// One detector in one run: a line of `detection.csv`.
 #[derive(Clone, Debug, Serialize)]
@@ -52,11 +52,11 @@ fn random(number: u64, case: usize) -> Random {
     Random(number << 32 | (case as u64) << 16)
 }
 
-/// Runs of all honest cases from a start.
-pub fn honest(number: u64) -> Vec<Found> {
+/// Runs of all clean cases from a start.
+pub fn clean(number: u64) -> Vec<Found> {
     let mut in_view = Vec::new();
     let mut all = Vec::new();
-    for (place, case) in HONEST.iter().enumerate() {
+    for (place, case) in CLEAN.iter().enumerate() {
         let start = case.kind.start(&mut random(number, 0));
         let seed = 100 * number + place as u64;
         let text = scene(case.kind, seed, &start, &mut random(number, 1 + place), &in_view);
@@ -72,7 +72,7 @@ pub fn honest(number: u64) -> Vec<Found> {
 /// Runs of all attacks from a start.
 pub fn attacked(number: u64) -> Vec<Found> {
     let one = |(place, case): (usize, &Case)| {
-        let place = HONEST.len() + place;
+        let place = CLEAN.len() + place;
         let start = case.kind.start(&mut random(number, 0));
         let seed = 100 * number + place as u64;
         let text = scene(case.kind, seed, &start, &mut random(number, 1 + place), &[]);

@@ -1,4 +1,4 @@
-//! Scenes of the cases: honest ones of six kinds, spoofers and jammers.
+//! Scenes of the cases: clean ones of six kinds, spoofers and jammers.
 //!
 //! Spoofers are like those of scenarios of TEXBAT (T. E. Humphreys, J. A. Bhatti, D. P. Shepard and K. D.
 //! Wesson, The Texas Spoofing Test Battery, ION GNSS 2012; ds7: T. E. Humphreys, TEXBAT Data Sets 7 and 8,
@@ -15,7 +15,7 @@ const CN0_DBHZ: f64 = 45.0;
 /// Begin of an attack.
 pub const ON_S: f64 = 50.0;
 /// Duration of scenes.
-const HONEST_S: f64 = 240.0;
+const CLEAN_S: f64 = 240.0;
 const ROCKET_S: f64 = 200.0;
 const JAMMED_S: f64 = 70.0;
 const SPOOFED_S: f64 = 95.0;
@@ -56,7 +56,7 @@ const fn case(name: &'static str, kind: Kind) -> Case {
 }
 
 /// Scenes without an attack; the first has a plain sky.
-pub const HONEST: [Case; 6] = [
+pub const CLEAN: [Case; 6] = [
     case("static", Kind::Static),
     case("two systems", Kind::TwoSystems),
     case("urban multipath", Kind::Multipath),
@@ -66,21 +66,25 @@ pub const HONEST: [Case; 6] = [
 ];
 
 /// Spoofers, and then jammers of mean J/S in dB.
-pub const ATTACKS: [Case; 17] = [
+pub const ATTACKS: [Case; 21] = [
     case("like ds2: time push, +10 dB", Kind::TimePush(10.0, 3.0)),
     case("like ds3: time push, +1.3 dB", Kind::TimePush(1.3, 3.0)),
     case("like ds4: position push, +0.4 dB", Kind::PositionPush(0.4, 3.0)),
     case("like ds7: phase aligned, +1.3 dB", Kind::PhaseAligned),
     case("meaconing, +6 dB", Kind::Meaconing),
+    case("CW, J/S 0 dB", Kind::Cw(0.0)),
     case("CW, J/S 10 dB", Kind::Cw(10.0)),
     case("CW, J/S 20 dB", Kind::Cw(20.0)),
     case("CW, J/S 30 dB", Kind::Cw(30.0)),
+    case("chirp, J/S 0 dB", Kind::Chirp(0.0)),
     case("chirp, J/S 10 dB", Kind::Chirp(10.0)),
     case("chirp, J/S 20 dB", Kind::Chirp(20.0)),
     case("chirp, J/S 30 dB", Kind::Chirp(30.0)),
+    case("band noise, J/S 0 dB", Kind::Noise(0.0)),
     case("band noise, J/S 10 dB", Kind::Noise(10.0)),
     case("band noise, J/S 20 dB", Kind::Noise(20.0)),
     case("band noise, J/S 30 dB", Kind::Noise(30.0)),
+    case("pulses, J/S 0 dB", Kind::Pulses(0.0)),
     case("pulses, J/S 10 dB", Kind::Pulses(10.0)),
     case("pulses, J/S 20 dB", Kind::Pulses(20.0)),
     case("pulses, J/S 30 dB", Kind::Pulses(30.0)),
@@ -98,9 +102,9 @@ impl Kind {
         }
     }
 
-    /// True for a scene of [`HONEST`].
-    pub fn is_honest(self) -> bool {
-        HONEST.iter().any(|case| case.kind == self)
+    /// True for a scene of [`CLEAN`].
+    pub fn is_clean(self) -> bool {
+        CLEAN.iter().any(|case| case.kind == self)
     }
 
     /// A time and a position for which there are messages.
@@ -116,12 +120,12 @@ pub fn scene(kind: Kind, seed: u64, start: &Start, random: &mut Random, in_view:
     // That of the street, of the rocket or of a push.
     let azimuth_deg = random.between(0.0, 360.0).round();
     let more = more(kind, random, place, azimuth_deg, in_view);
-    let (level, power) = match kind.is_honest() {
+    let (level, power) = match kind.is_clean() {
         true => ("correlations", "kind = \"link_budget\"".to_owned()),
         false => ("balanced", format!("kind = \"fixed\"\ncn0_dbhz = {CN0_DBHZ}")),
     };
     let (motion, duration_s) = match kind {
-        Kind::Multipath => (walk(place, azimuth_deg), HONEST_S),
+        Kind::Multipath => (walk(place, azimuth_deg), CLEAN_S),
         Kind::Dynamics => {
             let rocket = format!(
                 "kind = \"rocket\"\nlatitude_deg = {latitude_deg}\nlongitude_deg = {longitude_deg}\nheight_m = 130\n\
@@ -130,7 +134,7 @@ pub fn scene(kind: Kind, seed: u64, start: &Start, random: &mut Random, in_view:
             );
             (rocket, ROCKET_S)
         }
-        _ if kind.is_honest() => (at_rest, HONEST_S),
+        _ if kind.is_clean() => (at_rest, CLEAN_S),
         _ if kind.jammer().is_some() => (at_rest, JAMMED_S),
         _ => (at_rest, SPOOFED_S),
     };
@@ -168,7 +172,8 @@ fn walk([latitude_deg, longitude_deg]: [f64; 2], azimuth_deg: f64) -> String {
     let point = |deg: [f64; 2], more: &str| {
         let [latitude_deg, longitude_deg] = deg.map(|deg| format!("{deg:.7}"));
         format!(
-            "\n[[motion.point]]\nlatitude_deg = {latitude_deg}\nlongitude_deg = {longitude_deg}\nheight_m = 130\n{more}\n"
+            "\n[[motion.point]]\nlatitude_deg = {latitude_deg}\nlongitude_deg = {longitude_deg}\nheight_m = 130\n\
+             {more}\n"
         )
     };
     let begin = point([latitude_deg, longitude_deg], "speed_mps = 0\nhold_s = 40");

@@ -34,7 +34,7 @@ pub struct LabelledSignal {
     /// Prompt without its symbols, in units of its noise's standard deviation.
     prompt: f64,
     prompt_sigma: f64,
-    /// In parts of the mean prompt, as all of early and late.
+    /// Prompt a quarter of a cycle ahead, as a part of the mean prompt; so are early and late.
     prompt_q: f64,
     early: Option<f64>,
     late: Option<f64>,
@@ -166,8 +166,7 @@ impl Sums {
     }
 }
 
-/// Ends of the intervals with tests, and the largest ratio of each detector among the tests of `number` by
-/// those ends: of a signal, or of what is no signal.
+/// Largest ratio of each detector among the tests of some links, by the ends of all intervals with tests.
 fn ratios(run: &Run, is_own: impl Fn(u32) -> bool) -> Result<BTreeMap<u64, Ratios>, JudgeError> {
     let mut all: BTreeMap<u64, Ratios> = BTreeMap::new();
     run.tests.each(|test| {
