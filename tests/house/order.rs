@@ -141,6 +141,7 @@ pub const ORDER: Order<'static> = &[
             &["allan", "errors", "independent", "ionosphere", "lines", "osnma", "peaks", "psd", "spectrum", "spoofing"],
             &["clock", "consistency", "elevation", "jitter", "protection"],
             &["detection", "slips"],
+            &["labelled"],
         ],
     ),
     (

@@ -231,11 +231,43 @@ def counts():
                      make.Page(page, command, pattern=rf"^\| {case}, no fault \| {share} \| \d+: ", text=r"\1 (\2 to \3)", runs="100"), rooms)
         yield Figure(f"integrity.{name}.alarms_apart", f"{case}, no fault: the same where no two codes disturb each other", "of 1",
                      make.Page(page, command, pattern=rf"^\| {case}, no fault \| [^|]*\| {share} of \d+ \|", text=r"\1 (\2 to \3)", runs="100"), rooms)
+    yield from detection()
     faults = "GNSS_TWIN_LONG=1 GNSS_TWIN_WRITE_ROBUSTNESS=$PWD/reports/robustness.md cargo test --test faults -- --test-threads 1"
     rooms = ("tests/faults", "src/cli", "src/receiver/source")
     for name, what, column in [("cases", "cases of damaged input and of a failing machine", 1), ("failures", "of them failed", 5)]:
         yield Figure(f"validation.robustness_{name}", what, "",
                      make.Page("reports/robustness.md", faults, summed=column), rooms, "= 0" if name == "failures" else "")
+
+
+# Detectors of jamming and spoofing in the order of the page's columns.
+DETECTORS = ["level", "cn0_fall", "correlation_ratio", "correlation_phase", "correlation_delta", "code_carrier", "raim", "position_jump", "clock_jump"]
+
+
+def detection():
+    page, command = "reports/detection.md", "cargo bench --bench detection"
+    rooms = (*ALL_SAMPLES, "src/twin", "src/analysis/measure", "benches/detection")
+    yield Figure("detection.kept", "pairs of a detector and a clean scene in which the stated probability of a false alarm is not refuted", "",
+                 make.Page(page, command, pattern=r"^In (\d+) of (\d+) pairs", text=r"\1 of \2", runs="24"), rooms)
+    scenes = [("static", "at rest"), ("two_systems", "GPS and Galileo"), ("multipath", "urban multipath"), ("scintillation", "scintillation"),
+              ("dynamics", "high dynamics"), ("oscillator", "a cheap oscillator"), ("samples", "at rest by samples")]
+    for column, (scene, words) in enumerate(scenes):
+        for name in DETECTORS:
+            if name == "level" and scene != "samples":
+                continue
+            pattern = rf"^\| `{name}` \| (?:[^|]*\| ){{{column}}}(?:\*\*)?\d+ of \d+: (\S+) \((\S+) to ([^)]+)\)"
+            yield Figure(f"detection.alarms.{scene}.{name}", f"{name}, {words}: share of tests with a false alarm, with its interval", "of 1",
+                         make.Page(page, command, pattern=pattern, text=r"\1 (\2 to \3)", runs="24"), rooms)
+    attacks = [("ds2", "like ds2"), ("ds3", "like ds3"), ("ds4", "like ds4"), ("ds7", "like ds7"), ("meaconing", "meaconing")]
+    attacks += [(f"{name}_{js}", f"{words}, J/S {js} dB") for name, words in
+                [("cw", "CW"), ("chirp", "chirp"), ("noise", "band noise"), ("pulses", "pulses")] for js in (0, 10, 20)]
+    for attack, words in attacks:
+        for column, name in enumerate(DETECTORS[:5]):
+            row = rf"^\| {words}[^|]*\| (?:[^|]*\| ){{{column}}}"
+            yield Figure(f"detection.share.{attack}.{name}", f"{name}, {words}: share of attacked tests with an alarm", "of 1",
+                         make.Page(page, command, pattern=row + r"(\d\.\d+) \(", runs="10"), rooms)
+            if attack in ("ds2", "ds3", "ds4", "ds7", "meaconing"):
+                yield Figure(f"detection.delay.{attack}.{name}", f"{name}, {words}: median time to the first alarm", "s",
+                             make.Page(page, command, pattern=row + r"([\d.]+|none), [^;|]*;", runs="10"), rooms)
 
 
 # Figures of loops as the pages of studies name them.

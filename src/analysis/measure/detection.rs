@@ -295,6 +295,23 @@ impl Detection {
         &self.labels.attacks
     }
 
+    /// Truth about the tests that end at a sample.
+    pub fn label(&self, sample: u64) -> Label {
+        self.labels.of(sample)
+    }
+
+    /// Number of the first attack in the interval that ends at a sample, from 1.
+    pub fn attack_of(&self, sample: u64) -> Option<usize> {
+        let begin = sample.saturating_sub(self.labels.interval);
+        let is_running = |attack: &Attack| attack.from <= sample && begin <= attack.to;
+        self.labels.attacks.iter().position(is_running).map(|place| place + 1)
+    }
+
+    /// Samples of a test.
+    pub fn interval(&self) -> u64 {
+        self.labels.interval
+    }
+
     /// A test with its truth.
     pub fn labelled<'a>(&self, run: &'a Run, test: &Test) -> Labelled<'a> {
         let names = run.tested.get(test.link as usize);
@@ -307,7 +324,7 @@ impl Detection {
             statistic: test.statistic,
             threshold: test.threshold,
             alarm: test.alarm,
-            label: self.labels.of(test.sample),
+            label: self.label(test.sample),
         }
     }
 }

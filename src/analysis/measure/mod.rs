@@ -8,8 +8,8 @@
 //! waves that the receiver reported with those that there were, [`spoofing`] measures how far a spoofer moved
 //! the fixes, [`osnma`] which tags it took for authentic, [`ionosphere`] what two bands showed of it.
 //! [`protection`] compares errors with the protection levels that the receiver states, [`detection`] the
-//! alarms of its detectors with the jammers and spoofers that there were. [`independent`] says
-//! how many independent values a correlated series is worth.
+//! alarms of its detectors with the jammers and spoofers that there were, and [`labelled`] says the truth
+//! beside the correlations. [`independent`] says how many independent values a correlated series is worth.
 
 pub mod allan;
 pub mod clock;
@@ -20,6 +20,7 @@ pub mod errors;
 pub mod independent;
 pub mod ionosphere;
 pub mod jitter;
+pub mod labelled;
 pub mod lines;
 pub mod osnma;
 pub mod peaks;

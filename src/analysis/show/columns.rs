@@ -10,6 +10,11 @@ pub const CONSISTENCY: &str = "sample,time_s,east_m,north_m,up_m,sigma_east_m,si
 pub const PROTECTION: &str = "sample,time_s,horizontal_m,vertical_m,hpl_m,vpl_m,available,detected";
 /// Judge's `detection.csv`.
 pub const DETECTION: &str = "sample,time_s,detector,sv,signal,statistic,threshold,alarm,label";
+/// `detection_labelled.csv`.
+pub const LABELLED: &str = "\
+    sample,time_s,sv,signal,updates,cn0_dbhz,phase_lock,prompt,prompt_sigma,prompt_q,early,late,early_q,late_q,\
+    early_sigma,late_sigma,tap_spacing_chips,dll_discriminator_chips,dll_sigma_chips,pll_sigma_cycles,level,cn0_fall,\
+    correlation_ratio,correlation_phase,correlation_delta,code_carrier,raim,position_jump,clock_jump,label,attack";
 /// `roc.csv`.
 pub const ROC: &str = "detector,threshold_ratio,false_alarm_share,detection_share";
 /// `position.csv`.

@@ -13,6 +13,7 @@ use crate::judge::verdict::Verdict;
 use crate::measure::elevation::Elevations;
 use crate::measure::errors::PositionError;
 use crate::measure::jitter::Jitter;
+use crate::measure::labelled;
 use crate::measure::psd::Psd;
 use crate::measure::slips::{COLUMNS, Slips};
 use crate::read::PeakRow;
@@ -117,8 +118,11 @@ pub(crate) fn write_measured(
     }
     if judged.detection.figures.is_some() {
         let (path, run) = (directory.join("detection.csv"), judged.run);
-        let labelled = run.tests.cursor().map(|test| test.map(|test| judged.detection.labelled(run, &test)));
-        write_read_rows(&path, columns::DETECTION, labelled)?;
+        let tests = run.tests.cursor().map(|test| test.map(|test| judged.detection.labelled(run, &test)));
+        write_read_rows(&path, columns::DETECTION, tests)?;
+        let mut signals = Table::create(&directory.join("detection_labelled.csv"), columns::LABELLED)?;
+        labelled::each(run, judged.detection, |row| signals.row(&row))?;
+        signals.finish()?;
     }
     if !judged.detection.roc.is_empty() {
         write_rows(&directory.join("roc.csv"), columns::ROC, judged.detection.roc.iter())?;
