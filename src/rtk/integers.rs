@@ -185,7 +185,7 @@ impl Floats {
 }
 
 /// Success rate below which nothing is searched for.
-const LEAST_SEARCHED: f64 = 1e-3;
+const LEAST_SEARCHED: f64 = 0.5;
 /// Double differences that must be left for one to be suspected.
 const LEAST_LEFT: usize = 5;
 /// Distance from a whole number, in cycles, from which on an ambiguity is none.

@@ -10,8 +10,14 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::pairs::Track;
 
-/// Residual of a phase beyond which it slipped, in cycles: between noise of 0.02 and half a cycle.
-const LARGEST_CYCLES: f64 = 0.2;
+/// Least size of a slip, in cycles: between noise and half a cycle.
+const LEAST_CYCLES: f64 = 0.3;
+/// Deviation of the change of a phase's single difference, metres: low satellites have the most.
+const NOISE_M: f64 = 0.01;
+/// Deviations that a slip must have.
+const SIGMAS: f64 = 4.0;
+/// Least redundancy of a phase: below it the others do not tell whether it slipped.
+const LEAST_REDUNDANCY: f64 = 1e-3;
 
 /// Change of a phase since the epoch before.
 #[derive(Clone, Copy, Debug)]
@@ -32,14 +38,16 @@ pub fn slipped(changes: &[Change], is_static: bool) -> Vec<Track> {
     let unknowns = if is_static { 1 } else { 4 };
     let mut kept: Vec<Change> = changes.to_vec();
     let mut found = Vec::new();
-    while let Some(residuals) = residuals(&kept, is_static) {
-        let cycles = |at: &usize| (residuals[*at] / kept[*at].wavelength_m).abs();
-        let Some(worst) = (0..kept.len()).max_by(|one, other| cycles(one).total_cmp(&cycles(other))) else { break };
-        if cycles(&worst) <= LARGEST_CYCLES {
+    while let Some(misses) = misses(&kept, is_static) {
+        let Some(worst) = (0..kept.len()).max_by(|one, other| misses[*one].0.total_cmp(&misses[*other].0)) else {
+            break;
+        };
+        let (normalised_m, slip_m) = misses[worst];
+        if normalised_m <= SIGMAS * NOISE_M || slip_m <= LEAST_CYCLES * kept[worst].wavelength_m {
             return found;
         }
         if kept.len() <= unknowns + 1 {
-            // No more can be told from the others.
+            // Which one it is cannot be told.
             found.extend(kept.iter().map(|change| change.track));
             return found;
         }
@@ -48,8 +56,10 @@ pub fn slipped(changes: &[Change], is_static: bool) -> Vec<Track> {
     found
 }
 
-/// Residuals of the changes after a common clock and a displacement; `None` if they do not determine them.
-fn residuals(changes: &[Change], is_static: bool) -> Option<DVector<f64>> {
+/// Residual of each change after a common clock and a displacement: divided by the root of its redundancy, by
+/// which residuals of unlike geometry compare, and by the redundancy, the slip that it would be. In metres;
+/// `None` if the changes do not determine the unknowns.
+fn misses(changes: &[Change], is_static: bool) -> Option<Vec<(f64, f64)>> {
     let unknowns = if is_static { 1 } else { 4 };
     if changes.len() <= unknowns {
         return None;
@@ -59,9 +69,17 @@ fn residuals(changes: &[Change], is_static: bool) -> Option<DVector<f64>> {
         axis => changes[row].direction[axis - 1],
     });
     let values = DVector::from_fn(changes.len(), |row, _| changes[row].change_m);
-    let normal = (design.transpose() * &design).cholesky()?;
-    let solution = normal.solve(&(design.transpose() * &values));
-    Some(values - design * solution)
+    let inverse = (design.transpose() * &design).cholesky()?.inverse();
+    let residuals = &values - &design * (&inverse * (design.transpose() * &values));
+    let miss = |row: usize| {
+        let own = design.row(row);
+        let redundancy = 1.0 - (own * &inverse * own.transpose())[(0, 0)];
+        if redundancy < LEAST_REDUNDANCY {
+            return (0.0, 0.0);
+        }
+        (residuals[row].abs() / redundancy.sqrt(), residuals[row].abs() / redundancy)
+    };
+    Some((0..changes.len()).map(miss).collect())
 }
 
 #[cfg(test)]

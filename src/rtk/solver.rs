@@ -455,3 +455,7 @@ fn solution(
     };
     Solution { status, position_m, covariance_m2, float_m, satellites, on_two_bands, floats, integers }
 }
+
+#[cfg(test)]
+#[path = "solver_tests.rs"]
+mod tests;

@@ -214,6 +214,19 @@ pub const ORDER: Order<'static> = &[
         ],
     ),
     (
+        "rtk",
+        &[
+            &["carrier", "lambda", "normal", "orbits", "place", "troposphere"],
+            &["error"],
+            &["files"],
+            &["pairs"],
+            &["integers", "slips"],
+            &["solver", "truth"],
+            &["judge"],
+            &["run"],
+        ],
+    ),
+    (
         "study",
         &[
             &["correlation", "demand", "measure", "normal", "watch"],
