@@ -27,7 +27,7 @@ const LARGEST_PER_KM_M: f64 = 0.001;
 /// Longest time to the first fix.
 const LONGEST_S: f64 = 60.0;
 /// Least share of fixed epochs after the first fix.
-const LEAST_FIXED: f64 = 0.95;
+const LEAST_FIXED: f64 = 0.9;
 /// Largest error of the base's place where the truth is known.
 const LARGEST_BASE_M: f64 = 0.01;
 /// Largest distance of the base's place from the mean of its own fixes, which the ionosphere moves.

@@ -85,7 +85,8 @@ pub struct Figures {
     pub float: usize,
     /// Mean length of the baseline, metres.
     pub length_m: Option<f64>,
-    /// Share of the solved epochs from the first fix on that are fixed, wholly or in part.
+    /// Share of the solved epochs from the first fix on that are fixed. A part of the integers is a fix if it
+    /// gives a precise position ([`Solution::is_fix`]).
     pub fix_rate: Option<f64>,
     /// Time from the first solution to the first fix, seconds.
     pub first_fix_s: Option<f64>,
@@ -206,7 +207,7 @@ impl Judge {
         let figures = &mut self.figures;
         figures.solved += 1;
         self.lengths_m += length_m;
-        let is_fixed = solution.status != Status::Float;
+        let is_fixed = solution.is_fix();
         match solution.status {
             Status::Fixed => figures.fixed += 1,
             Status::Partial => figures.partial += 1,

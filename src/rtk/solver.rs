@@ -109,6 +109,20 @@ pub struct Solution {
     pub integers: Option<Integers>,
 }
 
+/// Largest formal deviation, in three dimensions, of a position that a part of the integers makes a fix, metres.
+const PRECISE_M: f64 = 0.02;
+
+impl Solution {
+    /// True if the integers give the position: all of them, or a part that leaves it two centimetres.
+    pub fn is_fix(&self) -> bool {
+        match self.status {
+            Status::Fixed => true,
+            Status::Partial => self.covariance_m2.trace() <= PRECISE_M * PRECISE_M,
+            Status::Float => false,
+        }
+    }
+}
+
 /// Result of an epoch.
 #[derive(Clone, Debug, Default)]
 pub struct Solved {

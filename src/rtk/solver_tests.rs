@@ -57,12 +57,11 @@ impl Sky {
                 let code = Code::new(text).unwrap();
                 let wavelength_m = SPEED_OF_LIGHT_MPS / crate::carrier::carrier_hz(sv, code, None).unwrap();
                 let ranges_m = [0, 1].map(|one: usize| modelled(&emission, &places[one]).0 + clocks_m[one]);
-                let code_m = ranges_m.map(|range_m| range_m + self.noise_m[0] * self.normal());
+                let [of_code_m, of_phase_m] = self.noise_m;
+                let code_m = ranges_m.map(|range_m| range_m + of_code_m * self.normal());
                 let whole = |one: usize| 1000.0 * f64::from(sv.number) + 77_777.0 * one as f64 + f64::from(code.band());
-                let phase =
-                    |one: usize, noise: f64| ranges_m[one] + wavelength_m * whole(one) + self.noise_m[1] * noise;
-                let noise = [self.normal(), self.normal()];
-                let phase_m = [phase(0, noise[0]), phase(1, noise[1])];
+                let phase_m =
+                    [0, 1].map(|one: usize| ranges_m[one] + wavelength_m * whole(one) + of_phase_m * self.normal());
                 let phases = Some(Phases { phase_m, is_broken: false, is_half: false });
                 let emissions = [emission; 2];
                 shared.push(Shared {
