@@ -7,7 +7,7 @@ use clap::builder::UnknownArgumentValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::cli::address::listen_address;
-use crate::cli::baseline::{least_ratio, mask, place, probability, signal};
+use crate::cli::baseline::{least_ratio, mask, position, probability, signal};
 use crate::cli::lines;
 use crate::cli::live::intake::Origin;
 use crate::cli::osnma::args::Osnma;
@@ -121,7 +121,7 @@ pub struct Baseline {
     pub navigation: Vec<PathBuf>,
     /// Antenna of the base: latitude and longitude in degrees, height above the ellipsoid in metres [default:
     /// the truth of its run]
-    #[arg(long, value_name = "LAT,LON,HEIGHT", allow_hyphen_values = true, value_parser = place)]
+    #[arg(long, value_name = "LAT,LON,HEIGHT", allow_hyphen_values = true, value_parser = position)]
     pub base_position: Option<Geodetic>,
     /// Signals that take part, by system and RINEX code [default: all that both observe]
     #[arg(long, value_name = "G1C,E5Q,...", value_delimiter = ',', value_parser = signal)]

@@ -17,20 +17,20 @@ use rtk::error::RtkError;
 use rtk::integers::Belief;
 use rtk::judge::{Figures, ON_TWO_BANDS};
 use rtk::pairs::Choice;
-use rtk::run::{BasePlace, Baseline, Inputs, baseline};
+use rtk::run::{BasePosition, Baseline, Inputs, baseline};
 use rtk::solver::Settings;
 
 /// Largest error of the horizontal baseline, and of its height, that carriers leave at short distances.
 const LARGEST_M: [f64; 2] = [0.003, 0.006];
-/// What a kilometre of distance adds to both: atmosphere that the two places do not share.
+/// Error that a kilometre of distance adds to both: atmosphere that the two receivers do not share.
 const LARGEST_PER_KM_M: f64 = 0.001;
 /// Longest time to the first fix.
 const LONGEST_S: f64 = 60.0;
 /// Least share of fixed epochs after the first fix.
 const LEAST_FIXED: f64 = 0.9;
-/// Largest error of the base's place where the truth is known.
+/// Largest error of the base's position where the truth is known.
 const LARGEST_BASE_M: f64 = 0.01;
-/// Largest distance of the base's place from the mean of its own fixes, which the ionosphere moves.
+/// Largest distance of the base's position from the mean of its own fixes, which the ionosphere moves.
 const LARGEST_FROM_FIXES_M: f64 = 30.0;
 
 /// Finds the baseline, writes its tables if a directory is named, and prints figures and verdict.
@@ -41,7 +41,7 @@ pub fn execute(arguments: &args::Baseline) -> Result<(), CliError> {
         rover: arguments.rover.clone(),
         navigation: arguments.navigation.clone(),
         choice: Choice { signals: arguments.signals.iter().copied().collect() },
-        place: arguments.base_position.map_or(BasePlace::Truth, |place| BasePlace::Given(place.to_ecef())),
+        position: arguments.base_position.map_or(BasePosition::Truth, |given| BasePosition::Given(given.to_ecef())),
     };
     let settings = Settings {
         mask_rad: arguments.mask_deg.to_radians(),
@@ -102,7 +102,7 @@ fn judgements(found: &Baseline) -> Vec<Judgement> {
     let source = "receivers resolve half cycles or say that they may be missing";
     judge("ambiguities that are not whole", count(figures.not_whole.len()), "", Bound::Max(0.0), source);
     if let Some(off_m) = figures.base_off_m {
-        judge("base off its true place", json!(off_m), "m", Bound::Max(LARGEST_BASE_M), "survey of the base");
+        judge("base off its true position", json!(off_m), "m", Bound::Max(LARGEST_BASE_M), "survey of the base");
     }
     if let Some(off_m) = found.base_from_fixes_m {
         let source = "single positions, with the ionosphere's error";
@@ -204,7 +204,7 @@ fn write(directory: &Path, found: &Baseline, verdict: &[Judgement], object: &Val
 }
 
 /// Latitude and longitude in degrees, height in metres.
-pub fn place(text: &str) -> Result<Geodetic, String> {
+pub fn position(text: &str) -> Result<Geodetic, String> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
     match numbers.as_deref() {
         Some([latitude, longitude, height])

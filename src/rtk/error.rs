@@ -79,9 +79,9 @@ pub enum RtkError {
         /// Satellites of the rover, in words.
         rover: String,
     },
-    /// A base whose place nothing tells.
+    /// A base whose position nothing tells.
     #[error("{}: no truth/trajectory.csv in it: expected --base-position for a base without a truth", path.display())]
-    NoPlace {
+    NoPosition {
         /// Directory of the base's run.
         path: PathBuf,
     },

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use crate::pairs::{Pair, Track};
-use crate::place::Place;
+use crate::site::Site;
 use crate::solver::{Event, Solution, Solved, Status};
 use crate::truth::Truth;
 use gnss::time::Epoch;
@@ -94,9 +94,9 @@ pub struct Figures {
     pub first_fix_two_bands_s: Option<f64>,
     /// Root mean square of the fixed epochs' errors, metres.
     pub east_rms_m: Option<f64>,
-    /// That of the north component.
+    /// Root mean square of the north component.
     pub north_rms_m: Option<f64>,
-    /// That of the up component.
+    /// Root mean square of the up component.
     pub up_rms_m: Option<f64>,
     /// Root mean square of the horizontal error of one component: of east and north together.
     pub horizontal_rms_m: Option<f64>,
@@ -122,7 +122,7 @@ pub struct Figures {
     pub slips: usize,
     /// Ambiguities that are not whole: satellites with signals.
     pub not_whole: Vec<String>,
-    /// Distance of the base's stated place from its true one, metres.
+    /// Distance of the base's stated position from the true one, metres.
     pub base_off_m: Option<f64>,
 }
 
@@ -160,7 +160,7 @@ impl Errors {
     }
 }
 
-/// What is true of an epoch: truths of base and rover, if the runs have them.
+/// Truths of base and rover, if the runs have them.
 pub type Truths<'a> = Option<[&'a Truth; 2]>;
 
 impl Judge {
@@ -184,7 +184,7 @@ impl Judge {
         if solution.on_two_bands >= ON_TWO_BANDS {
             self.first_on_two.get_or_insert(pair.labels[1]);
         }
-        let base = Place::new(*base_m);
+        let base = Site::new(*base_m);
         let baseline_m = solution.position_m - base_m;
         row.fill(solution, &(base.axes * baseline_m), &base);
         let error_m = truths.and_then(|[of_base, of_rover]| {
@@ -322,7 +322,7 @@ impl Row {
         }
     }
 
-    fn fill(&mut self, solution: &Solution, baseline_m: &Vector3<f64>, base: &Place) {
+    fn fill(&mut self, solution: &Solution, baseline_m: &Vector3<f64>, base: &Site) {
         self.status = solution.status.name();
         (self.east_m, self.north_m, self.up_m) = (Some(baseline_m.x), Some(baseline_m.y), Some(baseline_m.z));
         let local = base.axes * solution.covariance_m2.fixed_view::<3, 3>(0, 0) * base.axes.transpose();

@@ -13,7 +13,7 @@ pub const OF_POSITION: usize = 3;
 /// One single difference, rover minus base.
 #[derive(Clone, Debug)]
 pub struct Difference {
-    /// Its derivatives, by the number of the unknown.
+    /// Derivatives of the difference, by the number of the unknown.
     pub derivatives: Vec<(usize, f64)>,
     /// Observation less model, metres.
     pub misclosure_m: f64,

@@ -174,7 +174,7 @@ fn phases(base: &Values, rover: &Values, wavelength_m: f64) -> Option<Phases> {
 
 /// Model of one observation's range between a receiver and a satellite: geometry, satellite clock and neutral
 /// atmosphere, metres; with the direction from the satellite to the receiver and the elevation.
-pub fn modelled(emission: &Emission, place: &crate::place::Place) -> (f64, Vector3<f64>, f64) {
+pub fn modelled(emission: &Emission, place: &crate::site::Site) -> (f64, Vector3<f64>, f64) {
     let sight_m = emission.to(&place.position_m);
     let range_m = sight_m.norm();
     let direction = sight_m / range_m;

@@ -12,13 +12,13 @@ use crate::solver::{Settings, Solver};
 use crate::truth::{Truth, each};
 use gnss::record::Fix;
 
-/// Source of the base's place.
+/// Source of the base's position.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum BasePlace {
+pub enum BasePosition {
     /// The truth of its run, epoch by epoch.
     #[default]
     Truth,
-    /// A place that is given, ECEF in metres.
+    /// A position that is given, ECEF in metres.
     Given(Vector3<f64>),
 }
 
@@ -33,8 +33,8 @@ pub struct Inputs {
     pub navigation: Vec<PathBuf>,
     /// Signals that take part.
     pub choice: Choice,
-    /// Place of the base.
-    pub place: BasePlace,
+    /// Site of the base.
+    pub position: BasePosition,
 }
 
 /// Baseline that was found.
@@ -46,7 +46,7 @@ pub struct Baseline {
     pub figures: Figures,
     /// True if a truth judged them.
     pub is_judged: bool,
-    /// Distance of the base's place from the mean of its own fixes, metres, if its run has fixes.
+    /// Distance of the base's position from the mean of its own fixes, metres, if its run has fixes.
     pub base_from_fixes_m: Option<f64>,
 }
 
@@ -67,7 +67,7 @@ pub fn baseline(inputs: &Inputs, settings: Settings) -> Result<Baseline, RtkErro
 /// Solves epochs that are in memory.
 ///
 /// # Errors
-/// [`RtkError::NoPlace`].
+/// [`RtkError::NoPosition`].
 pub fn solve(
     pairs: &[Pair],
     [of_base, of_rover]: [&Option<Truth>; 2],
@@ -77,27 +77,27 @@ pub fn solve(
     let truths = of_base.as_ref().zip(of_rover.as_ref()).map(|(base, rover)| [base, rover]);
     let (mut solver, mut judge, mut rows) = (Solver::new(settings), Judge::default(), Vec::new());
     let mut off_m: Option<f64> = None;
-    let mut place_m = None;
+    let mut position_m = None;
     for pair in pairs {
         let true_m = of_base.as_ref().and_then(|truth| truth.position_m(pair.labels[0]));
-        let base_m = match inputs.place {
-            BasePlace::Given(place_m) => place_m,
+        let base_m = match inputs.position {
+            BasePosition::Given(position_m) => position_m,
             // A base at rest between two rows of its truth.
-            BasePlace::Truth => true_m
+            BasePosition::Truth => true_m
                 .or_else(|| of_base.as_ref().and_then(Truth::first_m))
-                .ok_or_else(|| RtkError::NoPlace { path: inputs.base.clone() })?,
+                .ok_or_else(|| RtkError::NoPosition { path: inputs.base.clone() })?,
         };
         if let Some(true_m) = true_m {
             let own_m = (base_m - true_m).norm();
             off_m = Some(off_m.map_or(own_m, |most_m| most_m.max(own_m)));
         }
-        place_m = Some(base_m);
+        position_m = Some(base_m);
         let solved = solver.epoch(pair, &base_m);
         rows.push(judge.take(pair, &base_m, &solved, truths));
     }
     let mut figures = judge.finish();
     figures.base_off_m = off_m;
-    let base_from_fixes_m = fixes.zip(place_m).map(|(fixes, place_m)| (fixes - place_m).norm());
+    let base_from_fixes_m = fixes.zip(position_m).map(|(fixes, position_m)| (fixes - position_m).norm());
     Ok(Baseline { rows, figures, is_judged: truths.is_some(), base_from_fixes_m })
 }
 

@@ -1,10 +1,10 @@
 //! Cycle slips that no receiver announced, as single differences of phases from epoch to epoch show them.
 //!
-//! From one epoch to the next, a phase less its modelled range changes by the receivers' clocks, which all
+//! A phase less its modelled range changes from epoch to epoch by the receivers' clocks, which all
 //! signals share, and by the rover's motion beyond the approximate positions. What is left is the noise of
 //! the phases, some millimetres, or a slip: half a cycle is 9 cm on L1. The largest residual is taken out
 //! until all are small (Baarda's data snooping). Limits: with few phases a slip cannot be told from a motion,
-//! and the faulty one of two cannot be told from the other; then both begin anew.
+//! and the faulty one of two cannot be told from the other; then both begin again.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 

@@ -1,10 +1,10 @@
 //! Baselines epoch by epoch: float solution, integers, and what is known of the ambiguities afterwards.
 //!
-//! The unknowns are the rover's position, of each epoch anew or one for all, and an ambiguity of each
+//! The unknowns are the rover's position, one for each epoch or one for all, and an ambiguity of each
 //! satellite's signal, which stays until its phase slips or ends. Information of the ambiguities adds up; the
 //! code's noise is correlated by the receivers' loops, so that epochs closer than a stated time add nothing.
-//! Integers are looked for in each epoch anew and never put into what is known: a wrong fix does not
-//! stay. Limits: atmosphere of both places by one model, so that baselines beyond some kilometres lose their
+//! Integers are looked for in each epoch again and never put into what is known: a wrong fix does not
+//! stay. Limits: atmosphere of both receivers by one model, so that baselines beyond some kilometres lose their
 //! integers to the ionosphere; GLONASS by carriers of its own stays float.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,7 +15,7 @@ use crate::carrier::{Code, chips_hz, is_divided};
 use crate::integers::{Belief, Floats, Integers};
 use crate::normal::{Difference, Normal, OF_POSITION};
 use crate::pairs::{Pair, Track, modelled};
-use crate::place::Place;
+use crate::site::Site;
 use crate::slips::{Change, slipped};
 use gnss::satellite::System;
 use gnss::time::Epoch;
@@ -95,7 +95,7 @@ pub struct Solution {
     pub status: Status,
     /// ECEF position of the rover, metres.
     pub position_m: Vector3<f64>,
-    /// Its covariance, square metres.
+    /// Covariance of the position, square metres.
     pub covariance_m2: DMatrix<f64>,
     /// ECEF position of the float solution, metres.
     pub float_m: Vector3<f64>,
@@ -142,7 +142,7 @@ struct Ambiguity {
     is_half: bool,
 }
 
-/// A track's difference of an epoch, at the approximate place.
+/// A track's difference of an epoch, at the approximate position.
 #[derive(Clone, Debug)]
 struct Row {
     track: Track,
@@ -166,7 +166,7 @@ pub struct Solver {
     /// Time of the newest epoch in it.
     known_at: Option<Epoch>,
     /// Approximate position of the rover.
-    place_m: Option<Vector3<f64>>,
+    rough_m: Option<Vector3<f64>>,
     /// Phases less their model of the epoch before.
     before: BTreeMap<Track, f64>,
     not_whole: BTreeSet<Track>,
@@ -180,7 +180,7 @@ impl Solver {
             ambiguities: Vec::new(),
             known: Normal::new(OF_POSITION),
             known_at: None,
-            place_m: None,
+            rough_m: None,
             before: BTreeMap::new(),
             not_whole: BTreeSet::new(),
         }
@@ -188,7 +188,7 @@ impl Solver {
 
     /// Solves an epoch, with the base at an ECEF position in metres.
     pub fn epoch(&mut self, pair: &Pair, base_m: &Vector3<f64>) -> Solved {
-        let base = Place::new(*base_m);
+        let base = Site::new(*base_m);
         let Some(place) = self.approximate(pair, &base) else { return Solved::default() };
         let rows = self.rows(pair, &base, &place);
         let events = self.follow(&rows);
@@ -210,14 +210,14 @@ impl Solver {
         solved
     }
 
-    /// Place of the rover by codes alone, to metres; at rest that of the first epoch serves for all.
-    fn approximate(&mut self, pair: &Pair, base: &Place) -> Option<Place> {
-        if let Some(position_m) = self.place_m.filter(|_| self.settings.is_static) {
-            return Some(Place::new(position_m));
+    /// Site of the rover by codes alone, to metres; at rest that of the first epoch serves for all.
+    fn approximate(&mut self, pair: &Pair, base: &Site) -> Option<Site> {
+        if let Some(position_m) = self.rough_m.filter(|_| self.settings.is_static) {
+            return Some(Site::new(position_m));
         }
-        let mut position_m = self.place_m.unwrap_or(base.position_m);
+        let mut position_m = self.rough_m.unwrap_or(base.position_m);
         for _ in 0..MOST_STEPS {
-            let rows = self.rows(pair, base, &Place::new(position_m));
+            let rows = self.rows(pair, base, &Site::new(position_m));
             let mut normal = Normal::new(OF_POSITION);
             let codes = |row: &Row| difference(row, row.code_m, row.code_m2, None);
             groups(&rows)
@@ -227,15 +227,15 @@ impl Solver {
             position_m += step.fixed_rows::<3>(0);
             // An error of a metre moves a direction by 5e-8 rad, and a double difference by less than that.
             if step.norm() < 1.0 {
-                self.place_m = Some(position_m);
-                return Some(Place::new(position_m));
+                self.rough_m = Some(position_m);
+                return Some(Site::new(position_m));
             }
         }
         None
     }
 
     /// Single differences above the mask, rover minus base, less their model.
-    fn rows(&self, pair: &Pair, base: &Place, rover: &Place) -> Vec<Row> {
+    fn rows(&self, pair: &Pair, base: &Site, rover: &Site) -> Vec<Row> {
         let all = pair.shared.iter().filter_map(|shared| {
             let (of_base_m, ..) = modelled(&shared.emissions[0], base);
             let (of_rover_m, direction, elevation_rad) = modelled(&shared.emissions[1], rover);
@@ -244,8 +244,8 @@ impl Solver {
             let [code_m2, phase_m2] = variances(sv.system, code, elevation_rad, shared.cn0_dbhz);
             let phase =
                 shared.phases.map(|own| (own.phase_m[1] - own.phase_m[0] - model_m, own.is_broken, own.is_half));
-            // Far from the true place, as at the first step, an elevation says nothing.
-            let is_above = elevation_rad >= self.settings.mask_rad || self.place_m.is_none();
+            // Far from the true position, as at the first step, an elevation says nothing.
+            let is_above = elevation_rad >= self.settings.mask_rad || self.rough_m.is_none();
             is_above.then_some(Row {
                 track: shared.track,
                 wavelength_m: shared.wavelength_m,
@@ -399,7 +399,7 @@ impl Solver {
     }
 }
 
-/// Steps to the approximate place, of which the first may be thousands of kilometres.
+/// Steps to the approximate position, of which the first may be thousands of kilometres.
 const MOST_STEPS: usize = 12;
 
 /// Deviation of the code of 1.023 million chips a second at 45 dB-Hz, metres: a loop of 1 Hz with a quarter
@@ -407,7 +407,7 @@ const MOST_STEPS: usize = 12;
 const CODE_M: f64 = 0.5;
 const CODE_CHIPS_HZ: f64 = 1.023e6;
 const CODE_CN0_DBHZ: f64 = 45.0;
-/// What no C/N0 tells of a code, at the zenith, metres.
+/// Deviation of a code that no C/N0 tells, at the zenith, metres.
 const CODE_FLOOR_M: f64 = 0.1;
 /// Deviation of a phase, and what low elevations add to it, metres.
 const PHASE_M: [f64; 2] = [0.001, 0.002];

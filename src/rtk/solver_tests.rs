@@ -49,7 +49,7 @@ impl Sky {
     fn pair(&mut self, epoch: u32, codes: &[&str]) -> Pair {
         let at = Epoch::new(1_290_689_460 + i64::from(epoch), 0.0);
         let clocks_m = [39_000.0 + 15.0 * f64::from(epoch), -65_000.0 - 7.0 * f64::from(epoch)];
-        let places = [Place::new(self.base_m), Place::new(self.rover_m)];
+        let places = [Site::new(self.base_m), Site::new(self.rover_m)];
         let mut shared = Vec::new();
         for (sv, position_m) in self.satellites.clone() {
             let emission = Emission { position_m, clock_s: 1e-4 };
@@ -94,7 +94,7 @@ fn two_bands_are_fixed_at_the_first_epoch_to_millimetres() {
         let mut sky = Sky::new();
         let mut solver = Solver::new(Settings { is_static, ..Settings::default() });
         for epoch in 0..20 {
-            let solved = solver.epoch(&sky.pair(epoch, &TWO), &sky.base_m.clone());
+            let solved = solver.epoch(&sky.pair(epoch, &TWO), &sky.base_m);
             assert_eq!(status(&solved), Status::Fixed, "epoch {epoch}");
             assert!(sky.error_m(&solved) < 0.012, "epoch {epoch}: {}", sky.error_m(&solved));
             assert!(solved.events.is_empty());
@@ -109,8 +109,8 @@ fn without_noise_the_baseline_is_exact_and_the_float_solution_is_weaker() {
     let mut sky = Sky::new();
     sky.noise_m = [0.0, 0.0];
     let mut solver = Solver::new(Settings::default());
-    let solved = solver.epoch(&sky.pair(0, &TWO), &sky.base_m.clone());
-    // Ranges of 2.3e7 m in f64, and the second order of an approximate place a metre off.
+    let solved = solver.epoch(&sky.pair(0, &TWO), &sky.base_m);
+    // Ranges of 2.3e7 m in f64, and the second order of an approximate position a metre off.
     assert!(sky.error_m(&solved) < 1e-6, "{}", sky.error_m(&solved));
     let solution = solved.solution.unwrap();
     let fixed = solution.covariance_m2.trace();
@@ -127,7 +127,7 @@ fn a_rover_at_rest_gains_on_one_that_moves_and_information_comes_once_a_second()
             let mut pair = sky.pair(0, &["1C"]);
             let later_s = f64::from(epoch) * f64::from(step) / 10.0;
             pair.labels = pair.labels.map(|label| label.plus_s(later_s));
-            let solved = solver.epoch(&pair, &sky.base_m.clone());
+            let solved = solver.epoch(&pair, &sky.base_m);
             let floats = solved.solution.unwrap().floats;
             last = floats.covariance.trace();
         }
@@ -156,7 +156,7 @@ fn a_slip_that_none_announced_is_found_and_what_is_announced_begins_anew() {
                 phases.phase_m[1] += cycles * own.wavelength_m;
                 phases.is_broken = is_broken && epoch == 6;
             }
-            let solved = solver.epoch(&pair, &sky.base_m.clone());
+            let solved = solver.epoch(&pair, &sky.base_m);
             let is_first = solved.events.contains(&(slipped, event));
             assert_eq!(is_first, epoch == 6, "epoch {epoch}: {:?}", solved.events);
             assert!(sky.error_m(&solved) < 0.012 && status(&solved) != Status::Float, "epoch {epoch}");
@@ -175,7 +175,7 @@ fn a_half_cycle_from_the_start_is_named_and_does_no_harm() {
             let own = &mut pair.shared[index];
             own.phases.as_mut().unwrap().phase_m[0] += 0.5 * own.wavelength_m;
             let track = own.track;
-            let solved = solver.epoch(&pair, &sky.base_m.clone());
+            let solved = solver.epoch(&pair, &sky.base_m);
             named.extend(solved.events.iter().copied());
             assert!(sky.error_m(&solved) < 0.012, "epoch {epoch}: {}", sky.error_m(&solved));
             assert!(named.iter().all(|event| *event == (track, Event::NotWhole)));
@@ -193,7 +193,7 @@ fn a_half_cycle_that_a_receiver_announces_is_left_out_of_the_integers() {
     let phases = own.phases.as_mut().unwrap();
     phases.phase_m[1] += 0.5 * own.wavelength_m;
     phases.is_half = true;
-    let solved = solver.epoch(&pair, &sky.base_m.clone());
+    let solved = solver.epoch(&pair, &sky.base_m);
     assert!(solved.events.is_empty() && status(&solved) == Status::Fixed);
     assert!(sky.error_m(&solved) < 0.012);
 }
@@ -203,5 +203,5 @@ fn too_few_satellites_give_no_solution() {
     let mut sky = Sky::new();
     sky.satellites.truncate(3);
     let mut solver = Solver::new(Settings::default());
-    assert!(solver.epoch(&sky.pair(0, &TWO), &sky.base_m.clone()).solution.is_none());
+    assert!(solver.epoch(&sky.pair(0, &TWO), &sky.base_m).solution.is_none());
 }

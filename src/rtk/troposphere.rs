@@ -1,8 +1,8 @@
-//! Neutral atmosphere of both places: what differs between them is their height.
+//! Neutral atmosphere of both receivers: what differs between them is their height.
 //!
 //! Source: Saastamoinen 1972 by the standard atmosphere of ISO 2533, and the mapping of Black and Eisner 1984.
 //! A difference of 100 m in height is 3 cm of zenith delay. Limits: no weather; below 5° of elevation the
-//! mapping is off by per cent, which both places share.
+//! mapping is off by per cent, which both receivers share.
 
 /// Zenith delay in metres at a height above the ellipsoid, half saturated.
 fn zenith_m(height_m: f64) -> f64 {

@@ -216,7 +216,7 @@ pub const ORDER: Order<'static> = &[
     (
         "rtk",
         &[
-            &["carrier", "lambda", "normal", "orbits", "place", "troposphere"],
+            &["carrier", "lambda", "normal", "orbits", "site", "troposphere"],
             &["error"],
             &["files"],
             &["pairs"],

@@ -28,7 +28,7 @@ pub enum LambdaError {
         order: usize,
         /// Ambiguity from which on it is not positive, from 0.
         at: usize,
-        /// Its conditional variance.
+        /// Conditional variance of that ambiguity.
         variance: f64,
     },
     /// A vector and a covariance of different orders, or none at all.

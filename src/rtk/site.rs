@@ -1,12 +1,12 @@
-//! Place of an antenna with its local directions.
+//! Site of an antenna with its local directions.
 
 use nalgebra::{Matrix3, Vector3};
 
 use gnss::earth::Geodetic;
 
-/// Place of an antenna.
+/// Site of an antenna.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
+pub struct Site {
     /// ECEF position, metres.
     pub position_m: Vector3<f64>,
     /// Height above the ellipsoid, metres.
@@ -17,8 +17,8 @@ pub struct Place {
     pub axes: Matrix3<f64>,
 }
 
-impl Place {
-    /// Place of an ECEF position in metres.
+impl Site {
+    /// Site of an ECEF position in metres.
     pub fn new(position_m: Vector3<f64>) -> Self {
         let geodetic = Geodetic::from_ecef(&position_m);
         let axes = geodetic.ecef_to_enu();
