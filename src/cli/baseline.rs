@@ -70,7 +70,7 @@ pub fn execute(arguments: &args::Baseline) -> Result<(), CliError> {
 fn rtk_error(error: RtkError) -> CliError {
     match &error {
         RtkError::Read { path, source } => CliError::read(path.display(), source),
-        RtkError::NoPlace { .. } => CliError::usage(error),
+        RtkError::NoPosition { .. } => CliError::usage(error),
         _ => CliError::input(error),
     }
 }
