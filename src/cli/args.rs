@@ -7,7 +7,7 @@ use clap::builder::UnknownArgumentValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::cli::address::listen_address;
-use crate::cli::baseline::{least_ratio, mask, position, probability, signal};
+use crate::cli::baseline::args::Baseline;
 use crate::cli::lines;
 use crate::cli::live::intake::Origin;
 use crate::cli::osnma::args::Osnma;
@@ -19,13 +19,10 @@ use crate::cli::study::args::Study;
 use crate::cli::watch::{Watched, tcp_peer};
 use analysis::show::document::Forms;
 use generator::fidelity::Grade;
-use gnss::earth::Geodetic;
 use gnss::exchange::Version;
 use gnss::samples::Format;
-use gnss::satellite::System;
 use gnss::time::Epoch;
 use logs::frames::Protocol;
-use rtk::carrier::Code;
 
 /// A GNSS digital twin: generates IF samples from real ephemerides, receives them and judges the receiver.
 ///
@@ -94,53 +91,6 @@ pub struct Logs {
     /// Time within three days of the log, for messages that name no week: UTC like 2026-11-23T05:00:00Z
     #[arg(long, value_name = "UTC", value_parser = Epoch::parse)]
     pub near: Option<Epoch>,
-    #[command(flatten)]
-    pub printed: Printed,
-}
-
-#[derive(Args, Debug)]
-#[command(
-    after_help = "Examples:\n  gnss-twin baseline reports/base reports/rover --out reports/baseline\n  gnss-twin \
-                        baseline reports/base reports/rover --signals G1C,E1C --check\n  gnss-twin baseline base.rnx \
-                        rover.rnx --navigation brdc.rnx --base-position 37.605,-0.986,60\n\nRuns with a truth are \
-                        judged: error of the baseline, integers, fix rate, time to the first fix. Exit code with \
-                        --check: 3 if a limit is broken"
-)]
-pub struct Baseline {
-    /// Run of the base, or its RINEX observations
-    #[arg(value_name = "BASE_RUN")]
-    pub base: PathBuf,
-    /// Run of the rover, or its RINEX observations
-    #[arg(value_name = "ROVER_RUN")]
-    pub rover: PathBuf,
-    /// Directory for baseline.csv, verdict.csv and baseline.json [default: nothing is written]
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// RINEX navigation file; may be repeated [default: those of both runs]
-    #[arg(long, value_name = "FILE.rnx")]
-    pub navigation: Vec<PathBuf>,
-    /// Antenna of the base: latitude and longitude in degrees, height above the ellipsoid in metres [default:
-    /// the truth of its run]
-    #[arg(long, value_name = "LAT,LON,HEIGHT", allow_hyphen_values = true, value_parser = position)]
-    pub base_position: Option<Geodetic>,
-    /// Signals that take part, by system and RINEX code [default: all that both observe]
-    #[arg(long, value_name = "G1C,E5Q,...", value_delimiter = ',', value_parser = signal)]
-    pub signals: Vec<(System, Code)>,
-    /// Estimate one position for all epochs: the rover is at rest
-    #[arg(long = "static")]
-    pub is_static: bool,
-    /// Elevation in degrees below which satellites take no part
-    #[arg(long, value_name = "DEG", default_value_t = 10.0, value_parser = mask)]
-    pub mask_deg: f64,
-    /// Least ratio of the second best integers' squared norm to that of the best
-    #[arg(long, value_name = "RATIO", default_value_t = 3.0, value_parser = least_ratio)]
-    pub ratio: f64,
-    /// Least success rate of bootstrapping for a fix
-    #[arg(long, value_name = "P", default_value_t = 0.999, value_parser = probability)]
-    pub success_rate: f64,
-    /// End with exit code 3 if a limit of the verdict is broken
-    #[arg(long)]
-    pub check: bool,
     #[command(flatten)]
     pub printed: Printed,
 }

@@ -53,7 +53,8 @@ pub enum RtkError {
     },
     /// Observations whose times have nothing in common.
     #[error(
-        "no common epochs: the base observes from {} to {}, the rover from {} to {}, and no two times are within {within_s} s",
+        "no common epochs: the base observes from {} to {}, the rover from {} to {}, and no two times are within \
+         {within_s} s",
         base[0], base[1], rover[0], rover[1]
     )]
     NoCommonEpochs {
@@ -66,8 +67,8 @@ pub enum RtkError {
     },
     /// Epochs in which the two have too few satellites in common.
     #[error(
-        "no common satellites: in {epochs} common epochs base and rover share {most} satellites at most on one signal with \
-         ephemerides, expected {LEAST} in one epoch; the base observes {base}, the rover {rover}"
+        "no common satellites: in {epochs} common epochs base and rover share {most} satellites at most on one signal \
+         with ephemerides, expected {LEAST} in one epoch; the base observes {base}, the rover {rover}"
     )]
     NoCommonSatellites {
         /// Common epochs.

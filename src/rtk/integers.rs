@@ -146,8 +146,8 @@ impl Floats {
         })
     }
 
-    /// [`Self::fix`] without one track more, if that makes integers believed that were not, and if the track's
-    /// ambiguity is then far from a whole number.
+    /// [`Self::fix`] without one track more, if that makes integers believed that were not, and if the
+    /// ambiguity of the track is then far from a whole number.
     pub fn without_one(&self, takes: impl Fn(Track) -> bool, belief: Belief) -> Option<(Track, Integers)> {
         let candidates = (0..self.tracks.len()).filter(|index| takes(self.tracks[*index].0));
         let fixed = candidates.filter_map(|left_out| {

@@ -1,7 +1,7 @@
 //! Judgement of a baseline by the truth: its error, its integers, and how long it took to fix them.
 //!
-//! A fix is wrong if one of its integers is not that of the truth, however small the error of the position. So
-//! many wrong ones are allowed as the stated success rates leave: bootstrapping is a lower bound for least
+//! A fix is wrong if one of its integers is not that of the truth, however small the error of the position.
+//! So many wrong ones are allowed as the stated success rates leave: bootstrapping is a lower bound for least
 //! squares, so that the expected number is at most the sum of what they miss.
 
 use nalgebra::Vector3;

@@ -3,8 +3,8 @@
 //! The unknowns are the rover's position, one for each epoch or one for all, and an ambiguity of each
 //! satellite's signal, which stays until its phase slips or ends. Information of the ambiguities adds up; the
 //! code's noise is correlated by the receivers' loops, so that epochs closer than a stated time add nothing.
-//! Integers are looked for in each epoch again and never put into what is known: a wrong fix does not
-//! stay. Limits: atmosphere of both receivers by one model, so that baselines beyond some kilometres lose their
+//! Integers are looked for in each epoch again and never put into what is known: a wrong fix does not stay.
+//! Limits: atmosphere of both receivers by one model, so that baselines beyond some kilometres lose their
 //! integers to the ionosphere; GLONASS by carriers of its own stays float.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -109,7 +109,8 @@ pub struct Solution {
     pub integers: Option<Integers>,
 }
 
-/// Largest formal deviation, in three dimensions, of a position that a part of the integers makes a fix, metres.
+/// Largest formal deviation in three dimensions of a position that a part of the integers makes a fix,
+/// metres.
 const PRECISE_M: f64 = 0.02;
 
 impl Solution {

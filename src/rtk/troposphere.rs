@@ -1,7 +1,7 @@
 //! Neutral atmosphere of both receivers: what differs between them is their height.
 //!
-//! Source: Saastamoinen 1972 by the standard atmosphere of ISO 2533, and the mapping of Black and Eisner 1984.
-//! A difference of 100 m in height is 3 cm of zenith delay. Limits: no weather; below 5° of elevation the
+//! Source: Saastamoinen 1972 by the standard atmosphere of ISO 2533, mapping of Black and Eisner 1984. A
+//! difference of 100 m in height is 3 cm of zenith delay. Limits: no weather; below 5° of elevation the
 //! mapping is off by per cent, which both receivers share.
 
 /// Zenith delay in metres at a height above the ellipsoid, half saturated.

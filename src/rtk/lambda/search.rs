@@ -1,7 +1,8 @@
 //! Search for the two integer vectors nearest to a float vector.
 //!
-//! Source: Chang, Yang and Zhou 2005, section 4: depth first, the integers of each level in the order of their
-//! distance (Schnorr and Euchner 1994), and a bound that shrinks to the second best vector found so far.
+//! Source: Chang, Yang and Zhou 2005, section 4: depth first, the integers of each level in the order of
+//! their distance (Schnorr and Euchner 1994), and a bound that shrinks to the second best vector found so
+//! far.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -1,18 +1,17 @@
 //! `baseline`: position of one receiver relative to another by double differences, judged by their truths.
 
+pub mod args;
+
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::cli::args;
+use crate::cli::baseline::args::Baseline as Arguments;
 use crate::cli::error::CliError;
 use crate::cli::staging::Staging;
 use analysis::judge::judgement::{Bound, Judgement, MARGINAL_SHARE, Status};
-use gnss::earth::Geodetic;
-use gnss::satellite::System;
-use rtk::carrier::Code;
 use rtk::error::RtkError;
 use rtk::integers::Belief;
 use rtk::judge::{Figures, ON_TWO_BANDS};
@@ -34,7 +33,7 @@ const LARGEST_BASE_M: f64 = 0.01;
 const LARGEST_FROM_FIXES_M: f64 = 30.0;
 
 /// Finds the baseline, writes its tables if a directory is named, and prints figures and verdict.
-pub fn execute(arguments: &args::Baseline) -> Result<(), CliError> {
+pub fn execute(arguments: &Arguments) -> Result<(), CliError> {
     let staging = arguments.out.as_deref().map(Staging::directory).transpose()?;
     let inputs = Inputs {
         base: arguments.base.clone(),
@@ -136,8 +135,8 @@ fn words(found: &Baseline) -> String {
             found.figures;
         let _ = writeln!(
             text,
-            "integers      {integers_right} right, {integers_wrong} wrong, {integers_not_fixed} not fixed; {wrong_fixes} \
-             wrong fixes of {}, {expected_wrong:.2e} expected at most",
+            "integers      {integers_right} right, {integers_wrong} wrong, {integers_not_fixed} not fixed; \
+             {wrong_fixes} wrong fixes of {}, {expected_wrong:.2e} expected at most",
             figures.judged
         );
     }
@@ -201,48 +200,4 @@ fn write(directory: &Path, found: &Baseline, verdict: &[Judgement], object: &Val
     put(&table, whole(rows)?)?;
     put(&directory.join("verdict.csv"), whole(judged)?)?;
     put(&directory.join("baseline.json"), format!("{object:#}\n").into_bytes())
-}
-
-/// Latitude and longitude in degrees, height in metres.
-pub fn position(text: &str) -> Result<Geodetic, String> {
-    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
-    match numbers.as_deref() {
-        Some([latitude, longitude, height])
-            if latitude.abs() <= 90.0 && longitude.abs() <= 360.0 && (-1e4..=1e8).contains(height) =>
-        {
-            Ok(Geodetic::from_degrees(*latitude, *longitude, *height))
-        }
-        _ => Err("expected latitude and longitude in degrees and a height in metres, like 37.605,-0.986,60".to_owned()),
-    }
-}
-
-/// System and code, such as `G1C`.
-pub fn signal(text: &str) -> Result<(System, Code), String> {
-    let found = text.chars().next().and_then(|letter| {
-        let (system, _) = System::LETTERS.iter().find(|(_, own)| *own == letter)?;
-        Some((*system, Code::new(text.get(1..)?)?))
-    });
-    found.ok_or_else(|| "expected a system's letter and the code of RINEX, like G1C or E5Q".to_owned())
-}
-
-/// Elevation mask in degrees.
-pub fn mask(text: &str) -> Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|deg| (-90.0..90.0).contains(deg))
-        .ok_or_else(|| "expected degrees from -90 to 90".to_owned())
-}
-
-/// Ratio of squared norms.
-pub fn least_ratio(text: &str) -> Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|ratio| (1.0..=1e6).contains(ratio))
-        .ok_or_else(|| "expected a ratio from 1 to 1e6".to_owned())
-}
-
-/// Probability below one.
-pub fn probability(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|p| (0.0..1.0).contains(p));
-    value.ok_or_else(|| "expected a probability from 0 to below 1".to_owned())
 }
