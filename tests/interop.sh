@@ -3,7 +3,7 @@
 # two systems by Galileo alone and by GPS and Galileo, to 5 m. The judge must find from its RINEX and NMEA files what the scenes put
 # into them. Debian's RTKLIB must find the static scene's place by the RINEX files that a run writes, of the receiver and of the truth;
 # and by those of a truth without a troposphere to 0.01 m: of GPS and Galileo, and of two carriers of four systems through an ionosphere.
-# georinex reads of those what the tables say. gpsdecode, pynmeagps and xmllint read NMEA, KML and GPX of fixes and truth,
+# RTKLIB's baseline of two receivers must be ours. georinex reads of those what the tables say. gpsdecode, pynmeagps and xmllint read NMEA, KML and GPX of fixes and truth,
 # and pyarrow every table as Parquet.
 #
 # usage: tests/interop.sh [GNSS_TWIN_BINARY [galileo]]     (default: target/release/gnss-twin, and GPS alone)
@@ -184,6 +184,50 @@ cp "$work/both.truth/navigation.rnx" "$work/bands/truth/navigation_before.rnx"
 for system in 1 8 4 32 45; do
     rtklib "bands_$system" "$work/bands/truth" 0.01 pos1-tropopt=off pos1-ionoopt=dual-freq pos1-frequency=l1+l2 "pos1-navsys=$system"
 done
+# Two receivers 600 m apart: RTKLIB's baseline and ours by the same files, against both truths. Fixed epochs of both are right to 3 mm
+# horizontally and 6 mm up, and differ by 12 mm at most, each with its own weights.
+for name in base rover; do
+    at=(37.605 -0.986 60 1.3e-4 5)
+    [ "$name" = base ] || at=(37.609 -0.9815 72 -2.2e-4 6)
+    sed -e "s/^latitude_deg = .*/latitude_deg = ${at[0]}/; s/^longitude_deg = .*/longitude_deg = ${at[1]}/; s/^height_m = .*/height_m = ${at[2]}/" \
+        -e "s/^bias_s = .*/bias_s = ${at[3]}/; s/^seed = .*/seed = ${at[4]}/; s/^duration_s = .*/duration_s = 45/" \
+        -e "s|igrg3380.10i.gz|$root/scenarios/igrg3380.10i.gz|" "$root/scenarios/dual_band.toml" >"$work/$name.toml"
+    "$twin" run "$work/$name.toml" --allow-outside --level correlations --out "$work/$name" --quiet
+done
+"$twin" baseline "$work/base" "$work/rover" --check --out "$work/baseline" | sed 's/^/interop: baseline, /' || failed=1
+read -r x y z < <(awk -F, 'NR == 2 { print $4, $5, $6 }' "$work/base/truth/trajectory.csv")
+printf '%s\n' pos1-posmode=kinematic pos1-frequency=l1+2+3 pos1-elmask=10 pos1-ionoopt=off pos1-tropopt=off pos1-navsys=8 \
+    pos2-armode=continuous pos2-arthres=3 out-solformat=enu out-timeform=tow out-timesys=gpst out-timendec=3 \
+    ant2-postype=xyz "ant2-pos1=$x" "ant2-pos2=$y" "ant2-pos3=$z" >"$work/baseline.conf"
+rnx2rtkp -k "$work/baseline.conf" -o "$work/baseline.pos" "$work/rover/rx/observations.rnx" "$work/base/rx/observations.rnx" \
+    "$work/rover/rx/navigation.rnx" >"$work/rnx2rtkp.log" 2>&1
+python3 - "$work" <<'END' || failed=1
+import csv, math, sys
+
+work = sys.argv[1]
+ours = {}
+with open(f"{work}/baseline/baseline.csv", newline="") as stream:
+    for row in csv.DictReader(stream):
+        if row["status"] in ("fixed", "partial"):
+            hours, minutes, seconds = row["time"].split("T")[1].split(":")
+            second = round(3600 * int(hours) + 60 * int(minutes) + float(seconds), 1)
+            own = [float(row[f"{axis}_m"]) for axis in ("east", "north", "up")]
+            ours[second] = own, [value - float(row[f"error_{axis}_m"]) for value, axis in zip(own, ("east", "north", "up"))]
+fixed, squares, apart = 0, [0.0] * 3, 0.0
+for line in open(f"{work}/baseline.pos"):
+    words = line.split()
+    if line.startswith("%") or words[5] != "1":
+        continue
+    found = ours.get(round(float(words[1]) % 86400, 1))
+    if found:
+        place = [float(word) for word in words[2:5]]
+        fixed += 1
+        squares = [sum_ + (one - true) ** 2 for sum_, one, true in zip(squares, place, found[1])]
+        apart = max(apart, math.dist(place, found[0]))
+rms = [math.sqrt(one / max(fixed, 1)) for one in squares]
+print(f"interop: RTKLIB's baseline, {fixed} fixed epochs, rms {rms[0]:.4f} {rms[1]:.4f} {rms[2]:.4f} m, from ours {apart:.4f} m at most")
+sys.exit(not (fixed > 100 and math.hypot(rms[0], rms[1]) <= 0.003 and rms[2] <= 0.006 and apart <= 0.012))
+END
 scene=$root/scenarios/static.toml
 # And what reads XML and NMEA: no word of theirs on standard error, every fix a position.
 if ! command -v xmllint >/dev/null || ! command -v gpsdecode >/dev/null; then

@@ -7,6 +7,7 @@ use clap::builder::UnknownArgumentValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::cli::address::listen_address;
+use crate::cli::baseline::args::Baseline;
 use crate::cli::lines;
 use crate::cli::live::intake::Origin;
 use crate::cli::osnma::args::Osnma;
@@ -55,6 +56,8 @@ pub enum Command {
     Pack(Pack),
     /// Show what a receiver's log holds, or convert it to tables
     Logs(Logs),
+    /// Find the baseline between the receivers of two runs by their carriers, and judge it
+    Baseline(Baseline),
     /// Verify the authentication of Galileo's navigation messages (OSNMA)
     Osnma(Osnma),
     /// Convert the tables of a run or a study to Parquet

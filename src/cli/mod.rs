@@ -7,6 +7,7 @@ mod address;
 mod analyze;
 mod archive;
 mod args;
+mod baseline;
 mod check;
 mod collection;
 mod error;
@@ -95,6 +96,7 @@ fn execute(arguments: Arguments) -> Result<(), CliError> {
         Command::Study(arguments) => study::execute(&arguments),
         Command::Pack(arguments) => pack::execute(&arguments),
         Command::Logs(arguments) => logs::execute(&arguments),
+        Command::Baseline(arguments) => baseline::execute(&arguments),
         Command::Osnma(arguments) => osnma::execute(&arguments),
         #[cfg(feature = "parquet")]
         Command::Parquet(arguments) => parquet::execute(&arguments),

@@ -215,6 +215,19 @@ pub const ORDER: Order<'static> = &[
         ],
     ),
     (
+        "rtk",
+        &[
+            &["carrier", "lambda", "normal", "orbits", "site", "troposphere"],
+            &["error"],
+            &["files"],
+            &["pairs"],
+            &["integers", "slips"],
+            &["solver", "truth"],
+            &["judge"],
+            &["run"],
+        ],
+    ),
+    (
         "study",
         &[
             &["correlation", "demand", "measure", "normal", "watch"],

@@ -1,5 +1,6 @@
 //! The program as a user calls it: the command line, ports, live streams and studies.
 
+mod baseline;
 mod cli;
 mod command;
 mod live;

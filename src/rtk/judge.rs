@@ -1,0 +1,340 @@
+//! Judgement of a baseline by the truth: its error, its integers, and how long it took to fix them.
+//!
+//! A fix is wrong if one of its integers is not that of the truth, however small the error of the position.
+//! So many wrong ones are allowed as the stated success rates leave: bootstrapping is a lower bound for least
+//! squares, so that the expected number is at most the sum of what they miss.
+
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use crate::pairs::{Pair, Track};
+use crate::site::Site;
+use crate::solver::{Event, Solution, Solved, Status};
+use crate::truth::Truth;
+use gnss::time::Epoch;
+
+/// Integers of an epoch against those of the truth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Verified {
+    /// Fixed numbers that are those of the truth.
+    pub right: usize,
+    /// Fixed numbers that are not.
+    pub wrong: usize,
+    /// Double differences, or combinations of them, that are not fixed.
+    pub not_fixed: usize,
+}
+
+/// One epoch of a baseline: a row of `baseline.csv`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// GPS time by the rover's clock.
+    pub time: String,
+    /// Kind of the solution: fixed, partial, float, or none.
+    pub status: &'static str,
+    /// Baseline from base to rover in the base's local directions, metres.
+    pub east_m: Option<f64>,
+    /// North component.
+    pub north_m: Option<f64>,
+    /// Up component.
+    pub up_m: Option<f64>,
+    /// Formal standard deviations of the three.
+    pub sigma_east_m: Option<f64>,
+    /// Deviation of the north component.
+    pub sigma_north_m: Option<f64>,
+    /// Deviation of the up component.
+    pub sigma_up_m: Option<f64>,
+    /// Baseline less that of the truth, metres.
+    pub error_east_m: Option<f64>,
+    /// Error of the north component.
+    pub error_north_m: Option<f64>,
+    /// Error of the up component.
+    pub error_up_m: Option<f64>,
+    /// Satellites that take part.
+    pub satellites: usize,
+    /// Satellites with phases on more than one band.
+    pub two_bands: usize,
+    /// Squared norm of the second best integers relative to the best.
+    pub ratio: Option<f64>,
+    /// Success rate of bootstrapping.
+    pub success_rate: Option<f64>,
+    /// Fixed numbers that are those of the truth.
+    pub right: Option<usize>,
+    /// Fixed numbers that are not.
+    pub wrong: Option<usize>,
+    /// Numbers that are not fixed.
+    pub not_fixed: Option<usize>,
+    /// Seconds since the first epoch with a solution, for the summary.
+    #[serde(skip)]
+    pub since_s: f64,
+    /// Events of the epoch.
+    pub events: String,
+}
+
+/// Figures of a baseline.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Figures {
+    /// Common epochs.
+    pub epochs: usize,
+    /// Epochs with a solution.
+    pub solved: usize,
+    /// Epochs with all ambiguities fixed.
+    pub fixed: usize,
+    /// Epochs with some of them fixed.
+    pub partial: usize,
+    /// Epochs with none fixed.
+    pub float: usize,
+    /// Mean length of the baseline, metres.
+    pub length_m: Option<f64>,
+    /// Share of the solved epochs from the first fix on that are fixed. A part of the integers is a fix if it
+    /// gives a precise position ([`Solution::is_fix`]).
+    pub fix_rate: Option<f64>,
+    /// Time from the first solution to the first fix, seconds.
+    pub first_fix_s: Option<f64>,
+    /// Time to it from the first epoch with five satellites on two bands, seconds.
+    pub first_fix_two_bands_s: Option<f64>,
+    /// Root mean square of the fixed epochs' errors, metres.
+    pub east_rms_m: Option<f64>,
+    /// Root mean square of the north component.
+    pub north_rms_m: Option<f64>,
+    /// Root mean square of the up component.
+    pub up_rms_m: Option<f64>,
+    /// Root mean square of the horizontal error of one component: of east and north together.
+    pub horizontal_rms_m: Option<f64>,
+    /// Root mean square of the float epochs' errors in three dimensions.
+    pub float_rms_m: Option<f64>,
+    /// Epochs whose integers are judged.
+    pub judged: usize,
+    /// Fixed epochs with a wrong integer.
+    pub wrong_fixes: usize,
+    /// Wrong fixes that the stated success rates let expect at most.
+    pub expected_wrong: f64,
+    /// Fixed numbers that are right, over all epochs.
+    pub integers_right: usize,
+    /// Fixed numbers that are wrong.
+    pub integers_wrong: usize,
+    /// Numbers that are not fixed.
+    pub integers_not_fixed: usize,
+    /// Least ratio of the fixed epochs.
+    pub least_ratio: Option<f64>,
+    /// Slips that a receiver announced.
+    pub announced_slips: usize,
+    /// Slips that no receiver announced.
+    pub slips: usize,
+    /// Ambiguities that are not whole: satellites with signals.
+    pub not_whole: Vec<String>,
+    /// Distance of the base's stated position from the true one, metres.
+    pub base_off_m: Option<f64>,
+}
+
+/// Satellites on two bands with which a first epoch is to be fixed at once.
+pub const ON_TWO_BANDS: usize = 5;
+
+/// Collects the epochs of a baseline.
+#[derive(Debug, Default)]
+pub struct Judge {
+    /// Figures so far.
+    pub figures: Figures,
+    first: Option<Epoch>,
+    first_on_two: Option<Epoch>,
+    fixed_from_here: [usize; 2],
+    fixed_errors: Errors,
+    float_errors: Errors,
+    lengths_m: f64,
+}
+
+/// Sums of squared errors.
+#[derive(Debug, Default)]
+struct Errors {
+    sums_m2: Vector3<f64>,
+    count: usize,
+}
+
+impl Errors {
+    fn add(&mut self, error_m: &Vector3<f64>) {
+        self.sums_m2 += error_m.component_mul(error_m);
+        self.count += 1;
+    }
+
+    fn rms_m(&self) -> Option<Vector3<f64>> {
+        (self.count > 0).then(|| (self.sums_m2 / self.count as f64).map(f64::sqrt))
+    }
+}
+
+/// Truths of base and rover, if the runs have them.
+pub type Truths<'a> = Option<[&'a Truth; 2]>;
+
+impl Judge {
+    /// Takes an epoch, and returns its row.
+    pub fn take(&mut self, pair: &Pair, base_m: &Vector3<f64>, solved: &Solved, truths: Truths<'_>) -> Row {
+        let figures = &mut self.figures;
+        figures.epochs += 1;
+        for (track, event) in &solved.events {
+            match event {
+                Event::Announced => figures.announced_slips += 1,
+                Event::Slip => figures.slips += 1,
+                Event::NotWhole => figures.not_whole.push(named(*track)),
+            }
+        }
+        let events: Vec<String> =
+            solved.events.iter().map(|(track, event)| format!("{} {}", named(*track), event.name())).collect();
+        let mut row = Row::empty(pair, events.join("; "));
+        let Some(solution) = &solved.solution else { return row };
+        let first = *self.first.get_or_insert(pair.labels[1]);
+        row.since_s = pair.labels[1].since(first);
+        if solution.on_two_bands >= ON_TWO_BANDS {
+            self.first_on_two.get_or_insert(pair.labels[1]);
+        }
+        let base = Site::new(*base_m);
+        let baseline_m = solution.position_m - base_m;
+        row.fill(solution, &(base.axes * baseline_m), &base);
+        let error_m = truths.and_then(|[of_base, of_rover]| {
+            let true_m = of_rover.position_m(pair.labels[1])? - of_base.position_m(pair.labels[0])?;
+            Some(base.axes * (baseline_m - true_m))
+        });
+        if let Some(error_m) = &error_m {
+            row.set_error(error_m);
+        }
+        self.count(pair, solution, error_m, baseline_m.norm());
+        if let Some(verified) = truths.and_then(|truths| verify(pair, solution, truths)) {
+            self.count_integers(solution, verified);
+            (row.right, row.wrong) = (Some(verified.right), Some(verified.wrong));
+            row.not_fixed = Some(verified.not_fixed);
+        }
+        row
+    }
+
+    fn count(&mut self, pair: &Pair, solution: &Solution, error_m: Option<Vector3<f64>>, length_m: f64) {
+        let figures = &mut self.figures;
+        figures.solved += 1;
+        self.lengths_m += length_m;
+        let is_fixed = solution.is_fix();
+        match solution.status {
+            Status::Fixed => figures.fixed += 1,
+            Status::Partial => figures.partial += 1,
+            Status::Float => figures.float += 1,
+        }
+        if is_fixed && figures.first_fix_s.is_none() {
+            figures.first_fix_s = self.first.map(|first| pair.labels[1].since(first));
+        }
+        if is_fixed && figures.first_fix_two_bands_s.is_none() {
+            figures.first_fix_two_bands_s = self.first_on_two.map(|first| pair.labels[1].since(first));
+        }
+        if figures.first_fix_s.is_some() {
+            self.fixed_from_here[0] += usize::from(is_fixed);
+            self.fixed_from_here[1] += 1;
+        }
+        if let Some(error_m) = &error_m {
+            if is_fixed { self.fixed_errors.add(error_m) } else { self.float_errors.add(error_m) }
+        }
+        let ratio = solution.integers.as_ref().filter(|found| found.is_believed).map(|found| found.ratio);
+        figures.least_ratio = match (figures.least_ratio, ratio) {
+            (Some(least), Some(ratio)) => Some(least.min(ratio)),
+            (least, ratio) => least.or(ratio),
+        };
+    }
+
+    fn count_integers(&mut self, solution: &Solution, verified: Verified) {
+        let figures = &mut self.figures;
+        figures.integers_right += verified.right;
+        figures.integers_wrong += verified.wrong;
+        figures.integers_not_fixed += verified.not_fixed;
+        if let Some(found) = solution.integers.as_ref().filter(|found| found.is_believed) {
+            figures.judged += 1;
+            figures.wrong_fixes += usize::from(verified.wrong > 0);
+            figures.expected_wrong += 1.0 - found.success_rate;
+        }
+    }
+
+    /// Figures of all epochs.
+    pub fn finish(mut self) -> Figures {
+        let figures = &mut self.figures;
+        let [fixed, all] = self.fixed_from_here;
+        figures.fix_rate = (all > 0).then(|| fixed as f64 / all as f64);
+        figures.length_m = (figures.solved > 0).then(|| self.lengths_m / figures.solved as f64);
+        if let Some(rms_m) = self.fixed_errors.rms_m() {
+            (figures.east_rms_m, figures.north_rms_m) = (Some(rms_m.x), Some(rms_m.y));
+            figures.up_rms_m = Some(rms_m.z);
+            figures.horizontal_rms_m = Some(libm::hypot(rms_m.x, rms_m.y));
+        }
+        figures.float_rms_m = self.float_errors.rms_m().map(|rms_m| rms_m.norm());
+        figures.not_whole.sort();
+        figures.not_whole.dedup();
+        self.figures
+    }
+}
+
+/// Name of a track, such as `G05 1C`.
+fn named((sv, code): Track) -> String {
+    format!("{sv} {code}")
+}
+
+/// Fixed numbers against those of the truth; `None` if the truth lacks one of the tracks.
+fn verify(pair: &Pair, solution: &Solution, [of_base, of_rover]: [&Truth; 2]) -> Option<Verified> {
+    let floats = &solution.floats;
+    let Some(found) = &solution.integers else {
+        let not_fixed = floats.doubles(|_| true).pairs.len();
+        return Some(Verified { not_fixed, ..Verified::default() });
+    };
+    let count = found.doubles.pairs.len();
+    if !found.is_believed {
+        return Some(Verified { not_fixed: count, ..Verified::default() });
+    }
+    // Whole number of a single difference, with what all tracks of the signal share.
+    let single = |index: usize| {
+        let (track, _) = floats.tracks[index];
+        let shared = pair.shared.iter().find(|shared| shared.track == track)?;
+        let [base_m, rover_m] = shared.phases?.phase_m;
+        let base_cycles = base_m / shared.wavelength_m - of_base.carrier_cycles(pair.labels[0], track)?;
+        let rover_cycles = rover_m / shared.wavelength_m - of_rover.carrier_cycles(pair.labels[1], track)?;
+        Some(rover_cycles - base_cycles - floats.references[index])
+    };
+    let doubles: Option<Vec<f64>> =
+        found.doubles.pairs.iter().map(|(own, pivot)| Some((single(*own)? - single(*pivot)?).round())).collect();
+    let expected = &found.rows * nalgebra::DVector::from_vec(doubles?);
+    let right = found.fixed.iter().zip(expected.iter()).filter(|(fixed, expected)| fixed == expected).count();
+    let fixed = found.fixed.len();
+    Some(Verified { right, wrong: fixed - right, not_fixed: count - fixed })
+}
+
+impl Row {
+    fn empty(pair: &Pair, events: String) -> Self {
+        Self {
+            time: pair.labels[1].to_string(),
+            status: "none",
+            east_m: None,
+            north_m: None,
+            up_m: None,
+            sigma_east_m: None,
+            sigma_north_m: None,
+            sigma_up_m: None,
+            error_east_m: None,
+            error_north_m: None,
+            error_up_m: None,
+            satellites: 0,
+            two_bands: 0,
+            ratio: None,
+            success_rate: None,
+            right: None,
+            wrong: None,
+            not_fixed: None,
+            since_s: 0.0,
+            events,
+        }
+    }
+
+    fn fill(&mut self, solution: &Solution, baseline_m: &Vector3<f64>, base: &Site) {
+        self.status = solution.status.name();
+        (self.east_m, self.north_m, self.up_m) = (Some(baseline_m.x), Some(baseline_m.y), Some(baseline_m.z));
+        let local = base.axes * solution.covariance_m2.fixed_view::<3, 3>(0, 0) * base.axes.transpose();
+        let sigma = |axis: usize| Some(local[(axis, axis)].max(0.0).sqrt());
+        (self.sigma_east_m, self.sigma_north_m, self.sigma_up_m) = (sigma(0), sigma(1), sigma(2));
+        (self.satellites, self.two_bands) = (solution.satellites, solution.on_two_bands);
+        self.ratio = solution.integers.as_ref().map(|found| found.ratio).filter(|ratio| ratio.is_finite());
+        self.success_rate = solution.integers.as_ref().map(|found| found.success_rate);
+    }
+
+    fn set_error(&mut self, error_m: &Vector3<f64>) {
+        (self.error_east_m, self.error_north_m) = (Some(error_m.x), Some(error_m.y));
+        self.error_up_m = Some(error_m.z);
+    }
+}

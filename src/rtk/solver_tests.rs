@@ -1,0 +1,207 @@
+//! Laws of baselines on a sky in memory, with integers and noise that the tests know.
+
+use nalgebra::Vector3;
+
+use super::*;
+use crate::orbits::Emission;
+use crate::pairs::{Phases, Shared, modelled};
+use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::satellite::Sv;
+
+/// Satellites of GPS and Galileo over an antenna, each with signals on two bands.
+struct Sky {
+    base_m: Vector3<f64>,
+    rover_m: Vector3<f64>,
+    satellites: Vec<(Sv, Vector3<f64>)>,
+    /// Deviations of codes and phases, metres.
+    noise_m: [f64; 2],
+    state: u64,
+}
+
+impl Sky {
+    fn new() -> Self {
+        let place = Geodetic::from_degrees(37.6, -1.0, 60.0);
+        let (base_m, axes) = (place.to_ecef(), place.ecef_to_enu());
+        let rover_m = base_m + axes.transpose() * Vector3::new(400.0, 440.0, 12.0);
+        let satellite = |number: u8| {
+            let (azimuth, elevation) = (2.4 * f64::from(number), 0.25 + 0.09 * f64::from(number % 14));
+            let direction = Vector3::new(
+                libm::cos(elevation) * libm::sin(azimuth),
+                libm::cos(elevation) * libm::cos(azimuth),
+                libm::sin(elevation),
+            );
+            let system = if number % 2 == 0 { System::Gps } else { System::Galileo };
+            (Sv { system, number }, base_m + axes.transpose() * direction * 2.3e7)
+        };
+        Self { base_m, rover_m, satellites: (1..=14).map(satellite).collect(), noise_m: [0.3, 0.002], state: 5 }
+    }
+
+    /// Sum of twelve uniform numbers less six: nearly normal.
+    fn normal(&mut self) -> f64 {
+        let mut uniform = || {
+            self.state = self.state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    }
+
+    /// Epoch of these codes; clocks of the receivers are microseconds apart and drift.
+    fn pair(&mut self, epoch: u32, codes: &[&str]) -> Pair {
+        let at = Epoch::new(1_290_689_460 + i64::from(epoch), 0.0);
+        let clocks_m = [39_000.0 + 15.0 * f64::from(epoch), -65_000.0 - 7.0 * f64::from(epoch)];
+        let places = [Site::new(self.base_m), Site::new(self.rover_m)];
+        let mut shared = Vec::new();
+        for (sv, position_m) in self.satellites.clone() {
+            let emission = Emission { position_m, clock_s: 1e-4 };
+            for text in codes {
+                let code = Code::new(text).unwrap();
+                let wavelength_m = SPEED_OF_LIGHT_MPS / crate::carrier::carrier_hz(sv, code, None).unwrap();
+                let ranges_m = [0, 1].map(|one: usize| modelled(&emission, &places[one]).0 + clocks_m[one]);
+                let [of_code_m, of_phase_m] = self.noise_m;
+                let code_m = ranges_m.map(|range_m| range_m + of_code_m * self.normal());
+                let whole = |one: usize| 1000.0 * f64::from(sv.number) + 77_777.0 * one as f64 + f64::from(code.band());
+                let phase_m =
+                    [0, 1].map(|one: usize| ranges_m[one] + wavelength_m * whole(one) + of_phase_m * self.normal());
+                let phases = Some(Phases { phase_m, is_broken: false, is_half: false });
+                let emissions = [emission; 2];
+                shared.push(Shared {
+                    track: (sv, code),
+                    wavelength_m,
+                    code_m,
+                    phases,
+                    cn0_dbhz: Some(45.0),
+                    emissions,
+                });
+            }
+        }
+        Pair { labels: [at, at], shared }
+    }
+
+    fn error_m(&self, solved: &Solved) -> f64 {
+        (solved.solution.as_ref().unwrap().position_m - self.rover_m).norm()
+    }
+}
+
+fn status(solved: &Solved) -> Status {
+    solved.solution.as_ref().unwrap().status
+}
+
+const TWO: [&str; 2] = ["1C", "5Q"];
+
+#[test]
+fn two_bands_are_fixed_at_the_first_epoch_to_millimetres() {
+    for is_static in [false, true] {
+        let mut sky = Sky::new();
+        let mut solver = Solver::new(Settings { is_static, ..Settings::default() });
+        for epoch in 0..20 {
+            let solved = solver.epoch(&sky.pair(epoch, &TWO), &sky.base_m);
+            assert_eq!(status(&solved), Status::Fixed, "epoch {epoch}");
+            assert!(sky.error_m(&solved) < 0.012, "epoch {epoch}: {}", sky.error_m(&solved));
+            assert!(solved.events.is_empty());
+            let integers = solved.solution.unwrap().integers.unwrap();
+            assert!(integers.ratio > 3.0 && integers.success_rate > 0.999);
+        }
+    }
+}
+
+#[test]
+fn without_noise_the_baseline_is_exact_and_the_float_solution_is_weaker() {
+    let mut sky = Sky::new();
+    sky.noise_m = [0.0, 0.0];
+    let mut solver = Solver::new(Settings::default());
+    let solved = solver.epoch(&sky.pair(0, &TWO), &sky.base_m);
+    // Ranges of 2.3e7 m in f64, and the second order of an approximate position a metre off.
+    assert!(sky.error_m(&solved) < 1e-6, "{}", sky.error_m(&solved));
+    let solution = solved.solution.unwrap();
+    let fixed = solution.covariance_m2.trace();
+    assert!(fixed > 0.0 && fixed < 1e-4, "{fixed}");
+}
+
+#[test]
+fn a_rover_at_rest_gains_on_one_that_moves_and_information_comes_once_a_second() {
+    let sigma = |is_static: bool, step: u32, count: u32| {
+        let mut sky = Sky::new();
+        let mut solver = Solver::new(Settings { is_static, ..Settings::default() });
+        let mut last = 0.0;
+        for epoch in 0..count {
+            let mut pair = sky.pair(0, &["1C"]);
+            let later_s = f64::from(epoch) * f64::from(step) / 10.0;
+            pair.labels = pair.labels.map(|label| label.plus_s(later_s));
+            let solved = solver.epoch(&pair, &sky.base_m);
+            let floats = solved.solution.unwrap().floats;
+            last = floats.covariance.trace();
+        }
+        last
+    };
+    // Nine epochs within a second tell nothing that the first did not: two are joined, of ten a second apart
+    // all.
+    let (once, quick, slow) = (sigma(false, 10, 1), sigma(false, 1, 10), sigma(false, 10, 10));
+    assert!((once / quick - 2.0).abs() < 0.3 && (once / slow - 10.0).abs() < 1.5, "{once} {quick} {slow}");
+    assert!(sigma(true, 10, 10) < slow);
+}
+
+#[test]
+fn a_slip_that_none_announced_is_found_and_what_is_announced_begins_anew() {
+    for (cycles, is_broken, event) in
+        [(0.5, false, Event::Slip), (-7.0, false, Event::Slip), (1234.0, true, Event::Announced)]
+    {
+        let mut sky = Sky::new();
+        let mut solver = Solver::new(Settings::default());
+        for epoch in 0..12 {
+            let mut pair = sky.pair(epoch, &TWO);
+            let slipped = pair.shared[9].track;
+            if epoch >= 6 {
+                let own = &mut pair.shared[9];
+                let phases = own.phases.as_mut().unwrap();
+                phases.phase_m[1] += cycles * own.wavelength_m;
+                phases.is_broken = is_broken && epoch == 6;
+            }
+            let solved = solver.epoch(&pair, &sky.base_m);
+            let is_first = solved.events.contains(&(slipped, event));
+            assert_eq!(is_first, epoch == 6, "epoch {epoch}: {:?}", solved.events);
+            assert!(sky.error_m(&solved) < 0.012 && status(&solved) != Status::Float, "epoch {epoch}");
+        }
+    }
+}
+
+#[test]
+fn a_half_cycle_from_the_start_is_named_and_does_no_harm() {
+    for index in [0, 9, 27] {
+        let mut sky = Sky::new();
+        let mut solver = Solver::new(Settings::default());
+        let mut named = Vec::new();
+        for epoch in 0..5 {
+            let mut pair = sky.pair(epoch, &TWO);
+            let own = &mut pair.shared[index];
+            own.phases.as_mut().unwrap().phase_m[0] += 0.5 * own.wavelength_m;
+            let track = own.track;
+            let solved = solver.epoch(&pair, &sky.base_m);
+            named.extend(solved.events.iter().copied());
+            assert!(sky.error_m(&solved) < 0.012, "epoch {epoch}: {}", sky.error_m(&solved));
+            assert!(named.iter().all(|event| *event == (track, Event::NotWhole)));
+        }
+        assert_eq!(named.len(), 1, "{named:?}");
+    }
+}
+
+#[test]
+fn a_half_cycle_that_a_receiver_announces_is_left_out_of_the_integers() {
+    let mut sky = Sky::new();
+    let mut solver = Solver::new(Settings::default());
+    let mut pair = sky.pair(0, &TWO);
+    let own = &mut pair.shared[3];
+    let phases = own.phases.as_mut().unwrap();
+    phases.phase_m[1] += 0.5 * own.wavelength_m;
+    phases.is_half = true;
+    let solved = solver.epoch(&pair, &sky.base_m);
+    assert!(solved.events.is_empty() && status(&solved) == Status::Fixed);
+    assert!(sky.error_m(&solved) < 0.012);
+}
+
+#[test]
+fn too_few_satellites_give_no_solution() {
+    let mut sky = Sky::new();
+    sky.satellites.truncate(3);
+    let mut solver = Solver::new(Settings::default());
+    assert!(solver.epoch(&sky.pair(0, &TWO), &sky.base_m).solution.is_none());
+}
