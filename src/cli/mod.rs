@@ -17,6 +17,7 @@ mod lines;
 mod live;
 mod logs;
 mod made;
+mod ntrip;
 mod osnma;
 mod pack;
 mod packed;
@@ -29,6 +30,7 @@ mod progress;
 mod receive;
 mod recording;
 mod reference;
+mod rtcm;
 mod run;
 mod scenario;
 mod scenes;
@@ -95,6 +97,7 @@ fn execute(arguments: Arguments) -> Result<(), CliError> {
         Command::Study(arguments) => study::execute(&arguments),
         Command::Pack(arguments) => pack::execute(&arguments),
         Command::Logs(arguments) => logs::execute(&arguments),
+        Command::Rtcm(arguments) => rtcm::execute(&arguments),
         Command::Osnma(arguments) => osnma::execute(&arguments),
         #[cfg(feature = "parquet")]
         Command::Parquet(arguments) => parquet::execute(&arguments),

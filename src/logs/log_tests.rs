@@ -114,8 +114,8 @@ fn damaged_logs_neither_stop_the_reader_nor_lose_a_byte_nor_grow() {
         let number = [1005, 1006, 1033, 1074, 1077, 1085, 1096, 1127, 1230][numbers.below(9)] << 4;
         let body = bytes.iter().copied().take(1000);
         let rtcm = [0xd3, 0, 0, (number >> 8) as u8, number as u8].into_iter().chain(body.clone()).collect::<Vec<u8>>();
-        let near = Calendar::new(Some(Epoch::from_week(2200, 0.0)));
-        read += usize::from(crate::rtcm::read(&rtcm, &near, &mut Locks::default()).table.is_some());
+        let mut near = Calendar::new(Some(Epoch::from_week(2200, 0.0)));
+        read += usize::from(crate::rtcm::read(&rtcm, &mut near, &mut Locks::default()).table.is_some());
         let block = [4027_u16, 4007, 4006, 5914][numbers.below(4)].to_le_bytes();
         let sbf = [b'$', b'@', 0, 0, block[0], block[1], 0, 0].into_iter().chain(body).collect::<Vec<u8>>();
         read += usize::from(crate::sbf::read(&sbf, &mut near.clone(), &mut Locks::default()).table.is_some());
