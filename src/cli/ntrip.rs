@@ -1,4 +1,4 @@
-//! Client of NTRIP: `ntrip://[USER:PASSWORD@]HOST:PORT/MOUNT` in the place of a file.
+//! Client of NTRIP: `ntrip://[USER:PASSWORD@]HOST:PORT/MOUNT` instead of a file.
 //!
 //! A stream without an end is ended by a signal, as if the caster had ended it.
 

@@ -3,8 +3,8 @@
 //!
 //! Source: RTCM 10410.1 (NTRIP 2.0), with what it says of version 1.0. A request is read and answered as a
 //! text; who calls has the connection. Version 1 answers `ICY 200 OK` and sends bytes as they are, version 2
-//! HTTP/1.1 in chunks. Limits: one mount point of a caster, no uploads, no RTSP and no UDP; passwords go over
-//! the line unencrypted, as NTRIP has it.
+//! HTTP/1.1 in chunks. Limits: one mount point of a caster, no uploads, no RTSP and no UDP; passwords go
+//! over the line unencrypted, as NTRIP has it.
 
 use std::io::{self, ErrorKind, Read};
 
@@ -87,7 +87,7 @@ pub struct Caster {
 pub struct Answer {
     /// Bytes to send first.
     pub text: String,
-    /// How the stream follows; none where the answer is all.
+    /// Form of the stream that follows; none where the answer is all.
     pub stream: Option<Body>,
 }
 
@@ -137,7 +137,8 @@ impl Caster {
         let login = if self.user.is_some() { "B" } else { "N" };
         // Carriers 2: L1 and L2; solution 0: one base; no GGA is needed; bits a second are not known.
         let line = format!(
-            "STR;{};gnss-twin;RTCM 3.3;{};2;{};none;;{latitude_deg:.4};{longitude_deg:.4};0;0;gnss-twin;none;{login};N;0;\r\n",
+            "STR;{};gnss-twin;RTCM 3.3;{};2;{};none;;{latitude_deg:.4};{longitude_deg:.4};0;0;gnss-twin;none;\
+             {login};N;0;\r\n",
             self.mount, self.messages, self.systems
         );
         let body = line + "ENDSOURCETABLE\r\n";

@@ -2,10 +2,11 @@
 //!
 //! Source: RTCM 10403.3, 3.5. Multiple Signal Messages (MSM) 4 to 7 of all systems become observations;
 //! 1005, 1006, 1033, 1230 and ephemerides become tables; further messages are counted by their numbers.
-//! Columns are the standard's numbers of data fields, such as `DF406`, values in their units, scales applied.
-//! Times are those of the day or of the week: the week is the one nearest to a time that is known, which
-//! ephemerides of Galileo, BeiDou and GLONASS state. [`station`] writes what is read here, by the same lists of
-//! fields. Limits: messages 1001 to 1012 and MSM 1 to 3, which hold no whole range, are not decoded.
+//! Columns are the standard's numbers of data fields, such as `DF406`, values in their units, scales
+//! applied. Times are those of the day or of the week: the week is the one nearest to a time that is known,
+//! which ephemerides of Galileo, BeiDou and GLONASS state. [`station`] writes what is read here, by the same
+//! lists of fields. Limits: messages 1001 to 1012 and MSM 1 to 3, which hold no whole range, are not
+//! decoded.
 
 pub mod ephemeris;
 pub mod field;

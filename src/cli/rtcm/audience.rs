@@ -1,7 +1,7 @@
 //! Clients of a stream: those of a TCP listener, and those of a caster that ask for its mount point.
 //!
-//! Each client has a thread and a queue. One whose queue is full takes its stream too slowly and is sent away,
-//! so that no client delays the others. A client gets what is sent after it has come.
+//! Each client has a thread and a queue. One whose queue is full takes its stream too slowly and is sent
+//! away, so that no client delays the others. A client gets what is sent after it has come.
 
 use std::io::{self, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};

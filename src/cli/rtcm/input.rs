@@ -1,8 +1,8 @@
-//! Observations, ephemerides and place of a station: from the tables of a run, or from RINEX files.
+//! Observations, ephemerides and position of a station: from the tables of a run, or from RINEX files.
 //!
-//! Tables have all digits, and ephemerides by the integers of the messages from which they were decoded. RINEX
-//! has its own resolution; its ephemerides are those of [`gnss::rinex`], which of Galileo keeps one message of
-//! a satellite.
+//! Tables have all digits, and ephemerides by the integers of the messages from which they were decoded.
+//! RINEX has its own resolution; its ephemerides are those of [`gnss::rinex`], which of Galileo keeps one
+//! message of a satellite.
 
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -30,7 +30,7 @@ const STILL_M: f64 = 0.01;
 /// An epoch with the observations that were left out of it.
 type Epochs = Box<dyn Iterator<Item = Result<(ObservedEpoch, Vec<Refused>), CliError>>>;
 
-/// What a station sends.
+/// Content of a station's stream.
 pub struct Input {
     /// Epochs in the order of their times.
     pub epochs: Epochs,
@@ -89,7 +89,7 @@ impl Input {
         }
         let mut sets = sets.ephemerides(&signal::all(), near);
         sets.extend(files(arguments)?);
-        let trajectory = own.parent().unwrap_or(&own).join("truth/trajectory.csv");
+        let trajectory = run.join("truth/trajectory.csv");
         let position_m = if trajectory.is_file() { still(&trajectory)? } else { None };
         let epochs = Box::new(Grouped { rows: rows(&table)?, next: None });
         let receiver = if arguments.truth { "gnss-twin truth" } else { "gnss-twin" };

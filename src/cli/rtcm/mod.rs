@@ -1,8 +1,8 @@
 //! `rtcm`: observations and ephemerides of a run, or of RINEX files, as the RTCM 3.3 stream of a reference
 //! station, to a file, to TCP clients and as a caster of NTRIP.
 //!
-//! A file is written at once. With clients the first epoch waits for the first of them, and the others follow
-//! at the times of their labels. What cannot be written is left out and named with its count.
+//! A file is written at once. With clients the first epoch waits for the first of them, and the others
+//! follow at the times of their labels. What cannot be written is left out and named with its count.
 
 mod audience;
 mod input;
@@ -75,7 +75,7 @@ fn station(arguments: &args::Rtcm, input: &Input) -> Result<Station, CliError> {
     let messages = &arguments.messages;
     if position_m.is_none() && (messages.has(1005) || messages.has(1006)) {
         scenario::note(
-            "no position of the antenna is known that stays in place, so 1005 and 1006 are not sent: --position gives it",
+            "no position of an antenna that does not move is known, so 1005 and 1006 are not sent: --position gives it",
         );
     }
     let text = |text: &str| text.chars().filter(|char| char.is_ascii_graphic() || *char == ' ').take(31).collect();

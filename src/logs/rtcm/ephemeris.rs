@@ -1,10 +1,10 @@
 //! Ephemerides: messages 1019 (GPS), 1020 (GLONASS), 1041 (NavIC), 1042 (BeiDou), 1044 (QZSS), 1045 and 1046
 //! (Galileo F/NAV and I/NAV).
 //!
-//! Source: RTCM 10403.3, tables 3.5-21, 3.5-22 and those of 3.5.15; the scales are those of the satellites' own
-//! messages. A list of fields with the members that they carry is read and written. The week of a message is
-//! that of its reference time. Limits: of GLONASS almanac, τ_c and τ_GPS, which ephemerides here do not have,
-//! are zero and P1, P3 and M those of a GLONASS-M satellite; NavIC's spare bits are zero.
+//! Source: RTCM 10403.3, tables 3.5-21, 3.5-22 and those of 3.5.15; the scales are those of the satellites'
+//! own messages. A list of fields with the members that they carry is read and written. The week of a
+//! message is that of its reference time. Limits: of GLONASS almanac, τ_c and τ_GPS, which ephemerides here
+//! do not have, are zero and P1, P3 and M those of a GLONASS-M satellite; NavIC's spare bits are zero.
 
 use super::field::{self, Field, Refused, i, m, reserved, turn, u};
 use crate::table::{Table, Value};
@@ -28,7 +28,7 @@ struct Sent {
     week: f64,
     toe_s: f64,
     toc_s: f64,
-    /// Of GLONASS: four years and day among them, both from 1.
+    /// Four years and the day among them by GLONASS, both from 1.
     four_years: f64,
     day: f64,
 }
@@ -256,15 +256,26 @@ const GLONASS: [Entry; 36] = [
     constant!(reserved(7), 0.0),
 ];
 
-#[rustfmt::skip]
+/// Message of a system; `weeks` are the GPS week that is week 0 and the weeks that it distinguishes.
+const fn layout(
+    (number, name): (u64, &'static str),
+    system: System,
+    form: &'static SetForm,
+    scale: &'static TimeScale,
+    weeks: [i64; 2],
+    fields: &'static [Entry],
+) -> Layout {
+    Layout { number, name, system, form, scale, weeks, fields }
+}
+
 static LAYOUTS: [Layout; 7] = [
-    Layout { number: 1019, name: "1019", system: System::Gps, form: &LNAV_SETS, scale: &GPST, weeks: [0, 1024], fields: &GPS },
-    Layout { number: 1020, name: "1020", system: System::Glonass, form: &GNAV_SETS, scale: &GLONASST, weeks: [0, 0], fields: &GLONASS },
-    Layout { number: 1041, name: "1041", system: System::Navic, form: &PLAIN, scale: &GPST, weeks: [1024, 1024], fields: &NAVIC },
-    Layout { number: 1042, name: "1042", system: System::BeiDou, form: &D1_SETS, scale: &BDT, weeks: [BDT_WEEK, 8192], fields: &BEIDOU },
-    Layout { number: 1044, name: "1044", system: System::Qzss, form: &QZSS_SETS, scale: &GPST, weeks: [0, 1024], fields: &QZSS },
-    Layout { number: 1045, name: "1045", system: System::Galileo, form: &FNAV_SETS, scale: &GPST, weeks: [1024, 4096], fields: &GALILEO_FNAV },
-    Layout { number: 1046, name: "1046", system: System::Galileo, form: &INAV_SETS, scale: &GPST, weeks: [1024, 4096], fields: &GALILEO_INAV },
+    layout((1019, "1019"), System::Gps, &LNAV_SETS, &GPST, [0, 1024], &GPS),
+    layout((1020, "1020"), System::Glonass, &GNAV_SETS, &GLONASST, [0, 0], &GLONASS),
+    layout((1041, "1041"), System::Navic, &PLAIN, &GPST, [1024, 1024], &NAVIC),
+    layout((1042, "1042"), System::BeiDou, &D1_SETS, &BDT, [BDT_WEEK, 8192], &BEIDOU),
+    layout((1044, "1044"), System::Qzss, &QZSS_SETS, &GPST, [0, 1024], &QZSS),
+    layout((1045, "1045"), System::Galileo, &FNAV_SETS, &GPST, [1024, 4096], &GALILEO_FNAV),
+    layout((1046, "1046"), System::Galileo, &INAV_SETS, &GPST, [1024, 4096], &GALILEO_INAV),
 ];
 
 /// First field of every message.

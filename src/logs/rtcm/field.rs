@@ -1,8 +1,8 @@
 //! Fields of messages in which they follow one another, each read and written by one declaration.
 //!
 //! Source: RTCM 10403.3, 3.4 (data fields) and 3.3 (types of data). A field has the standard's number as its
-//! name, a width in bits and a scale. A table of a message has one row. Limits: a field is there or not by one
-//! bit of a mask alone.
+//! name, a width in bits and a scale. A table of a message has one row. Limits: a field is there or not by
+//! one bit of a mask alone.
 
 use thiserror::Error;
 

@@ -3,8 +3,8 @@
 //! A range is given in three parts: whole milliseconds and a fraction of 1/1024 ms of the satellite, and a
 //! fine part of each signal; the fine parts of code and carrier are independent. Lock times are bounds below
 //! the true ones. The carrier of GLONASS needs the channel of the satellite, which MSM5 and MSM7 have; of
-//! MSM4 and MSM6 it is the one that the slot has by [`gnss::glonass::fdma`]. [`write`] writes what [`Kind::read`]
-//! reads, by the same widths and scales.
+//! MSM4 and MSM6 it is the one that the slot has by [`gnss::glonass::fdma`]. [`write`] writes what
+//! [`Kind::read`] reads, by the same widths and scales.
 
 pub mod write;
 
@@ -53,7 +53,7 @@ const HEAD: [(&str, usize); 10] = [
 ];
 /// Place of the time among them.
 const TIME: usize = 2;
-/// Widths of whole milliseconds, extended information, fraction and rate of a satellite (tables 3.5-80 and 81).
+/// Widths of whole milliseconds, extended information, fraction and rate of a satellite (table 3.5-80).
 const SATELLITE: [usize; 4] = [8, 4, 10, 14];
 /// Whole milliseconds that say that there is no range.
 const NO_RANGE: u64 = 255;

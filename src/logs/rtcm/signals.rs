@@ -1,8 +1,8 @@
 //! Satellites and signals in the masks of Multiple Signal Messages.
 //!
 //! Source: RTCM 10403.3, tables 3.5-91 to 3.5-108; numbers of messages by 3.5.16. A list of bits with RINEX
-//! codes is read in both directions. Limits: signals that the tables leave open, such as NavIC's on S and L1,
-//! have no bit.
+//! codes is read in both directions. Limits: signals that the tables leave open, such as NavIC's on S and
+//! L1, have no bit.
 
 use gnss::glonass::fdma;
 use gnss::satellite::{Sv, System};
