@@ -210,8 +210,8 @@ fn mount_point(text: &str) -> Result<(SocketAddr, String), String> {
 
 /// Latitude and longitude in degrees and height in metres.
 fn place(text: &str) -> Result<Geodetic, String> {
-    let numbers: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
-    match numbers[..] {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    match numbers.unwrap_or_default()[..] {
         [latitude, longitude, height_m]
             if latitude.abs() <= 90.0 && longitude.abs() <= 360.0 && (-1e4..1e7).contains(&height_m) =>
         {

@@ -71,7 +71,7 @@ pub fn execute(arguments: &args::Rtcm) -> Result<(), CliError> {
 
 /// Station as the arguments and the input describe it.
 fn station(arguments: &args::Rtcm, input: &Input) -> Result<Station, CliError> {
-    let position_m = arguments.position.map(|place| place.to_ecef()).or(input.position_m);
+    let position_m = arguments.position.map(Geodetic::to_ecef).or(input.position_m);
     let messages = &arguments.messages;
     if position_m.is_none() && (messages.has(1005) || messages.has(1006)) {
         scenario::note(
