@@ -55,8 +55,8 @@ impl Request {
         let authorization =
             user.map_or_else(String::new, |user| format!("Authorization: Basic {}\r\n", STANDARD.encode(user)));
         format!(
-            "GET /{mount} HTTP/1.1\r\nHost: {host}\r\nNtrip-Version: Ntrip/2.0\r\nUser-Agent: {AGENT}\r\n{authorization}\
-             Connection: close\r\n\r\n"
+            "GET /{mount} HTTP/1.1\r\nHost: {host}\r\nNtrip-Version: Ntrip/2.0\r\nUser-Agent: {AGENT}\r\n\
+             {authorization}Connection: close\r\n\r\n"
         )
     }
 
@@ -147,7 +147,8 @@ impl Caster {
             false => ("SOURCETABLE 200 OK", "text/plain"),
         };
         format!(
-            "{first}\r\nServer: {AGENT}\r\nConnection: close\r\nContent-Type: {kind}\r\nContent-Length: {}\r\n\r\n{body}",
+            "{first}\r\nServer: {AGENT}\r\nConnection: close\r\nContent-Type: {kind}\r\nContent-Length: {}\r\n\r\n\
+             {body}",
             body.len()
         )
     }
@@ -168,7 +169,7 @@ pub fn chunk(bytes: &[u8]) -> Vec<u8> {
 /// Form of the stream that follows the head of an answer.
 ///
 /// # Errors
-/// What the caster says instead.
+/// Words of the caster that are no stream.
 pub fn answered(head: &str) -> Result<Body, String> {
     let first = head.lines().next().unwrap_or("").trim();
     let mut words = first.split_ascii_whitespace();

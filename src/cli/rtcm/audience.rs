@@ -10,8 +10,8 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
+use super::args::Rtcm;
 use crate::cli::address::{accept, listen};
-use crate::cli::args;
 use crate::cli::error::CliError;
 use crate::cli::interrupt;
 use crate::cli::platform::LOOK;
@@ -87,7 +87,7 @@ fn serve(mut stream: TcpStream, body: Body, frames: &Receiver<Frames>) {
 
 impl Audience {
     /// Opens the listeners that are asked for; none if there are none.
-    pub fn open(arguments: &args::Rtcm, caster: impl FnOnce(&str) -> Caster) -> Result<Option<Self>, CliError> {
+    pub fn open(arguments: &Rtcm, caster: impl FnOnce(&str) -> Caster) -> Result<Option<Self>, CliError> {
         if arguments.serve.is_none() && arguments.caster.is_none() {
             return Ok(None);
         }

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use crate::cli::args;
+use super::args::Rtcm;
 use crate::cli::error::{CliError, shown};
 use analysis::read::rinex_obs;
 use gnss::broadcast::Ephemeris;
@@ -46,7 +46,7 @@ pub struct Input {
 
 impl Input {
     /// Opens what the arguments name.
-    pub fn open(arguments: &args::Rtcm) -> Result<Self, CliError> {
+    pub fn open(arguments: &Rtcm) -> Result<Self, CliError> {
         let path = &arguments.input;
         let about = fs::metadata(path).map_err(|error| CliError::read(shown(path), &error))?;
         if about.is_dir() {
@@ -61,7 +61,7 @@ impl Input {
         Self::of_rinex(path, arguments)
     }
 
-    fn of_run(run: &Path, arguments: &args::Rtcm) -> Result<Self, CliError> {
+    fn of_run(run: &Path, arguments: &Rtcm) -> Result<Self, CliError> {
         let inner = run.join(if arguments.truth { "truth" } else { "rx" });
         let own = if inner.is_dir() || arguments.truth { inner } else { run.to_owned() };
         let table = own.join("observations.csv");
@@ -96,7 +96,7 @@ impl Input {
         Ok(Self { epochs, sets, position_m, receiver: receiver.to_owned(), systems })
     }
 
-    fn of_rinex(path: &Path, arguments: &args::Rtcm) -> Result<Self, CliError> {
+    fn of_rinex(path: &Path, arguments: &Rtcm) -> Result<Self, CliError> {
         let bytes = fs::read(path).map_err(|error| CliError::read(shown(path), &error))?;
         let read = rinex_obs::read(&bytes)
             .map_err(|fault| CliError::input(format!("{}:{}: {}", shown(path), fault.line, fault.what)))?;
@@ -110,7 +110,7 @@ impl Input {
 }
 
 /// Ephemerides of the navigation files that are named.
-fn files(arguments: &args::Rtcm) -> Result<Vec<Ephemeris>, CliError> {
+fn files(arguments: &Rtcm) -> Result<Vec<Ephemeris>, CliError> {
     let mut sets = Vec::new();
     for path in &arguments.nav {
         let bytes = fs::read(path).map_err(|error| CliError::read(shown(path), &error))?;

@@ -4,6 +4,7 @@
 //! A file is written at once. With clients the first epoch waits for the first of them, and the others
 //! follow at the times of their labels. What cannot be written is left out and named with its count.
 
+pub mod args;
 mod audience;
 mod input;
 
@@ -14,12 +15,12 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use crate::cli::args;
 use crate::cli::error::{CliError, shown};
 use crate::cli::interrupt;
 use crate::cli::platform::LOOK;
 use crate::cli::scenario;
 use crate::cli::staging::Staging;
+use args::Rtcm;
 use audience::Audience;
 use gnss::earth::Geodetic;
 use gnss::satellite::System;
@@ -29,7 +30,7 @@ use logs::ntrip::Caster;
 use logs::rtcm::station::{Sender, Station};
 
 /// Writes or serves the stream.
-pub fn execute(arguments: &args::Rtcm) -> Result<(), CliError> {
+pub fn execute(arguments: &Rtcm) -> Result<(), CliError> {
     let user = arguments.user()?;
     let input = Input::open(arguments)?;
     let station = station(arguments, &input)?;
@@ -70,7 +71,7 @@ pub fn execute(arguments: &args::Rtcm) -> Result<(), CliError> {
 }
 
 /// Station as the arguments and the input describe it.
-fn station(arguments: &args::Rtcm, input: &Input) -> Result<Station, CliError> {
+fn station(arguments: &Rtcm, input: &Input) -> Result<Station, CliError> {
     let position_m = arguments.position.map(Geodetic::to_ecef).or(input.position_m);
     let messages = &arguments.messages;
     if position_m.is_none() && (messages.has(1005) || messages.has(1006)) {
@@ -89,7 +90,7 @@ fn station(arguments: &args::Rtcm, input: &Input) -> Result<Station, CliError> {
     })
 }
 
-fn caster(mount: &str, user: Option<String>, arguments: &args::Rtcm, station: &Station, input: &Input) -> Caster {
+fn caster(mount: &str, user: Option<String>, arguments: &Rtcm, station: &Station, input: &Input) -> Caster {
     let place = station.position_m.map(|position_m| Geodetic::from_ecef(&position_m));
     // As source tables of casters name systems.
     let name = |system: &System| match system {
@@ -140,7 +141,7 @@ struct Told {
     systems: Vec<System>,
 }
 
-fn report(arguments: &args::Rtcm, sender: &Sender, told: &Told) -> Result<(), CliError> {
+fn report(arguments: &Rtcm, sender: &Sender, told: &Told) -> Result<(), CliError> {
     let messages: Vec<String> = sender.counts.iter().map(|(number, count)| format!("{number} {count}")).collect();
     let systems: Vec<&str> = told.systems.iter().map(|system| system.name()).collect();
     let mut text = format!("{:<14}{} of {}\n", "epochs", told.epochs, systems.join(", "));

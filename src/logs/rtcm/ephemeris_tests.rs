@@ -31,8 +31,8 @@ fn an_ephemeris_of_every_message_is_read_back_with_its_orbit_and_clock() {
         for minutes in [-10.0, 0.0, 12.0] {
             let at = set.toe.plus_s(60.0 * minutes);
             let (own, other) = (set.state_and_clock_l1(at).unwrap(), read.state_and_clock_l1(at).unwrap());
-            // Twelve digits of 42 000 km in the file.
-            assert!((own.0.position_m - other.0.position_m).norm() < 1e-4, "{} {minutes}", set.sv);
+            // Thirteen digits in the file: of three angles and of the axis, 42 000 km times 1.6e-12 each.
+            assert!((own.0.position_m - other.0.position_m).norm() < 3e-4, "{} {minutes}", set.sv);
             assert!((own.1.offset_s - other.1.offset_s).abs() < 1e-16, "{} {minutes}", set.sv);
         }
         // What a message holds is written again with the same bits, but for delays that it does not have.

@@ -51,7 +51,7 @@ const HEAD: [(&str, usize); 10] = [
     ("DF417", 1),
     ("DF418", 3),
 ];
-/// Place of the time among them.
+/// Index of the time among them.
 const TIME: usize = 2;
 /// Widths of whole milliseconds, extended information, fraction and rate of a satellite (table 3.5-80).
 const SATELLITE: [usize; 4] = [8, 4, 10, 14];

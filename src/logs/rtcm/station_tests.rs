@@ -20,7 +20,7 @@ fn station() -> Station {
 fn epochs(count: u32) -> (Vec<Ephemeris>, Vec<ObservedEpoch>) {
     let sets = rinex::embedded_two_systems().unwrap().ephemerides;
     let start = Epoch::parse("2020-11-29T12:50:55").unwrap();
-    let satellites = ["G05", "R01", "E01", "C06"].map(|sv| sv.parse::<Sv>().unwrap());
+    let satellites = ["G05", "R06", "E27", "C10"].map(|sv| sv.parse::<Sv>().unwrap());
     let epoch = |second: u32| {
         let value = |sv: Sv| Observed {
             sv,
@@ -55,7 +55,7 @@ fn the_printed_station_makes_the_printed_frame_but_for_its_flags() {
         0x33,
     ];
     let different: Vec<usize> = (0..19).filter(|place| body[*place] != printed[*place]).collect();
-    assert_eq!(different, [3, 9], "{body:x?}");
+    assert_eq!(different, [3, 4, 9], "{body:x?}");
     assert_eq!(super::framed(&printed)[22..], [0x36, 0x0b, 0x98]);
 }
 
@@ -85,7 +85,9 @@ fn a_stream_is_read_from_its_middle_on_and_without_a_date_from_outside() {
             _ => None,
         });
         let labels: Vec<Epoch> = dated.collect();
-        assert!(labels.len() > 30 && labels.iter().all(|label| (0.0..40.0).contains(&label.since(start))), "{cut}");
+        let astray: Vec<f64> =
+            labels.iter().map(|label| label.since(start)).filter(|s| !(0.0..40.0).contains(s)).collect();
+        assert!(labels.len() > 4 * 30 && astray.is_empty(), "{cut}: {} labels, {astray:?}", labels.len());
     }
 }
 

@@ -25,7 +25,7 @@ fn observed(sv: Sv, code: &'static str, range_m: f64) -> Observed {
         code,
         pseudorange_m: Some(range_m),
         carrier_cycles: Some(range_m / SPEED_OF_LIGHT_MPS * hz + 1e6),
-        doppler_hz: Some(-1234.567),
+        doppler_hz: Some(-235.1234 / SPEED_OF_LIGHT_MPS * hz),
         cn0_dbhz: Some(44.44),
         lock_s: Some(12.345),
         lost_lock: false,
@@ -152,12 +152,12 @@ fn whole_cycles_stay_while_a_carrier_is_locked_and_change_when_it_slips_or_drift
         ((own.carrier_cycles.unwrap() - other.carrier_cycles.unwrap()).round(), other.lock_s.unwrap())
     };
     let (first, _) = run(0, 10.0, 5.0, false);
-    let (second, lock_s) = run(1, 1100.0, 6.0, false);
+    let (second, lock_s) = run(1, 1000.0, 6.0, false);
     assert_eq!((second, lock_s), (first, 5.888));
     // Beyond 1171 m the lock begins again.
-    let (third, lock_s) = run(2, 1300.0, 7.0, false);
+    let (third, lock_s) = run(2, 1400.0, 7.0, false);
     assert!(third > first && lock_s == 0.0);
-    let (fourth, lock_s) = run(3, 1300.0, 8.0, false);
+    let (fourth, lock_s) = run(3, 1400.0, 8.0, false);
     assert_eq!((fourth, lock_s), (third, 0.992));
     // A lock that is younger than the epoch before, and one that is said to be lost.
     assert_eq!(run(4, 5.0, 0.5, false), (0.0 + (5.0 / SPEED_OF_LIGHT_MPS * 1_575.42e6_f64).round(), 0.496));
