@@ -5,21 +5,30 @@ Every field of every message of the shipped logs (and of those in $GNSS_TWIN_DAT
 pyrtcm. Then a run's own observations and positions are written as UBX (by pyubx2), as MSM7 of RTCM 3 and as SBF (by this
 script, read again by pyrtcm and pysbf2), and the judge must give the verdict of the RINEX and NMEA files that they came from.
 
-usage: tests/logs.py PROGRAM      the environment needs pyubx2, pyrtcm and pysbf2: tests/logs.sh makes one
+What `gnss-twin rtcm` writes is read by pyrtcm, every message and field as the program's own reader has it, and by RTKLIB's convbin,
+whose observations and ephemerides must be those of the run's own RINEX files to the resolution of MSM4 and MSM7. RTKLIB's str2str
+gets the same stream from the program's caster, and its rnx2rtkp finds the antenna by it.
+
+usage: tests/logs.py PROGRAM      the environment needs pyubx2, pyrtcm, pysbf2 and RTKLIB: tests/logs.sh makes one
 exit:  0 all fields are equal; 1 they are not.
 """
+import collections
 import csv
 import datetime
 import json
 import math
 import os
 import pathlib
+import re
+import signal
+import socket
 import struct
 import subprocess
 import sys
 import tempfile
+import time
 
-from pyrtcm import RTCMReader
+from pyrtcm import RTCM_DATA_FIELDS, RTCMReader
 from pysbf2 import SBFReader
 from pyubx2 import GET, UBXMessage, UBXReader
 
@@ -41,6 +50,14 @@ def program(*arguments, expect=0):
     if done.returncode != expect:
         sys.exit(f"logs: {' '.join(map(str, arguments))}: exit {done.returncode}\n{done.stdout}{done.stderr}")
     return done.stdout + done.stderr
+
+
+def object_of(*arguments):
+    """Object that the program prints with --json."""
+    done = subprocess.run([PROGRAM, *map(str, arguments), "--json"], capture_output=True, text=True)
+    if done.returncode:
+        sys.exit(f"logs: {' '.join(map(str, arguments))}: exit {done.returncode}\n{done.stdout}{done.stderr}")
+    return json.loads(done.stdout)
 
 
 def tables(directory):
@@ -101,6 +118,10 @@ SATELLITE = {"DF397": 255, "DF398": None, "DF399": -8192}
 SIGNAL = {"DF400": -2**14 * 2.0**-24, "DF401": -2**21 * 2.0**-29, "DF402": None, "DF403": 0, "DF405": -2**19 * 2.0**-29,
           "DF406": -2**23 * 2.0**-31, "DF407": None, "DF408": 0, "DF404": -2**14 * 1e-4, "DF420": None}
 NUMBERS = {"110": 100, "111": 192}
+
+
+# Fields of 1020 whose scale pyrtcm leaves out.
+UNSCALED = {"DF121": 2.0**-40, "DF124": 2.0**-30, "DF125": 2.0**-30, "DF133": 2.0**-31, "DF135": 2.0**-30}
 
 
 def expect(path, byte, name, column, cell, value, absent=None):
@@ -170,6 +191,13 @@ def compare_rtcm(path, found):
                 if column == "byte" or cell == "" and column not in values:
                     continue
                 value = values.get(column)
+                step = RTCM_DATA_FIELDS.get(column, (None, 0, 0))[2]
+                if column in UNSCALED:
+                    step = UNSCALED[column]
+                    value *= step
+                if 0 < step < 1e-4:
+                    # Small numbers in steps, which are whole.
+                    cell, value = str(float(cell) / step), value / step
                 # The text that fits the number of its characters.
                 compared += expect(path, byte, name, column, cell, value)
     return compared
@@ -465,6 +493,221 @@ def refusals(work):
             sys.exit(f"logs: {name}: refused by {words!r}, expected {told!r}")
 
 
+# Signals of four systems, for which RTKLIB has two carriers each, and those of three more; the front ends that receive them.
+FOUR = ("2020-11-29T12:50:13", ["GPS L1 C/A", "GPS L2C", "Galileo E1", "Galileo E5b", "GLONASS G1", "GLONASS G2", "BeiDou B1I",
+                                "BeiDou B2I"],
+        [("l1", 1575.42e6, 4.2e6), ("b1", 1561.098e6, 4.2e6), ("g1", 1602e6, 9e6), ("l2", 1227.6e6, 2.6e6), ("b2", 1207.14e6, 21.3e6),
+         ("g2", 1246e6, 7.5e6)])
+DURATION_S = 50
+MS_M = LIGHT_MPS / 1e3
+CARRIERS = {"G1": 1575.42e6, "G2": 1227.6e6, "E1": 1575.42e6, "E7": 1207.14e6, "C2": 1561.098e6, "C7": 1207.14e6}
+
+
+def four_systems(work):
+    """A run of four systems with two carriers each."""
+    start, signals, front_ends = FOUR
+    text = (ROOT / "scenarios/glonass_two_bands.toml").read_text()
+    head = text[:text.index("[[front_end]]")].replace(text[text.index("signals ="):text.index("\n", text.index("signals ="))],
+                                                     f"signals = {json.dumps(signals)}")
+    lines = [f"duration_s = {DURATION_S}" if line.startswith("duration_s") else f"start = {start}" if line.startswith("start =") else line
+             for line in head.splitlines() if not line.startswith(("#", "interpolation"))]
+    text = "\n".join(line for line in lines if line)
+    text = re.sub(r"\n\[ionosphere\](\n[a-z_]+ = .*)*", "", text)
+    text += "".join(f'\n[[front_end]]\nname = "{name}"\ncenter_hz = {centre}\nsample_rate_hz = {rate}\nformat = "ci8"\n'
+                    for name, centre, rate in front_ends)
+    (work / "four.toml").write_text(text)
+    program("run", work / "four.toml", "--level", "correlations", "--out", work / "four", "--report", "none", "--quiet")
+    return work / "four"
+
+
+def channel_hz(sv, band, channels):
+    return CARRIERS.get(sv[0] + band) or (1602e6 + 562.5e3 * channels[sv] if band == "1" else 1246e6 + 437.5e3 * channels[sv])
+
+
+def channels_of(path):
+    found = {}
+    for line in open(path):
+        if line[60:].startswith("GLONASS SLOT / FRQ #"):
+            words = line[4:60].split()
+            found.update({slot: int(channel) for slot, channel in zip(words[::2], words[1::2])})
+        if "END OF HEADER" in line:
+            return found
+
+
+def own_streams(work, runs):
+    """What the program writes, by pyrtcm and the program's own reader; returns the fields compared."""
+    compared, seen = 0, set()
+    for run, messages in runs:
+        log = work / f"{run.name}-{messages.split(',')[0]}.rtcm3"
+        told = object_of("rtcm", run, "--out", log, "--messages", messages, "--station", 2003)
+        found = work / log.stem
+        counts = object_of("logs", log, "--out", found)
+        own = {message["message"].split()[0]: message["count"] for message in counts["messages"]}
+        other = collections.Counter(message.identity for _, message in RTCMReader(open(log, "rb")) if message)
+        if not own == dict(other) == told["messages"] or counts["undated"] or counts["protocols"][0]["damaged"]:
+            sys.exit(f"logs: {log.name}: {told['messages']} written, {own} read, {dict(other)} by pyrtcm, {counts['undated']} without a date")
+        if any(message["read"] != message["count"] for message in counts["messages"]):
+            sys.exit(f"logs: {log.name}: not all messages were read: {counts['messages']}")
+        compared += compare_rtcm(log, tables(found))
+        seen |= own.keys()
+    wanted = {"1005", "1006", "1033", "1230", "1019", "1020", "1041", "1042", "1044", "1045", "1046", "1107"}
+    wanted |= {f"1{system}{level}" for system in ("07", "08", "09", "11", "12", "13") for level in (4, 7)}
+    if not wanted <= seen:
+        sys.exit(f"logs: messages that no stream had: {sorted(wanted - seen)}")
+    return compared
+
+
+def rtklib_rinex(work, log):
+    """Observations and ephemerides of a stream by RTKLIB's convbin: paths of both files."""
+    paths = work / f"{log.stem}.obs", work / f"{log.stem}.nav"
+    done = subprocess.run(["convbin", "-r", "rtcm3", "-v", "3.04", "-tr", "2020/11/29", "12:00:00", "-o", paths[0], "-n", paths[1], log],
+                          capture_output=True, text=True)
+    if done.returncode or not all(path.is_file() for path in paths):
+        sys.exit(f"logs: convbin failed: {done.stderr}")
+    return paths
+
+
+def same_observations(own, other, channels, level):
+    """Observations of two RINEX files to the resolution of MSM4 or MSM7; returns the number of values and the largest differences."""
+    code_m, carrier_m, power = {4: (2**-24 * MS_M, 2**-29 * MS_M, 1), 7: (2**-29 * MS_M, 2**-31 * MS_M, 1 / 16)}[level]
+    other = {round(1000 * (whole + fraction)): values for whole, fraction, values in other}
+    compared, whole_cycles, worst = 0, {}, dict.fromkeys("CLDS", 0.0)
+    for whole, fraction, values in own:
+        label = round(1000 * (whole + fraction))
+        # The receiver's label is given as a whole millisecond, and ranges with it.
+        later_s = label / 1000 - whole - fraction
+        if label not in other or other[label].keys() != values.keys():
+            sys.exit(f"logs: RTKLIB has other satellites at {label} ms: {sorted(other.get(label, {}))}, expected {sorted(values)}")
+        for sv, row in values.items():
+            for code, (value, lost) in row.items():
+                hz = channel_hz(sv, code[1], channels)
+                found = other[label][sv].get(code, (None, None))[0]
+                if found is None and code[0] == "D" and level == 4:
+                    continue
+                if found is None:
+                    sys.exit(f"logs: RTKLIB has no {code} of {sv} at {label} ms")
+                difference = found - value
+                # Both files print thousandths.
+                if code[0] == "C":
+                    difference -= LIGHT_MPS * later_s
+                    bar = code_m / 2 + 1.1e-3
+                elif code[0] == "L":
+                    difference -= hz * later_s
+                    if lost or (sv, code) not in whole_cycles:
+                        whole_cycles[sv, code] = round(difference)
+                    difference -= whole_cycles[sv, code]
+                    bar = carrier_m / 2 / LIGHT_MPS * hz + 1.1e-3
+                elif code[0] == "D":
+                    bar = 0.5e-4 / LIGHT_MPS * hz + 1.1e-3
+                else:
+                    # RTKLIB keeps quarters of 1 dB.
+                    bar = power / 2 + 0.126
+                if abs(difference) > bar:
+                    sys.exit(f"logs: {code} of {sv} at {label} ms: {found} by RTKLIB, {value} of the receiver, bar {bar}")
+                worst[code[0]] = max(worst[code[0]], abs(difference))
+                compared += 1
+    return compared, worst
+
+
+def ephemerides(path):
+    """Records of a RINEX 3 navigation file: (satellite, epoch) to the numbers of its lines."""
+    found, head = {}, True
+    for line in open(path):
+        if head:
+            head = "END OF HEADER" not in line
+            continue
+        numbers = [line[at:at + 19].strip().replace("D", "E") for at in range(4, 80, 19)]
+        if line[0] != " ":
+            key = line[:23]
+            found.setdefault(key, []).append([])
+            numbers = [line[at:at + 19].strip().replace("D", "E") for at in range(23, 80, 19)]
+        found[key][-1].append([float(number) if number else 0.0 for number in numbers])
+    return found
+
+
+def same_ephemerides(own, other):
+    """Elements of every ephemeris that the stream had; returns their number."""
+    compared = 0
+    for key, records in own.items():
+        if key not in other:
+            sys.exit(f"logs: RTKLIB has no ephemeris of {key}, but {sorted(other)}")
+        vector = key[0] == "R"
+        # Lines and columns that hold the orbit, the clock and delays: not times of sending and flags that RTCM does not have.
+        cells = [(0, 0), (0, 1)] + [(line, column) for line in (1, 2, 3) for column in range(3)]
+        if not vector:
+            cells = [(0, column) for column in range(3)] + [(line, column) for line in (1, 2, 3, 4) for column in range(4)]
+            cells += [(5, 0), (5, 2), (6, 1), (6, 2)]
+        for record in records:
+            off = [[cell for cell in cells if not math.isclose(record[cell[0]][cell[1]], found[cell[0]][cell[1]], rel_tol=2e-12, abs_tol=1e-20)]
+                   for found in other[key]]
+            if all(off):
+                cell = off[0][0]
+                sys.exit(f"logs: ephemeris of {key}: line {cell[0]}, number {cell[1]}: "
+                         f"{other[key][0][cell[0]][cell[1]]} by RTKLIB, {record[cell[0]][cell[1]]} of the receiver")
+            compared += len(cells)
+    return compared
+
+
+def rtklib(work, run):
+    """Observations and ephemerides that RTKLIB reads of the streams; returns numbers of values and of elements."""
+    own = run / "rx/observations.rnx"
+    values = elements = 0
+    for level in (7, 4):
+        observations, navigation = rtklib_rinex(work, work / f"four-msm{level}.rtcm3")
+        count, worst = same_observations(read_rinex(own), read_rinex(observations), channels_of(own), level)
+        values += count
+        print(f"logs: MSM{level} by RTKLIB: code {worst['C'] * 1e3:.2f} mm, carrier {worst['L']:.5f} cycles, Doppler {worst['D']:.4f} Hz, "
+              f"C/N0 {worst['S']:.3f} dB off at most")
+        elements += same_ephemerides(ephemerides(run / "rx/navigation.rnx"), ephemerides(navigation))
+    return values, elements
+
+
+def live(work, run):
+    """The stream from the caster by RTKLIB's str2str and the program's client, and RTKLIB's position by it."""
+    port = free_port()
+    caster = subprocess.Popen([PROGRAM, "rtcm", run, "--caster", f"{port}/TWIN", "--user", "rover:secret", "--messages",
+                               "msm7,1006,1033,1230,eph(5)", "--speed", "8", "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    caster.stderr.readline()
+    address = f"127.0.0.1:{port}/TWIN"
+    refused = program("logs", f"ntrip://rover:wrong@{address}", expect=65)
+    if "401" not in refused:
+        sys.exit(f"logs: a wrong password is answered by {refused!r}")
+    # The caster waits for its first client, so str2str gets all of it, and the other one what is sent after it has come.
+    client = subprocess.Popen(["str2str", "-in", f"ntrip://rover:secret@{address}", "-out", f"file://{work}/live.rtcm3"],
+                              stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    time.sleep(0.5)
+    told = object_of("logs", f"ntrip://rover:secret@{address}")
+    sent = json.loads(caster.communicate(timeout=60)[0])
+    time.sleep(1.5)
+    client.send_signal(signal.SIGINT)
+    client.wait(timeout=20)
+    log = work / "live.rtcm3"
+    got = collections.Counter(message.identity for _, message in RTCMReader(open(log, "rb")) if message)
+    read = {message["message"].split()[0]: message["count"] for message in told["messages"]}
+    if dict(got) != sent["messages"]:
+        sys.exit(f"logs: str2str got {dict(got)} of the caster's {sent['messages']}")
+    if any(read.get(number, 0) < 0.7 * count - 10 for number, count in sent["messages"].items()) or told["protocols"][0]["damaged"] > 1:
+        sys.exit(f"logs: the program's client got {told} of the caster's {sent['messages']}")
+    if sent["clients"] != 2:
+        sys.exit(f"logs: {sent['clients']} clients, expected 2")
+    observations, navigation = rtklib_rinex(work, log)
+    done = subprocess.run(["rnx2rtkp", "-p", "0", "-sys", "G,R,E,C", "-e", "-o", work / "live.pos", observations, navigation], capture_output=True)
+    rows = [line.split() for line in open(work / "live.pos") if not line.startswith("%")]
+    with open(run / "truth/trajectory.csv", newline="") as file:
+        truth = next(csv.DictReader(file))
+    mean = [sum(float(row[2 + axis]) for row in rows) / len(rows) for axis in range(3)] if rows else [math.inf] * 3
+    off = math.dist(mean, [float(truth[key]) for key in ("x_m", "y_m", "z_m")])
+    if done.returncode or off > 3:
+        sys.exit(f"logs: rnx2rtkp by the caster's stream: {len(rows)} positions, {off} m off")
+    return sum(got.values()), len(rows), off
+
+
+def free_port():
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return listener.getsockname()[1]
+
+
 if __name__ == "__main__":
     if len(sys.argv) != 2:
         sys.exit(__doc__)
@@ -474,5 +717,15 @@ if __name__ == "__main__":
         fields = [witness(work, "ubx", "ubx", compare_ubx), witness(work, "rtcm", "rtcm3", compare_rtcm)]
         rows, blocks = closed_loop(work)
         refusals(work)
+        four = four_systems(work)
+        runs = [(four, "msm7,1005,1033,1230,eph"), (four, "msm4,1006,eph(5)")]
+        for scene in ("qzss", "navic", "sbas", "galileo_e5"):
+            program("run", ROOT / f"scenarios/{scene}.toml", "--level", "correlations", "--out", work / scene, "--report", "none", "--quiet")
+            runs += [(work / scene, "msm7,eph"), (work / scene, "msm4,eph")]
+        streams = own_streams(work, runs)
+        values, elements = rtklib(work, four)
+        messages, positions, off = live(work, four)
     print(f"logs: {fields[0]} fields of UBX equal pyubx2's, {fields[1]} of RTCM 3 pyrtcm's, {blocks} of SBF pysbf2's; "
           f"{rows} verdict rows by UBX, RTCM 3 and SBF as by RINEX and NMEA")
+    print(f"logs: {streams} fields of own RTCM 3 equal pyrtcm's; {values} observations and {elements} elements by RTKLIB's convbin as in the "
+          f"receiver's RINEX; {messages} messages of the caster by str2str, {positions} positions of rnx2rtkp, {off:.2f} m off")

@@ -14,6 +14,7 @@ use crate::cli::osnma::args::Osnma;
 use crate::cli::pack::args::Pack;
 use crate::cli::packed::{Bits, Packed};
 use crate::cli::printed::Printed;
+use crate::cli::rtcm::args::Rtcm;
 use crate::cli::sink::Spec;
 use crate::cli::study::args::Study;
 use crate::cli::watch::{Watched, tcp_peer};
@@ -58,6 +59,8 @@ pub enum Command {
     Logs(Logs),
     /// Find the baseline between the receivers of two runs by their carriers, and judge it
     Baseline(Baseline),
+    /// Send a run's observations and ephemerides as the RTCM 3.3 stream of a reference station
+    Rtcm(Rtcm),
     /// Verify the authentication of Galileo's navigation messages (OSNMA)
     Osnma(Osnma),
     /// Convert the tables of a run or a study to Parquet
@@ -83,7 +86,8 @@ pub enum Command {
                   the fields of all messages of that name; observations.csv and fixes.csv have what can be judged"
 )]
 pub struct Logs {
-    /// Log as it came out of the device: UBX, RTCM 3, SBF, also mixed with NMEA; - is standard input
+    /// Log as it came out of the device: UBX, RTCM 3, SBF, also mixed with NMEA; - is standard input,
+    /// ntrip://[USER:PASSWORD@]HOST:PORT/MOUNT the stream of a caster
     pub log: PathBuf,
     /// Directory for one table per kind of message [default: no tables are written]
     #[arg(long, value_name = "DIR")]

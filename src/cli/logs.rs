@@ -13,6 +13,7 @@ use serde_json::{Value as Json, json};
 
 use crate::cli::args;
 use crate::cli::error::CliError;
+use crate::cli::ntrip;
 use crate::cli::staging::Staging;
 use gnss::earth::Geodetic;
 use gnss::time::Epoch;
@@ -97,6 +98,9 @@ pub fn execute(arguments: &args::Logs) -> Result<(), CliError> {
 fn open(path: &Path) -> Result<Box<dyn Read>, CliError> {
     if path == Path::new("-") {
         return Ok(Box::new(io::stdin().lock()));
+    }
+    if ntrip::is_stream(path) {
+        return ntrip::open(path);
     }
     let failed = |error: io::Error| CliError::read(path.display(), &error);
     if !fs::metadata(path).map_err(failed)?.is_file() {

@@ -18,6 +18,7 @@ mod lines;
 mod live;
 mod logs;
 mod made;
+mod ntrip;
 mod osnma;
 mod pack;
 mod packed;
@@ -30,6 +31,7 @@ mod progress;
 mod receive;
 mod recording;
 mod reference;
+mod rtcm;
 mod run;
 mod scenario;
 mod scenes;
@@ -97,6 +99,7 @@ fn execute(arguments: Arguments) -> Result<(), CliError> {
         Command::Pack(arguments) => pack::execute(&arguments),
         Command::Logs(arguments) => logs::execute(&arguments),
         Command::Baseline(arguments) => baseline::execute(&arguments),
+        Command::Rtcm(arguments) => rtcm::execute(&arguments),
         Command::Osnma(arguments) => osnma::execute(&arguments),
         #[cfg(feature = "parquet")]
         Command::Parquet(arguments) => parquet::execute(&arguments),

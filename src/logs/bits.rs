@@ -40,9 +40,51 @@ impl<'a> Bits<'a> {
     }
 }
 
+/// Writer of bits, the most significant of each number first.
+#[derive(Clone, Debug, Default)]
+pub struct Writer {
+    bytes: Vec<u8>,
+    count: usize,
+}
+
+impl Writer {
+    /// Appends the lowest `count` bits of a number, 64 at most; of a negative one those of its two's
+    /// complement.
+    pub fn put(&mut self, number: i64, count: usize) {
+        for place in (0..count.min(64)).rev() {
+            if self.count.is_multiple_of(8) {
+                self.bytes.push(0);
+            }
+            if let Some(last) = self.bytes.last_mut() {
+                *last |= ((number >> place & 1) as u8) << (7 - self.count % 8);
+            }
+            self.count += 1;
+        }
+    }
+
+    /// Bytes so far; the last one is filled up with zeros.
+    pub fn into_bytes(self) -> Vec<u8> {
+        self.bytes
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let numbers = [(5_i64, 3), (-1, 7), (i64::MIN, 64), (0, 1), (0x1_2345_6789, 33), (-8192, 14)];
+        let mut writer = Writer::default();
+        numbers.iter().for_each(|(number, count)| writer.put(*number, *count));
+        let bytes = writer.into_bytes();
+        let mut bits = Bits::new(&bytes);
+        for (number, count) in numbers {
+            let read = if number < 0 { bits.signed(count) } else { bits.unsigned(count).map(|read| read as i64) };
+            assert_eq!(read, Some(number));
+        }
+        assert_eq!(bytes.len(), 122_usize.div_ceil(8));
+    }
 
     #[test]
     fn numbers_follow_one_another_across_bytes() {

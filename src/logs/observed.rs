@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use gnss::broadcast::Ephemeris;
 use gnss::satellite::Sv;
 use gnss::time::Epoch;
 use nalgebra::Vector3;
@@ -120,6 +121,8 @@ pub enum Event {
     NoFix,
     /// Offset of the receiver's clock.
     Clock(ClockReading),
+    /// Ephemeris of a satellite.
+    Ephemeris(Box<Ephemeris>),
     /// Message whose week cannot be known: neither the log before it nor the caller names a date.
     Undated,
 }

@@ -106,7 +106,15 @@ pub const ORDER: Order<'static> = &[
             &["logged"],
         ],
     ),
-    ("logs", &[&["bits", "frames", "observed", "table"], &["content"], &["contents", "rtcm", "sbf", "ubx"], &["log"]]),
+    (
+        "logs",
+        &[
+            &["bits", "frames", "ntrip", "observed", "table"],
+            &["content"],
+            &["contents", "rtcm", "sbf", "ubx"],
+            &["log"],
+        ],
+    ),
     (
         "analysis/read",
         &[

@@ -88,7 +88,7 @@ fn read(path: &Path, asked: Option<Protocol>, near: Epoch) -> Result<(Protocol, 
             Some(Event::Refinement(refinement)) => own.refine(&refinement),
             Some(Event::Clock(reading)) => own.clocks.push(reading),
             Some(Event::NoFix) => own.without_fix += 1,
-            Some(Event::Fix(_) | Event::Undated) | None => {}
+            Some(Event::Fix(_) | Event::Ephemeris(_) | Event::Undated) | None => {}
         }
     }
     let contents = log.contents();

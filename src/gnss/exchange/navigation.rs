@@ -16,12 +16,24 @@ use crate::time::{BDT, BDT_WEEK, Epoch, TimeScale, UTC};
 /// Parameters of an ephemeris, or parameters that are common to all satellites, by name.
 type Raws = BTreeMap<String, i64>;
 
+/// Message, satellite and issue of an ephemeris.
+type Sent = (String, Sv, u32);
+
+/// Messages of signals by their names, with their time scales.
+fn messages(signals: &[&'static Signal]) -> BTreeMap<&'static str, (&'static Message, &'static TimeScale)> {
+    let of = |signal: &&'static Signal| {
+        let messages = signal.components.iter().filter_map(|component| component.message);
+        messages.map(|message| (message.name, (message, signal.time))).collect::<Vec<_>>()
+    };
+    signals.iter().flat_map(of).collect()
+}
+
 /// Collects parameters as they come; an ephemeris is some kilobytes, however often it is read again.
 #[derive(Debug, Default)]
 pub struct NavigationSets {
     /// Parameters by message, satellite and issue. Parameters that belong to no issue are in `common`, the
     /// newest only.
-    sets: BTreeMap<(String, Sv, u32), Raws>,
+    sets: BTreeMap<Sent, Raws>,
     common: BTreeMap<String, Raws>,
 }
 
@@ -38,6 +50,27 @@ impl NavigationSets {
         raws.insert(row.parameter.clone(), row.raw);
     }
 
+    /// All complete ephemerides, each once for each message, near a time by which their weeks are resolved;
+    /// `signals` are those whose messages were read.
+    pub fn ephemerides(&self, signals: &[&'static Signal], near: Epoch) -> Vec<Ephemeris> {
+        let messages = messages(signals);
+        let mut known = BTreeSet::new();
+        let complete = self.sets.keys().filter_map(|sent| {
+            let (message, time) = messages.get(sent.0.as_str())?;
+            let raw = |name: &str| self.raw(sent, name);
+            let set = (message.elements)(sent.1, &raw, time.label(near))?.timed(|label| time.instant(label));
+            known.insert((sent.1, sent.2, set.form.name)).then_some(set)
+        });
+        complete.collect()
+    }
+
+    /// Raw integer of a parameter of an ephemeris. What it needs and bears no issue is found under issue 0:
+    /// delays and health of I/NAV's word 5.
+    fn raw(&self, sent: &Sent, name: &str) -> Option<i64> {
+        let of = |issue: u32| self.sets.get(&(sent.0.clone(), sent.1, issue))?.get(name).copied();
+        of(sent.2).or_else(|| of(0))
+    }
+
     /// Writes all complete ephemerides, each once, near a time by which their weeks are resolved; `signals`
     /// are those whose messages were read. Coefficients of the ionosphere, which all satellites of a system
     /// send alike, have in RINEX 4 the first of them that sent a message.
@@ -51,10 +84,7 @@ impl NavigationSets {
         signals: &[&'static Signal],
         near: Epoch,
     ) -> io::Result<()> {
-        let messages: BTreeMap<&str, (&'static Message, &'static TimeScale)> = (signals.iter())
-            .flat_map(|signal| signal.components.iter().filter_map(|component| Some((component.message?, signal.time))))
-            .map(|(message, time)| (message.name, (message, time)))
-            .collect();
+        let messages = messages(signals);
         let mut systems: Vec<System> = signals.iter().map(|signal| signal.system).collect();
         systems.sort();
         systems.dedup();
@@ -93,13 +123,12 @@ impl NavigationSets {
         text += &header_line("", "END OF HEADER");
         text += &body;
         let mut known = BTreeSet::new();
-        for ((name, sv, issue), raws) in &self.sets {
+        for sent in self.sets.keys() {
+            let (name, sv, issue) = sent;
             let Some((message, time)) = messages.get(name.as_str()) else { continue };
             let Some(records) = message.rinex else { continue };
-            // What an ephemeris needs and bears no issue: delays and health of I/NAV's word 5.
-            let rest = self.sets.get(&(name.clone(), *sv, 0));
-            let raw = |name: &str| raws.get(name).or_else(|| rest?.get(name)).copied();
-            let set = (message.elements)(*sv, &raw, time.label(near));
+            let raw = |name: &str| self.raw(sent, name);
+            let set = (message.elements)(sent.1, &raw, time.label(near));
             let set = set.map(|set| set.timed(|label| time.instant(label)));
             // Version 3 has no records of the newer messages.
             let writes = records.lines.is_none() || version == Version::Four;

@@ -2,9 +2,13 @@
 //!
 //! A range is given in three parts: whole milliseconds and a fraction of 1/1024 ms of the satellite, and a
 //! fine part of each signal; the fine parts of code and carrier are independent. Lock times are bounds below
-//! the true ones. Limits: the carrier of GLONASS needs the channel of the satellite, which MSM5 and MSM7
-//! have.
+//! the true ones. The carrier of GLONASS needs the channel of the satellite, which MSM5 and MSM7 have; of
+//! MSM4 and MSM6 it is the one that the slot has by [`gnss::glonass::fdma`]. [`write`] writes what
+//! [`Kind::read`] reads, by the same widths and scales.
 
+pub mod write;
+
+use super::signals;
 use crate::bits::Bits;
 use crate::observed::{Calendar, Event, Locks, Observed, ObservedEpoch};
 use crate::table::{Table, Value};
@@ -32,18 +36,27 @@ pub struct Message {
     pub table: Table,
 }
 
-/// Systems by the tens of their messages' numbers, with the names of MSM4 to MSM7.
-const SYSTEMS: [(u64, System, [&str; 4]); 7] = [
-    (107, System::Gps, ["1074", "1075", "1076", "1077"]),
-    (108, System::Glonass, ["1084", "1085", "1086", "1087"]),
-    (109, System::Galileo, ["1094", "1095", "1096", "1097"]),
-    (110, System::Sbas, ["1104", "1105", "1106", "1107"]),
-    (111, System::Qzss, ["1114", "1115", "1116", "1117"]),
-    (112, System::BeiDou, ["1124", "1125", "1126", "1127"]),
-    (113, System::Navic, ["1134", "1135", "1136", "1137"]),
-];
 /// GPS time minus the time of BeiDou, seconds (BDS-SIS-ICD-B1I 3.0, 3.3).
 const BDT_BEHIND_S: i64 = 14;
+/// Fields before the masks with their widths in bits; reserved ones have no name (table 3.5-78).
+const HEAD: [(&str, usize); 10] = [
+    ("DF002", 12),
+    ("DF003", 12),
+    ("epoch", 30),
+    ("DF393", 1),
+    ("DF409", 3),
+    ("", 7),
+    ("DF411", 2),
+    ("DF412", 2),
+    ("DF417", 1),
+    ("DF418", 3),
+];
+/// Index of the time among them.
+const TIME: usize = 2;
+/// Widths of whole milliseconds, extended information, fraction and rate of a satellite (table 3.5-80).
+const SATELLITE: [usize; 4] = [8, 4, 10, 14];
+/// Whole milliseconds that say that there is no range.
+const NO_RANGE: u64 = 255;
 /// Most cells of a mask.
 const MOST_CELLS: usize = 64;
 
@@ -64,10 +77,21 @@ struct Satellite {
 impl Kind {
     /// Kind of a message with this number.
     pub fn of(number: u64) -> Option<Self> {
-        let (_, system, names) = SYSTEMS.into_iter().find(|(tens, ..)| *tens == number / 10)?;
+        let (_, system, names) = signals::SYSTEMS.into_iter().find(|(tens, ..)| *tens == number / 10)?;
         let level = number % 10;
         let name = names.into_iter().nth(usize::try_from(level.checked_sub(4)?).ok()?)?;
         Some(Self { system, name, level })
+    }
+
+    /// Number of the message.
+    pub fn number(self) -> u64 {
+        let tens = signals::SYSTEMS.into_iter().find(|(_, system, _)| *system == self.system);
+        tens.map_or(0, |(tens, ..)| 10 * tens + self.level)
+    }
+
+    /// System of the satellites.
+    pub fn system(self) -> System {
+        self.system
     }
 
     /// Fields and observations of a message's bytes; none where the message ends too early.
@@ -75,22 +99,17 @@ impl Kind {
         let mut bits = Bits::new(body);
         let mut head = Vec::new();
         let mut columns = Vec::new();
-        let mut next = |bits: &mut Bits<'_>, column: &'static str, count: usize| {
+        for (column, count) in HEAD {
             let number = bits.unsigned(count)?;
-            columns.push(column);
-            head.push(Value::Integer(number as i64));
-            Some(number)
+            if !column.is_empty() {
+                columns.push(column);
+                head.push(Value::Integer(number as i64));
+            }
+        }
+        let time = match head.get(TIME) {
+            Some(Value::Integer(time)) => *time as u64,
+            _ => return None,
         };
-        next(&mut bits, "DF002", 12)?;
-        next(&mut bits, "DF003", 12)?;
-        let time = next(&mut bits, "epoch", 30)?;
-        for (column, count) in [("DF393", 1), ("DF409", 3)] {
-            next(&mut bits, column, count)?;
-        }
-        bits.unsigned(7)?;
-        for (column, count) in [("DF411", 2), ("DF412", 2), ("DF417", 1), ("DF418", 3)] {
-            next(&mut bits, column, count)?;
-        }
         let (satellites, signals) = (bits.unsigned(64)?, bits.unsigned(32)?);
         let numbers: Vec<u8> = (1..=64).filter(|number| satellites >> (64 - number) & 1 == 1).collect();
         let signals: Vec<u8> = (1..=32).filter(|number| signals >> (32 - number) & 1 == 1).collect();
@@ -110,8 +129,8 @@ impl Kind {
         let mut table = Table { name: self.name, columns, rows: Vec::new() };
         let mut values = Vec::new();
         for (index, (satellite, signal)) in cells.into_iter().enumerate() {
-            let sv = self.sv(satellite.number);
-            let code = code(self.system, signal);
+            let sv = signals::satellite(self.system, satellite.number);
+            let code = signals::code(self.system, signal);
             let of = |list: &[Option<i64>]| list.get(index).copied().flatten();
             let own = fine.each_ref().map(|list| of(list));
             table.rows.push(self.row(&head, satellite, sv, code.unwrap_or(""), own));
@@ -139,20 +158,21 @@ impl Kind {
     fn satellites(self, bits: &mut Bits<'_>, numbers: &[u8]) -> Option<Vec<Satellite>> {
         let mut all: Vec<Satellite> =
             numbers.iter().map(|number| Satellite { number: *number, ..Satellite::default() }).collect();
+        let [whole, extended, fraction, rate] = SATELLITE;
         for own in &mut all {
-            own.whole_ms = Some(bits.unsigned(8)?).filter(|whole| *whole != 255);
+            own.whole_ms = Some(bits.unsigned(whole)?).filter(|whole| *whole != NO_RANGE);
         }
         if self.has_rates() {
             for own in &mut all {
-                own.extended = Some(bits.unsigned(4)?);
+                own.extended = Some(bits.unsigned(extended)?);
             }
         }
         for own in &mut all {
-            own.fraction = bits.unsigned(10)?;
+            own.fraction = bits.unsigned(fraction)?;
         }
         if self.has_rates() {
             for own in &mut all {
-                own.rate_mps = Some(bits.signed(14)?).filter(|rate| *rate != -8192);
+                own.rate_mps = Some(bits.signed(rate)?).filter(|sent| *sent != -1 << (rate - 1));
             }
         }
         Some(all)
@@ -161,8 +181,7 @@ impl Kind {
     /// Fine code, fine carrier, lock indicator, half-cycle flag, C/N0 and fine rate of each signal as sent;
     /// none where a value is marked as not there.
     fn fine(self, bits: &mut Bits<'_>, cells: usize) -> Option<[Vec<Option<i64>>; 6]> {
-        // Widths in bits: of MSM4 and 5, of MSM6 and 7 (tables 3.5-80 to 3.5-83).
-        let widths = if self.is_fine() { [20, 24, 10, 1, 10, 15] } else { [15, 22, 4, 1, 6, 15] };
+        let widths = self.widths();
         let mut found: [Vec<Option<i64>>; 6] = Default::default();
         for (field, (list, width)) in found.iter_mut().zip(widths).enumerate() {
             if field == 5 && !self.has_rates() {
@@ -176,6 +195,11 @@ impl Kind {
             }
         }
         Some(found)
+    }
+
+    /// Widths in bits of the fields of a signal: of MSM4 and 5, of MSM6 and 7 (tables 3.5-82 to 3.5-87).
+    fn widths(self) -> [usize; 6] {
+        if self.is_fine() { [20, 24, 10, 1, 10, 15] } else { [15, 22, 4, 1, 6, 15] }
     }
 
     fn fine_columns(self) -> [&'static str; 6] {
@@ -226,8 +250,8 @@ impl Kind {
         let metres = |part: Option<i64>, scale: f64| {
             rough_ms.zip(part).map(|(rough_ms, part)| (rough_ms + part as f64 * scale) * 1e-3 * SPEED_OF_LIGHT_MPS)
         };
-        let channel = satellite.extended.filter(|number| *number <= 13).map(|number| number as i32 - 7);
-        let carrier_hz = carrier_hz(sv.system, code, channel);
+        let channel = satellite.extended.filter(|number| *number <= 13).map(|number| number as i8 - 7);
+        let carrier_hz = signals::carrier_hz(sv, code, channel);
         let cycles = |metres: f64| carrier_hz.map(|hz| metres * hz / SPEED_OF_LIGHT_MPS);
         let rate = satellite.rate_mps.zip(fine[5]).map(|(rough, fine)| rough as f64 + fine as f64 * 1e-4);
         let carrier_cycles = metres(fine[1], carrier_scale).and_then(cycles);
@@ -255,21 +279,6 @@ impl Kind {
                 (indicator.min(704) - 32 * doublings) << doublings
             }
         }
-    }
-
-    /// Satellite of a bit of the mask, counted from 1.
-    fn sv(self, number: u8) -> Option<Sv> {
-        let (last, more) = match self.system {
-            System::Gps => (32, 0),
-            System::Glonass => (24, 0),
-            System::Galileo => (36, 0),
-            // PRN 120 is S20.
-            System::Sbas => (39, 19),
-            System::Qzss => (10, 0),
-            System::BeiDou => (63, 0),
-            System::Navic => (14, 0),
-        };
-        (number <= last).then_some(Sv { system: self.system, number: number + more })
     }
 }
 
@@ -305,59 +314,4 @@ impl Message {
         };
         calendar.at_ms(tow_ms.rem_euclid(WEEK_MS))
     }
-}
-
-/// RINEX code of a bit of the signal mask, counted from 1 (tables 3.5-91 to 3.5-108).
-fn code(system: System, bit: u8) -> Option<&'static str> {
-    let codes: &[(u8, &str)] = match system {
-        System::Gps => GPS,
-        System::Glonass => &[(2, "1C"), (3, "1P"), (8, "2C"), (9, "2P")],
-        System::Galileo => GALILEO,
-        System::Sbas => &[(2, "1C"), (22, "5I"), (23, "5Q"), (24, "5X")],
-        System::Qzss => QZSS,
-        System::BeiDou => BEIDOU,
-        System::Navic => &[(22, "5A")],
-    };
-    codes.iter().find(|(known, _)| *known == bit).map(|(_, code)| *code)
-}
-
-#[rustfmt::skip]
-const GPS: &[(u8, &str)] = &[
-    (2, "1C"), (3, "1P"), (4, "1W"), (8, "2C"), (9, "2P"), (10, "2W"), (15, "2S"), (16, "2L"), (17, "2X"),
-    (22, "5I"), (23, "5Q"), (24, "5X"), (30, "1S"), (31, "1L"), (32, "1X"),
-];
-#[rustfmt::skip]
-const GALILEO: &[(u8, &str)] = &[
-    (2, "1C"), (3, "1A"), (4, "1B"), (5, "1X"), (6, "1Z"), (8, "6C"), (9, "6A"), (10, "6B"), (11, "6X"),
-    (12, "6Z"), (14, "7I"), (15, "7Q"), (16, "7X"), (18, "8I"), (19, "8Q"), (20, "8X"), (22, "5I"), (23, "5Q"),
-    (24, "5X"),
-];
-#[rustfmt::skip]
-const QZSS: &[(u8, &str)] = &[
-    (2, "1C"), (9, "6S"), (10, "6L"), (11, "6X"), (15, "2S"), (16, "2L"), (17, "2X"), (22, "5I"), (23, "5Q"),
-    (24, "5X"), (30, "1S"), (31, "1L"), (32, "1X"),
-];
-#[rustfmt::skip]
-const BEIDOU: &[(u8, &str)] = &[
-    (2, "2I"), (3, "2Q"), (4, "2X"), (8, "6I"), (9, "6Q"), (10, "6X"), (14, "7I"), (15, "7Q"), (16, "7X"),
-    (22, "5D"), (23, "5P"), (24, "5X"), (25, "7D"), (30, "1D"), (31, "1P"), (32, "1X"),
-];
-
-/// Carrier of a signal, Hz; of GLONASS that of the satellite's channel (RINEX 4.02, table 23).
-fn carrier_hz(system: System, code: &str, channel: Option<i32>) -> Option<f64> {
-    let band = code.chars().next()?;
-    let megahertz = match (system, band) {
-        (System::Glonass, '1') => 1602.0 + 0.5625 * f64::from(channel?),
-        (System::Glonass, '2') => 1246.0 + 0.4375 * f64::from(channel?),
-        (_, '1') => 1575.42,
-        (System::BeiDou, '2') => 1561.098,
-        (_, '2') => 1227.6,
-        (_, '5') => 1176.45,
-        (System::BeiDou, '6') => 1268.52,
-        (_, '6') => 1278.75,
-        (_, '7') => 1207.14,
-        (_, '8') => 1191.795,
-        _ => return None,
-    };
-    Some(1e6 * megahertz)
 }

@@ -13,8 +13,8 @@ fn frames(name: &str) -> Vec<Vec<u8>> {
 }
 
 fn observed(near: &str) -> Vec<ObservedEpoch> {
-    let (calendar, mut locks) = (Calendar::new(Epoch::parse(near).ok()), Locks::default());
-    let read = |frame: Vec<u8>| match super::read(&frame, &calendar, &mut locks).event {
+    let (mut calendar, mut locks) = (Calendar::new(Epoch::parse(near).ok()), Locks::default());
+    let read = |frame: Vec<u8>| match super::read(&frame, &mut calendar, &mut locks).event {
         Some(Event::Observations(epoch)) => Some(epoch),
         _ => None,
     };
@@ -28,7 +28,7 @@ fn the_printed_station_has_the_printed_position() {
         0xd3, 0x00, 0x13, 0x3e, 0xd7, 0xd3, 0x02, 0x02, 0x98, 0x0e, 0xde, 0xef, 0x34, 0xb4, 0xbd, 0x62, 0xac, 0x09,
         0x41, 0x98, 0x6f, 0x33, 0x36, 0x0b, 0x98,
     ];
-    let table = read(&frame, &Calendar::default(), &mut Locks::default()).table.unwrap();
+    let table = read(&frame, &mut Calendar::default(), &mut Locks::default()).table.unwrap();
     assert_eq!(table.integer(0, "DF003"), Some(2003));
     let place = ["DF025", "DF026", "DF027"].map(|name| table.number(0, name).unwrap());
     assert_eq!(place, [1_114_104.599_9, -4_850_729.710_8, 3_975_521.464_3]);
@@ -62,7 +62,7 @@ fn a_message_without_a_known_week_says_so() {
     let all = frames("MIXED-RTCM3.rtcm3");
     let undated = all
         .iter()
-        .filter(|frame| read(frame, &Calendar::default(), &mut Locks::default()).event == Some(Event::Undated));
+        .filter(|frame| read(frame, &mut Calendar::default(), &mut Locks::default()).event == Some(Event::Undated));
     assert_eq!(undated.count(), 4);
 }
 
@@ -71,8 +71,8 @@ fn a_message_that_ends_too_early_has_no_table_and_does_not_stop() {
     for name in ["MIXED-RTCM3.rtcm3", "NTRIP-USCL00CHL0.rtcm3"] {
         for frame in frames(name) {
             for length in 0..frame.len() {
-                let calendar = Calendar::new(Some(Epoch::from_week(2200, 0.0)));
-                let found = read(&frame[..length], &calendar, &mut Locks::default());
+                let mut calendar = Calendar::new(Some(Epoch::from_week(2200, 0.0)));
+                let found = read(&frame[..length], &mut calendar, &mut Locks::default());
                 assert!(found.table.is_none_or(|table| table.rows.len() <= 64), "{name} {length}");
             }
         }
