@@ -39,6 +39,7 @@ mod sink;
 mod source;
 mod speed;
 mod staging;
+mod stations;
 mod study;
 mod watch;
 mod web;
