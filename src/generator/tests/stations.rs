@@ -164,7 +164,8 @@ fn observed(text: &str, station: &str) -> (Vec<u8>, Vec<Observation>) {
 fn a_station_alone_has_the_bytes_that_it_has_among_others() {
     let several = text("kind = \"noise\"\nbandwidth_hz = 1e6", [(1e-5, 0.0), (-3e-5, 1e-7)]);
     let alone = text_of_station(&several, "rover").unwrap();
-    assert_eq!(observed(&several, "rover"), observed(&alone, "rover"));
+    let ((bytes, rows), (own_bytes, own_rows)) = (observed(&several, "rover"), observed(&alone, "rover"));
+    assert!(bytes == own_bytes && format!("{rows:?}") == format!("{own_rows:?}"));
     // The order of stations changes nothing either.
     let (above, base) = several.split_once("[[station]]").unwrap();
     let (base, rover) = base.split_once("[[station]]").unwrap();
