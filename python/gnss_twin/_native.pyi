@@ -94,6 +94,7 @@ class Scene:
         *,
         seed: int | None = None,
         format: str | None = None,
+        station: str | None = None,
         front_end: str | None = None,
         allow_outside: bool = False,
     ) -> Scene:
@@ -106,6 +107,7 @@ class Scene:
         directory: _Path | None = None,
         seed: int | None = None,
         format: str | None = None,
+        station: str | None = None,
         front_end: str | None = None,
         allow_outside: bool = False,
     ) -> Scene:
@@ -118,6 +120,7 @@ class Scene:
         directory: _Path | None = None,
         seed: int | None = None,
         format: str | None = None,
+        station: str | None = None,
         front_end: str | None = None,
         allow_outside: bool = False,
     ) -> Scene:

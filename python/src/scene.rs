@@ -162,8 +162,12 @@ fn overrides(seed: Option<u64>, format: Option<&str>, allow_outside: bool) -> Py
     Ok(Overrides { seed, format, allow_outside })
 }
 
-/// The scenario with one of its front ends, where one is named.
-fn chosen(scenario: Scenario, front_end: Option<&str>) -> Result<Scenario, Failure> {
+/// The scenario of one of its stations with one of its front ends, where they are named.
+fn chosen(scenario: Scenario, station: Option<&str>, front_end: Option<&str>) -> Result<Scenario, Failure> {
+    let scenario = match station {
+        Some(name) => scenario.with_station(name)?,
+        None => scenario,
+    };
     Ok(match front_end {
         Some(name) => scenario.with_front_end(name)?,
         None => scenario,
@@ -174,18 +178,20 @@ fn chosen(scenario: Scenario, front_end: Option<&str>) -> Result<Scenario, Failu
 impl Scene {
     /// Reads a file; files that it names are relative to its directory.
     #[staticmethod]
-    #[pyo3(signature = (path, *, seed = None, format = None, front_end = None, allow_outside = false))]
+    #[pyo3(signature = (path, *, seed = None, format = None, station = None, front_end = None,
+        allow_outside = false))]
     fn open(
         py: Python<'_>,
         path: PathBuf,
         seed: Option<u64>,
         format: Option<&str>,
+        station: Option<&str>,
         front_end: Option<&str>,
         allow_outside: bool,
     ) -> PyResult<Self> {
         let overrides = overrides(seed, format, allow_outside)?;
         long(py, |_| {
-            let scenario = chosen(Scenario::open(&path)?, front_end)?;
+            let scenario = chosen(Scenario::open(&path)?, station, front_end)?;
             let text = std::fs::read_to_string(&path).map_err(|error| Failure::file(&path, &error))?;
             let settings = Settings::of_scenario(&text, &path.display().to_string())?;
             let directory = path.parent().unwrap_or(Path::new(".")).to_owned();
@@ -195,34 +201,37 @@ impl Scene {
 
     /// Reads a text; files that it names are relative to `directory`.
     #[staticmethod]
-    #[pyo3(signature = (text, *, directory = None, seed = None, format = None, front_end = None,
-        allow_outside = false))]
+    #[pyo3(signature = (text, *, directory = None, seed = None, format = None, station = None,
+        front_end = None, allow_outside = false))]
     fn from_toml(
         py: Python<'_>,
         text: &str,
         directory: Option<PathBuf>,
         seed: Option<u64>,
         format: Option<&str>,
+        station: Option<&str>,
         front_end: Option<&str>,
         allow_outside: bool,
     ) -> PyResult<Self> {
         let overrides = overrides(seed, format, allow_outside)?;
         let directory = directory.unwrap_or_else(|| PathBuf::from("."));
         long(py, |_| {
-            let scenario = chosen(Scenario::parse_in(text, "scenario", &directory, allow_outside)?, front_end)?;
+            let scenario =
+                chosen(Scenario::parse_in(text, "scenario", &directory, allow_outside)?, station, front_end)?;
             Self::compose(scenario, Settings::of_scenario(text, "scenario")?, directory, overrides)
         })
     }
 
     /// Reads a dictionary with the keys of a scenario.
     #[staticmethod]
-    #[pyo3(signature = (keys, *, directory = None, seed = None, format = None, front_end = None,
-        allow_outside = false))]
+    #[pyo3(signature = (keys, *, directory = None, seed = None, format = None, station = None,
+        front_end = None, allow_outside = false))]
     fn from_dict(
         keys: &Bound<'_, PyDict>,
         directory: Option<PathBuf>,
         seed: Option<u64>,
         format: Option<&str>,
+        station: Option<&str>,
         front_end: Option<&str>,
         allow_outside: bool,
     ) -> PyResult<Self> {
@@ -239,7 +248,7 @@ impl Scene {
             };
             let scenario = Scenario::parse_in(&text, "scenario", &directory, allow_outside)
                 .map_err(|error| Failure::of_table(&error))?;
-            Self::compose(chosen(scenario, front_end)?, settings, directory, overrides)
+            Self::compose(chosen(scenario, station, front_end)?, settings, directory, overrides)
         })
     }
 

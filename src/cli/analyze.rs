@@ -11,6 +11,7 @@ use crate::cli::logs as log_tables;
 use crate::cli::printed;
 use crate::cli::run::judge_error;
 use crate::cli::scenario;
+use crate::cli::stations;
 use analysis::judge::foreign::{self, Files};
 use analysis::judge::schema::SUMMARY;
 use analysis::judge::verdict::Verdict;
@@ -27,6 +28,7 @@ pub fn execute(arguments: &args::Analyze) -> Result<(), CliError> {
     let Some(run) = &arguments.run else {
         return Err(CliError::usage("analyze: expected a run's directory, or --truth"));
     };
+    stations::refuse_several(run)?;
     let gate = Gate::read(arguments.check.as_ref(), &SUMMARY)?;
     earlier_files(run).iter().for_each(|warning| scenario::warn(warning));
     let summary = analysis::judge_into(run, gate.limits(), arguments.report.forms()).map_err(judge_error)?;

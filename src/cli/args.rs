@@ -210,13 +210,18 @@ fn grade(name: &str) -> Result<Grade, String> {
 
 #[derive(Args, Debug, Default)]
 #[command(after_help = "Examples:\n  gnss-twin run scenarios/static.toml --seed 7 --keep-if\n  gnss-twin run \
-                        scenarios/static.toml --level correlations")]
+                        scenarios/static.toml --level correlations\n  gnss-twin run scenarios/rtk_static.toml --station \
+                        base")]
 pub struct Run {
     /// Scene to run [default: the embedded scene of GPS and Galileo]
     pub scenario: Option<PathBuf>,
-    /// Directory for the results [default: reports/SCENE, or reports/SCENE-NAME with --front-end NAME]
+    /// Directory for the results, with one below it for each of several stations [default: reports/SCENE, or
+    /// reports/SCENE-NAME with --station NAME or --front-end NAME]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Station to run in a scene with several [default: all, one after the other]
+    #[arg(long, value_name = "NAME")]
+    pub station: Option<String>,
     /// Front end to receive in a scene with several [default: all in one reception]
     #[arg(long, value_name = "NAME")]
     pub front_end: Option<String>,
@@ -292,6 +297,9 @@ pub struct Generate {
     /// Packing of samples whose width is that of the scene's converter
     #[command(flatten)]
     pub packed: Bits,
+    /// Station whose samples are generated in a scene with several
+    #[arg(long, value_name = "NAME")]
+    pub station: Option<String>,
     /// Front end to generate in a scene with several [default: all]
     #[arg(long, value_name = "NAME")]
     pub front_end: Option<String>,
@@ -367,6 +375,9 @@ pub struct Live {
     /// Exit with code 3 after more than N late states
     #[arg(long, value_name = "N")]
     pub max_late: Option<u64>,
+    /// Station whose samples are sent in a scene with several
+    #[arg(long, value_name = "NAME")]
+    pub station: Option<String>,
     /// Front end to send in a scene with several
     #[arg(long, value_name = "NAME")]
     pub front_end: Option<String>,
@@ -593,6 +604,9 @@ pub struct ReceiverFiles {
 pub struct Plan {
     /// Scene to plan [default: the embedded scene of GPS and Galileo]
     pub scenario: Option<PathBuf>,
+    /// Station to plan in a scene with several [default: all]
+    #[arg(long, value_name = "NAME")]
+    pub station: Option<String>,
     /// Allow the scene to read files outside its own directory
     #[arg(long)]
     pub allow_outside: bool,

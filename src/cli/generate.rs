@@ -40,8 +40,9 @@ pub fn execute(arguments: &args::Generate) -> Result<(), CliError> {
     if arguments.printed.json && matches!(stream, Some(sink::Spec::Stdout)) {
         return Err(CliError::usage("--json and --out -: standard output takes one of them"));
     }
-    let named =
-        scenario::read(Some(&arguments.scenario), arguments.allow_outside)?.choose(arguments.front_end.as_deref())?;
+    let named = scenario::read(Some(&arguments.scenario), arguments.allow_outside)?
+        .at_station(arguments.station.as_deref())?
+        .choose(arguments.front_end.as_deref())?;
     let (mut scenes, warnings) = scenario::compose_all(
         &named,
         &Overrides {

@@ -42,6 +42,7 @@ mod sink;
 mod source;
 mod speed;
 mod staging;
+mod stations;
 mod study;
 mod watch;
 mod web;

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use crate::cli::args;
 use crate::cli::error::CliError;
 use crate::cli::run::generator_error;
-use crate::cli::scenario;
+use crate::cli::scenario::{self, Named};
 use generator::dynamics::{LineOfSight, lines_of_sight};
 use generator::effect::troposphere::TOP_M;
 use generator::plan::{Plan, Together};
@@ -25,12 +25,34 @@ use study::demand::{self, Answer, Demand};
 /// Standard gravity, for accelerations in g.
 const G_MPS2: f64 = 9.806_65;
 
-/// Prints the plan of a scene.
+/// Prints the plan of a scene, or of each station's.
 pub fn execute(arguments: &args::Plan) -> Result<(), CliError> {
-    let named = scenario::read(arguments.scenario.as_deref(), arguments.allow_outside)?;
+    let named = scenario::read(arguments.scenario.as_deref(), arguments.allow_outside)?
+        .at_station(arguments.station.as_deref())?;
+    let stations = named.each_station()?;
+    let (mut texts, mut objects) = (Vec::new(), Vec::new());
+    for (name, named) in &stations {
+        let (text, mut object) = planned(named, arguments)?;
+        match name {
+            Some(name) => {
+                object["station"] = json!(name);
+                texts.push(format!("station    {name}\n{text}"));
+            }
+            None => texts.push(text),
+        }
+        objects.push(object);
+    }
+    arguments.printed.results(&texts.join("\n"), || match objects.as_slice() {
+        [object] => object.clone(),
+        several => json!({ "stations": several }),
+    })
+}
+
+/// The plan of a scene in words, and as a JSON object.
+fn planned(named: &Named, arguments: &args::Plan) -> Result<(String, Value), CliError> {
     let overrides = Overrides { allow_outside: arguments.allow_outside, ..Overrides::default() };
-    let (scenes, warnings) = scenario::compose_all(&named, &overrides)?;
-    let settings = scenario::receiver_settings(&named)?;
+    let (scenes, warnings) = scenario::compose_all(named, &overrides)?;
+    let settings = scenario::receiver_settings(named)?;
     for warning in warnings {
         scenario::warn(&warning);
     }
@@ -58,7 +80,7 @@ pub fn execute(arguments: &args::Plan) -> Result<(), CliError> {
         note(&all.speed());
         together = format!("{all}\n");
     }
-    arguments.printed.results(&(together + &texts.join("\n")), || json!({ "front_ends": objects }))
+    Ok((together + &texts.join("\n"), json!({ "front_ends": objects })))
 }
 
 /// Warnings about an atmosphere that the receiver corrects for and that the scene does not have.

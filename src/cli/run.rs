@@ -1,108 +1,178 @@
 //! `run`: generator and receiver side by side with samples passed in memory, then the judge.
 //!
 //! All front ends of a scene are received in one reception ([`made`]); here are the verdict and the times.
+//! Several stations run one after the other ([`stations`]).
 
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::cli::args;
 use crate::cli::check::Gate;
 use crate::cli::error::CliError;
-use crate::cli::made::{self, Wanted};
+use crate::cli::made::{self, Both, Wanted};
 use crate::cli::printed;
 use crate::cli::progress::Progress;
-use crate::cli::scenario;
+use crate::cli::scenario::{self, Named};
 use crate::cli::speed::Speed;
 use crate::cli::staging::Staging;
+use crate::cli::stations;
 use analysis::judge::schema::SUMMARY;
+use analysis::judge::summary::Summary;
+use analysis::judge::verdict::Verdict;
 use analysis::{self, JudgeError};
 use generator::fidelity::Grade;
 use generator::scenario::Overrides;
+use generator::scene::Scene;
 use generator::{GenerateError, truth};
 use receiver::ReceiveError;
 use receiver::lead::undated;
 use receiver::output::OutputError;
+use receiver::settings::Settings;
 
-/// Runs a scene end to end.
+/// Runs a scene end to end, or that of each station.
 pub fn execute(arguments: &args::Run) -> Result<(), CliError> {
     scenario::use_threads(arguments.threads)?;
-    let mut named = scenario::read(arguments.scenario.as_deref(), arguments.allow_outside)?
-        .choose(arguments.front_end.as_deref())?;
-    if let Some(grade) = arguments.level {
-        named.scenario.front_ends.iter_mut().for_each(|front_end| front_end.fidelity = front_end.fidelity.at(grade));
-    }
+    let named = scenario::read(arguments.scenario.as_deref(), arguments.allow_outside)?
+        .at_station(arguments.station.as_deref())?;
+    let name = named.scenario.name.clone();
+    let mut stations = named.each_station()?;
     let gate = Gate::read(arguments.check.as_ref(), &SUMMARY)?;
-    let (scenes, warnings) = scenario::compose_all(
-        &named,
-        &Overrides { seed: arguments.seed, format: None, allow_outside: arguments.allow_outside },
-    )?;
-    let Some(scene) = scenes.first() else { return Err(CliError::bug("a scenario without a front end")) };
-    let settings = twin::settings_for(&scenes, &scenario::receiver_settings(&named)?);
-    // A scene is made for its position: without one there is nothing to judge.
-    if let Some((signal, reason)) = undated(&settings.acquisition.signals()) {
-        return Err(receiver_error(ReceiveError::Unsupported { signal: signal.name, reason }));
-    }
-    for warning in warnings {
-        scenario::warn(&warning);
-    }
     let own = arguments.front_end.as_ref().map_or_else(String::new, |name| format!("-{name}"));
-    let usual = || PathBuf::from("reports").join(scenario::file_name(&scene.name) + &own);
-    let target = arguments.out.clone().unwrap_or_else(usual);
+    let usual = |scene: &str| PathBuf::from("reports").join(scenario::file_name(scene) + &own);
+    let target = |scene: &str| arguments.out.clone().unwrap_or_else(|| usual(scene));
+    if stations.len() > 1 {
+        return stations::run(stations, arguments, &gate, &target(&name));
+    }
+    let Some((_, named)) = stations.pop() else { return Err(CliError::bug("a scenario without a station")) };
+    let case = Case::new(named, arguments)?;
+    let target = target(case.name());
     let staging = Staging::directory(&target)?;
-    let run = staging.path();
-
-    let is_sampled = scene.fidelity.grade != Grade::Correlations;
-    let label = format!("run {}", scene.name);
-    let progress = Progress::new(&label, Some(scene.samples), arguments.printed.in_words());
-    let told = |samples| progress.set(samples);
-    let wanted = Wanted { exchanged: Some(arguments.rinex), keep_if: arguments.keep_if, told: &told };
-    let both = made::make(run, &scenes, &settings, &wanted)?;
-    drop(progress);
-
-    let duration_s = scene.metadata.rate.elapsed_s(scene.samples);
-    let speed = Speed::new(duration_s, both.generator_busy, both.receiver_busy, both.whole);
-    write_json(&run.join("speed.json"), &speed)?;
-    let path = run.join("scenario.toml");
-    fs::write(&path, &named.text).map_err(|error| CliError::output(path.display(), &error))?;
-    let summary = analysis::judge_into(run, gate.limits(), arguments.report.forms()).map_err(judge_error)?;
+    let done = case.make(staging.path(), arguments, &gate)?;
     staging.commit()?;
 
-    for warning in &both.outcome.warnings {
-        scenario::warn(warning);
-    }
-    let mut text = format!("{summary}\n");
-    if let Some(diagnosis) = &both.outcome.diagnosis {
-        text += &format!("{diagnosis}\n");
-    }
-    text += &printed::last_fix_line(both.outcome.last_fix.as_ref());
-    text += &format!("margins       {}\n", both.outcome.conditioning);
-    for generated in &both.generated {
-        text += &if is_sampled {
-            format!("made          {generated}\n")
-        } else {
-            format!("modelled      {}\n", generated.modelled(duration_s))
-        };
-    }
-    text += &format!("results in {}\n", target.display());
-    let verdict = &summary.details.verdict;
-    arguments.printed.results(&text, || {
-        json!({
-            "results": target,
-            "made": both.generated,
-            "last_fix": printed::last_fix(both.outcome.last_fix.as_ref()),
-            "diagnosis": both.outcome.diagnosis.as_ref().map(ToString::to_string),
-            "margins": both.outcome.conditioning,
-            "summary": summary,
-            "verdict": printed::verdict(verdict),
-        })
-    })?;
-    gate.enforce(verdict, arguments.printed)
+    done.warn();
+    let text = done.text() + &format!("results in {}\n", target.display());
+    arguments.printed.results(&text, || done.object(&target))?;
+    gate.enforce(done.verdict(), arguments.printed)
 }
 
-fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), CliError> {
+/// A scenario of one station or none, ready to run.
+pub struct Case {
+    named: Named,
+    /// Scenes of the front ends, one at least.
+    pub scenes: Vec<Scene>,
+    settings: Settings,
+}
+
+impl Case {
+    /// Composes the scenes, and warns of what they lack.
+    pub fn new(named: Named, arguments: &args::Run) -> Result<Self, CliError> {
+        let mut named = named.choose(arguments.front_end.as_deref())?;
+        if let Some(grade) = arguments.level {
+            let each = named.scenario.front_ends.iter_mut();
+            each.for_each(|front_end| front_end.fidelity = front_end.fidelity.at(grade));
+        }
+        let (scenes, warnings) = scenario::compose_all(
+            &named,
+            &Overrides { seed: arguments.seed, format: None, allow_outside: arguments.allow_outside },
+        )?;
+        if scenes.is_empty() {
+            return Err(CliError::bug("a scenario without a front end"));
+        }
+        let settings = twin::settings_for(&scenes, &scenario::receiver_settings(&named)?);
+        // A scene is made for its position: without one there is nothing to judge.
+        if let Some((signal, reason)) = undated(&settings.acquisition.signals()) {
+            return Err(receiver_error(ReceiveError::Unsupported { signal: signal.name, reason }));
+        }
+        for warning in warnings {
+            scenario::warn(&warning);
+        }
+        Ok(Self { named, scenes, settings })
+    }
+
+    /// Name of the scene.
+    pub fn name(&self) -> &str {
+        self.scenes.first().map_or("", |scene| &scene.name)
+    }
+
+    /// Generates, receives and judges into an empty directory.
+    pub fn make(&self, run: &Path, arguments: &args::Run, gate: &Gate) -> Result<Done, CliError> {
+        let Some(scene) = self.scenes.first() else { return Err(CliError::bug("a scenario without a front end")) };
+        let is_sampled = scene.fidelity.grade != Grade::Correlations;
+        let label = format!("run {}", scene.name);
+        let progress = Progress::new(&label, Some(scene.samples), arguments.printed.in_words());
+        let told = |samples| progress.set(samples);
+        let wanted = Wanted { exchanged: Some(arguments.rinex), keep_if: arguments.keep_if, told: &told };
+        let both = made::make(run, &self.scenes, &self.settings, &wanted)?;
+        drop(progress);
+
+        let duration_s = scene.metadata.rate.elapsed_s(scene.samples);
+        let speed = Speed::new(duration_s, both.generator_busy, both.receiver_busy, both.whole);
+        write_json(&run.join("speed.json"), &speed)?;
+        let path = run.join("scenario.toml");
+        fs::write(&path, &self.named.text).map_err(|error| CliError::output(path.display(), &error))?;
+        let summary = analysis::judge_into(run, gate.limits(), arguments.report.forms()).map_err(judge_error)?;
+        Ok(Done { both, summary, modelled_s: (!is_sampled).then_some(duration_s) })
+    }
+}
+
+/// Results of a run beside its files.
+pub struct Done {
+    both: Both,
+    summary: Summary,
+    /// Length of a scene whose correlations a model gave, in seconds.
+    modelled_s: Option<f64>,
+}
+
+impl Done {
+    /// Warnings of the receiver.
+    pub fn warn(&self) {
+        self.both.outcome.warnings.iter().for_each(|warning| scenario::warn(warning));
+    }
+
+    /// Verdict of the judge.
+    pub fn verdict(&self) -> &Verdict {
+        &self.summary.details.verdict
+    }
+
+    /// Summary in words, with what was made.
+    pub fn text(&self) -> String {
+        let outcome = &self.both.outcome;
+        let mut text = format!("{}\n", self.summary);
+        if let Some(diagnosis) = &outcome.diagnosis {
+            text += &format!("{diagnosis}\n");
+        }
+        text += &printed::last_fix_line(outcome.last_fix.as_ref());
+        text += &format!("margins       {}\n", outcome.conditioning);
+        for generated in &self.both.generated {
+            text += &match self.modelled_s {
+                None => format!("made          {generated}\n"),
+                Some(duration_s) => format!("modelled      {}\n", generated.modelled(duration_s)),
+            };
+        }
+        text
+    }
+
+    /// JSON object of the run with results in a directory.
+    pub fn object(&self, results: &Path) -> Value {
+        let outcome = &self.both.outcome;
+        json!({
+            "results": results,
+            "made": self.both.generated,
+            "last_fix": printed::last_fix(outcome.last_fix.as_ref()),
+            "diagnosis": outcome.diagnosis.as_ref().map(ToString::to_string),
+            "margins": outcome.conditioning,
+            "summary": self.summary,
+            "verdict": printed::verdict(self.verdict()),
+        })
+    }
+}
+
+/// Writes a value as JSON.
+pub fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), CliError> {
     let mut text = serde_json::to_string_pretty(value).map_err(CliError::bug)?;
     text.push('\n');
     fs::write(path, text).map_err(|error| CliError::output(path.display(), &error))

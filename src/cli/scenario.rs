@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::cli::error::{CliError, escaped, shown};
 use crate::cli::scenes;
-use generator::scenario::{Overrides, Scenario, ScenarioError, described_signal};
+use generator::scenario::{Overrides, Scenario, ScenarioError, described_signal, text_of_station};
 use generator::scene::Scene;
 use receiver::settings::{Settings, SettingsError};
 
@@ -17,6 +17,7 @@ const EMBEDDED: &str = include_str!("../../scenarios/two_systems.toml");
 pub const LARGEST_BYTES: u64 = 4 << 20;
 
 /// A scenario as written, and the directory that its paths are relative to.
+#[derive(Clone)]
 pub struct Named {
     pub scenario: Scenario,
     /// Text of the scenario.
@@ -35,6 +36,30 @@ impl Named {
         let refuse = |_| CliError::usage(format!("--front-end {name}: {}: expected one of {known}", self.name));
         let scenario = self.scenario.with_front_end(name).map_err(refuse)?;
         Ok(Self { scenario, ..self })
+    }
+}
+
+impl Named {
+    /// The scenario of the station of that name, if there is a name. Its text is that of the station alone.
+    pub fn at_station(self, station: Option<&str>) -> Result<Self, CliError> {
+        let Some(name) = station else { return Ok(self) };
+        let known = self.scenario.station_names();
+        let known = if known.is_empty() { "it has no [[station]]".to_owned() } else { known.join(", ") };
+        let refuse = |_| CliError::usage(format!("--station {name}: {}: expected one of {known}", self.name));
+        let scenario = self.scenario.with_station(name).map_err(refuse)?;
+        let text = text_of_station(&self.text, name).ok_or_else(|| CliError::bug("a station without a text"))?;
+        Ok(Self { name: format!("{}, station {name}", self.name), scenario, text, directory: self.directory })
+    }
+
+    /// The scenario of each station with its name, in order; the scenario itself, without a name, if it has
+    /// none or one.
+    pub fn each_station(self) -> Result<Vec<(Option<String>, Self)>, CliError> {
+        if self.scenario.stations.is_empty() {
+            return Ok(vec![(None, self)]);
+        }
+        let names: Vec<String> = self.scenario.station_names().into_iter().map(str::to_owned).collect();
+        let at = |name: String| self.clone().at_station(Some(&name)).map(|named| (Some(name), named));
+        names.into_iter().map(at).collect()
     }
 }
 

@@ -28,7 +28,13 @@ pub fn execute(arguments: &args::Schema) -> Result<(), CliError> {
 
 /// The schema of a scene.
 pub fn scenario() -> String {
-    document("Scene of gnss-twin", object(SCENARIO))
+    let mut scene = object(SCENARIO);
+    // Stations may have their own.
+    if let Some(required) = scene["required"].as_array_mut() {
+        required.retain(|name| name != "motion");
+    }
+    scene["anyOf"] = json!([{ "required": ["motion"] }, { "required": ["station"] }]);
+    document("Scene of gnss-twin", scene)
 }
 
 fn document(title: &str, mut schema: Json) -> String {

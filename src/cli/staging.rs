@@ -13,8 +13,16 @@ use crate::cli::error::CliError;
 use analysis::show::staged::{Staged, present, remove};
 
 /// Files that mark a directory as one of ours, which may be replaced.
-const MARKERS: [&str; 7] =
-    ["truth/scene.json", "rx/receiver.json", "receiver.json", "scene.json", "log.json", "osnma.json", "baseline.json"];
+const MARKERS: [&str; 8] = [
+    "truth/scene.json",
+    "rx/receiver.json",
+    "receiver.json",
+    "scene.json",
+    "stations.json",
+    "log.json",
+    "osnma.json",
+    "baseline.json",
+];
 
 /// A directory or file in the making; dropped without [`Staging::commit`], it vanishes.
 pub struct Staging {

@@ -8,6 +8,7 @@ use std::str::FromStr;
 use crate::cli::address::peer_address;
 use crate::cli::args;
 use crate::cli::error::{CliError, shown};
+use crate::cli::stations;
 use crate::cli::web::{Web, source};
 use analysis::show::page::live::Words;
 
@@ -48,6 +49,7 @@ pub fn execute(arguments: &args::Watch) -> Result<(), CliError> {
             "Rows of the receiver's JSON lines. They have no truth.",
         ),
         Watched::Directory(path) => {
+            stations::refuse_several(path)?;
             if source::directories(path).is_empty() {
                 return Err(CliError::input(format!("{}: no such directory, finished or unfinished", shown(path))));
             }

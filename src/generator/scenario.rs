@@ -34,6 +34,7 @@ mod scintillation;
 mod signal_file;
 mod spoofing_and_jamming;
 mod stages;
+mod station;
 #[cfg(test)]
 mod tests;
 mod trajectory;
@@ -42,6 +43,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
+use toml::de::DeTable;
 
 pub use augmentation::SbasSpec;
 pub use builder::{Builder, put};
@@ -60,6 +62,7 @@ use read::{Refusals, Source, Table};
 pub use satellite::{MessageKind, MessageSpec, OrbitsSpec, SatelliteFault};
 pub use signal_file::described_signal;
 use stages::PlaybackSpec;
+pub use station::text_of as text_of_station;
 
 use crate::effect::multipath::Echo;
 use crate::effect::obstruction::Obstacle;
@@ -214,6 +217,10 @@ pub struct Scenario {
     pub duration_s: f64,
     /// Seed of all random numbers.
     pub seed: u64,
+    /// Name of the station whose scenario this is; absent where the scene has no stations.
+    pub station: Option<String>,
+    /// Scenarios of the stations, if there are several. The other fields are then those of the first.
+    pub stations: Vec<Scenario>,
     /// Signals that satellites send.
     pub signals: Vec<&'static Signal>,
     /// Navigation files, relative to the scenario's directory; empty means the embedded file.
@@ -320,7 +327,33 @@ impl Scenario {
     pub fn parse_in(text: &str, origin: &str, directory: &Path, allow_outside: bool) -> Result<Self, ScenarioError> {
         let source = Source { origin, text };
         let document = signal_file::parsed(&source)?;
-        let root = Table::new(&source, "", 0, document.get_ref(), keys::SCENARIO);
+        let own = station::each(&source, document.get_ref())?;
+        let Some(first) = own.first() else {
+            return Self::of_document(&source, document.get_ref(), directory, allow_outside);
+        };
+        let mut refusals = Refusals::default();
+        let mut stations = Vec::with_capacity(own.len());
+        for station in &own {
+            let read = Self::of_document(&source, &station.document, directory, allow_outside);
+            stations.extend(refusals.take(read).map(|scenario| scenario.at_station(&station.name)));
+        }
+        refusals.finish()?;
+        let whole = Self::of_document(&source, &first.document, directory, allow_outside)?;
+        Ok(match stations.pop() {
+            Some(only) if stations.is_empty() => only,
+            last => Self { stations: stations.into_iter().chain(last).collect(), ..whole },
+        })
+    }
+
+    /// Reads a document of that text.
+    fn of_document(
+        source: &Source<'_>,
+        document: &DeTable<'_>,
+        directory: &Path,
+        allow_outside: bool,
+    ) -> Result<Self, ScenarioError> {
+        let Source { origin, text } = *source;
+        let root = Table::new(source, "", 0, document, keys::SCENARIO);
         let mut refusals = Refusals::default();
         root.check(&mut refusals);
         let receiver = refusals.take(receiver(&root, text).map_err(|e| source.refused(&e))).flatten();
@@ -391,6 +424,8 @@ impl Scenario {
             start: start?,
             duration_s: duration_s?,
             seed: seed?,
+            station: None,
+            stations: Vec::new(),
             signals: signals?,
             navigation: files.iter().map(PathBuf::from).collect(),
             moved_to,

@@ -15,7 +15,7 @@ use crate::fast_phase::scintillation::Scintillation;
 pub use crate::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade};
 use crate::low_pass::CUTOFF_CPS;
 use crate::message::{MessageFault, Senders};
-use crate::random::Stream;
+use crate::random::{Stream, seed_of};
 use crate::ray::{Effect, SPACE_M, Sight};
 use crate::spoof::Constellation;
 use crate::stage::Stage;
@@ -38,7 +38,9 @@ pub struct Scene {
     pub name: String,
     /// Name of the front end, where the scenario gives it one.
     pub front_end_name: Option<String>,
-    /// Seed of all random numbers.
+    /// Name of the station that receives it, where the scenario has stations.
+    pub station: Option<String>,
+    /// Seed of all random numbers; of what stations share, if there are any.
     pub seed: u64,
     /// Number of samples.
     pub samples: u64,
@@ -113,11 +115,12 @@ impl Scene {
         Geodetic::from_ecef(&self.trajectory.at(0.0).position_m).height_m >= SPACE_M
     }
 
-    /// Seed of the random numbers of one front end. It is a function of the front end's name, and not of its
-    /// position in a list.
+    /// Seed of the random numbers of one front end. It is a function of the names of the front end and its
+    /// station, and not of their positions in a list.
     pub fn noise_seed(&self) -> u64 {
-        let own = |name: &String| Stream::new(self.seed, "front end").named(name).word(0);
-        self.front_end_name.as_ref().map_or(self.seed, own)
+        let seed = seed_of(self.station.as_deref(), self.seed);
+        let own = |name: &String| Stream::new(seed, "front end").named(name).word(0);
+        self.front_end_name.as_ref().map_or(seed, own)
     }
 
     /// Signals of the scene that a satellite sends and that lie at least partly in the samples' band.

@@ -150,7 +150,7 @@ const BOUNDS: [&str; 2] = ["min", "max"];
 /// Legality of `bad` at `table.key`, where `was` is the present value; `None` if the tables do not know the
 /// key.
 pub fn legal(table: &str, key: &str, was: &str, bad: &str) -> Option<Legal> {
-    let table = table.trim_start_matches("receiver.").trim_start_matches("front_end.");
+    let table = table.trim_start_matches("receiver.").trim_start_matches("station.").trim_start_matches("front_end.");
     let last = key.rsplit('.').next().unwrap_or(key);
     if last == "equals" {
         return Some(if ["inf", "-inf", "nan", "[1979-05-27]"].contains(&bad) { No } else { Yes });

@@ -1,5 +1,5 @@
 //! The samples of every shipped scene are the bytes that they have always been: `samples.sha256` has the
-//! hashes of three segments of each, and of each front end where there are several. A change of the signal
+//! hashes of three segments of each, and of each station and front end where there are several. A change of the signal
 //! chain that changes them says so there, and in the changelog why they were wrong before.
 
 use std::path::Path;
@@ -14,13 +14,16 @@ fn the_samples_of_every_shipped_scene_are_the_bytes_that_they_were() {
     let (mut changed, mut scenes) = (Vec::new(), std::collections::BTreeSet::new());
     for line in include_str!("../samples.sha256").lines() {
         let words: Vec<&str> = line.split_whitespace().collect();
-        let (&[hash, scenario, seek, samples], front_end) = words.split_first_chunk().unwrap();
+        let (&[hash, scenario, seek, samples], of_it) = words.split_first_chunk().unwrap();
+        let (stations, front_ends): (Vec<&str>, Vec<&str>) =
+            of_it.iter().partition(|word| word.starts_with("station="));
         let out = place.path().join("samples.sigmf-data");
         let done = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
             .current_dir(root)
             .args(["generate", scenario, "--seek", seek, "--samples", samples, "--out"])
             .arg(&out)
-            .args(front_end.iter().flat_map(|name| ["--front-end", *name]))
+            .args(stations.iter().map(|name| format!("--{name}")))
+            .args(front_ends.iter().flat_map(|name| ["--front-end", *name]))
             .output()
             .unwrap();
         assert!(done.status.success(), "{line}: {}", String::from_utf8_lossy(&done.stderr));

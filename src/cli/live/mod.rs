@@ -59,8 +59,9 @@ pub fn execute(arguments: &args::Live) -> Result<(), CliError> {
             "--to -: standard output is a terminal: name a sink with --to, or a pipe behind |",
         ));
     }
-    let mut named =
-        scenario::read(Some(&arguments.scenario), arguments.allow_outside)?.choose(arguments.front_end.as_deref())?;
+    let mut named = scenario::read(Some(&arguments.scenario), arguments.allow_outside)?
+        .at_station(arguments.station.as_deref())?
+        .choose(arguments.front_end.as_deref())?;
     let start = arguments.start_at.map(instant).transpose()?;
     if let Some((epoch, _)) = start {
         named.scenario.start = epoch;

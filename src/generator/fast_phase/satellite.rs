@@ -3,11 +3,12 @@
 //! An error reaches the antenna as a change of code and carrier alike. Steps and ramps begin and end at
 //! nodes, up to a millisecond after the time that the scene gives, which is that of arrival; a step takes no
 //! time. Limits: the noise is drawn over the received samples, whose time runs a millionth faster or slower
-//! than the satellite's.
+//! than the satellite's; that of stations, over the true time of arrival.
 
 use std::collections::BTreeMap;
 
 use super::Sources;
+use crate::clock::nodes::Nodes;
 use crate::clock::oscillator::Oscillator;
 use gnss::satellite::Sv;
 
@@ -53,6 +54,8 @@ pub struct SatelliteClocks {
     pub clocks: BTreeMap<Sv, SatelliteClock>,
     /// Descriptions of the clock errors for the plan.
     pub descriptions: Vec<String>,
+    /// Nodes in true time at which noise is drawn that several stations see; absent means the receiver's.
+    pub shared: Option<Nodes>,
 }
 
 impl SatelliteClocks {
@@ -75,7 +78,14 @@ impl SatelliteClock {
         [node, node + 1].map(|at| {
             let changed = self.changes.iter().map(|change| change.offset_s(sources, node, at));
             let elapsed_s = sources.nodes.elapsed_s(at);
-            let noise = |oscillator: &Oscillator| oscillator.slow_s(elapsed_s) + oscillator.quick_s(at);
+            let noise = |oscillator: &Oscillator| match sources.satellite_clocks.shared {
+                None => oscillator.slow_s(elapsed_s) + oscillator.quick_s(at),
+                Some(nodes) => {
+                    let true_s = self::elapsed_s(sources, at).max(0.0);
+                    let rate = nodes.rate();
+                    oscillator.slow_s(true_s) + oscillator.quick_at_s(nodes.place(rate, true_s * rate.hz()))
+                }
+            };
             changed.chain(self.noise.iter().map(noise)).sum::<f64>()
         })
     }

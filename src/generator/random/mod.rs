@@ -18,6 +18,12 @@ pub fn mix(x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
+/// Seed of what is random about one receiver in a scene with `seed`: that of its station's name, or the
+/// scene's without stations.
+pub fn seed_of(station: Option<&str>, seed: u64) -> u64 {
+    station.map_or(seed, |name| Stream::new(seed, "station").named(name).word(0))
+}
+
 /// Stream of the random numbers of one process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stream {

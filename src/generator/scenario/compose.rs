@@ -20,7 +20,7 @@ use crate::fast_phase::satellite::SatelliteClocks;
 use crate::fast_phase::scintillation::Scintillation;
 use crate::message::{MessageFault, Senders};
 use crate::presence;
-use crate::random::Stream;
+use crate::random::{Stream, seed_of};
 use crate::ray::{Effect, Ray};
 use crate::scene::Scene;
 use crate::sky::emission;
@@ -53,7 +53,9 @@ pub struct Overrides {
 
 /// Parts that the front ends of a scene share.
 struct World {
+    /// Seed of what is common to all stations, and of what is a station's own.
     seed: u64,
+    own_seed: u64,
     nodes: Nodes,
     trajectory: Trajectory,
     switches: Option<Arc<Switches>>,
@@ -109,12 +111,14 @@ impl Scenario {
     /// Composes the scenes of all front ends. Each equals the scene that its front end has alone.
     ///
     /// # Errors
-    /// Values that are impossible, alone or together.
+    /// Values that are impossible, alone or together; several stations, of which [`Scenario::with_station`]
+    /// chooses one.
     pub fn compose_all(
         &self,
         directory: &Path,
         overrides: &Overrides,
     ) -> Result<(Vec<Scene>, Vec<String>), ScenarioError> {
+        self.one_station()?;
         let mut warnings = Vec::new();
         let files = Files { directory, overrides };
         let mut bands = Vec::with_capacity(self.front_ends.len());
@@ -196,11 +200,12 @@ impl Scenario {
             return Err(self.conflict("motion", reason));
         }
         let seed = overrides.seed.unwrap_or(self.seed);
+        let own_seed = seed_of(self.station.as_deref(), seed);
         // Without a name a front end has the nodes of its own samples; with one, those that any front end
         // has.
         let own = bands.iter().find(|band| band.front_end.name.is_none());
         let nodes = own.map_or_else(Nodes::common, |band| Nodes::of(band.metadata.rate));
-        let receiver_clock = self.receiver_clock.clock(seed, nodes.rate(), &trajectory);
+        let receiver_clock = self.receiver_clock.clock(own_seed, nodes.rate(), &trajectory);
         let end = match own {
             Some(band) => SampleClock { start: self.start, rate: band.metadata.rate }.epoch(band.samples),
             None => self.start.plus_s(self.duration_s),
@@ -227,10 +232,10 @@ impl Scenario {
         let felt = self.scintillation.clone().filter(|strength| strength.is_felt());
         Ok(World {
             message_faults,
-            satellite_clocks: Arc::new(satellite::clocks(self, &catalogue, &receiver_clock, seed, nodes.rate())),
+            satellite_clocks: Arc::new(satellite::clocks(self, &catalogue, &receiver_clock, seed, nodes)),
             effects,
             scintillation: felt.map(|strength| {
-                Arc::new(Scintillation::new(strength, nodes.rate(), Stream::new(seed, "scintillation")))
+                Arc::new(Scintillation::new(strength, nodes.rate(), Stream::new(own_seed, "scintillation")))
             }),
             catalogue,
             messages,
@@ -238,6 +243,7 @@ impl Scenario {
             own,
             excluded,
             seed,
+            own_seed,
             nodes,
             switches: trajectory.tick_samples().map(|samples| Arc::new(Switches::new(samples))),
             trajectory,
@@ -257,15 +263,16 @@ impl Scenario {
         let Band { front_end, metadata, samples, signals } = band;
         let noise_lsb = front_end.noise_lsb.unwrap_or_else(|| default_noise_lsb(metadata.format));
         let if_hz = signals.first().map_or(0.0, |signal| metadata.if_hz(signal.centre_hz()));
-        let stages = front_end.stages.in_order(front_end, (metadata.format, if_hz), world.seed, noise_lsb);
+        let stages = front_end.stages.in_order(front_end, (metadata.format, if_hz), world.own_seed, noise_lsb);
         let refuse = |reason: &str| self.conflict("filter.bandwidth_hz", front_end.of_it() + reason);
         let fidelity = front_end.fidelity.suited(metadata.rate.hz(), &signals);
         let fidelity =
             fidelity.map_err(|unmet| self.conflict("fidelity.budget", front_end.of_it() + &unmet.to_string()));
         let shared = |effect: &Arc<dyn Effect>| Box::new(Arc::clone(effect)) as Box<dyn Effect>;
         let mut scene = Scene {
-            name: self.name.clone(),
+            name: self.scene_name(),
             front_end_name: front_end.name.clone(),
+            station: self.station.clone(),
             seed: world.seed,
             samples,
             clock: SampleClock { start: self.start, rate: metadata.rate },

@@ -14,7 +14,7 @@ use super::read::Table;
 use super::{Scenario, ScenarioError, satellite_list};
 use crate::catalogue::Catalogue;
 use crate::clock::ReceiverClock;
-use crate::clock::nodes::node_samples;
+use crate::clock::nodes::{Nodes, node_samples};
 use crate::clock::oscillator::{Oscillator, PowerLaw};
 use crate::fast_phase::satellite::{Change, ChangeKind, SatelliteClocks};
 use crate::message::{FOREVER_S, Kind, MessageFault, spoiled};
@@ -24,7 +24,6 @@ use crate::random::Stream;
 use gnss::message::Message;
 use gnss::satellite::{Sv, System};
 use gnss::sp3::{self, Precise};
-use gnss::time::Rate;
 
 /// True time beyond both ends of the scene for which there must be orbits: light times and the receiver's
 /// clock.
@@ -306,9 +305,12 @@ pub(super) fn clocks(
     catalogue: &Catalogue,
     receiver_clock: &ReceiverClock,
     seed: u64,
-    rate: Rate,
+    nodes: Nodes,
 ) -> SatelliteClocks {
-    let mut clocks = SatelliteClocks::default();
+    // Stations have clocks and rates of their own: what all of them see is drawn over the true time.
+    let shared = scenario.station.is_some().then(Nodes::common);
+    let (rate, drawn_at) = (nodes.rate(), shared.unwrap_or(nodes).rate());
+    let mut clocks = SatelliteClocks { shared, ..SatelliteClocks::default() };
     let node = |t_s: f64| {
         let sample = receiver_clock.reading_elapsed_s(scenario.start, t_s) * rate.hz();
         (sample / node_samples(rate) as f64).ceil().max(0.0) as u64
@@ -328,7 +330,7 @@ pub(super) fn clocks(
                 let stream = Stream::new(seed, "satellite clock").part(number);
                 let all: Vec<Sv> = satellites.clone().unwrap_or_else(|| catalogue.satellites().collect());
                 for sv in &all {
-                    let oscillator = Oscillator::new(*law, rate, stream.satellite(*sv));
+                    let oscillator = Oscillator::new(*law, drawn_at, stream.satellite(*sv));
                     clocks.clocks.entry(*sv).or_default().noise.push(oscillator);
                 }
                 let who = satellites.as_ref().map_or("all satellites".to_owned(), |list| names(list));

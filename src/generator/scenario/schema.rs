@@ -301,9 +301,8 @@ fn walk(found: &mut Vec<Listed>, keys: &'static [Key], (path, many): (&str, bool
     for key in keys {
         let below = if path.is_empty() { key.name.to_owned() } else { format!("{path}.{}", key.name) };
         match key.value {
-            Value::Table(inner) | Value::OneOrMore(inner) if !found.iter().any(|listed| same(&listed.keys, inner)) => {
-                walk(found, inner, (&below, false), key.meaning);
-            }
+            Value::Table(inner) | Value::OneOrMore(inner) | Value::Tables(inner) if is_listed(found, inner) => {}
+            Value::Table(inner) | Value::OneOrMore(inner) => walk(found, inner, (&below, false), key.meaning),
             Value::Tables(inner) => walk(found, inner, (&below, true), key.meaning),
             Value::BySatellite(each) => found.push(Listed {
                 heading: format!("[{below}]"),
@@ -314,6 +313,11 @@ fn walk(found: &mut Vec<Listed>, keys: &'static [Key], (path, many): (&str, bool
             _ => {}
         }
     }
+}
+
+/// True if a table with these keys is listed under another name.
+fn is_listed(found: &[Listed], keys: &'static [Key]) -> bool {
+    found.iter().any(|listed| same(&listed.keys, keys))
 }
 
 /// True if a table with these keys is the listed one: `[spoofer.motion]` is `[motion]` again.

@@ -77,6 +77,29 @@ impl Source<'_> {
         self.scenario.conflict("interference", reason)
     }
 
+    /// True if stations hear the source, each on its own path.
+    fn is_shared(&self) -> bool {
+        self.scenario.station.is_some()
+    }
+
+    /// Refuses a source whose power or delay belongs to one antenna, where there are stations.
+    fn suits_stations(&self) -> Result<(), ScenarioError> {
+        match (self.is_shared(), self.spec.place, self.spec.strength) {
+            (false, ..) => Ok(()),
+            (true, None, _) => Err(self.refuse(
+                "stations hear it from where it is: write its position (latitude_deg, longitude_deg and height_m)",
+            )),
+            (true, Some(_), Strength::Radiated { .. }) if matches!(self.scenario.power, Power::Fixed { .. }) => {
+                Err(self.refuse("eirp_dbw needs [power] kind = \"link_budget\", at every station"))
+            }
+            (true, Some(_), Strength::Radiated { .. }) => Ok(()),
+            (true, Some(_), strength) => Err(self.refuse(&format!(
+                "{} is the power at one antenna: write eirp_dbw, which all stations share",
+                strength.key()
+            ))),
+        }
+    }
+
     fn interferer(
         &self,
         directory: &Path,
@@ -85,10 +108,14 @@ impl Source<'_> {
     ) -> Result<Option<Interferer>, ScenarioError> {
         let spec = self.spec;
         let kind = spec.kind.name();
+        self.suits_stations()?;
         let Some(fitted) = self.waveform(directory, overrides, warnings)? else { return Ok(None) };
         let path = spec.place.map(|place| Way { emitter_m: place.to_ecef(), antenna: self.scene.trajectory.clone() });
         let jn0_dbhz = self.jn0_dbhz(path.as_ref())? + 10.0 * libm::log10(fitted.share);
-        let on = self.tuning.sample_at(spec.on_s)..spec.off_s.map_or(u64::MAX, |t_s| self.tuning.sample_at(t_s));
+        // Stations hear a switch when its wave arrives.
+        let travel_s = |t_s: f64| path.as_ref().filter(|_| self.is_shared()).map_or(0.0, |path| path.travel_s(t_s));
+        let switched = |t_s: f64| self.tuning.sample_at(t_s + travel_s(t_s));
+        let on = switched(spec.on_s)..spec.off_s.map_or(u64::MAX, switched);
         let place = if path.is_some() { " from its position" } else { "" };
         let end = spec.off_s.map_or(String::new(), |t_s| format!(" to {t_s} s"));
         let description = format!(
@@ -115,6 +142,7 @@ impl Source<'_> {
             jn0_hz: libm::pow(10.0, jn0_dbhz / 10.0),
             path,
             on,
+            sent_s: self.is_shared().then_some(spec.on_s),
             // Sources of one scene, and the thermal noise, draw from streams of their own.
             seed: seed ^ self.number.wrapping_mul(0xd1b5_4a32_d192_ed03),
             tuning: self.tuning.clone(),
@@ -205,6 +233,7 @@ impl Source<'_> {
                 let waveform = Waveform::Matched { chips: Repetition::of_hz(chips_hz), edge: self.edge() };
                 (waveform, 2.0 * chips_hz, format!(", random chips at {:.3} MHz", chips_hz / 1e6))
             }
+            Kind::Noise { bandwidth_hz } if self.is_shared() => return self.emitted(*bandwidth_hz, warnings),
             Kind::Noise { bandwidth_hz } => return Ok(self.noise(*bandwidth_hz)),
             Kind::Recording { path, format, rate_hz, repeat } => {
                 let bytes = self.scenario.load("interference.file", directory, path, overrides)?;
@@ -261,6 +290,50 @@ impl Source<'_> {
         Some(Fitted { waveform, share: width_hz / bandwidth_hz, carrier_hz, text })
     }
 
+    /// Noise that stations share: in its whole band, of which a front end passes what its samples hold about
+    /// the middle.
+    fn emitted(&self, bandwidth_hz: f64, warnings: &mut Vec<String>) -> Result<Option<Fitted>, ScenarioError> {
+        if self.overlap_hz(bandwidth_hz).is_none() {
+            return Ok(None);
+        }
+        let rate = Repetition::of_hz(NOISE_RATE * bandwidth_hz);
+        let cutoff_cps = self.cutoff_cps(rate.hz(), "1.5 times bandwidth_hz", warnings)?;
+        let cutoff_cps = cutoff_cps.min(0.5 * bandwidth_hz / rate.hz());
+        let width_hz = 2.0 * cutoff_cps * rate.hz();
+        let text = format!(", Gaussian in {:.6} MHz of {:.6} MHz", width_hz / 1e6, bandwidth_hz / 1e6);
+        let waveform = Waveform::Emitted { width_hz, rate, by: Interpolator::new(cutoff_cps, true) };
+        Ok(Some(Fitted { waveform, share: width_hz / bandwidth_hz, carrier_hz: self.spec.center_hz, text }))
+    }
+
+    /// Cut-off of the interpolator of a source at `rate_hz`, whose name is `key`, in cycles per sample of it:
+    /// what the samples' band holds on each side of its middle.
+    fn cutoff_cps(&self, rate_hz: f64, key: &str, warnings: &mut Vec<String>) -> Result<f64, ScenarioError> {
+        let (low_hz, high_hz) = self.tuning.band_hz();
+        let place_hz = self.tuning.place_hz(self.spec.center_hz);
+        let room_hz = (place_hz - low_hz).min(high_hz - place_hz);
+        let cutoff_cps = (room_hz / rate_hz).min(0.5);
+        // Below a sixteenth of the source's rate the interpolator's 64 neighbours hold no two cycles of the
+        // cut-off.
+        if cutoff_cps < 1.0 / 16.0 {
+            let reason = format!(
+                "the samples' band leaves {room_hz} Hz on a side of it: expected at least a sixteenth of {key}, {} Hz",
+                rate_hz / 16.0
+            );
+            return Err(self.refuse(&reason));
+        }
+        let needed_cps = if matches!(self.spec.kind, Kind::Noise { .. }) { 0.5 / NOISE_RATE } else { 0.5 };
+        if cutoff_cps < needed_cps * (1.0 - 1e-9) {
+            warnings.push(format!(
+                "interference number {} ({}): the samples' band holds {:.6} MHz on each side of its middle: the rest \
+                 is filtered away",
+                self.number,
+                self.spec.kind.name(),
+                room_hz / 1e6
+            ));
+        }
+        Ok(cutoff_cps)
+    }
+
     fn recording(
         &self,
         bytes: &[u8],
@@ -278,28 +351,7 @@ impl Source<'_> {
         }
         let scale = (1.0 / mean.sqrt()) as f32;
         i.iter_mut().chain(&mut q).for_each(|x| *x *= scale);
-        let (low_hz, high_hz) = self.tuning.band_hz();
-        let place_hz = self.tuning.place_hz(self.spec.center_hz);
-        let room_hz = (place_hz - low_hz).min(high_hz - place_hz);
-        let cutoff_cps = (room_hz / file_rate_hz).min(0.5);
-        // Below a sixteenth of the file's rate the interpolator's 64 neighbours hold no two cycles of the
-        // cut-off.
-        if cutoff_cps < 1.0 / 16.0 {
-            let reason = format!(
-                "the samples' band leaves {room_hz} Hz on a side of it: expected at least a sixteenth of \
-                 sample_rate_hz, {} Hz",
-                file_rate_hz / 16.0
-            );
-            return Err(self.refuse(&reason));
-        }
-        if cutoff_cps < 0.5 {
-            warnings.push(format!(
-                "interference number {} (recording): the samples' band holds {:.6} MHz on each side of its middle: \
-                 the rest is filtered away",
-                self.number,
-                room_hz / 1e6
-            ));
-        }
+        let cutoff_cps = self.cutoff_cps(file_rate_hz, "sample_rate_hz", warnings)?;
         let waveform = Waveform::Recording {
             samples: Arc::new(Recorded { i, q }),
             rate: Repetition::of_hz(file_rate_hz),

@@ -8,6 +8,7 @@ mod satellite;
 mod shipped;
 mod signal_file;
 mod spoofing_and_jamming;
+mod station;
 
 use std::path::Path;
 

@@ -11,3 +11,4 @@ mod other_time;
 mod plan;
 mod presence;
 mod signals;
+mod stations;

@@ -67,14 +67,16 @@ fn every_figure_of_the_plan_of_a_shipped_scene_is_a_number_or_said_to_be_unknown
         |folder: &Path| fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect::<Vec<PathBuf>>();
     let all = [files(&root), files(&root.join("extremes"))].concat();
     let is_scene = |path: &&PathBuf| {
-        path.extension().is_some_and(|end| end == "toml") && fs::read_to_string(path).unwrap().contains("[motion]")
+        path.extension().is_some_and(|end| end == "toml") && fs::read_to_string(path).unwrap().contains("motion]")
     };
     let scenes: Vec<&PathBuf> = all.iter().filter(is_scene).collect();
     assert!(scenes.len() > 40, "{scenes:?}");
     for path in scenes {
-        let mut scenario = Scenario::open(path).unwrap();
-        scenario.duration_s = scenario.duration_s.min(0.1);
-        let (scenes, _) = scenario.compose_all(path.parent().unwrap(), &Overrides::default()).unwrap();
+        let mut scenes = Vec::new();
+        for mut scenario in Scenario::open(path).unwrap().each_station().to_vec() {
+            scenario.duration_s = scenario.duration_s.min(0.1);
+            scenes.extend(scenario.compose_all(path.parent().unwrap(), &Overrides::default()).unwrap().0);
+        }
         for scene in scenes {
             let text = Plan::of(&scene).unwrap().to_string();
             let odd = text.split(|c: char| !c.is_alphanumeric()).find(|word| ["NaN", "inf"].contains(word));

@@ -6,6 +6,7 @@ pub(crate) mod osnma;
 pub(crate) mod satellites;
 pub mod signal;
 pub(crate) mod spoofing_and_jamming;
+pub(crate) mod station;
 pub(crate) mod way;
 
 use super::schema::{Key, flag, foreign, integer, number, one_or_more, table, tables, text, texts, time, word, words};
@@ -109,6 +110,12 @@ pub const SCENARIO: &[Key] = &[
         EXPECT,
         "Expectation of the judge where it differs from what physics alone implies: at least one of `fix`, `losses` \
          and `errors`, with the `reason`.",
+    ),
+    tables(
+        "station",
+        station::STATION,
+        "Receiver of several under one sky, up to eight. Its tables stand in place of the scene's of that name; of \
+         `[power]` single keys do. A scene in which every station has a `[station.motion]` has no `[motion]`.",
     ),
     foreign("receiver", "the receiver's settings", "receiver settings for `run`, as below"),
 ];

@@ -113,6 +113,21 @@ pub(crate) const MESSAGE_FAULT: &[Key] = &[
 const FIXED: &[&str] = &["fixed"];
 const BUDGET: &[&str] = &["link_budget"];
 
+const CN0_OF_ALL: Key = number(
+    "cn0_dbhz",
+    0.0,
+    100.0,
+    "dB-Hz",
+    "C/N0 of all satellites at the antenna; chip edges and filters reduce it in the samples",
+);
+const CN0_OF_EACH: Key = by_satellite("satellites", &CN0, "C/N0 by satellite, with kind = \"fixed\".").of(FIXED);
+const ANTENNA: Key =
+    word("antenna", || vec!["isotropic", "patch", "turnstile", "table"], "receive antenna").of(BUDGET);
+const ANTENNA_FILE: Key =
+    text("antenna_file", A_PATH, "gain and phase by direction, for antenna = \"table\"").of(BUDGET);
+const NOISE_FIGURE: Key = number("noise_figure_db", 0.0, 30.0, "dB", "noise figure of the receiver").of(BUDGET);
+const LOSS: Key = number("loss_db", -20.0, 60.0, "dB", "additional loss").of(BUDGET);
+
 pub(crate) const POWER: &[Key] = &[
     word(
         "kind",
@@ -120,25 +135,27 @@ pub(crate) const POWER: &[Key] = &[
         "equal C/N0 for all satellites, or a link budget by range, elevation and antennas",
     )
     .or_else("fixed if cn0_dbhz is there, else link_budget"),
-    number(
-        "cn0_dbhz",
-        0.0,
-        100.0,
-        "dB-Hz",
-        "C/N0 of all satellites at the antenna; chip edges and filters reduce it in the samples",
-    )
-    .required()
-    .of(FIXED),
-    by_satellite("satellites", &CN0, "C/N0 by satellite, with kind = \"fixed\".").of(FIXED),
+    CN0_OF_ALL.required().of(FIXED),
+    CN0_OF_EACH,
     word("transmit", transmits, "transmit antenna patterns: one block for all satellites, or the blocks of that date")
         .or_else("typical")
         .of(BUDGET),
     number("transmit_dbw", -10.0, 40.0, "dBW", "power fed into the transmit antennas").or(14.3).of(BUDGET),
     by_satellite("blocks", &BLOCK, "Blocks by satellite, with kind = \"link_budget\".").of(BUDGET),
-    word("antenna", || vec!["isotropic", "patch", "turnstile", "table"], "receive antenna").or_else("patch").of(BUDGET),
-    text("antenna_file", A_PATH, "gain and phase by direction, for antenna = \"table\"").of(BUDGET),
-    number("noise_figure_db", 0.0, 30.0, "dB", "noise figure of the receiver").or(2.5).of(BUDGET),
-    number("loss_db", -20.0, 60.0, "dB", "additional loss").or(0.0).of(BUDGET),
+    ANTENNA.or_else("patch"),
+    ANTENNA_FILE,
+    NOISE_FIGURE.or(2.5),
+    LOSS.or(0.0),
+];
+
+/// Keys of `[power]` that concern the receiver, and that a station may have of its own.
+pub(crate) const RECEIVED: &[Key] = &[
+    CN0_OF_ALL.or_else("the scene's"),
+    CN0_OF_EACH,
+    ANTENNA.or_else("the scene's"),
+    ANTENNA_FILE,
+    NOISE_FIGURE.or_else("the scene's"),
+    LOSS.or_else("the scene's"),
 ];
 
 fn blocks() -> Vec<&'static str> {

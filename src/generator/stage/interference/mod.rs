@@ -5,7 +5,8 @@
 //! anchored at every run of 4096 samples and linear within it (a Doppler rate of 1000 Hz/s leaves 3e-4 cycle
 //! at 2.6 Msps); where the antenna's motion is pushed, at its ticks too. Power is that at the antenna's port
 //! in the waveform's whole band; of matched chips the samples have what their edges keep, as of satellites.
-//! Limits: no polarisation, no pattern, one straight path.
+//! Every waveform but noise on the samples' own grid is a function of the time of emission, so stations hear
+//! the same one. Limits: no polarisation, no pattern, one straight path.
 
 pub mod arrival;
 pub mod period;
@@ -57,6 +58,8 @@ pub struct Interferer {
     pub path: Option<Path>,
     /// Samples in which the source is on, at the antenna.
     pub on: Range<u64>,
+    /// True time in seconds since the scene's start at which it is switched on, where stations share it.
+    pub sent_s: Option<f64>,
     /// Seed of the random numbers.
     pub seed: u64,
     /// Receiver's effect on the wave.
@@ -127,7 +130,9 @@ impl Interferer {
             }
             Waveform::Matched { chips, .. } => Interference::Matched { repetition_hz: chips.hz() },
             Waveform::White => Interference::Noise { width_hz: self.tuning.clock.rate.hz() },
-            Waveform::Noise { width_hz, .. } => Interference::Noise { width_hz: *width_hz },
+            Waveform::Noise { width_hz, .. } | Waveform::Emitted { width_hz, .. } => {
+                Interference::Noise { width_hz: *width_hz }
+            }
             Waveform::Recording { rate, .. } => Interference::Recording { width_hz: rate.hz() },
         }
     }
@@ -238,17 +243,29 @@ impl Interferer {
                 let source = draw(level, self.seed, Interpolator::reach(position, i.len()));
                 resampled(level, (by, position, source), anchor.turned(from), i, q);
             }
+            Waveform::Emitted { rate, by, .. } => {
+                let position = self.position(anchor, from, *rate, 0.0);
+                let (wi, mut wq) = draw(level, self.seed, Interpolator::reach(position, i.len()));
+                if self.tuning.inverted {
+                    wq.iter_mut().for_each(|x| *x = -*x);
+                }
+                resampled(level, (by, position, (wi, wq)), anchor.turned(from), i, q);
+            }
             Waveform::Recording { samples, rate, by, repeat } => {
                 // Its first sample is sent when it is switched on.
-                let late_s = self.tuning.elapsed_s(self.on.start);
-                let (whole, first, advance) = self.place(anchor, *rate, late_s);
-                let place = (i128::from(whole) << 64) + i128::from(first) + advance * i128::from(from);
-                let step = (advance >> 32) as u64;
-                let position = Position { whole: (place >> 64) as i64, fraction: (place >> 32) as u32, step };
+                let late_s = self.sent_s.unwrap_or_else(|| self.tuning.elapsed_s(self.on.start));
+                let position = self.position(anchor, from, *rate, late_s);
                 let source = samples.read(Interpolator::reach(position, i.len()), *repeat, self.tuning.inverted);
                 resampled(level, (by, position, source), anchor.turned(from), i, q);
             }
         }
+    }
+
+    /// Position among the source's samples at sample `from` of the run, the first of them sent at `late_s`.
+    fn position(&self, anchor: &Anchor, from: u64, rate: Repetition, late_s: f64) -> Position {
+        let (whole, first, advance) = self.place(anchor, rate, late_s);
+        let place = (i128::from(whole) << 64) + i128::from(first) + advance * i128::from(from);
+        Position { whole: (place >> 64) as i64, fraction: (place >> 32) as u32, step: (advance >> 32) as u64 }
     }
 
     /// Position in a repetition at sample `from` of the run, and its advance per sample, in 2^-64.

@@ -82,6 +82,15 @@ pub enum Waveform {
         /// Interpolator from the source's samples to the scene's.
         by: Interpolator,
     },
+    /// Gaussian noise of a band, drawn over the time of emission: every receiver hears the same.
+    Emitted {
+        /// Width of the part of the band that the samples hold, in Hz.
+        width_hz: f64,
+        /// Rate of the source's samples.
+        rate: Repetition,
+        /// Interpolator from the source's samples to the scene's.
+        by: Interpolator,
+    },
     /// Recorded samples of unit mean power.
     Recording {
         /// The samples of the file.
