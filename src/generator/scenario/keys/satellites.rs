@@ -121,8 +121,7 @@ const CN0_OF_ALL: Key = number(
     "C/N0 of all satellites at the antenna; chip edges and filters reduce it in the samples",
 );
 const CN0_OF_EACH: Key = by_satellite("satellites", &CN0, "C/N0 by satellite, with kind = \"fixed\".").of(FIXED);
-const ANTENNA: Key =
-    word("antenna", || vec!["isotropic", "patch", "turnstile", "table"], "receive antenna").of(BUDGET);
+const ANTENNA: Key = word("antenna", || vec!["isotropic", "patch", "turnstile", "table"], "receive antenna").of(BUDGET);
 const ANTENNA_FILE: Key =
     text("antenna_file", A_PATH, "gain and phase by direction, for antenna = \"table\"").of(BUDGET);
 const NOISE_FIGURE: Key = number("noise_figure_db", 0.0, 30.0, "dB", "noise figure of the receiver").of(BUDGET);

@@ -84,7 +84,7 @@ fn time_field(system: System, label: Epoch) -> u64 {
         System::BeiDou => ms(BDT.label(label)),
         System::Glonass => {
             let ms = ms(GLONASST.label(label));
-            (ms / 86_400_000) << 27 | ms % 86_400_000
+            ((ms / 86_400_000) << 27) | (ms % 86_400_000)
         }
         _ => ms(label),
     };
