@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::error::RtkError;
@@ -47,8 +46,7 @@ pub fn receiver(run: &Path, who: &'static str) -> Result<Receiver, RtkError> {
     Ok(Receiver { path, epochs, channels })
 }
 
-/// Ephemerides that both receivers read, from `rx/navigation.rnx` and what else RINEX has there, or those of
-/// files that are named.
+/// Ephemerides that both receivers read, from `rx/navigation.rnx`, or those of files that are named.
 ///
 /// # Errors
 /// A file that cannot be read or holds no ephemeris.
@@ -61,19 +59,19 @@ pub fn orbits(runs: [&Path; 2], named: &[PathBuf]) -> Result<Orbits, RtkError> {
         return Ok(orbits);
     }
     let mut refused = None;
-    for run in runs {
+    for run in runs.into_iter().filter(|run| run.is_dir()) {
         let path = run.join("rx").join("navigation.rnx");
         match ephemerides(&path) {
             Ok(sets) => orbits.add(sets),
             // A receiver that read no ephemeris may use the other's.
             Err(error @ RtkError::Navigation(NavigationError::Nothing { .. })) => refused = Some(error),
-            Err(RtkError::Read { source, .. }) if source.kind() == io::ErrorKind::NotFound && run.is_file() => {}
             Err(error) => return Err(error),
         }
     }
     match refused {
-        Some(error) if orbits.satellites() == 0 => Err(error),
-        _ => Ok(orbits),
+        _ if orbits.satellites() > 0 => Ok(orbits),
+        Some(error) => Err(error),
+        None => Err(RtkError::NoEphemerides),
     }
 }
 

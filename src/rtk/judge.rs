@@ -63,9 +63,6 @@ pub struct Row {
     pub wrong: Option<usize>,
     /// Numbers that are not fixed.
     pub not_fixed: Option<usize>,
-    /// Seconds since the first epoch with a solution, for the summary.
-    #[serde(skip)]
-    pub since_s: f64,
     /// Events of the epoch.
     pub events: String,
 }
@@ -90,6 +87,8 @@ pub struct Figures {
     pub fix_rate: Option<f64>,
     /// Time from the first solution to the first fix, seconds.
     pub first_fix_s: Option<f64>,
+    /// Epochs with five satellites on two bands.
+    pub on_two_bands: usize,
     /// Time to it from the first epoch with five satellites on two bands, seconds.
     pub first_fix_two_bands_s: Option<f64>,
     /// Root mean square of the fixed epochs' errors, metres.
@@ -179,9 +178,9 @@ impl Judge {
             solved.events.iter().map(|(track, event)| format!("{} {}", named(*track), event.name())).collect();
         let mut row = Row::empty(pair, events.join("; "));
         let Some(solution) = &solved.solution else { return row };
-        let first = *self.first.get_or_insert(pair.labels[1]);
-        row.since_s = pair.labels[1].since(first);
+        self.first.get_or_insert(pair.labels[1]);
         if solution.on_two_bands >= ON_TWO_BANDS {
+            figures.on_two_bands += 1;
             self.first_on_two.get_or_insert(pair.labels[1]);
         }
         let base = Site::new(*base_m);
@@ -317,7 +316,6 @@ impl Row {
             right: None,
             wrong: None,
             not_fixed: None,
-            since_s: 0.0,
             events,
         }
     }

@@ -12,6 +12,8 @@ use crate::carrier::{Code, carrier_hz};
 use crate::error::{LEAST, RtkError};
 use crate::files::Receiver;
 use crate::orbits::{Emission, Orbits, emission};
+use crate::site::Site;
+use crate::troposphere::delay_m;
 use analysis::read::rinex_obs::{ObservedEpoch, Values};
 use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::satellite::{Sv, System};
@@ -114,13 +116,14 @@ fn largest(shared: &[Shared]) -> usize {
     for own in shared {
         *counts.entry((own.track.0.system, own.track.1)).or_default() += 1;
     }
-    // One clock of each system is estimated, which its first satellite takes.
+    // Each system has a clock, which its first satellite takes.
     let mut of_system: BTreeMap<System, usize> = BTreeMap::new();
     for ((system, _), count) in counts {
         let most = of_system.entry(system).or_default();
         *most = (*most).max(count);
     }
-    of_system.values().map(|count| count.saturating_sub(1)).sum::<usize>() + 1
+    let others: usize = of_system.values().map(|count| count - 1).sum();
+    if of_system.is_empty() { 0 } else { others + 1 }
 }
 
 /// Satellites of a receiver in words.
@@ -174,11 +177,11 @@ fn phases(base: &Values, rover: &Values, wavelength_m: f64) -> Option<Phases> {
 
 /// Model of one observation's range between a receiver and a satellite: geometry, satellite clock and neutral
 /// atmosphere, metres; with the direction from the satellite to the receiver and the elevation.
-pub fn modelled(emission: &Emission, place: &crate::site::Site) -> (f64, Vector3<f64>, f64) {
-    let sight_m = emission.to(&place.position_m);
+pub fn modelled(emission: &Emission, site: &Site) -> (f64, Vector3<f64>, f64) {
+    let sight_m = emission.to(&site.position_m);
     let range_m = sight_m.norm();
     let direction = sight_m / range_m;
-    let elevation_rad = libm::asin((-direction.dot(&place.up)).clamp(-1.0, 1.0));
-    let air_m = crate::troposphere::delay_m(place.height_m, elevation_rad);
+    let elevation_rad = libm::asin((-direction.dot(&site.up)).clamp(-1.0, 1.0));
+    let air_m = delay_m(site.height_m, elevation_rad);
     (range_m - SPEED_OF_LIGHT_MPS * emission.clock_s + air_m, direction, elevation_rad)
 }

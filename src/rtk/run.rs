@@ -46,7 +46,7 @@ pub struct Baseline {
     pub figures: Figures,
     /// True if a truth judged them.
     pub is_judged: bool,
-    /// Distance of the base's position from the mean of its own fixes, metres, if its run has fixes.
+    /// Distance of a base at rest from the mean of its own fixes, metres, if its run has fixes.
     pub base_from_fixes_m: Option<f64>,
 }
 
@@ -76,28 +76,32 @@ pub fn solve(
 ) -> Result<Baseline, RtkError> {
     let truths = of_base.as_ref().zip(of_rover.as_ref()).map(|(base, rover)| [base, rover]);
     let (mut solver, mut judge, mut rows) = (Solver::new(settings), Judge::default(), Vec::new());
+    let resting_m = match inputs.position {
+        BasePosition::Given(given_m) => Some(given_m),
+        BasePosition::Truth => of_base.as_ref().and_then(Truth::resting_m),
+    };
     let mut off_m: Option<f64> = None;
-    let mut position_m = None;
     for pair in pairs {
         let true_m = of_base.as_ref().and_then(|truth| truth.position_m(pair.labels[0]));
         let base_m = match inputs.position {
-            BasePosition::Given(position_m) => position_m,
-            // A base at rest between two rows of its truth.
-            BasePosition::Truth => true_m
-                .or_else(|| of_base.as_ref().and_then(Truth::first_m))
-                .ok_or_else(|| RtkError::NoPosition { path: inputs.base.clone() })?,
+            BasePosition::Given(given_m) => Some(given_m),
+            BasePosition::Truth => true_m.or(resting_m),
         };
+        // Between two rows of its truth a base that moves has no position.
+        let Some(base_m) = base_m else { continue };
         if let Some(true_m) = true_m {
             let own_m = (base_m - true_m).norm();
             off_m = Some(off_m.map_or(own_m, |most_m| most_m.max(own_m)));
         }
-        position_m = Some(base_m);
         let solved = solver.epoch(pair, &base_m);
         rows.push(judge.take(pair, &base_m, &solved, truths));
     }
+    if rows.is_empty() {
+        return Err(RtkError::NoPosition { path: inputs.base.clone() });
+    }
     let mut figures = judge.finish();
     figures.base_off_m = off_m;
-    let base_from_fixes_m = fixes.zip(position_m).map(|(fixes, position_m)| (fixes - position_m).norm());
+    let base_from_fixes_m = fixes.zip(resting_m).map(|(fixes, resting_m)| (fixes - resting_m).norm());
     Ok(Baseline { rows, figures, is_judged: truths.is_some(), base_from_fixes_m })
 }
 

@@ -190,8 +190,8 @@ impl Solver {
     /// Solves an epoch, with the base at an ECEF position in metres.
     pub fn epoch(&mut self, pair: &Pair, base_m: &Vector3<f64>) -> Solved {
         let base = Site::new(*base_m);
-        let Some(place) = self.approximate(pair, &base) else { return Solved::default() };
-        let rows = self.rows(pair, &base, &place);
+        let Some(rover) = self.approximate(pair, &base) else { return Solved::default() };
+        let rows = self.rows(pair, &base, &rover);
         let events = self.follow(&rows);
         let own = self.equations(&rows);
         let mut whole = self.known.clone();
@@ -204,14 +204,14 @@ impl Solver {
                 self.not_whole.insert(track);
                 solved.events.push((track, Event::NotWhole));
             }
-            let float_m = place.position_m + position_m;
+            let float_m = rover.position_m + position_m;
             solved.solution = Some(solution(&rows, float_m, covariance_m2, floats, integers));
         }
         self.keep(whole, pair.labels[1]);
         solved
     }
 
-    /// Site of the rover by codes alone, to metres; at rest that of the first epoch serves for all.
+    /// Site of the rover by codes alone, to metres. At rest that of the first epoch serves for all.
     fn approximate(&mut self, pair: &Pair, base: &Site) -> Option<Site> {
         if let Some(position_m) = self.rough_m.filter(|_| self.settings.is_static) {
             return Some(Site::new(position_m));
@@ -343,8 +343,8 @@ impl Solver {
                 |((other, other_code), _): &&(Track, f64)| (other.system, *other_code) == (sv.system, code);
             // Of the same height the first.
             let higher = |(at, (_, other)): (usize, &(Track, f64))| *other > own || (*other == own && at < *index);
-            let group = tracks.iter().enumerate().filter(|(_, other)| is_of_group(other));
-            !group.into_iter().any(higher)
+            let mut group = tracks.iter().enumerate().filter(|(_, other)| is_of_group(other));
+            !group.any(higher)
         };
         let mut unknowns: Vec<usize> = (0..OF_POSITION).collect();
         let kept: Vec<usize> = (0..tracks.len()).filter(|index| !is_pivot(index)).collect();

@@ -13,7 +13,7 @@ struct Sky {
     base_m: Vector3<f64>,
     rover_m: Vector3<f64>,
     satellites: Vec<(Sv, Vector3<f64>)>,
-    /// Deviations of codes and phases, metres.
+    /// Deviation of codes relative to the usual one, and of phases in metres.
     noise_m: [f64; 2],
     state: u64,
 }
@@ -33,7 +33,7 @@ impl Sky {
             let system = if number % 2 == 0 { System::Gps } else { System::Galileo };
             (Sv { system, number }, base_m + axes.transpose() * direction * 2.3e7)
         };
-        Self { base_m, rover_m, satellites: (1..=14).map(satellite).collect(), noise_m: [0.3, 0.002], state: 5 }
+        Self { base_m, rover_m, satellites: (1..=14).map(satellite).collect(), noise_m: [1.0, 0.002], state: 5 }
     }
 
     /// Sum of twelve uniform numbers less six: nearly normal.
@@ -57,7 +57,8 @@ impl Sky {
                 let code = Code::new(text).unwrap();
                 let wavelength_m = SPEED_OF_LIGHT_MPS / crate::carrier::carrier_hz(sv, code, None).unwrap();
                 let ranges_m = [0, 1].map(|one: usize| modelled(&emission, &places[one]).0 + clocks_m[one]);
-                let [of_code_m, of_phase_m] = self.noise_m;
+                let [scale, of_phase_m] = self.noise_m;
+                let of_code_m = scale * if *text == "1C" { 0.4 } else { 0.08 };
                 let code_m = ranges_m.map(|range_m| range_m + of_code_m * self.normal());
                 let whole = |one: usize| 1000.0 * f64::from(sv.number) + 77_777.0 * one as f64 + f64::from(code.band());
                 let phase_m =

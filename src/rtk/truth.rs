@@ -27,6 +27,9 @@ pub struct Truth {
     carriers: BTreeMap<i64, Vec<(Track, f64)>>,
 }
 
+/// Largest distance between positions of an antenna at rest, metres.
+const LARGEST_REST_M: f64 = 1e-6;
+
 /// Milliseconds of a label, by which epochs are found. Labels of an epoch agree to 0.1 µs.
 fn key(label: Epoch) -> i64 {
     label.seconds() * 1000 + (label.fraction() * 1000.0).round() as i64
@@ -73,9 +76,11 @@ impl Truth {
         all.iter().find(|(own, _)| *own == track).map(|(_, cycles)| *cycles)
     }
 
-    /// First position, for a base at rest.
-    pub fn first_m(&self) -> Option<Vector3<f64>> {
-        self.positions_m.values().next().copied()
+    /// Position of an antenna that is at rest all the time, metres.
+    pub fn resting_m(&self) -> Option<Vector3<f64>> {
+        let first = self.positions_m.values().next()?;
+        let is_near = |other: &Vector3<f64>| (other - first).norm() < LARGEST_REST_M;
+        self.positions_m.values().all(is_near).then_some(*first)
     }
 }
 

@@ -81,11 +81,11 @@ fn two_receivers_600_m_apart_are_fixed_at_the_first_epoch_of_two_bands_and_fault
     assert_eq!(resting["figures"]["wrong_fixes"], 0, "{resting}");
     assert!(resting["figures"]["up_rms_m"].as_f64().unwrap() <= 0.006, "{resting}");
 
-    // 33 m to the north.
-    let wrong = judged(here, &["--base-position", "37.6053,-0.986,60"]);
+    // 67 m to the north.
+    let wrong = judged(here, &["--base-position", "37.6056,-0.986,60"]);
     assert_eq!(status(&wrong, "base off its true position"), "fail", "{wrong}");
     assert_eq!(status(&wrong, "base off its own fixes"), "fail", "{wrong}");
-    let refused = twin(&["baseline", "base", "rover", "--base-position", "37.6053,-0.986,60", "--check"], here);
+    let refused = twin(&["baseline", "base", "rover", "--base-position", "37.6056,-0.986,60", "--check"], here);
     assert_eq!(code(&refused), 3, "{}", stderr(&refused));
 
     let path = here.join("rover/rx/observations.rnx");

@@ -92,7 +92,7 @@ fn judgements(found: &Baseline) -> Vec<Judgement> {
         judge("fixes with a wrong integer", count(figures.wrong_fixes), "", Bound::Max(allowed), source);
     }
     judge("time to the first fix", json!(figures.first_fix_s), "s", Bound::Max(LONGEST_S), "one band");
-    if figures.first_fix_two_bands_s.is_some() {
+    if figures.on_two_bands > 0 {
         let source = format!("{ON_TWO_BANDS} satellites on two bands fix at once");
         judge("time to it on two bands", json!(figures.first_fix_two_bands_s), "s", Bound::Max(0.0), &source);
     }
