@@ -301,7 +301,9 @@ fn walk(found: &mut Vec<Listed>, keys: &'static [Key], (path, many): (&str, bool
     for key in keys {
         let below = if path.is_empty() { key.name.to_owned() } else { format!("{path}.{}", key.name) };
         match key.value {
-            Value::Table(inner) | Value::OneOrMore(inner) | Value::Tables(inner) if is_listed(found, inner) => {}
+            Value::Table(inner) | Value::OneOrMore(inner) if is_listed(found, inner) => {}
+            // At the top tables of different meaning may have equal names of keys.
+            Value::Tables(inner) if !path.is_empty() && is_listed(found, inner) => {}
             Value::Table(inner) | Value::OneOrMore(inner) => walk(found, inner, (&below, false), key.meaning),
             Value::Tables(inner) => walk(found, inner, (&below, true), key.meaning),
             Value::BySatellite(each) => found.push(Listed {
