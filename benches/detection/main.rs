@@ -25,7 +25,7 @@ use rayon::prelude::*;
 
 /// Times and positions of a receiver in scenes without an attack.
 const STARTS: u64 = 24;
-/// Those in each attack.
+/// Times and positions in each attack.
 const ATTACKED: u64 = 10;
 
 fn main() {

@@ -20,7 +20,7 @@ const NONE: f64 = 1e-9;
 const BEFORE: &str = "static, samples";
 
 /// Runs of some cases in which a detector tested.
-pub fn of<'a>(found: &'a [Found], detector: Detector, is_own: impl Fn(&Case) -> bool) -> Vec<&'a Found> {
+pub fn of(found: &[Found], detector: Detector, is_own: impl Fn(&Case) -> bool) -> Vec<&Found> {
     found.iter().filter(|one| one.detector == detector && is_own(&one.case)).collect()
 }
 
@@ -98,9 +98,12 @@ pub fn write(directory: &Path, found: &[Found]) {
     picture::draw(&directory.join("detection.png"), found);
 }
 
-/// Names and runs of the columns of scenes without an attack.
-pub fn columns() -> Vec<(&'static str, fn(&Case, &str) -> bool)> {
-    let mut all: Vec<(&'static str, fn(&Case, &str) -> bool)> =
+/// Name of a column, and whether a run belongs to it.
+pub type Column = (&'static str, fn(&Case, &str) -> bool);
+
+/// Columns of scenes without an attack.
+pub fn columns() -> Vec<Column> {
+    let mut all: Vec<Column> =
         CLEAN.iter().map(|case| (case.name, (|case: &Case, name: &str| case.name == name) as _)).collect();
     all.push((BEFORE, |case, _| !case.kind.is_clean()));
     all
@@ -110,11 +113,11 @@ fn clean_tables(text: &mut String, found: &[Found], starts: usize) {
     let _ = write!(
         text,
         "## False alarms\n\n\
-         Scenes without an attack are run from {starts} starts each, four minutes at the level of correlations, at which there \
-         are no samples and no tests of the level. The last column has the {:.0} s before each attack, at the level of \
-         samples. Multipath: a pedestrian between two walls (amplitudes 0.4 and 0.3, 8 to 30 m away) over wet ground. \
-         Scintillation: four satellites with S4 = 0.7, decorrelated after 0.8 s. Dynamics: a rocket with 22.9 g for \
-         5 s. Oscillator: a TCXO after Winkel's table, half a ppm off.\n\n\
+         Scenes without an attack are run from {starts} starts each, four minutes at the level of correlations, at \
+         which there are no samples and no tests of the level. The last column has the {:.0} s before each \
+         attack, at the level of samples. Multipath: a pedestrian between two walls (amplitudes 0.4 and 0.3, 8 \
+         to 30 m away) over wet ground. Scintillation: four satellites with S4 = 0.7, decorrelated after 0.8 s. \
+         Dynamics: a rocket with 22.9 g for 5 s. Oscillator: a TCXO after Winkel's table, half a ppm off.\n\n\
          A cell has alarms of all tests, their share and its interval (95 %): the exact one of as many independent \
          tests as the scatter between starts and the autocorrelation of the statistic leave. It is bold where the \
          whole interval lies above the stated {}.\n\n",
@@ -168,8 +171,8 @@ fn attack_tables(text: &mut String, found: &[Found], starts: usize) {
         "\n## Attacks\n\n\
          Attacks begin after {ON_S:.0} s and last to the end: 20 s of jammers, 45 s of spoofers. Each is run from \
          {starts} starts at the level of samples, because the level of correlations models neither. Satellites have \
-         45 dB-Hz, to which J/S is relative; it is a mean over time. CW lies within 400 kHz, a chirp sweeps 2 MHz in 20 \
-         to 500 µs, noise is 2 MHz wide, pulses of 10 µs come 1100 times a second.\n\n\
+         45 dB-Hz, to which J/S is relative; it is a mean over time. CW lies within 400 kHz, a chirp sweeps 2 \
+         MHz in 20 to 500 µs, noise is 2 MHz wide, pulses of 10 µs come 1100 times a second.\n\n\
          Spoofers have power and push of scenarios of TEXBAT and are otherwise no copies: *like ds2* and *like ds3* \
          push time by 3 m/s from their beginning, *like ds4* begins on the true signals and after 5 s pushes the \
          position up to 3 m/s, *like ds7* grows within 10 s from −20 dB with the phases of the true signals and then \

@@ -55,10 +55,10 @@ pub fn draw(path: &Path, found: &[Found]) {
             None => falls.push((name, vec![(js_db, own.value)])),
         }
     }
-    let lined = |(number, (name, points)): (usize, (&str, Vec<(f64, f64)>))| {
-        Series::lined(format!("cn0_fall, {name}"), Detector::ALL.len() + number, points)
-    };
-    let falls: Vec<Series> = falls.into_iter().enumerate().map(lined).collect();
+    let numbers = Detector::ALL.len()..;
+    let lined =
+        numbers.zip(falls).map(|(number, (name, points))| Series::lined(format!("cn0_fall, {name}"), number, points));
+    let falls: Vec<Series> = lined.collect();
     legend.extend(legend_of(&falls));
     let falls = Chart::new("cn0_fall under jammers", Axis::new("J/S (dB)", (0.0, 30.0)), detected(), falls);
     figure(path, (1280, 1120), 2, &[alarms, spoofers, jammers, falls], &legend).unwrap();

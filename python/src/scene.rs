@@ -203,6 +203,7 @@ impl Scene {
     #[staticmethod]
     #[pyo3(signature = (text, *, directory = None, seed = None, format = None, station = None,
         front_end = None, allow_outside = false))]
+    #[expect(clippy::too_many_arguments, reason = "each is a keyword of Python")]
     fn from_toml(
         py: Python<'_>,
         text: &str,
@@ -226,6 +227,7 @@ impl Scene {
     #[staticmethod]
     #[pyo3(signature = (keys, *, directory = None, seed = None, format = None, station = None,
         front_end = None, allow_outside = false))]
+    #[expect(clippy::too_many_arguments, reason = "each is a keyword of Python")]
     fn from_dict(
         keys: &Bound<'_, PyDict>,
         directory: Option<PathBuf>,

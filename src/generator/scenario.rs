@@ -327,32 +327,13 @@ impl Scenario {
     pub fn parse_in(text: &str, origin: &str, directory: &Path, allow_outside: bool) -> Result<Self, ScenarioError> {
         let source = Source { origin, text };
         let document = signal_file::parsed(&source)?;
-        let own = station::each(&source, document.get_ref())?;
-        let Some(first) = own.first() else {
-            return Self::of_document(&source, document.get_ref(), directory, allow_outside);
-        };
-        let mut refusals = Refusals::default();
-        let mut stations = Vec::with_capacity(own.len());
-        for station in &own {
-            let read = Self::of_document(&source, &station.document, directory, allow_outside);
-            stations.extend(refusals.take(read).map(|scenario| scenario.at_station(&station.name)));
-        }
-        refusals.finish()?;
-        let whole = Self::of_document(&source, &first.document, directory, allow_outside)?;
-        Ok(match stations.pop() {
-            Some(only) if stations.is_empty() => only,
-            last => Self { stations: stations.into_iter().chain(last).collect(), ..whole },
-        })
+        let of = |document: &DeTable<'_>| Self::of_document(&source, document, (directory, allow_outside));
+        station::scenario(&source, document.get_ref(), of)
     }
 
-    /// Reads a document of that text.
-    fn of_document(
-        source: &Source<'_>,
-        document: &DeTable<'_>,
-        directory: &Path,
-        allow_outside: bool,
-    ) -> Result<Self, ScenarioError> {
-        let Source { origin, text } = *source;
+    /// Reads a document of that text; files are below a directory, or outside of it where that is allowed.
+    fn of_document(source: &Source<'_>, document: &DeTable<'_>, files: (&Path, bool)) -> Result<Self, ScenarioError> {
+        let (Source { origin, text }, (directory, allow_outside)) = (source, files);
         let root = Table::new(source, "", 0, document, keys::SCENARIO);
         let mut refusals = Refusals::default();
         root.check(&mut refusals);

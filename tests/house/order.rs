@@ -185,7 +185,7 @@ pub const ORDER: Order<'static> = &[
     (
         "analysis/show/plot",
         &[
-            &["clip", "drawing", "marks", "ticks"],
+            &["clip", "drawing", "marks", "names", "ticks"],
             &["chart"],
             &["series"],
             &["canvas"],

@@ -158,3 +158,28 @@ impl Scenario {
         self.station.as_ref().map_or_else(|| self.name.clone(), |station| format!("{}-{station}", self.name))
     }
 }
+
+/// Scenario of a document, each station's read by `of`: that of the first station with those of all, that of
+/// the only one, or that of the document itself.
+///
+/// # Errors
+/// Refusals of every station.
+pub(super) fn scenario(
+    source: &Source<'_>,
+    document: &DeTable<'_>,
+    of: impl Fn(&DeTable<'_>) -> Result<Scenario, ScenarioError>,
+) -> Result<Scenario, ScenarioError> {
+    let own = each(source, document)?;
+    let Some(first) = own.first() else { return of(document) };
+    let mut refusals = Refusals::default();
+    let mut stations = Vec::with_capacity(own.len());
+    for station in &own {
+        stations.extend(refusals.take(of(&station.document)).map(|scenario| scenario.at_station(&station.name)));
+    }
+    refusals.finish()?;
+    let whole = of(&first.document)?;
+    Ok(match stations.pop() {
+        Some(only) if stations.is_empty() => only,
+        last => Scenario { stations: stations.into_iter().chain(last).collect(), ..whole },
+    })
+}

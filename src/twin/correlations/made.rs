@@ -80,7 +80,7 @@ pub(super) struct Made {
     widths_chips: [f64; 2],
     /// Segments of the longest code of the signal.
     segments: usize,
-    /// What depends on the code of a replica, by the satellite's number.
+    /// Tables of the code of a replica, by the satellite's number.
     replicas: Vec<OnceLock<Box<Replica>>>,
     /// Codes of the components by the satellite's number.
     codes: Vec<OnceLock<Option<Vec<i8>>>>,
