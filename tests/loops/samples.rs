@@ -1,6 +1,6 @@
 //! The samples of every shipped scene are the bytes that they have always been: `samples.sha256` has the
-//! hashes of three segments of each, and of each station and front end where there are several. A change of the signal
-//! chain that changes them says so there, and in the changelog why they were wrong before.
+//! hashes of three segments of each, and of each station and front end where there are several. A change of
+//! the signal chain that changes them says so there, and in the changelog why they were wrong before.
 
 use std::path::Path;
 use std::process::Command;

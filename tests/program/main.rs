@@ -6,4 +6,5 @@ mod live;
 mod osnma;
 mod pack;
 mod ports;
+mod stations;
 mod study;
