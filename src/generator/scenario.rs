@@ -333,7 +333,7 @@ impl Scenario {
 
     /// Reads a document of that text; files are below a directory, or outside of it where that is allowed.
     fn of_document(source: &Source<'_>, document: &DeTable<'_>, files: (&Path, bool)) -> Result<Self, ScenarioError> {
-        let (Source { origin, text }, (directory, allow_outside)) = (source, files);
+        let (&Source { origin, text }, (directory, allow_outside)) = (source, files);
         let root = Table::new(source, "", 0, document, keys::SCENARIO);
         let mut refusals = Refusals::default();
         root.check(&mut refusals);

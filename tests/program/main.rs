@@ -7,4 +7,5 @@ mod live;
 mod osnma;
 mod pack;
 mod ports;
+mod stations;
 mod study;

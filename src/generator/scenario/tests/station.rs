@@ -1,7 +1,6 @@
 //! Stations of a scenario: what each has, what is refused, and the text of one alone.
 
 use super::*;
-use crate::scenario::hardware::ClockSpec;
 
 const SCENE: &str = "name = \"pair\"\nstart = 2010-07-01T10:00:00\nduration_s = 1\nseed = 5\n\
     [receiver_clock]\nbias_s = 1e-5\n[power]\nkind = \"link_budget\"\nloss_db = 1\nnoise_figure_db = 2\n[noise]\n";
