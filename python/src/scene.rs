@@ -227,7 +227,6 @@ impl Scene {
     #[staticmethod]
     #[pyo3(signature = (keys, *, directory = None, seed = None, format = None, station = None,
         front_end = None, allow_outside = false))]
-    #[expect(clippy::too_many_arguments, reason = "each is a keyword of Python")]
     fn from_dict(
         keys: &Bound<'_, PyDict>,
         directory: Option<PathBuf>,
