@@ -39,6 +39,7 @@ fn scene(rate_hz: f64, duration_s: f64, format: Format, center_hz: f64, inverted
     Scene {
         name: "test".to_owned(),
         front_end_name: None,
+        station: None,
         seed: 5,
         samples: (duration_s * rate_hz) as u64,
         clock: SampleClock { start, rate },
