@@ -30,7 +30,7 @@ impl Sky {
                 libm::cos(elevation) * libm::cos(azimuth),
                 libm::sin(elevation),
             );
-            let system = if number % 2 == 0 { System::Gps } else { System::Galileo };
+            let system = if number.is_multiple_of(2) { System::Gps } else { System::Galileo };
             (Sv { system, number }, base_m + axes.transpose() * direction * 2.3e7)
         };
         Self { base_m, rover_m, satellites: (1..=14).map(satellite).collect(), noise_m: [1.0, 0.002], state: 5 }
