@@ -67,8 +67,8 @@ pub enum RtkError {
     },
     /// Epochs in which the two have too few satellites in common.
     #[error(
-        "no common satellites: a position needs {LEAST} on one signal with ephemerides, and in {epochs} common epochs base \
-         and rover share {most} at most; the base observes {base}, the rover {rover}"
+        "no common satellites: a position needs {LEAST} on one signal with ephemerides, and in {epochs} common epochs \
+         base and rover share {most} at most; the base observes {base}, the rover {rover}"
     )]
     NoCommonSatellites {
         /// Common epochs.
@@ -84,7 +84,10 @@ pub enum RtkError {
     #[error("no ephemerides: expected --navigation for observation files that are not of a run")]
     NoEphemerides,
     /// A base whose position nothing tells.
-    #[error("{}: no position of the base in truth/trajectory.csv: expected --base-position for a base without a truth", path.display())]
+    #[error(
+        "{}: no position of the base in truth/trajectory.csv: expected --base-position for a base without a truth",
+        path.display()
+    )]
     NoPosition {
         /// Directory of the base's run.
         path: PathBuf,

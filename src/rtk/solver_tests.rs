@@ -3,16 +3,19 @@
 use nalgebra::Vector3;
 
 use super::*;
+use crate::carrier::Code;
 use crate::orbits::Emission;
 use crate::pairs::{Phases, Shared, modelled};
-use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use gnss::satellite::Sv;
+use gnss::earth::Geodetic;
+use gnss::satellite::System;
 
 /// Satellites of GPS and Galileo over an antenna, each with signals on two bands.
 struct Sky {
     base_m: Vector3<f64>,
     rover_m: Vector3<f64>,
     satellites: Vec<(Sv, Vector3<f64>)>,
+    /// Ionosphere of each satellite between the receivers on L1, metres.
+    ionosphere_m: f64,
     /// Deviation of codes relative to the usual one, and of phases in metres.
     noise_m: [f64; 2],
     state: u64,
@@ -33,7 +36,14 @@ impl Sky {
             let system = if number % 2 == 0 { System::Gps } else { System::Galileo };
             (Sv { system, number }, base_m + axes.transpose() * direction * 2.3e7)
         };
-        Self { base_m, rover_m, satellites: (1..=14).map(satellite).collect(), noise_m: [1.0, 0.002], state: 5 }
+        Self {
+            base_m,
+            rover_m,
+            satellites: (1..=14).map(satellite).collect(),
+            ionosphere_m: 0.0,
+            noise_m: [1.0, 0.002],
+            state: 5,
+        }
     }
 
     /// Sum of twelve uniform numbers less six: nearly normal.
@@ -56,13 +66,17 @@ impl Sky {
             for text in codes {
                 let code = Code::new(text).unwrap();
                 let wavelength_m = SPEED_OF_LIGHT_MPS / crate::carrier::carrier_hz(sv, code, None).unwrap();
+                // The rover's alone: a pattern over the satellites, on each carrier by its square.
+                let ratio = wavelength_m / L1_M;
+                let delays_m = [0.0, self.ionosphere_m * libm::sin(2.2 * f64::from(sv.number)) * ratio * ratio];
                 let ranges_m = [0, 1].map(|one: usize| modelled(&emission, &places[one]).0 + clocks_m[one]);
                 let [scale, of_phase_m] = self.noise_m;
                 let of_code_m = scale * if *text == "1C" { 0.4 } else { 0.08 };
-                let code_m = ranges_m.map(|range_m| range_m + of_code_m * self.normal());
+                let code_m = [0, 1].map(|one: usize| ranges_m[one] + delays_m[one] + of_code_m * self.normal());
                 let whole = |one: usize| 1000.0 * f64::from(sv.number) + 77_777.0 * one as f64 + f64::from(code.band());
-                let phase_m =
-                    [0, 1].map(|one: usize| ranges_m[one] + wavelength_m * whole(one) + of_phase_m * self.normal());
+                let phase_m = [0, 1].map(|one: usize| {
+                    ranges_m[one] - delays_m[one] + wavelength_m * whole(one) + of_phase_m * self.normal()
+                });
                 let phases = Some(Phases { phase_m, is_broken: false, is_half: false });
                 let emissions = [emission; 2];
                 shared.push(Shared {
@@ -197,6 +211,24 @@ fn a_half_cycle_that_a_receiver_announces_is_left_out_of_the_integers() {
     let solved = solver.epoch(&pair, &sky.base_m);
     assert!(solved.events.is_empty() && status(&solved) == Status::Fixed);
     assert!(sky.error_m(&solved) < 0.012);
+}
+
+#[test]
+fn an_ionosphere_that_is_expected_leaves_the_integers_right_and_one_that_is_not_is_refused() {
+    for (ionosphere, expected) in [(5e-5, true), (0.0, false)] {
+        let mut sky = Sky::new();
+        // Three centimetres over 600 m, as in a storm: 5e-5 of the baseline.
+        sky.ionosphere_m = 0.03;
+        let mut solver = Solver::new(Settings { ionosphere, ..Settings::default() });
+        let mut fixed = false;
+        for epoch in 0..40 {
+            let solved = solver.epoch(&sky.pair(epoch, &TWO), &sky.base_m);
+            let is_whole = status(&solved) == Status::Fixed;
+            assert!(!is_whole || sky.error_m(&solved) < 0.04, "{ionosphere}: {}", sky.error_m(&solved));
+            fixed |= is_whole;
+        }
+        assert_eq!(fixed, expected, "{ionosphere}");
+    }
 }
 
 #[test]
