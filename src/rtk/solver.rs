@@ -5,7 +5,7 @@
 //! as a random walk whose deviation grows with the baseline (Bock et al. 1986; Odijk 2000). Information of
 //! the ambiguities adds up; the code's noise is correlated by the receivers' loops, so that epochs closer
 //! than a stated time add nothing. Integers are looked for in each epoch again and never put into what is
-//! known: a wrong fix does not stay. Limits: the deviation of the ionosphere is a setting, and the troposphere
+//! known: a wrong fix does not stay. Limits: the deviation of the ionosphere is a setting; the troposphere is
 //! that of one model; GLONASS by carriers of its own stays float.
 
 use std::collections::{BTreeMap, BTreeSet};
