@@ -96,7 +96,7 @@ const USUAL_DBHZ: [f64; 2] = [35.0, 12.0];
 const LEAST_SINE: f64 = 0.05;
 
 /// Variances of a single difference of codes and of phases, square metres.
-fn variances(system: System, code: Code, elevation_rad: f64, cn0_dbhz: Option<f64>) -> [f64; 2] {
+pub fn variances(system: System, code: Code, elevation_rad: f64, cn0_dbhz: Option<f64>) -> [f64; 2] {
     let sine = libm::sin(elevation_rad).max(LEAST_SINE);
     let cn0_dbhz = cn0_dbhz.unwrap_or(USUAL_DBHZ[0] + USUAL_DBHZ[1] * sine);
     let noise = libm::pow(10.0, (CODE_CN0_DBHZ - cn0_dbhz) / 20.0);

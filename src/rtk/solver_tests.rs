@@ -6,6 +6,7 @@ use super::*;
 use crate::carrier::Code;
 use crate::orbits::Emission;
 use crate::pairs::{Phases, Shared, modelled};
+use crate::rows::variances;
 use gnss::earth::Geodetic;
 use gnss::satellite::System;
 
@@ -16,8 +17,8 @@ struct Sky {
     satellites: Vec<(Sv, Vector3<f64>)>,
     /// Ionosphere of each satellite between the receivers on L1, metres.
     ionosphere_m: f64,
-    /// Deviation of codes relative to the usual one, and of phases in metres.
-    noise_m: [f64; 2],
+    /// Deviations of codes and phases, relative to those of the weights.
+    noise: [f64; 2],
     state: u64,
 }
 
@@ -70,8 +71,9 @@ impl Sky {
                 let ratio = wavelength_m / L1_M;
                 let delays_m = [0.0, self.ionosphere_m * libm::sin(2.2 * f64::from(sv.number)) * ratio * ratio];
                 let ranges_m = [0, 1].map(|one: usize| modelled(&emission, &places[one]).0 + clocks_m[one]);
-                let [scale, of_phase_m] = self.noise_m;
-                let of_code_m = scale * if *text == "1C" { 0.4 } else { 0.08 };
+                // Of one receiver.
+                let weights = variances(sv.system, code, modelled(&emission, &places[0]).2, Some(CN0_DBHZ));
+                let [of_code_m, of_phase_m] = [0, 1].map(|kind| self.noise[kind] * (0.5 * weights[kind]).sqrt());
                 let code_m = [0, 1].map(|one: usize| ranges_m[one] + delays_m[one] + of_code_m * self.normal());
                 let whole = |one: usize| 1000.0 * f64::from(sv.number) + 77_777.0 * one as f64 + f64::from(code.band());
                 let phase_m = [0, 1].map(|one: usize| {
@@ -84,7 +86,7 @@ impl Sky {
                     wavelength_m,
                     code_m,
                     phases,
-                    cn0_dbhz: Some(45.0),
+                    cn0_dbhz: Some(CN0_DBHZ),
                     emissions,
                 });
             }
@@ -102,6 +104,7 @@ fn status(solved: &Solved) -> Status {
 }
 
 const TWO: [&str; 2] = ["1C", "5Q"];
+const CN0_DBHZ: f64 = 45.0;
 
 #[test]
 fn two_bands_are_fixed_at_the_first_epoch_to_millimetres() {
@@ -122,7 +125,7 @@ fn two_bands_are_fixed_at_the_first_epoch_to_millimetres() {
 #[test]
 fn without_noise_the_baseline_is_exact_and_the_float_solution_is_weaker() {
     let mut sky = Sky::new();
-    sky.noise_m = [0.0, 0.0];
+    sky.noise = [0.0, 0.0];
     let mut solver = Solver::new(Settings::default());
     let solved = solver.epoch(&sky.pair(0, &TWO), &sky.base_m);
     // Ranges of 2.3e7 m in f64, and the second order of an approximate position a metre off.
@@ -229,6 +232,35 @@ fn an_ionosphere_that_is_expected_leaves_the_integers_right_and_one_that_is_not_
         }
         assert_eq!(fixed, expected, "{ionosphere}");
     }
+}
+
+#[test]
+fn integers_are_wrong_no_more_often_than_their_success_rates_say() {
+    let (mut expected, mut wrong, mut trials) = (0.0, 0, 0);
+    for trial in 0..240_usize {
+        let mut sky = Sky::new();
+        sky.state = 1000 + trial as u64;
+        sky.satellites.truncate(7 + trial % 8);
+        // Whatever is found counts.
+        let belief = Belief { ratio: 1.0, success_rate: 0.0 };
+        let mut solver = Solver::new(Settings { belief, is_static: true, ..Settings::default() });
+        for epoch in 0..6 {
+            let solved = solver.epoch(&sky.pair(epoch, &["1C"]), &sky.base_m);
+            let Some(solution) = solved.solution else { continue };
+            let Some(found) = &solution.integers else { continue };
+            // All single differences have the same integer, of which the references were taken.
+            let of = |index: usize| -solution.floats.references[index];
+            let doubles = found.doubles.pairs.iter().map(|(own, pivot)| of(*own) - of(*pivot));
+            let true_ones = &found.rows * DVector::from_iterator(found.doubles.pairs.len(), doubles);
+            trials += 1;
+            expected += 1.0 - found.success_rate;
+            wrong += usize::from(found.fixed != true_ones);
+        }
+    }
+    assert!(trials > 100 && expected > 5.0, "{trials} trials, {expected} expected");
+    // Epochs of a trial share its noise: five deviations, each of six epochs.
+    let bound = expected + 5.0 * (6.0 * expected).sqrt();
+    assert!((wrong as f64) < bound, "{wrong} of {trials}, {expected} expected");
 }
 
 #[test]
