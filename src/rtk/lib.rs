@@ -18,6 +18,7 @@ pub mod lambda;
 pub mod normal;
 pub mod orbits;
 pub mod pairs;
+pub mod rows;
 pub mod run;
 pub mod site;
 pub mod slips;

@@ -86,6 +86,24 @@ impl Normal {
         self.right[unknown] = 0.0;
     }
 
+    /// Adds what is known of an unknown by itself: zero, with a variance.
+    pub fn constrain(&mut self, unknown: usize, variance: f64) {
+        self.matrix[(unknown, unknown)] += 1.0 / variance;
+    }
+
+    /// Lets an unknown walk randomly: adds to its variance, and leaves every estimate (Sherman and Morrison
+    /// 1950).
+    pub fn loosen(&mut self, unknown: usize, variance: f64) {
+        if variance <= 0.0 {
+            return;
+        }
+        let column = self.matrix.column(unknown).into_owned();
+        let share = 1.0 / (1.0 / variance + column[unknown]);
+        let right = self.right[unknown];
+        self.matrix.ger(-share, &column, &column, 1.0);
+        self.right.axpy(-share * right, &column, 1.0);
+    }
+
     /// Equations of the unknowns that are listed, in that order; those that are new begin without
     /// information.
     pub fn arranged(&self, from: &[Option<usize>]) -> Self {
@@ -206,6 +224,22 @@ mod tests {
         let arranged = reduced.arranged(&[Some(8), None, Some(4)]);
         assert_eq!(arranged.matrix[(0, 2)], reduced.matrix[(8, 4)]);
         assert_eq!(arranged.matrix[(1, 1)], 0.0);
+    }
+
+    #[test]
+    fn an_unknown_that_walks_has_more_variance_and_the_same_estimate() {
+        let mut normal = Normal::new(3);
+        normal.add_group(&codes());
+        normal.constrain(1, 0.25);
+        let (solution, mut covariance) = normal.solve(&[0, 1, 2]).unwrap();
+        normal.loosen(1, 0.04);
+        let (after, of_after) = normal.solve(&[0, 1, 2]).unwrap();
+        covariance[(1, 1)] += 0.04;
+        assert!((after - &solution).norm() < 1e-9 * solution.norm());
+        assert!((&of_after - &covariance).norm() < 1e-9 * covariance.norm());
+        let unchanged = normal.clone();
+        normal.loosen(1, 0.0);
+        assert_eq!(normal, unchanged);
     }
 
     #[test]

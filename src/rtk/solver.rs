@@ -1,23 +1,26 @@
 //! Baselines epoch by epoch: float solution, integers, and what is known of the ambiguities afterwards.
 //!
-//! The unknowns are the rover's position, one for each epoch or one for all, and an ambiguity of each
-//! satellite's signal, which stays until its phase slips or ends. Information of the ambiguities adds up; the
-//! code's noise is correlated by the receivers' loops, so that epochs closer than a stated time add nothing.
-//! Integers are looked for in each epoch again and never put into what is known: a wrong fix does not stay.
-//! Limits: atmosphere of both receivers by one model, so that baselines beyond some kilometres lose their
-//! integers to the ionosphere; GLONASS by carriers of its own stays float.
+//! The unknowns are the rover's position, one for each epoch or one for all, an ambiguity of each satellite's
+//! signal, which stays until its phase slips or ends, and the ionosphere of each satellite, rover minus base,
+//! as a random walk whose deviation grows with the baseline (Bock et al. 1986; Odijk 2000). Information of
+//! the ambiguities adds up; the code's noise is correlated by the receivers' loops, so that epochs closer
+//! than a stated time add nothing. Integers are looked for in each epoch again and never put into what is
+//! known: a wrong fix does not stay. Limits: the deviation of the ionosphere is a setting; the troposphere is
+//! that of one model; GLONASS by carriers of its own stays float.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use crate::carrier::{Code, chips_hz, is_divided};
+use crate::carrier::is_divided;
 use crate::integers::{Belief, Floats, Integers};
 use crate::normal::{Difference, Normal, OF_POSITION};
-use crate::pairs::{Pair, Track, modelled};
+use crate::pairs::{Pair, Track};
+use crate::rows::{Row, by_codes, difference, groups, rows};
 use crate::site::Site;
 use crate::slips::{Change, slipped};
-use gnss::satellite::System;
+use gnss::earth::SPEED_OF_LIGHT_MPS;
+use gnss::satellite::Sv;
 use gnss::time::Epoch;
 
 /// Settings of a baseline.
@@ -31,6 +34,9 @@ pub struct Settings {
     pub is_static: bool,
     /// Time after which the noise of codes is independent, seconds.
     pub correlation_s: f64,
+    /// Deviation of the ionosphere between the receivers at the zenith on L1, relative to the baseline; zero
+    /// for receivers under the same ionosphere.
+    pub ionosphere: f64,
 }
 
 impl Default for Settings {
@@ -40,6 +46,7 @@ impl Default for Settings {
             belief: Belief { ratio: 3.0, success_rate: 0.999 },
             is_static: false,
             correlation_s: 1.0,
+            ionosphere: 1e-6,
         }
     }
 }
@@ -143,26 +150,14 @@ struct Ambiguity {
     is_half: bool,
 }
 
-/// A track's difference of an epoch, at the approximate position.
-#[derive(Clone, Debug)]
-struct Row {
-    track: Track,
-    wavelength_m: f64,
-    code_m: f64,
-    /// Phase, with what the receivers say of it: broken, half.
-    phase: Option<(f64, bool, bool)>,
-    direction: Vector3<f64>,
-    elevation_rad: f64,
-    code_m2: f64,
-    phase_m2: f64,
-}
-
 /// Baselines in the making.
 #[derive(Debug)]
 pub struct Solver {
     settings: Settings,
     ambiguities: Vec<Ambiguity>,
-    /// Information of position and ambiguities from epochs before.
+    /// Satellites whose ionosphere is an unknown, each with its variance, square metres.
+    delays: Vec<(Sv, f64)>,
+    /// Information of position, ambiguities and ionosphere from epochs before.
     known: Normal,
     /// Time of the newest epoch in it.
     known_at: Option<Epoch>,
@@ -179,6 +174,7 @@ impl Solver {
         Self {
             settings,
             ambiguities: Vec::new(),
+            delays: Vec::new(),
             known: Normal::new(OF_POSITION),
             known_at: None,
             rough_m: None,
@@ -190,12 +186,17 @@ impl Solver {
     /// Solves an epoch, with the base at an ECEF position in metres.
     pub fn epoch(&mut self, pair: &Pair, base_m: &Vector3<f64>) -> Solved {
         let base = Site::new(*base_m);
-        let Some(rover) = self.approximate(pair, &base) else { return Solved::default() };
-        let rows = self.rows(pair, &base, &rover);
-        let events = self.follow(&rows);
-        let own = self.equations(&rows);
-        let mut whole = self.known.clone();
-        whole.add(&own);
+        // At rest the first epoch's position serves for all.
+        let mask_rad = self.settings.mask_rad;
+        if self.rough_m.is_none() || !self.settings.is_static {
+            let Some(rough_m) = by_codes(pair, &base, self.rough_m, mask_rad) else { return Solved::default() };
+            self.rough_m = Some(rough_m);
+        }
+        let Some(rover) = self.rough_m.map(Site::new) else { return Solved::default() };
+        let rows = rows(pair, &base, &rover, Some(mask_rad));
+        let events = self.follow(&rows, (rover.position_m - base.position_m).norm());
+        let mut whole = self.walked(pair.labels[1]);
+        whole.add(&self.equations(&rows));
         let floats = self.floats(&whole, &rows);
         let mut solved = Solved { solution: None, events };
         if let Some((position_m, covariance_m2, floats)) = floats {
@@ -211,58 +212,8 @@ impl Solver {
         solved
     }
 
-    /// Site of the rover by codes alone, to metres. At rest that of the first epoch serves for all.
-    fn approximate(&mut self, pair: &Pair, base: &Site) -> Option<Site> {
-        if let Some(position_m) = self.rough_m.filter(|_| self.settings.is_static) {
-            return Some(Site::new(position_m));
-        }
-        let mut position_m = self.rough_m.unwrap_or(base.position_m);
-        for _ in 0..MOST_STEPS {
-            let rows = self.rows(pair, base, &Site::new(position_m));
-            let mut normal = Normal::new(OF_POSITION);
-            let codes = |row: &Row| difference(row, row.code_m, row.code_m2, None);
-            groups(&rows)
-                .values()
-                .for_each(|group| normal.add_group(&group.iter().map(|row| codes(row)).collect::<Vec<_>>()));
-            let (step, _) = normal.solve(&[0, 1, 2])?;
-            position_m += step.fixed_rows::<3>(0);
-            // An error of a metre moves a direction by 5e-8 rad, and a double difference by less than that.
-            if step.norm() < 1.0 {
-                self.rough_m = Some(position_m);
-                return Some(Site::new(position_m));
-            }
-        }
-        None
-    }
-
-    /// Single differences above the mask, rover minus base, less their model.
-    fn rows(&self, pair: &Pair, base: &Site, rover: &Site) -> Vec<Row> {
-        let all = pair.shared.iter().filter_map(|shared| {
-            let (of_base_m, ..) = modelled(&shared.emissions[0], base);
-            let (of_rover_m, direction, elevation_rad) = modelled(&shared.emissions[1], rover);
-            let model_m = of_rover_m - of_base_m;
-            let (sv, code) = shared.track;
-            let [code_m2, phase_m2] = variances(sv.system, code, elevation_rad, shared.cn0_dbhz);
-            let phase =
-                shared.phases.map(|own| (own.phase_m[1] - own.phase_m[0] - model_m, own.is_broken, own.is_half));
-            // Far from the true position, as at the first step, an elevation says nothing.
-            let is_above = elevation_rad >= self.settings.mask_rad || self.rough_m.is_none();
-            is_above.then_some(Row {
-                track: shared.track,
-                wavelength_m: shared.wavelength_m,
-                code_m: shared.code_m[1] - shared.code_m[0] - model_m,
-                phase,
-                direction,
-                elevation_rad,
-                code_m2,
-                phase_m2,
-            })
-        });
-        all.collect()
-    }
-
     /// Ends ambiguities whose phases are gone, broken or slipped, and begins those of new phases.
-    fn follow(&mut self, rows: &[Row]) -> Vec<(Track, Event)> {
+    fn follow(&mut self, rows: &[Row], baseline_m: f64) -> Vec<(Track, Event)> {
         let mut events = Vec::new();
         let changes: Vec<Change> = rows
             .iter()
@@ -293,6 +244,11 @@ impl Solver {
                 self.not_whole.remove(&own.track);
             }
         }
+        let first_delay = OF_POSITION + self.ambiguities.len();
+        let is_seen = |sv: Sv| rows.iter().any(|row| row.track.0 == sv);
+        let delays: Vec<usize> = (0..self.delays.len()).filter(|index| is_seen(self.delays[*index].0)).collect();
+        let gone = (0..self.delays.len()).filter(|index| !delays.contains(index));
+        gone.for_each(|index| self.known.eliminate(first_delay + index));
         let mut from: Vec<Option<usize>> = (0..OF_POSITION).map(Some).collect();
         from.extend(kept.iter().map(|index| Some(OF_POSITION + index)));
         let mut ambiguities: Vec<Ambiguity> = kept.iter().map(|index| self.ambiguities[*index].clone()).collect();
@@ -306,17 +262,63 @@ impl Solver {
                 from.push(None);
             }
         }
+        from.extend(delays.iter().map(|index| Some(first_delay + index)));
+        self.delays = delays.iter().map(|index| self.delays[*index]).collect();
         self.known = self.known.arranged(&from);
         self.ambiguities = ambiguities;
+        self.begin_delays(rows, baseline_m);
         events
+    }
+
+    /// Begins the ionosphere of satellites that are new.
+    fn begin_delays(&mut self, rows: &[Row], baseline_m: f64) {
+        let sigma_m = self.settings.ionosphere * baseline_m;
+        if sigma_m <= 0.0 {
+            return;
+        }
+        for row in rows {
+            let sv = row.track.0;
+            if self.delays.iter().any(|(own, _)| *own == sv) {
+                continue;
+            }
+            let slant_m = sigma_m * obliquity(row.elevation_rad);
+            let unknown = self.known.order();
+            let from: Vec<Option<usize>> = (0..unknown).map(Some).chain([None]).collect();
+            self.known = self.known.arranged(&from);
+            self.known.constrain(unknown, slant_m * slant_m);
+            self.delays.push((sv, slant_m * slant_m));
+        }
+    }
+
+    /// Information from the epochs before, as it is at a time: the ionosphere walked since.
+    fn walked(&self, at: Epoch) -> Normal {
+        let mut known = self.known.clone();
+        let elapsed_s = self.known_at.map_or(0.0, |before| at.since(before).max(0.0));
+        let first_delay = OF_POSITION + self.ambiguities.len();
+        for (index, (_, variance_m2)) in self.delays.iter().enumerate() {
+            known.loosen(first_delay + index, variance_m2 * elapsed_s / IONOSPHERE_S);
+        }
+        known
+    }
+
+    /// Unknown of a satellite's ionosphere, with what a metre of it on L1 is on a carrier; none where it is
+    /// not estimated.
+    fn delay(&self, row: &Row) -> Option<(usize, f64)> {
+        let index = self.delays.iter().position(|(sv, _)| *sv == row.track.0)?;
+        let ratio = row.wavelength_m / L1_M;
+        Some((OF_POSITION + self.ambiguities.len() + index, ratio * ratio))
     }
 
     /// Normal equations of an epoch's codes and phases.
     fn equations(&self, rows: &[Row]) -> Normal {
-        let mut normal = Normal::new(OF_POSITION + self.ambiguities.len());
+        let mut normal = Normal::new(self.known.order());
         for group in groups(rows).values() {
-            let codes: Vec<Difference> =
-                group.iter().map(|row| difference(row, row.code_m, row.code_m2, None)).collect();
+            let of_code = |row: &&Row| {
+                let mut code = difference(row, row.code_m, row.code_m2, None);
+                code.derivatives.extend(self.delay(row));
+                code
+            };
+            let codes: Vec<Difference> = group.iter().map(of_code).collect();
             normal.add_group(&codes);
             let phases: Vec<Difference> = group
                 .iter()
@@ -324,7 +326,9 @@ impl Solver {
                     let (phase_m, ..) = row.phase?;
                     let index = self.ambiguities.iter().position(|own| own.track == row.track)?;
                     let rest_m = phase_m - row.wavelength_m * self.ambiguities[index].reference;
-                    Some(difference(row, rest_m, row.phase_m2, Some(OF_POSITION + index)))
+                    let mut phase = difference(row, rest_m, row.phase_m2, Some(OF_POSITION + index));
+                    phase.derivatives.extend(self.delay(row).map(|(unknown, share)| (unknown, -share)));
+                    Some(phase)
                 })
                 .collect();
             normal.add_group(&phases);
@@ -349,6 +353,7 @@ impl Solver {
         let mut unknowns: Vec<usize> = (0..OF_POSITION).collect();
         let kept: Vec<usize> = (0..tracks.len()).filter(|index| !is_pivot(index)).collect();
         unknowns.extend(kept.iter().map(|index| OF_POSITION + index));
+        unknowns.extend(OF_POSITION + tracks.len()..whole.order());
         let (solution, covariance) = whole.solve(&unknowns)?;
         let mut values = DVector::zeros(tracks.len());
         let mut of_values = DMatrix::zeros(tracks.len(), tracks.len());
@@ -400,47 +405,18 @@ impl Solver {
     }
 }
 
-/// Steps to the approximate position, of which the first may be thousands of kilometres.
-const MOST_STEPS: usize = 12;
+/// Length of L1's wave, metres.
+const L1_M: f64 = SPEED_OF_LIGHT_MPS / 1_575.42e6;
+/// Time in which the ionosphere between the receivers walks by its own deviation, seconds: that in which a
+/// satellite's line of sight crosses some tens of kilometres of it.
+const IONOSPHERE_S: f64 = 600.0;
+/// Radius of the Earth relative to that of a shell of electrons 350 km above it.
+const SHELL: f64 = 6371.0 / (6371.0 + 350.0);
 
-/// Deviation of the code of 1.023 million chips a second at 45 dB-Hz, metres: a loop of 1 Hz with a quarter
-/// of a chip between early and late. It grows with the noise's amplitude and with the length of a chip.
-const CODE_M: f64 = 0.5;
-const CODE_CHIPS_HZ: f64 = 1.023e6;
-const CODE_CN0_DBHZ: f64 = 45.0;
-/// Deviation of a code that no C/N0 tells, at the zenith, metres.
-const CODE_FLOOR_M: f64 = 0.1;
-/// Deviation of a phase, and what low elevations add to it, metres.
-const PHASE_M: [f64; 2] = [0.001, 0.002];
-/// C/N0 at the horizon where a file states none, and what the zenith has more, dB-Hz.
-const USUAL_DBHZ: [f64; 2] = [35.0, 12.0];
-/// Least sine of an elevation in a weight.
-const LEAST_SINE: f64 = 0.05;
-
-/// Variances of a single difference of codes and of phases, square metres.
-fn variances(system: System, code: Code, elevation_rad: f64, cn0_dbhz: Option<f64>) -> [f64; 2] {
-    let sine = libm::sin(elevation_rad).max(LEAST_SINE);
-    let cn0_dbhz = cn0_dbhz.unwrap_or(USUAL_DBHZ[0] + USUAL_DBHZ[1] * sine);
-    let noise = libm::pow(10.0, (CODE_CN0_DBHZ - cn0_dbhz) / 20.0);
-    let code_m = libm::hypot(CODE_M * noise * CODE_CHIPS_HZ / chips_hz(system, code), CODE_FLOOR_M / sine);
-    let phase_m = libm::hypot(PHASE_M[0], PHASE_M[1] / sine);
-    // Of two receivers.
-    [2.0 * code_m * code_m, 2.0 * phase_m * phase_m]
-}
-
-/// Rows of each system and signal, which share a clock.
-fn groups(rows: &[Row]) -> BTreeMap<(System, Code), Vec<&Row>> {
-    let mut groups: BTreeMap<(System, Code), Vec<&Row>> = BTreeMap::new();
-    for row in rows {
-        groups.entry((row.track.0.system, row.track.1)).or_default().push(row);
-    }
-    groups
-}
-
-fn difference(row: &Row, misclosure_m: f64, variance_m2: f64, ambiguity: Option<usize>) -> Difference {
-    let mut derivatives: Vec<(usize, f64)> = (0..OF_POSITION).map(|axis| (axis, row.direction[axis])).collect();
-    derivatives.extend(ambiguity.map(|index| (index, row.wavelength_m)));
-    Difference { derivatives, misclosure_m, variance_m2 }
+/// Slant delay of a thin shell of electrons relative to that at the zenith.
+fn obliquity(elevation_rad: f64) -> f64 {
+    let sine = SHELL * libm::cos(elevation_rad);
+    1.0 / (1.0 - sine * sine).sqrt()
 }
 
 fn solution(
@@ -450,7 +426,7 @@ fn solution(
     floats: Floats,
     integers: Option<Integers>,
 ) -> Solution {
-    let mut bands: BTreeMap<gnss::satellite::Sv, BTreeSet<u8>> = BTreeMap::new();
+    let mut bands: BTreeMap<Sv, BTreeSet<u8>> = BTreeMap::new();
     for row in rows {
         let own = bands.entry(row.track.0).or_default();
         if row.phase.is_some() {

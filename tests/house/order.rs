@@ -229,7 +229,7 @@ pub const ORDER: Order<'static> = &[
             &["error"],
             &["files"],
             &["pairs"],
-            &["integers", "slips"],
+            &["integers", "rows", "slips"],
             &["solver", "truth"],
             &["judge"],
             &["run"],

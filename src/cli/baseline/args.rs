@@ -49,6 +49,10 @@ pub struct Baseline {
     /// Least success rate of bootstrapping for a fix
     #[arg(long, value_name = "P", default_value_t = 0.999, value_parser = probability)]
     pub success_rate: f64,
+    /// Deviation of the ionosphere between the receivers at the zenith on L1, millimetres per kilometre of
+    /// baseline
+    #[arg(long, value_name = "PPM", default_value_t = 1.0, value_parser = parts_per_million)]
+    pub ionosphere_ppm: f64,
     /// End with exit code 3 if a limit of the verdict is broken
     #[arg(long)]
     pub check: bool,
@@ -92,6 +96,14 @@ fn least_ratio(text: &str) -> Result<f64, String> {
         .ok()
         .filter(|ratio| (1.0..=1e6).contains(ratio))
         .ok_or_else(|| "expected a ratio from 1 to 1e6".to_owned())
+}
+
+/// Millionths.
+fn parts_per_million(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|ppm| (0.0..=1e4).contains(ppm))
+        .ok_or_else(|| "expected a number from 0 to 1e4".to_owned())
 }
 
 /// Probability below one.

@@ -46,6 +46,7 @@ pub fn execute(arguments: &Arguments) -> Result<(), CliError> {
         mask_rad: arguments.mask_deg.to_radians(),
         belief: Belief { ratio: arguments.ratio, success_rate: arguments.success_rate },
         is_static: arguments.is_static,
+        ionosphere: 1e-6 * arguments.ionosphere_ppm,
         ..Settings::default()
     };
     let found = baseline(&inputs, settings).map_err(rtk_error)?;
