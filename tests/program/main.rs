@@ -7,5 +7,6 @@ mod live;
 mod osnma;
 mod pack;
 mod ports;
+mod rtcm;
 mod stations;
 mod study;

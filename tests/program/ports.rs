@@ -57,14 +57,14 @@ fn fifo(path: &Path) {
 }
 
 /// A program that listens, and the address at which it does.
-struct Server {
+pub struct Server {
     child: Child,
-    address: SocketAddr,
+    pub address: SocketAddr,
     stderr: BufReader<std::process::ChildStderr>,
 }
 
 impl Server {
-    fn start(arguments: &str, directory: &Path) -> Self {
+    pub fn start(arguments: &str, directory: &Path) -> Self {
         let mut child = twin(arguments, directory).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         let mut stderr = BufReader::new(child.stderr.take().unwrap());
         let mut line = String::new();
@@ -79,7 +79,7 @@ impl Server {
     }
 
     /// Waits for its end: the exit code, and what it said since it listened.
-    fn end(mut self) -> (i32, String) {
+    pub fn end(mut self) -> (i32, String) {
         let mut text = String::new();
         self.stderr.read_to_string(&mut text).unwrap();
         (self.child.wait().unwrap().code().unwrap_or(-1), text)

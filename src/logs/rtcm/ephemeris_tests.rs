@@ -7,7 +7,8 @@ const QZSS: &[u8] = include_bytes!("../../../scenarios/qzss_2023-03-12_02h_04h.r
 
 fn sets() -> Vec<Ephemeris> {
     let both = rinex::embedded_two_systems().unwrap().ephemerides;
-    let fnav: Vec<_> = both.iter().filter(|set| set.sv.system == System::Galileo).map(FNAV.form).collect();
+    let fnav = both.iter().filter(|set| set.sv.system == System::Galileo).map(|set| (FNAV.quantised)(&(FNAV.form)(set)).unwrap());
+    let fnav: Vec<Ephemeris> = fnav.collect();
     let more = [NAVIC, QZSS].into_iter().flat_map(|file| rinex::read(file, "shipped").unwrap().ephemerides);
     let old = rinex::embedded().unwrap().ephemerides.into_iter().step_by(17);
     both.into_iter().chain(fnav).chain(more).chain(old).filter(|set| set.sv.system != System::Sbas).collect()
@@ -33,7 +34,7 @@ fn an_ephemeris_of_every_message_is_read_back_with_its_orbit_and_clock() {
             let (own, other) = (set.state_and_clock_l1(at).unwrap(), read.state_and_clock_l1(at).unwrap());
             // Thirteen digits in the file: of three angles and of the axis, 42 000 km times 1.6e-12 each.
             assert!((own.0.position_m - other.0.position_m).norm() < 3e-4, "{} {minutes}", set.sv);
-            assert!((own.1.offset_s - other.1.offset_s).abs() < 1e-16, "{} {minutes}", set.sv);
+            assert!((own.1.offset_s - other.1.offset_s).abs() < 1e-15, "{} {minutes}", set.sv);
         }
         // What a message holds is written again with the same bits, but for delays that it does not have.
         assert_eq!(write(&read).unwrap(), body, "{}", set.sv);

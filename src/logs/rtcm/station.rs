@@ -155,14 +155,6 @@ impl Plan {
     }
 }
 
-impl Default for Plan {
-    fn default() -> Self {
-        let [msm, eph] = [msm_numbers(7), ephemeris::numbers().collect()];
-        let all = [1006, 1033, 1230].into_iter().chain(msm).chain(eph);
-        Self { messages: all.map(|number| (number, usual_s(number))).collect() }
-    }
-}
-
 fn msm_numbers(level: u64) -> Vec<u64> {
     signals::SYSTEMS.iter().map(|(tens, ..)| 10 * tens + level).collect()
 }

@@ -21,6 +21,10 @@ use gnss::time::{BDT, Epoch, GLONASST};
 
 /// Metres of a millisecond of light.
 const MS_M: f64 = 1e-3 * SPEED_OF_LIGHT_MPS;
+/// Largest difference in seconds between two counts of one lock.
+const SAME_S: f64 = 5e-4;
+/// Seconds at which counts of lock times end in receivers that count least.
+const LEAST_S: f64 = 64.0;
 /// Longest gap in seconds that a carrier without a lock time survives.
 const GAP_S: f64 = 30.0;
 /// Largest indicators of a lock time: of MSM4 and 5, of MSM6 and 7.
@@ -204,7 +208,7 @@ impl Kind {
         let kept = before.filter(|arc| {
             let since_s = label.since(arc.at);
             let is_new = match told_s {
-                Some(lock_s) => lock_s < arc.lock_s - 1e-3 || lock_s < since_s.min(64.0) - 2e-3,
+                Some(lock_s) => lock_s < arc.lock_s - SAME_S || lock_s < since_s.min(LEAST_S) - SAME_S,
                 None => since_s > GAP_S,
             };
             !value.own.lost_lock && !is_new
