@@ -87,7 +87,7 @@ pub enum Command {
 )]
 pub struct Logs {
     /// Log as it came out of the device: UBX, RTCM 3, SBF, also mixed with NMEA; - is standard input,
-    /// ntrip://[USER:PASSWORD@]HOST:PORT/MOUNT the stream of a caster
+    /// ntrip://HOST:PORT/MOUNT the stream of a caster, with USER:PASSWORD@ before HOST if it asks for them
     pub log: PathBuf,
     /// Directory for one table per kind of message [default: no tables are written]
     #[arg(long, value_name = "DIR")]

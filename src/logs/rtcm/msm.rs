@@ -3,7 +3,7 @@
 //! A range is given in three parts: whole milliseconds and a fraction of 1/1024 ms of the satellite, and a
 //! fine part of each signal; the fine parts of code and carrier are independent. Lock times are bounds below
 //! the true ones. The carrier of GLONASS needs the channel of the satellite, which MSM5 and MSM7 have; of
-//! MSM4 and MSM6 it is the one that the slot has by [`gnss::glonass::fdma`]. [`write`] writes what
+//! MSM4 and MSM6 it is the one that the slot has by [`gnss::glonass::fdma`]. [`mod@write`] writes what
 //! [`Kind::read`] reads, by the same widths and scales.
 
 pub mod write;
