@@ -7,7 +7,10 @@ const QZSS: &[u8] = include_bytes!("../../../scenarios/qzss_2023-03-12_02h_04h.r
 
 fn sets() -> Vec<Ephemeris> {
     let both = rinex::embedded_two_systems().unwrap().ephemerides;
-    let fnav = both.iter().filter(|set| set.sv.system == System::Galileo).map(|set| (FNAV.quantised)(&(FNAV.form)(set)).unwrap());
+    let fnav = both
+        .iter()
+        .filter(|set| set.sv.system == System::Galileo)
+        .map(|set| (FNAV.quantised)(&(FNAV.form)(set)).unwrap());
     let fnav: Vec<Ephemeris> = fnav.collect();
     let more = [NAVIC, QZSS].into_iter().flat_map(|file| rinex::read(file, "shipped").unwrap().ephemerides);
     let old = rinex::embedded().unwrap().ephemerides.into_iter().step_by(17);

@@ -85,7 +85,8 @@ fn a_stream_is_read_from_its_middle_on_and_without_a_date_from_outside() {
             _ => None,
         });
         let labels: Vec<Epoch> = dated.collect();
-        let off: Vec<f64> = labels.iter().map(|label| label.since(start)).filter(|s| !(0.0..40.0).contains(s)).collect();
+        let off: Vec<f64> =
+            labels.iter().map(|label| label.since(start)).filter(|s| !(0.0..40.0).contains(s)).collect();
         // The date comes with ephemerides, at the latest with those of 12:51:30: five epochs of four systems.
         assert!(labels.len() >= 20 && off.is_empty(), "{cut}: {} labels, {off:?}", labels.len());
     }

@@ -28,7 +28,7 @@ const SHORTEST_S: f64 = 0.01;
 /// Way at an instant, with the phase of its field in cycles and its amplitude.
 pub type Found = (Mirrors, f64, f64);
 
-/// Instants from the scene's start to `end_s` between which the antenna moves [`STEP_M`] at most.
+/// Instants from the scene's start to `end_s` between which the antenna moves half a metre at most.
 pub fn instants(trajectory: &Trajectory, end_s: f64) -> Vec<f64> {
     let (mut t_s, mut found) = (0.0, vec![0.0]);
     while t_s < end_s {
