@@ -27,7 +27,7 @@ fn parts(text: &str) -> Result<(Option<&str>, String, &str), String> {
     let expected = || format!("'{text}': expected ntrip://[USER:PASSWORD@]HOST:PORT/MOUNT");
     let (place, mount) = rest.split_once('/').ok_or_else(expected)?;
     let (user, host) = place.rsplit_once('@').map_or((None, place), |(user, host)| (Some(user), host));
-    if mount.is_empty() || mount.contains(|char: char| char.is_whitespace() || char.is_control()) {
+    if host.is_empty() || mount.is_empty() || mount.contains(|char: char| char.is_whitespace() || char.is_control()) {
         return Err(expected());
     }
     let host = if host.contains(':') { host.to_owned() } else { format!("{host}:2101") };

@@ -126,9 +126,13 @@ fn a_mistyped_key_of_any_text_is_refused_at_its_line_with_the_right_key() {
                 }
             }
             // Headers of tables, but for the first part of a name in several parts, which other headers may
-            // have too.
+            // have too, and for a list whose entries have tables: those would be the entry's before.
+            let has_tables = |header: &str| text.lines().any(|line| line.starts_with(&format!("[{header}.")));
             for (number, line) in text.lines().enumerate().filter(|(_, line)| line.starts_with('[')) {
                 let header = line.split(" #").next().unwrap().trim().trim_matches(['[', ']']).to_owned();
+                if line.starts_with("[[") && has_tables(&header) {
+                    continue;
+                }
                 let (above, key) = header.rsplit_once('.').map_or(("", header.as_str()), |(above, key)| (above, key));
                 for typo in typos(key) {
                     let whole = if above.is_empty() { typo.clone() } else { format!("{above}.{typo}") };
