@@ -689,7 +689,9 @@ def live(work, run):
     if sent["clients"] != 2:
         sys.exit(f"logs: {sent['clients']} clients, expected 2")
     observations, navigation = rtklib_rinex(work, log)
-    done = subprocess.run(["rnx2rtkp", "-p", "0", "-sys", "G,R,E,C", "-e", "-o", work / "live.pos", observations, navigation], capture_output=True)
+    # The scene has no ionosphere, which RTKLIB would correct for by coefficients of its own.
+    (work / "live.conf").write_text("pos1-posmode=single\npos1-ionoopt=off\npos1-tropopt=saas\npos1-navsys=45\nout-solformat=xyz\n")
+    done = subprocess.run(["rnx2rtkp", "-k", work / "live.conf", "-o", work / "live.pos", observations, navigation], capture_output=True)
     rows = [line.split() for line in open(work / "live.pos") if not line.startswith("%")]
     with open(run / "truth/trajectory.csv", newline="") as file:
         truth = next(csv.DictReader(file))
