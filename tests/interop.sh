@@ -187,10 +187,11 @@ for system in 1 8 4 32 45; do
     rtklib "bands_$system" "$work/bands/truth" 0.01 pos1-tropopt=off pos1-ionoopt=dual-freq pos1-frequency=l1+l2 "pos1-navsys=$system"
 done
 # Two receivers 600 m apart: RTKLIB's baseline and ours by the same files, against both truths. Fixed epochs of both are right to 3 mm
-# horizontally and 6 mm up, and differ by 12 mm at most, each with its own weights.
+# horizontally and 6 mm up, and differ by 12 mm at most, each with its own weights. They are at nearly one height: RTKLIB's mean error
+# in height is 6.5 mm where they are 12 m apart in height, and 4.9 mm where they are 2 m apart; ours is 0.4 mm in both.
 for name in base rover; do
     at=(37.605 -0.986 60 1.3e-4 5)
-    [ "$name" = base ] || at=(37.609 -0.9815 72 -2.2e-4 6)
+    [ "$name" = base ] || at=(37.609 -0.9815 62 -2.2e-4 6)
     sed -e "s/^latitude_deg = .*/latitude_deg = ${at[0]}/; s/^longitude_deg = .*/longitude_deg = ${at[1]}/; s/^height_m = .*/height_m = ${at[2]}/" \
         -e "s/^bias_s = .*/bias_s = ${at[3]}/; s/^seed = .*/seed = ${at[4]}/; s/^duration_s = .*/duration_s = 45/" \
         -e "s|igrg3380.10i.gz|$root/scenarios/igrg3380.10i.gz|" "$root/scenarios/dual_band.toml" >"$work/$name.toml"
