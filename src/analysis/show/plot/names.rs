@@ -26,7 +26,7 @@ impl Name {
         let near = [(x - 8, y - above), (left, y - above), (x - 8, y + above), (left, y + above)];
         let beside = [(x + BESIDE, y), (x - BESIDE - width, y)];
         let step = (height + APART) * above.signum();
-        let far = (1..6).flat_map(move |k| {
+        let far = (1..16).flat_map(move |k| {
             [x - 8, left].into_iter().flat_map(move |x| [(x, y - above - k * step), (x, y + above + k * step)])
         });
         near.into_iter().chain(beside).chain(far)
@@ -47,13 +47,10 @@ pub(super) fn apart(names: &[Name], corners: [(i32, i32); 2]) -> Vec<(i32, i32)>
     for name in names {
         let free = |at: &(i32, i32)| {
             let own = name.covered(*at);
-            own[0] >= from
-                && own[2] <= to
-                && own[1] >= top
-                && own[3] <= bottom
-                && !taken.iter().any(|one| meet(one, &own))
+            own[1] >= top && own[3] <= bottom && !taken.iter().any(|one| meet(one, &own))
         };
-        let at = name.positions().find(free).or_else(|| name.positions().next()).unwrap_or(name.at);
+        let within = |(x, y): (i32, i32)| (x.clamp(from, from.max(to - name.size.0)), y);
+        let at = name.positions().map(within).find(free).or_else(|| name.positions().next()).unwrap_or(name.at);
         taken.push(name.covered(at));
         found.push(at);
     }
