@@ -80,7 +80,7 @@ fn a_carrier_arrives_with_the_phase_of_its_path_at_both_stations() {
     let text = text("kind = \"cw\"\noffset_hz = 123456", clocks);
     for ((name, place), (bias_s, drift)) in PLACES.iter().zip(clocks) {
         let scene = scene(&text, name);
-        // The base's clock is early: its first samples are before the scene's start, with which the wave begins.
+        // The base's first samples are before the scene's start, with which the wave begins.
         for start in [4096_u64, 8192, 100 * 4096] {
             for (k, (i, q)) in received(&scene, start, 4096).iter().enumerate().step_by(371) {
                 // The clock reads the time since the start plus its bias, and gains.
