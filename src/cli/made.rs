@@ -68,7 +68,7 @@ impl From<Failure> for CliError {
 }
 
 /// Failure that an error of the twin means.
-fn failure(error: TwinError) -> Failure {
+pub fn failure(error: TwinError) -> Failure {
     match error {
         TwinError::Generate(error) => generator_error(error).into(),
         TwinError::Receive(error) => receiver_error(error).into(),

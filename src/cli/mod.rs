@@ -14,6 +14,7 @@ mod error;
 mod generate;
 mod glimpse;
 mod interrupt;
+mod ladder;
 mod lines;
 mod live;
 mod logs;

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use crate::cli::args;
 use crate::cli::error::CliError;
+use crate::cli::ladder::Ladder;
 use crate::cli::run::generator_error;
 use crate::cli::scenario::{self, Named};
 use generator::dynamics::{LineOfSight, lines_of_sight};
@@ -80,7 +81,10 @@ fn planned(named: &Named, arguments: &args::Plan) -> Result<(String, Value), Cli
         note(&all.speed());
         together = format!("{all}\n");
     }
-    Ok((together + &texts.join("\n"), json!({ "front_ends": objects })))
+    let ladder = Ladder::new(named, &scenes, &plans, &overrides)?;
+    note(&ladder.speed());
+    texts.push(ladder.text());
+    Ok((together + &texts.join("\n"), json!({ "front_ends": objects, "ladder": ladder.object() })))
 }
 
 /// Warnings about an atmosphere that the receiver corrects for and that the scene does not have.

@@ -75,12 +75,19 @@ impl Case {
             let each = named.scenario.front_ends.iter_mut();
             each.for_each(|front_end| front_end.fidelity = front_end.fidelity.at(grade));
         }
-        let (scenes, warnings) = scenario::compose_all(
+        let (mut scenes, warnings) = scenario::compose_all(
             &named,
             &Overrides { seed: arguments.seed, format: None, allow_outside: arguments.allow_outside },
         )?;
         if scenes.is_empty() {
             return Err(CliError::bug("a scenario without a front end"));
+        }
+        // Whoever keeps the samples wants them made.
+        if !arguments.keep_if && twin::is_modelled(&scenes).map_err(made::failure)? {
+            for scene in scenes.iter_mut().filter(|scene| scene.fidelity.grade != Grade::Correlations) {
+                scene.fidelity.grade = Grade::Correlations;
+                scenario::note("level correlations keeps the budget: no samples are made");
+            }
         }
         let settings = twin::settings_for(&scenes, &scenario::receiver_settings(&named)?);
         // A scene is made for its position: without one there is nothing to judge.

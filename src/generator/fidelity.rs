@@ -16,7 +16,7 @@ use gnss::signal::{Component, Layers, Signal};
 
 use bias::{LARGEST_BIAS_M, standing_bias_m};
 pub use bias::{LOOP_HZ, allowed_m, code_bias_m, moving_bias_m};
-pub use budget::{Budget, LARGEST_OVER_RMS, Unmet};
+pub use budget::{Budget, LARGEST_OVER_RMS, Promise, Unmet};
 pub use costs::kernel_ns;
 
 /// Level of fidelity: a name for a value of every knob, or the errors below which the cheapest are taken.
@@ -328,19 +328,27 @@ pub fn choices(chosen: Fidelity, rate_hz: f64, noise: bool, signals: &[&Signal])
     ];
     found.extend(layers_choice(chosen, level, signals));
     if noise {
-        let (error, ns) = match chosen.noise {
-            Arithmetic::F32 => ("3e-7 of its size", 1.3),
-            Arithmetic::F64 => ("1e-16 of its size", 20.0),
+        let error = match chosen.noise {
+            Arithmetic::F32 => "3e-7 of its size",
+            Arithmetic::F64 => "1e-16 of its size",
         };
         found.push(Choice {
             knob: "noise",
             value: chosen.noise.name().to_owned(),
             own: chosen.noise != level.noise,
             error: error.to_owned(),
-            cost: format!("{ns:.1} ns, satellites or not"),
+            cost: format!("{:.1} ns, satellites or not", noise_ns(chosen.noise)),
         });
     }
     found
+}
+
+/// Time in ns on one core for the noise of a sample.
+pub fn noise_ns(arithmetic: Arithmetic) -> f64 {
+    match arithmetic {
+        Arithmetic::F32 => 1.3,
+        Arithmetic::F64 => 20.0,
+    }
 }
 
 /// Ratio of the kernels' time per sample with one value of a knob to that with another, over all signals

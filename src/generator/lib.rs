@@ -70,7 +70,7 @@ pub mod scene;
 pub mod sky;
 pub mod spoof;
 pub mod stage;
-mod stopwatch;
+pub mod stopwatch;
 pub mod stream;
 pub mod switches;
 pub mod synth;

@@ -6,11 +6,13 @@
 
 mod machinery;
 mod models;
+mod rung;
 
 use std::fmt;
 
 pub use machinery::{Machinery, machinery};
 use models::models;
+pub use rung::{Errors, Rung};
 
 use serde::Serialize;
 
@@ -114,7 +116,8 @@ pub struct Plan {
     pub bytes: u64,
     /// Memory of a batch and of the motion, in bytes.
     pub memory_bytes: u64,
-    /// Processor time in seconds for all samples, from the measured speed.
+    /// Processor time in seconds for all samples, knots and rows of the truth, from measured speeds. What the
+    /// system takes to write files is not in it.
     #[serde(skip)]
     pub time_s: f64,
     /// Work of the synthesiser.
@@ -166,7 +169,7 @@ impl Plan {
             samples: scene.samples,
             bytes,
             memory_bytes: machinery.block_bytes + knots,
-            time_s: scene.samples as f64 * levels.sample_s + machinery.knots_s,
+            time_s: scene.samples as f64 * levels.sample_s + machinery.knots_s + machinery.truth_s,
             satellites,
             silent: silent(scene)?,
             levels,
@@ -181,8 +184,8 @@ impl Plan {
     pub fn speed(&self) -> String {
         let Self { time_s, sample_ns, signal_sample_ns, .. } = self;
         format!(
-            "this machine needs about {time_s:.1} s of one core for the samples: {sample_ns:.1} ns for each, \
-             {signal_sample_ns:.2} ns for each signal of a satellite in it"
+            "this machine needs about {time_s:.1} s of one core for samples and truth: {sample_ns:.1} ns a sample, \
+             {signal_sample_ns:.2} ns a signal of a satellite in it"
         )
     }
 }
@@ -191,7 +194,7 @@ impl Together<'_> {
     /// Describes the time that this machine needs for all of them.
     pub fn speed(&self) -> String {
         let time_s: f64 = self.0.iter().map(|plan| plan.time_s).sum();
-        format!("this machine needs about {time_s:.1} s of one core for the samples of all front ends")
+        format!("this machine needs about {time_s:.1} s of one core for samples and truth of all front ends")
     }
 }
 

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 /// Start of a piece of work on this thread.
-pub(crate) struct Stopwatch(Duration);
+pub struct Stopwatch(Duration);
 
 impl Stopwatch {
     /// A watch that counts from now on.

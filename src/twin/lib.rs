@@ -86,7 +86,7 @@ pub fn run(
     truth: &mut (dyn truth::Sink + Send),
     records: &mut (dyn output::Sink + Send),
 ) -> Result<Done, TwinError> {
-    if scenes.iter().any(|scene| scene.fidelity.grade == Grade::Correlations) {
+    if is_modelled(scenes)? {
         return correlations::run(scenes, settings, (truth, records), &mut |_| ());
     }
     let metadata: Vec<IfMetadata> = scenes.iter().map(|scene| scene.metadata.clone()).collect();
@@ -94,6 +94,17 @@ pub fn run(
     let fed =
         feed(scenes, truth, &mut |number, samples| Ok::<_, TwinError>(reception.take_of(number, samples, records)?))?;
     Ok(Done { generated: fed.generated, outcome: reception.finish(records)? })
+}
+
+/// True if a model gives the correlations of these front ends and no samples are made: at that level, and with
+/// a budget that it keeps.
+///
+/// # Errors
+/// Errors of orbits.
+pub fn is_modelled(scenes: &[Scene]) -> Result<bool, TwinError> {
+    let has_budget = scenes.iter().any(|scene| matches!(scene.fidelity.grade, Grade::Budget(_)));
+    let is_asked = scenes.iter().any(|scene| scene.fidelity.grade == Grade::Correlations);
+    Ok(is_asked || has_budget && correlations::broken(scenes)?.is_none())
 }
 
 /// The settings with which a scene is received: where they name no signals to search for, those of the scene,

@@ -48,13 +48,36 @@ pub struct Unmet {
     pub rate_msps: f64,
 }
 
+/// Largest errors of a choice of knobs or of a level, with the signals that have them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Promise<'s> {
+    /// Error of a code in metres.
+    pub code_m: (&'s Signal, f64),
+    /// Error of a carrier in cycles.
+    pub carrier_cycles: f64,
+    /// Error of a C/N0 in dB, against an ideal filter of the samples' band.
+    pub cn0_db: (&'s Signal, f64),
+}
+
+impl<'s> Promise<'s> {
+    /// Promise of knobs for `signals` at a sample rate; `None` without signals.
+    pub fn of(knobs: &Fidelity, rate_hz: f64, signals: &[&'s Signal]) -> Option<Self> {
+        let Fidelity { code_edge, waveform, carrier, knot_tolerance_cycles, .. } = *knobs;
+        let (by, rms_m) = worst(signals, |signal| code_bias_m(code_edge, signal, rate_hz))?;
+        Some(Self {
+            code_m: (by, LARGEST_OVER_RMS * rms_m),
+            carrier_cycles: carrier.error_cycles() + knot_tolerance_cycles,
+            cn0_db: worst(signals, |signal| off_db(code_edge, waveform, signal, rate_hz))?,
+        })
+    }
+}
+
 /// Values of the knobs, with their errors and their cost.
 struct Candidate<'s> {
     code_edge: CodeEdge,
     carrier: Arithmetic,
     waveform: Layers,
-    code_m: (&'s Signal, f64),
-    cn0_db: (&'s Signal, f64),
+    promise: Promise<'s>,
     ns: f64,
 }
 
@@ -76,20 +99,20 @@ impl Budget {
         if candidates.is_empty() {
             return Ok(fidelity(CodeEdge::Nearest, Arithmetic::F32, Layers::Whole));
         }
-        let kept = candidates.iter().find(|one| self.broken(one).is_none());
+        let kept = candidates.iter().find(|one| self.broken(&one.promise).is_none());
         kept.map(|one| fidelity(one.code_edge, one.carrier, one.waveform))
             .ok_or_else(|| self.unmet(&candidates, rate_hz))
     }
 
-    /// First error of a candidate that is beyond the budget, in words.
-    fn broken(self, one: &Candidate<'_>) -> Option<String> {
-        let least_cycles = one.carrier.error_cycles() + KNOTS_CYCLES[0];
+    /// First error of a promise that is beyond the budget, in words.
+    pub fn broken(self, promise: &Promise<'_>) -> Option<String> {
+        let Promise { code_m, carrier_cycles, cn0_db } = *promise;
         let beyond = |(signal, error): (&Signal, f64), bound: f64, what: &str, unit: &str| {
             (error > bound).then(|| format!("{what} of {signal} up to {error:.2e} {unit} off"))
         };
-        beyond(one.code_m, self.code_m, "code", "m").or_else(|| beyond(one.cn0_db, self.cn0_db, "C/N0", "dB")).or_else(
-            || (least_cycles > self.carrier_cycles).then(|| format!("carrier up to {least_cycles:.2e} cycle off")),
-        )
+        beyond(code_m, self.code_m, "code", "m").or_else(|| beyond(cn0_db, self.cn0_db, "C/N0", "dB")).or_else(|| {
+            (carrier_cycles > self.carrier_cycles).then(|| format!("carrier up to {carrier_cycles:.2e} cycle off"))
+        })
     }
 
     fn unmet(self, candidates: &[Candidate<'_>], rate_hz: f64) -> Unmet {
@@ -97,11 +120,12 @@ impl Budget {
         let least = |error: fn(&Candidate<'_>) -> f64, within: &dyn Fn(&&Candidate<'_>) -> bool| {
             candidates.iter().filter(within).min_by(|a, b| error(a).total_cmp(&error(b)))
         };
-        let code = least(|one| one.code_m.1, &|_| true).map(|one| one.code_m);
+        let code = least(|one| one.promise.code_m.1, &|_| true).map(|one| one.promise.code_m);
         if let Some((signal, least)) = code.filter(|(_, least)| *least > self.code_m) {
             return unmet("code_m", self.code_m, (signal.to_string(), least));
         }
-        let cn0 = least(|one| one.cn0_db.1, &|one| one.code_m.1 <= self.code_m).map(|one| one.cn0_db);
+        let kept = |one: &&Candidate<'_>| one.promise.code_m.1 <= self.code_m;
+        let cn0 = least(|one| one.promise.cn0_db.1, &kept).map(|one| one.promise.cn0_db);
         if let Some((signal, least)) = cn0.filter(|(_, least)| *least > self.cn0_db) {
             return unmet("cn0_db", self.cn0_db, (signal.to_string(), least));
         }
@@ -113,7 +137,7 @@ impl Budget {
     pub fn cheaper(self, chosen: &Fidelity, rate_hz: f64, signals: &[&Signal]) -> Vec<String> {
         let mut told: Vec<String> = Vec::new();
         for one in candidates(rate_hz, signals) {
-            let Some(broken) = self.broken(&one) else { break };
+            let Some(broken) = self.broken(&one.promise) else { break };
             let Candidate { code_edge, carrier, waveform, .. } = one;
             let mut knobs = vec![format!("code_edge {}", code_edge.name())];
             knobs.extend((carrier != chosen.carrier).then(|| format!("carrier {}", carrier.name())));
@@ -137,9 +161,9 @@ fn three_digits(value: f64) -> f64 {
 fn candidates<'s>(rate_hz: f64, signals: &[&'s Signal]) -> Vec<Candidate<'s>> {
     let mut all = Vec::new();
     for (_, code_edge) in CodeEdge::NAMES {
-        let Some((by, rms_m)) = worst(signals, |signal| code_bias_m(code_edge, signal, rate_hz)) else { continue };
         for (_, waveform) in Layers::NAMES {
-            let Some(cn0_db) = worst(signals, |signal| off_db(code_edge, waveform, signal, rate_hz)) else { continue };
+            let knobs = Fidelity { code_edge, waveform, ..Fidelity::of(Grade::Balanced) };
+            let Some(promise) = Promise::of(&knobs, rate_hz, signals) else { continue };
             let layered = signals.iter().flat_map(|signal| signal.components).any(|one| one.layers.len() > 1);
             if waveform == Layers::Strongest && !layered {
                 continue;
@@ -149,8 +173,9 @@ fn candidates<'s>(rate_hz: f64, signals: &[&'s Signal]) -> Vec<Candidate<'s>> {
                     share_made(signal, waveform)
                         * kernel_ns(signal, rate_hz, code_edge, carrier).unwrap_or(f64::INFINITY)
                 });
-                let (code_m, ns) = ((by, LARGEST_OVER_RMS * rms_m), ns.sum());
-                all.push(Candidate { code_edge, carrier, waveform, code_m, cn0_db, ns });
+                // Knots cost nothing a sample, so a budget takes the finest that it needs.
+                let promise = Promise { carrier_cycles: carrier.error_cycles() + KNOTS_CYCLES[0], ..promise };
+                all.push(Candidate { code_edge, carrier, waveform, promise, ns: ns.sum() });
             }
         }
     }

@@ -8,9 +8,13 @@ use crate::scene::Scene;
 use crate::stopwatch::Stopwatch;
 use crate::stream::{Options, transmitters};
 use crate::synth::{Edge, RUN_SAMPLES};
+use crate::transmit::Transmitter;
+use crate::truth::observe_by;
 
 /// Roots of each satellite's grid that a plan looks at.
 const PLANNED_ROOTS: u64 = 16;
+/// Rows of each satellite's truth that a plan makes to time them.
+const PLANNED_ROWS: u64 = 4;
 
 /// Figures of the synthesiser that depend on the scene and the machine.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -26,9 +30,12 @@ pub struct Machinery {
     /// Time in seconds on one core of this machine for all knots of the scene.
     #[serde(skip)]
     pub knots_s: f64,
+    /// Time in seconds on one core of this machine for all rows of the truth.
+    #[serde(skip)]
+    pub truth_s: f64,
 }
 
-/// Computes the synthesiser's figures: knots along the scene, memory of a batch, and the usual speed.
+/// Computes the synthesiser's figures: knots along the scene, memory of a batch, and the time of knots and truth.
 ///
 /// # Errors
 /// Errors of orbits.
@@ -68,5 +75,21 @@ pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
         },
         block_bytes: batch.min(scene.samples) * scene.metadata.format.bytes() as u64,
         knots_s,
+        truth_s: truth_s(scene, &transmitters)?,
     })
+}
+
+/// Time of all rows of the truth on one core, from a few rows of each signal.
+fn truth_s(scene: &Scene, transmitters: &[Transmitter]) -> Result<f64, GenerateError> {
+    let rows = (scene.clock.rate.elapsed_s(scene.samples) / scene.truth_interval_s).ceil();
+    let (watch, each) = (Stopwatch::start(), scene.samples.div_ceil(PLANNED_ROWS).max(1));
+    let mut made = 0;
+    for sample in (0..scene.samples).step_by(each as usize) {
+        for one in transmitters {
+            // What is not in view takes no time here, nor in the scene.
+            observe_by(scene, &one.from, (one.sv, one.signal), (sample, 0.0), one.geometry.as_deref())?;
+        }
+        made += 1;
+    }
+    Ok(watch.elapsed_s() * rows / f64::from(made.max(1)))
 }

@@ -19,6 +19,7 @@ fn plan(text: &str) -> Plan {
         knot_reason: "a test".to_owned(),
         block_bytes: 1 << 20,
         knots_s: 0.5,
+        truth_s: 0.25,
     };
     Plan::new(&scene, machinery, Levels::new(&scene).unwrap()).unwrap()
 }
@@ -36,8 +37,8 @@ fn the_static_scene_has_the_satellites_that_its_comment_promises() {
     assert!((6.5..7.5).contains(&lowest.elevation_deg), "{plan}");
     assert!(plan.satellites.iter().all(|s| s.appears.is_none() && s.leaves.is_none()), "{plan}");
     assert_eq!((plan.samples, plan.bytes), (156_000_000, 312_000_000));
-    // What was measured, for all samples and knots: of one signal of twelve satellites.
-    let expected_s = 156e6 * 1e-9 * plan.sample_ns + plan.machinery.knots_s;
+    // What was measured, for all samples, knots and rows: of one signal of twelve satellites.
+    let expected_s = 156e6 * 1e-9 * plan.sample_ns + plan.machinery.knots_s + plan.machinery.truth_s;
     assert!((plan.time_s / expected_s - 1.0).abs() < 1e-9 && plan.sample_ns > 0.0 && plan.speed_mps == 0.0);
     assert!((plan.sample_ns / plan.signal_sample_ns / 12.0 - 1.0).abs() < 1e-9);
     // The link budget's reach from 5 degrees to the zenith.

@@ -12,6 +12,7 @@
 mod crowd;
 mod made;
 mod noise;
+mod promise;
 mod ray;
 mod refusal;
 mod search;
@@ -42,6 +43,7 @@ use receiver::settings::Settings;
 use crowd::{Course, Crowd, LEAST_LONG_CHIPS};
 use made::Made;
 use noise::Noise;
+pub use promise::{broken, promise};
 use ray::Question;
 pub use refusal::{Refused, refuse};
 use sent::Sent;
@@ -274,7 +276,6 @@ impl Correlations<'_> {
 
     /// Refuses satellites whose short codes a receiver finds in each other's correlations.
     fn refuse_near_and_far(&self) -> Result<(), Refused> {
-        let is_short = |signal: &'static Signal| lead(signal).is_some_and(|lead| lead.code_chips < LEAST_LONG_CHIPS);
         for signal in self.plan.scene.signals.iter().copied().filter(|one| is_short(one)) {
             let of = self.sent.iter().zip(&self.cn0_hz);
             let of = of.filter(|(one, hz)| one.transmitter.signal == signal && **hz > 0.0);
@@ -314,6 +315,11 @@ impl Correlations<'_> {
             }
         });
     }
+}
+
+/// True of a signal whose short code a receiver finds in other satellites' correlations.
+fn is_short(signal: &'static Signal) -> bool {
+    lead(signal).is_some_and(|lead| lead.code_chips < LEAST_LONG_CHIPS)
 }
 
 /// True if a receiver cannot tell what is sent from a link.

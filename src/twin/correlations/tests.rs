@@ -17,6 +17,7 @@ use receiver::lead::lead;
 use receiver::output::Record;
 use receiver::settings::Settings;
 
+use super::promise::{HEIGHT, bounds};
 use super::*;
 
 /// A scene at rest with the signal, at the rate, of some satellites that send it.
@@ -160,6 +161,9 @@ fn code_and_carrier_are_those_of_samples(is_in: fn(&Signal) -> bool, most: (f64,
     let taken = |signal: &&'static Signal| refusal::signal(signal).is_none() && is_in(signal);
     for signal in SIGNALS.into_iter().filter(taken) {
         let rate_hz = if signal.components[0].chip_rate_hz < 3e6 { 43.7e6 } else { 61.3e6 };
+        // A budget is held against nothing smaller.
+        let (bound_m, bound_cycles) = bounds(signal);
+        assert!(most.0 <= bound_m && most.1 <= bound_cycles, "{signal}");
         let sv = first(&at_rest(signal, rate_hz, 0.02, ""));
         let period_s = lead(signal).unwrap().period_s();
         let only = format!("[satellites]\nonly = [\"{sv}\"]\n");
@@ -179,7 +183,7 @@ fn code_and_carrier_are_those_of_samples(is_in: fn(&Signal) -> bool, most: (f64,
                     let apart = (code_m - own_m, cycles - own_cycles, height - 1.0);
                     let place = format!("{signal} {index} {at}: {own_m:.4} m, apart {apart:?}");
                     println!("{place}");
-                    if !(apart.0.abs() < most.0 && apart.1.abs() < most.1 && apart.2.abs() < 5e-3) {
+                    if !(apart.0.abs() < most.0 && apart.1.abs() < most.1 && apart.2.abs() < HEIGHT) {
                         missed.push(place);
                     }
                 }
@@ -315,4 +319,27 @@ fn an_effect_without_a_model_is_refused_by_name() {
     assert!(refused(jammer).contains("[[interference]]"));
     assert!(refuse(&[kanpur(1.0, ""), kanpur(1.0, "[fidelity]\ncode_edge = \"band_limited\"\n")]).is_err());
     assert!(refuse(&[kanpur(1.0, "")]).is_ok());
+}
+
+/// A scene with a budget that this level keeps is not sampled; one that it does not keep says which error, or
+/// which effect, is why.
+#[test]
+fn a_budget_takes_this_level_where_its_errors_and_effects_allow_it() {
+    let reason = |rest: &str, budget: &str| {
+        broken(&[kanpur(1.0, &format!("{rest}[fidelity]\nbudget = {{ {budget} }}\n"))]).unwrap()
+    };
+    assert_eq!(reason("", "code_m = 3.0, carrier_cycles = 1e-3, cn0_db = 0.5"), None);
+    let jammer = "[[interference]]\nkind = \"noise\"\nbandwidth_hz = 1e5\njn0_dbhz = 60\n";
+    for (rest, budget, why) in [
+        ("", "code_m = 5e-4, carrier_cycles = 1e-3", "fidelity.code_edge"),
+        ("", "code_m = 3.0, carrier_cycles = 1e-4", "carrier up to"),
+        ("", "cn0_db = 0.1", "C/N0 of GPS L1 C/A"),
+        (jammer, "code_m = 3.0", "[[interference]]"),
+        ("[scintillation]\ns4 = 0.5\n", "code_m = 3.0", "[scintillation]"),
+        ("[power]\ncn0_dbhz = { G03 = 30, G06 = 50 }\n", "code_m = 3.0", "dB apart"),
+    ] {
+        let found = reason(rest, budget).unwrap_or_default();
+        assert!(found.contains(why), "{rest} {budget}: {found}");
+    }
+    assert_eq!(broken(&[kanpur(1.0, "")]).unwrap(), None);
 }

@@ -1,0 +1,187 @@
+//! Ladder of a plan: what each level of fidelity costs a scene, and how far it errs.
+//!
+//! Times of the levels that make samples are the generator's. Where a model answers in place of samples, the
+//! time is that of generator and receiver, from a pilot of the scene's first seconds on one core.
+
+use std::fmt::Write;
+
+use serde_json::{Value, json};
+
+use crate::cli::error::CliError;
+use crate::cli::made::failure;
+use crate::cli::scenario::{self, Named};
+use generator::plan::{Errors, Plan, Rung};
+use generator::scenario::Overrides;
+use generator::scene::{Grade, Scene};
+use generator::stopwatch::Stopwatch;
+use receiver::output::{OutputError, Record, Sink};
+use receiver::settings::Settings;
+
+/// Lengths of the two pilots in seconds. What a scene costs a second is their difference.
+const PILOTS_S: [f64; 2] = [1.0, 4.0];
+
+/// Levels of a scene, from the one with most samples' detail to the one with least.
+pub struct Ladder {
+    rungs: Vec<Rung>,
+    chosen: &'static str,
+    /// Reason for which a budget takes samples.
+    broken: Option<String>,
+}
+
+impl Ladder {
+    /// Ladder of a scene, of whose front ends there are plans.
+    ///
+    /// # Errors
+    /// Errors of the scene at a level that it has.
+    pub fn new(named: &Named, scenes: &[Scene], plans: &[Plan], overrides: &Overrides) -> Result<Self, CliError> {
+        let each = scenes.iter().zip(plans).map(|(scene, plan)| Rung::of_samples(scene, plan));
+        let join = |all: Vec<Rung>, more: Vec<Rung>| all.into_iter().zip(more).map(|(a, b)| a.join(b)).collect();
+        let mut rungs = each.reduce(join).unwrap_or_default();
+        rungs.push(correlations(named, overrides)?);
+        let own = scenes.first().map_or("", |scene| scene.fidelity.grade.name());
+        let is_modelled = twin::is_modelled(scenes).map_err(failure)?;
+        let broken = twin::correlations::broken(scenes).map_err(failure)?;
+        Ok(Self { rungs, chosen: if is_modelled { Grade::Correlations.name() } else { own }, broken })
+    }
+
+    /// Lines of the ladder without times, which differ from run to run.
+    pub fn text(&self) -> String {
+        let mut out = "ladder       code m   carrier cycle  C/N0 dB  memory MiB\n".to_owned();
+        for Rung { level, refused, memory_bytes, errors, .. } in &self.rungs {
+            let mark = if *level == self.chosen { "*" } else { " " };
+            let _ = match (refused, errors) {
+                (Some(refused), _) => writeln!(out, "{mark} {level:12} refused: {refused}"),
+                (None, Some(Errors { code_m, carrier_cycles, cn0_db })) => {
+                    let mib = memory_bytes.map_or("-".to_owned(), |bytes| format!("{:.1}", bytes as f64 / 1_048_576.0));
+                    writeln!(out, "{mark} {level:12} {code_m:7.1e}  {carrier_cycles:13.1e}  {cn0_db:7.2}  {mib:>10}")
+                }
+                (None, None) => writeln!(out, "{mark} {level:12} no signals"),
+            };
+        }
+        if let Some(broken) = &self.broken {
+            let _ = writeln!(out, "  correlations would break the budget: {broken}");
+        }
+        out
+    }
+
+    /// Times of the levels on this machine, in words.
+    pub fn speed(&self) -> String {
+        let known = self.rungs.iter().filter(|rung| rung.refused.is_none());
+        let each: Vec<String> = known.map(|rung| format!("{} {:.1} s", rung.level, rung.time_s)).collect();
+        format!(
+            "levels on this machine, of one core: {}; correlations with the receiver, the others without",
+            each.join(", ")
+        )
+    }
+
+    /// JSON array of the levels.
+    pub fn object(&self) -> Value {
+        let each = self.rungs.iter().map(|rung| json!({ "rung": rung, "chosen": rung.level == self.chosen }));
+        each.collect()
+    }
+}
+
+/// The level of modelled correlations, as `run --level correlations` has it.
+fn correlations(named: &Named, overrides: &Overrides) -> Result<Rung, CliError> {
+    let mut named = named.clone();
+    let ends = named.scenario.front_ends.iter_mut();
+    ends.for_each(|front_end| front_end.fidelity = front_end.fidelity.at(Grade::Correlations));
+    let (mut scenes, _) = scenario::compose_all(&named, overrides)?;
+    let settings = twin::settings_for(&scenes, &scenario::receiver_settings(&named)?);
+    let rung = |refused, time_s, errors| Rung {
+        level: Grade::Correlations.name(),
+        refused,
+        time_s,
+        memory_bytes: None,
+        errors,
+    };
+    let promise = match twin::correlations::promise(&scenes) {
+        Ok(promise) => promise,
+        Err(refused) => return Ok(rung(Some(format!("no model of {}", refused.effect)), 0.0, None)),
+    };
+    let duration_s = scenes.first().map_or(0.0, |scene| scene.clock.rate.elapsed_s(scene.samples));
+    let [short, long] = PILOTS_S.map(|s| s.min(duration_s));
+    let ends: Vec<u64> = scenes.iter().map(|scene| scene.samples).collect();
+    let mut pilot_s = |duration_s: f64| {
+        for (scene, end) in scenes.iter_mut().zip(&ends) {
+            scene.samples = ((duration_s * scene.clock.rate.hz()) as u64).min(*end);
+        }
+        pilot_s(&scenes, &settings)
+    };
+    let [first_s, both_s] = [pilot_s(short)?, pilot_s(long)?];
+    let second_s = if long > short { (both_s - first_s) / (long - short) } else { 0.0 };
+    let time_s = both_s + second_s.max(0.0) * (duration_s - long);
+    Ok(rung(None, time_s, promise.map(Errors::from)))
+}
+
+/// Time of one core for scenes at this level.
+fn pilot_s(scenes: &[Scene], settings: &Settings) -> Result<f64, CliError> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(CliError::bug)?;
+    pool.install(|| {
+        let watch = Stopwatch::start();
+        let done = twin::correlations::run(scenes, settings, (&mut (), &mut Nowhere), &mut |_| ());
+        done.map(|_| watch.elapsed_s()).map_err(|error| failure(error).into())
+    })
+}
+
+/// Sink that keeps nothing.
+struct Nowhere;
+
+impl Sink for Nowhere {
+    fn take(&mut self, _: Record) -> Result<(), OutputError> {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use generator::scenario::Scenario;
+
+    fn ladder(text: &str) -> Ladder {
+        let scenario = Scenario::parse(text, "ladder").unwrap();
+        let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+        let named = Named { scenario, text: text.to_owned(), name: "ladder".to_owned(), directory };
+        let overrides = Overrides::default();
+        let (scenes, _) = scenario::compose_all(&named, &overrides).unwrap();
+        let plans: Vec<Plan> = scenes.iter().map(|scene| Plan::of(scene).unwrap()).collect();
+        Ladder::new(&named, &scenes, &plans, &overrides).unwrap()
+    }
+
+    /// Of C/A at 2.6 Msps the errors of codes fall from the nearest chip to the band-limited one (1.15, 0.12
+    /// and 0.011 m rms, as another language has them), and samples take more time the less they err.
+    #[test]
+    fn a_dearer_level_errs_less_and_the_scene_s_own_is_marked() {
+        let ladder = ladder(&include_str!("../../scenarios/static.toml").replace("duration_s = 60", "duration_s = 5"));
+        let names: Vec<&str> = ladder.rungs.iter().map(|rung| rung.level).collect();
+        assert_eq!(names, ["fast", "balanced", "reference", "correlations"]);
+        let code_m = |at: usize| ladder.rungs[at].errors.unwrap().code_m / 5.0;
+        for (at, expected_m) in [(0, 1.15), (1, 0.122), (2, 0.0108)] {
+            assert!((code_m(at) / expected_m - 1.0).abs() < 0.15, "{at}: {}", code_m(at));
+        }
+        assert!(ladder.rungs[..3].is_sorted_by(|a, b| a.time_s < b.time_s), "{:?}", ladder.rungs);
+        assert!(ladder.rungs[3].time_s > 0.0 && ladder.rungs[3].refused.is_none());
+        let text = ladder.text();
+        assert!(text.contains("* balanced") && !text.contains("would break"), "{text}");
+        assert_eq!(ladder.object()[1]["chosen"], true);
+    }
+
+    #[test]
+    fn a_level_without_an_effect_of_the_scene_says_which_and_a_budget_what_it_would_break() {
+        let jammed = ladder(include_str!("../../scenarios/jammed.toml"));
+        assert!(jammed.text().contains("correlations refused: no model of [[interference]]"), "{}", jammed.text());
+        let budget = |errors: &str| {
+            let fidelity = format!("[fidelity]\nbudget = {{ {errors} }}\n[front_end]");
+            ladder(&include_str!("../../scenarios/static.toml").replacen("[front_end]", &fidelity, 1)).text()
+        };
+        let loose = budget("code_m = 1.0, carrier_cycles = 1e-3");
+        assert!(loose.contains("* correlations") && loose.contains("  budget "), "{loose}");
+        let tight = budget("code_m = 1.0, carrier_cycles = 5e-5");
+        assert!(
+            tight.contains("* budget") && tight.contains("correlations would break the budget: carrier"),
+            "{tight}"
+        );
+    }
+}
