@@ -38,10 +38,10 @@ impl Ladder {
         let join = |all: Vec<Rung>, more: Vec<Rung>| all.into_iter().zip(more).map(|(a, b)| a.join(b)).collect();
         let mut rungs = each.reduce(join).unwrap_or_default();
         rungs.push(correlations(named, overrides)?);
-        let own = scenes.first().map_or("", |scene| scene.fidelity.grade.name());
-        let is_modelled = twin::is_modelled(scenes).map_err(failure)?;
+        let own = scenes.first().map_or(Grade::Balanced, |scene| scene.fidelity.grade);
         let broken = twin::correlations::broken(scenes).map_err(failure)?;
-        Ok(Self { rungs, chosen: if is_modelled { Grade::Correlations.name() } else { own }, broken })
+        let is_kept = matches!(own, Grade::Budget(_)) && broken.is_none();
+        Ok(Self { rungs, chosen: if is_kept { Grade::Correlations.name() } else { own.name() }, broken })
     }
 
     /// Lines of the ladder without times, which differ from run to run.

@@ -83,11 +83,8 @@ impl Case {
             return Err(CliError::bug("a scenario without a front end"));
         }
         // Whoever keeps the samples wants them made.
-        if !arguments.keep_if && twin::is_modelled(&scenes).map_err(made::failure)? {
-            for scene in scenes.iter_mut().filter(|scene| scene.fidelity.grade != Grade::Correlations) {
-                scene.fidelity.grade = Grade::Correlations;
-                scenario::note("level correlations keeps the budget: no samples are made");
-            }
+        if !arguments.keep_if && twin::settle(&mut scenes).map_err(made::failure)? {
+            scenario::note("level correlations keeps the budget: no samples are made");
         }
         let settings = twin::settings_for(&scenes, &scenario::receiver_settings(&named)?);
         // A scene is made for its position: without one there is nothing to judge.

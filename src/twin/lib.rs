@@ -76,7 +76,7 @@ pub struct Done {
 
 /// Generates a scene and receives its samples with `settings`, from the first to the last. `scenes` are its
 /// front ends, one or several ([`settings_for`]); a reference to one [`Scene`] is made such a slice by
-/// [`std::slice::from_ref`].
+/// [`std::slice::from_ref`]. Scenes with a budget make samples, unless [`settle`] has found that they need none.
 ///
 /// # Errors
 /// The first error of either side; what the sinks took before stays.
@@ -86,7 +86,7 @@ pub fn run(
     truth: &mut (dyn truth::Sink + Send),
     records: &mut (dyn output::Sink + Send),
 ) -> Result<Done, TwinError> {
-    if is_modelled(scenes)? {
+    if scenes.iter().any(|scene| scene.fidelity.grade == Grade::Correlations) {
         return correlations::run(scenes, settings, (truth, records), &mut |_| ());
     }
     let metadata: Vec<IfMetadata> = scenes.iter().map(|scene| scene.metadata.clone()).collect();
@@ -96,15 +96,17 @@ pub fn run(
     Ok(Done { generated: fed.generated, outcome: reception.finish(records)? })
 }
 
-/// True if a model gives the correlations of these front ends and no samples are made: at that level, and with
-/// a budget that it keeps.
+/// Takes the level of correlations for front ends with a budget, if it keeps that; true if it does.
 ///
 /// # Errors
 /// Errors of orbits.
-pub fn is_modelled(scenes: &[Scene]) -> Result<bool, TwinError> {
+pub fn settle(scenes: &mut [Scene]) -> Result<bool, TwinError> {
     let has_budget = scenes.iter().any(|scene| matches!(scene.fidelity.grade, Grade::Budget(_)));
-    let is_asked = scenes.iter().any(|scene| scene.fidelity.grade == Grade::Correlations);
-    Ok(is_asked || has_budget && correlations::broken(scenes)?.is_none())
+    let is_kept = has_budget && correlations::broken(scenes)?.is_none();
+    if is_kept {
+        scenes.iter_mut().for_each(|scene| scene.fidelity = correlations::knobs(scene));
+    }
+    Ok(is_kept)
 }
 
 /// The settings with which a scene is received: where they name no signals to search for, those of the scene,

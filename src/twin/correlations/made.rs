@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 
 use generator::fidelity::CodeEdge;
 use generator::scene::Scene;
-use gnss::signal::{Component, Layer, Layers, PeakTable, Shape, Signal, chip_kinds, least_common_multiple};
+use gnss::signal::{Component, Layer, Layers, PeakTable, Shape, Signal, least_common_multiple};
 use num_complex::Complex64;
 use receiver::acquire::SEARCHED;
 use receiver::correlate::Edge;
@@ -17,6 +17,7 @@ use receiver::correlate::correlator::Code;
 use receiver::lead::lead;
 use receiver::settings::Settings;
 
+use super::sequence::Sequence;
 use super::taps::{Sets, Taps};
 
 /// Steps a chip of the tables of peaks.
@@ -214,29 +215,13 @@ impl Made {
         let strongest = self.component.strongest()?;
         let alone = [Layer { weight: 1.0, phase_cycles: 0.0, ..*strongest }];
         let layers = if self.made.0 == Layers::Whole { self.component.layers } else { &alone };
-        let replica = steps(self.code(number, self.index)?, layers);
+        let replica = Sequence::new(self.code(number, self.index)?, begin(self.component), layers);
         let code = self.code(number, index)?;
-        let incoming = steps(code, sent.made_with(self.sent));
-        let per_chip = least_common_multiple(replica.0, incoming.0);
-        let [replica, incoming] = [replica, incoming].map(|(steps, values)| {
-            let repeated = values.into_iter().flat_map(move |value| std::iter::repeat_n(value, per_chip / steps));
-            repeated.collect::<Vec<Complex64>>()
-        });
-        let first = begin(self.component) * per_chip;
-        let replica = replica.get(first..first + length * per_chip)?;
-        let reach = LAGS_CHIPS * per_chip;
-        // The incoming steps from `reach` before the first one on.
-        let total = incoming.len();
-        let around: Vec<Complex64> = (incoming.iter().copied().cycle())
-            .skip((begin(sent) * per_chip + total - reach % total) % total)
-            .take(replica.len() + 2 * reach)
-            .collect();
-        let scale = 1.0 / (replica.len() as f64 * share(code).sqrt());
-        let sum = |lag: usize| {
-            let pairs = around.iter().skip(lag).zip(replica).filter(|(_, local)| **local != Complex64::ZERO);
-            pairs.map(|(incoming, local)| incoming * local.conj()).sum::<Complex64>() * scale
-        };
-        let sums: Vec<Complex64> = (0..=2 * reach).map(sum).collect();
+        let incoming = Sequence::new(code, begin(sent), sent.made_with(self.sent));
+        let per_chip = least_common_multiple(replica.steps(), incoming.steps());
+        let scale = 1.0 / share(code).sqrt();
+        let mut sums = incoming.correlate(&replica, length, (LAGS_CHIPS, per_chip));
+        sums.iter_mut().for_each(|sum| *sum *= scale);
         let step_chips = 1.0 / per_chip as f64;
         let table = |of: fn(&Complex64) -> f64| {
             let lags: Vec<f64> = sums.iter().map(of).collect();
@@ -250,17 +235,6 @@ impl Made {
 /// Share of a code's chips that are its turn.
 fn share(chips: &[i8]) -> f64 {
     chips.iter().filter(|&&chip| chip != 0).count() as f64 / chips.len().max(1) as f64
-}
-
-/// Steps of all chips of a code with these layers, and the number of them in a chip.
-fn steps(chips: &[i8], layers: &[Layer]) -> (usize, Vec<Complex64>) {
-    let (kinds, pattern) = chip_kinds(layers);
-    let kind = |index: usize| pattern.get(index % pattern.len().max(1)).and_then(|kind| kinds.get(*kind));
-    let wave = |(index, chip): (usize, &i8)| {
-        let chip = f64::from(*chip);
-        kind(index).into_iter().flatten().map(move |step| step * chip)
-    };
-    (kinds.first().map_or(1, Vec::len), chips.iter().enumerate().flat_map(wave).collect())
 }
 
 #[cfg(test)]

@@ -18,6 +18,7 @@ mod refusal;
 mod search;
 mod sent;
 mod separation;
+mod sequence;
 mod taps;
 #[cfg(test)]
 mod tests;
@@ -43,7 +44,7 @@ use receiver::settings::Settings;
 use crowd::{Course, Crowd, LEAST_LONG_CHIPS};
 use made::Made;
 use noise::Noise;
-pub use promise::{broken, promise};
+pub use promise::{broken, knobs, promise};
 use ray::Question;
 pub use refusal::{Refused, refuse};
 use sent::Sent;

@@ -5,9 +5,10 @@
 //! while a scene runs, so a budget takes samples where their powers change in ways that a few instants do not
 //! show.
 
-use generator::fidelity::Promise;
+use generator::fidelity::{Fidelity, Promise};
 use generator::scene::{Grade, Scene};
 use generator::spoof::Constellation;
+use generator::stream::GenerateError;
 use generator::truth;
 use gnss::signal::Signal;
 
@@ -26,27 +27,37 @@ pub(super) fn bounds(signal: &Signal) -> (f64, f64) {
         (true, _) => (2e-2, 2e-4),
         (false, 1) => (1e-3, 1e-4),
         // Components of one satellite in each other's correlations, 40 Hz beside the carrier.
-        (false, _) => (7e-3, 1.7e-4),
+        (false, _) => (8e-3, 1.7e-4),
     }
 }
 
-/// Largest errors at this level for the front ends of a scene, the first of which says how motion is
-/// followed. `None` without signals.
+/// Knobs of a scene at this level: its own, and for a budget edges of area in place of those that samples
+/// would need, since a model has no positions between samples.
+pub fn knobs(scene: &Scene) -> Fidelity {
+    let knot_tolerance_cycles = scene.fidelity.knot_tolerance_cycles;
+    match scene.fidelity.grade {
+        Grade::Budget(_) => Fidelity { knot_tolerance_cycles, ..Fidelity::of(Grade::Correlations) },
+        _ => scene.fidelity,
+    }
+}
+
+/// Largest errors at this level for the front ends of a scene. `None` without signals.
 ///
 /// # Errors
 /// [`Refused`], with an effect that has no model.
 pub fn promise(scenes: &[Scene]) -> Result<Option<Promise<'static>>, Refused> {
     refuse(scenes)?;
     let of = |scene: &Scene| {
-        let knobs = Promise::of(&scene.fidelity, scene.clock.rate.hz(), &scene.signals)?;
+        let knobs = knobs(scene);
+        let sampled = Promise::of(&knobs, scene.clock.rate.hz(), &scene.signals)?;
         let worst = |of: fn(&Signal) -> f64| {
             let all = scene.signals.iter().map(|signal| (*signal, of(signal)));
             all.max_by(|(_, a), (_, b)| a.total_cmp(b))
         };
-        let (signal, cn0_db) = knobs.cn0_db;
+        let (signal, cn0_db) = sampled.cn0_db;
         Some(Promise {
             code_m: worst(|signal| bounds(signal).0)?,
-            carrier_cycles: scene.fidelity.knot_tolerance_cycles + worst(|signal| bounds(signal).1)?.1,
+            carrier_cycles: knobs.knot_tolerance_cycles + worst(|signal| bounds(signal).1)?.1,
             cn0_db: (signal, cn0_db + 20.0 * libm::log10(1.0 + HEIGHT)),
         })
     };
@@ -91,9 +102,13 @@ fn near_and_far(scenes: &[Scene]) -> Result<Option<String>, TwinError> {
             }
             for sample in (0..scene.samples).step_by((scene.samples / INSTANTS).max(1) as usize) {
                 let (mut least, mut most) = (f64::MAX, f64::MIN);
+                let local = scene.clock.epoch(sample);
                 for sv in scene.senders().filter(|sv| scene.signals_of(*sv).any(|one| one == signal)) {
+                    if !truth::in_view(scene, sv, local).map_err(GenerateError::from)? {
+                        continue;
+                    }
                     let seen = truth::observe(scene, &Constellation::authentic(), sv, signal, sample, 0.0);
-                    if let Some((row, ..)) = seen.map_err(generator::stream::GenerateError::from)? {
+                    if let Some((row, ..)) = seen.map_err(GenerateError::from)? {
                         (least, most) = (least.min(row.cn0_dbhz), most.max(row.cn0_dbhz));
                     }
                 }

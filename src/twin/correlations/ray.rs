@@ -7,7 +7,7 @@ use receiver::correlate::correlator::{Code, Interval};
 use receiver::correlate::{phasor, units_to_chips};
 
 use super::made::{Made, Peak};
-use super::sent::{Anchor, Sent, centred, split, turns};
+use super::sent::{Anchor, Sent, centred, turns};
 
 /// 2^64 as a float.
 const TURN: f64 = 18_446_744_073_709_551_616.0;
@@ -98,7 +98,7 @@ impl Question<'_> {
         ([first, half, last], cycles): (&Ends, [f64; 3]),
         sent: usize,
     ) -> Option<Course<'_>> {
-        let Interval { nco, from, to, .. } = self.interval;
+        let Interval { nco, from, to, end } = self.interval;
         let (made, rate_hz, samples) = (self.made, scene.clock.rate.hz(), (to - from) as f64);
         let component = made.signal.components.get(sent)?;
         let (period, share) = anchor.code_at(sent, component.period_s(), anchor.elapsed_s(from, rate_hz), first)?;
@@ -111,7 +111,11 @@ impl Question<'_> {
         let is_long = component.code_chips > made.length;
         let segment = self.code.segment.unwrap_or_else(|| if is_long { running() } else { 0 });
         let begin = if is_long { segment as f64 * local_length } else { 0.0 };
-        let local = begin + local_length * split(units_to_chips(nco.code) / local_length).1;
+        // A jump back at the beginning of a period shows its last chips. They are those before it, where the
+        // code is a segment.
+        let rest = units_to_chips(nco.code_step as i64) * end.saturating_sub(from) as f64;
+        let since = local_length - rest;
+        let local = begin + since + centred(units_to_chips(nco.code) - since, local_length);
         let apart = centred(phase - local, length);
         let peak = made.peak(self.code.link.sv.number, segment as usize, sent)?;
         let gained = passed - units_to_chips(nco.code_step as i64) * samples;

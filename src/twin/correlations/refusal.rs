@@ -3,9 +3,10 @@
 use generator::fidelity::CodeEdge;
 use generator::scene::Scene;
 use gnss::samples::Format;
-use gnss::signal::{Layer, Signal};
-use receiver::lead::lead;
+use gnss::signal::Signal;
 use thiserror::Error;
+
+use super::promise::knobs;
 
 /// Least noise in LSB: from there on rounding adds noise of 1/12 LSB² to within exp(−2π²), 3e-9.
 const LEAST_LSB: f32 = 1.0;
@@ -48,27 +49,13 @@ fn refused(scene: &Scene) -> Option<String> {
         .or_else(|| (!format.is_complex()).then(real))
         .or_else(|| quantisation(scene))
         .or_else(|| scene.metadata.inverted.then(|| "front_end.spectrum_inverted".to_owned()))
-        .or_else(|| edge(scene.fidelity.code_edge))
+        .or_else(|| edge(knobs(scene).code_edge))
         .or_else(|| scene.signals.iter().find_map(|one| signal(one)))
 }
 
 /// Signal whose correlations the model does not have, with the reason.
 pub(super) fn signal(signal: &'static Signal) -> Option<String> {
-    let differ = |a: &Layer, b: &Layer| ((a.phase_cycles - b.phase_cycles) % 0.5).abs() > 0.0;
-    let is_mixed = |layers: &[Layer]| {
-        layers.iter().any(|layer| !layer.chips.is_empty()) || layers.windows(2).any(|pair| differ(&pair[0], &pair[1]))
-    };
-    if signal.sides_hz() > 0.0 {
-        return Some(format!("{signal} (signals), both sidebands of which are followed"));
-    }
-    // Channels lose such a pilot here from time to time, which they do not by samples.
-    let longest = signal.components.iter().map(|one| one.code_chips).max();
-    if lead(signal).map(|lead| lead.code_chips) != longest {
-        return Some(format!("{signal} (signals), the pilot of which has a code longer than is searched for"));
-    }
-    // Sums of samples differ by 3 and 5 cm.
-    let is_mixed = signal.components.iter().any(|one| is_mixed(one.layers));
-    is_mixed.then(|| format!("{signal} (signals), whose pulses take turns or are in quadrature"))
+    (signal.sides_hz() > 0.0).then(|| format!("{signal} (signals), both sidebands of which are followed"))
 }
 
 /// Whole numbers whose rounding is no noise of its own, or that clip.
