@@ -111,15 +111,21 @@ impl<'a> Plan<'a> {
         let made = Made::all(scene, settings);
         let rate_hz = scene.clock.rate.hz();
         let sampled: Vec<Sampled> = scene.signals.iter().map(|signal| Sampled::new(signal, scene)).collect();
-        let carriers = |signal: &'static Signal| signal.satellites().map(|sv| signal.carrier_hz(sv));
+        // One for most signals, one a channel for others.
+        let carriers = |signal: &&'static Signal| {
+            let mut all: Vec<f64> = signal.satellites().map(|sv| signal.carrier_hz(sv)).collect();
+            all.sort_by(f64::total_cmp);
+            all.dedup();
+            all
+        };
+        let carriers: Vec<Vec<f64>> = scene.signals.iter().map(carriers).collect();
         let from_all = |made: &Made| {
             let mut all = BTreeMap::new();
             let own = (&made.own, made.component.chip_rate_hz);
-            for (number, (signal, sampled)) in scene.signals.iter().zip(&sampled).enumerate() {
-                for (own_hz, other_hz) in
-                    carriers(made.signal).flat_map(|own| carriers(signal).map(move |hz| (own, hz)))
-                {
-                    let apart_hz = other_hz - own_hz;
+            let place = scene.signals.iter().position(|signal| *signal == made.signal);
+            let own_hz = place.and_then(|place| carriers.get(place)).map_or(&[][..], Vec::as_slice);
+            for (number, (others_hz, sampled)) in carriers.iter().zip(&sampled).enumerate() {
+                for apart_hz in own_hz.iter().flat_map(|own_hz| others_hz.iter().map(move |hz| hz - own_hz)) {
                     let entry = all.entry((number, apart_hz.round() as i64));
                     entry.or_insert_with(|| sampled.separation_s(own, apart_hz, rate_hz));
                 }
