@@ -25,7 +25,7 @@ pub const SEEDS_PER_SEED: u64 = 3;
 const OTHER_SEEDS: u64 = 1000;
 
 /// Scenes that both levels take.
-pub const SITES: [Site; 15] = [
+pub const SITES: [Site; 18] = [
     Site { name: "static", seconds: 45.0, seeds: 20 },
     Site { name: "moderate", seconds: 45.0, seeds: 20 },
     Site { name: "high_dynamics", seconds: 60.0, seeds: 20 },
@@ -41,6 +41,9 @@ pub const SITES: [Site; 15] = [
     Site { name: "galileo", seconds: 40.0, seeds: 20 },
     Site { name: "two_systems", seconds: 40.0, seeds: 20 },
     Site { name: "beidou_b2a", seconds: 25.0, seeds: 20 },
+    Site { name: "gps_l1c", seconds: 30.0, seeds: 20 },
+    Site { name: "beidou_b1c", seconds: 30.0, seeds: 20 },
+    Site { name: "qzss_bands", seconds: 35.0, seeds: 20 },
 ];
 
 /// One figure of a run.

@@ -271,9 +271,10 @@ impl Waveform {
         for k in -half..half {
             let hz = (f64::from(k) + 0.5) * step_hz;
             let met = self.met(sampler, hz);
+            let beside = other.met(sampler, hz);
             own += met;
-            others += other.met(sampler, hz);
-            shared += met * other.met(sampler, hz - apart_hz);
+            others += beside;
+            shared += met * if apart_hz == 0.0 { beside } else { other.met(sampler, hz - apart_hz) };
         }
         shared / (own * others * step_hz)
     }
