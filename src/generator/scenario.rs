@@ -5,6 +5,7 @@
 //! a [`Scene`](crate::scene::Scene). Units are in the names of the keys: degrees and dB here,
 //! radians and ratios from here on. `[receiver]` is kept as written for the receiver's own settings.
 
+mod array;
 mod attitude;
 mod augmentation;
 mod band;
@@ -45,6 +46,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 use toml::de::DeTable;
 
+pub use array::ElementSpec;
 pub use augmentation::SbasSpec;
 pub use builder::{Builder, put};
 pub use city::CitySpec;
@@ -252,7 +254,9 @@ pub struct Scenario {
     pub motion: MotionSpec,
     /// Attitude of the body that carries the antenna; absent means an antenna that points up.
     pub attitude: Option<Attitude>,
-    /// One at least.
+    /// Elements of an array on that body; absent means one antenna.
+    pub array: Option<Vec<ElementSpec>>,
+    /// One at least; one for each element of an array.
     pub front_ends: Vec<FrontEnd>,
     /// Power of the signals.
     pub power: Power,
@@ -395,7 +399,11 @@ impl Scenario {
         let expect = refusals.take(expect);
         let noise = noise.is_some();
         let allowed_m = allowed_m(power.as_ref().filter(|_| noise).map(Power::strongest_dbhz));
-        let front_ends = front_end::front_ends(root, allowed_m, refusals);
+        let array = array::array(root, refusals);
+        let front_ends = front_end::front_ends(root, allowed_m, refusals).map(|front_ends| match &array {
+            Some(elements) => array::front_ends(root, elements, front_ends, refusals),
+            None => front_ends,
+        });
         let playback = refusals.take(playback.map(|t| stages::playback(&t)).transpose()).flatten();
         let Choice { mask_rad, only, excluded, include_unhealthy } = chosen?;
         Some(Self {
@@ -422,6 +430,7 @@ impl Scenario {
             message_faults,
             motion: motion?,
             attitude: attitude?,
+            array,
             city: city?,
             front_ends: front_ends?,
             power: power?,
