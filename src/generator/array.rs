@@ -32,6 +32,8 @@ pub struct Element {
     pub lever_arms_m: Arc<[Vector3<f64>]>,
     /// Row of the coupling matrix; empty without coupling.
     pub coupling: Vec<Complex64>,
+    /// Gain of the channel as a factor on amplitudes, which its noise has too. It is part of the samples' gain.
+    pub gain: f64,
     /// Phase by which the channel is ahead, in cycles.
     pub phase_cycles: f64,
     /// Delay of the channel in seconds.

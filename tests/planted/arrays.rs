@@ -15,9 +15,8 @@ const ERRORS_DEG: [f64; 3] = [0.0, 70.0, -110.0];
 
 #[test]
 fn satellites_reach_the_elements_with_the_phases_by_which_the_receiver_steers() {
-    let element = |(arm, error): (&[f64; 3], &f64)| {
-        format!("[[array.element]]\nlever_arm_m = {arm:?}\nphase_deg = {error}\n")
-    };
+    let element =
+        |(arm, error): (&[f64; 3], &f64)| format!("[[array.element]]\nlever_arm_m = {arm:?}\nphase_deg = {error}\n");
     let elements: String = ARMS_M.iter().zip(&ERRORS_DEG).map(element).collect();
     let text = format!(
         "name = \"array\"\nstart = 2010-07-01T08:12:30\nduration_s = 1\n[motion]\nkind = \"static\"\n\

@@ -194,6 +194,7 @@ impl Scenario {
             body: body.clone(),
             lever_arms_m: all.iter().map(|element| element.lever_arm_m).collect(),
             coupling: spec.coupling.clone(),
+            gain: spec.gain,
             phase_cycles: spec.phase_cycles,
             delay_s: spec.delay_s,
         });
@@ -203,7 +204,8 @@ impl Scenario {
             source.at_element(antenna, tuning.clone(), (!element.is_ideal()).then(|| Arc::clone(&element)));
         }
         if !element.is_ideal() {
-            scene.effects.push(Box::new(element));
+            scene.effects.push(Box::new(Arc::clone(&element)));
         }
+        scene.element = Some(element);
     }
 }

@@ -289,6 +289,7 @@ impl Scenario {
             receiver_clock: world.receiver_clock.clone(),
             nodes: world.nodes,
             trajectory: world.trajectory.clone(),
+            element: None,
             catalogue: Arc::clone(&world.catalogue),
             messages: Arc::clone(&world.messages),
             osnma: world.osnma.clone(),
