@@ -1,11 +1,12 @@
-//! Element of an array: what one of several antennas on a body receives, against the wave at its place.
+//! Element of an array: what one of several antennas on a body receives, against the wave at its position.
 //!
-//! Elements share the body, its clock and its sky; their places are lever arms, and the geometry of each is
-//! its own. Here is what the geometry does not have: errors of an element's channel (phase and delay), and
-//! the mutual coupling of the antennas, a matrix that acts on the waves before the noise of the amplifiers.
-//! With plane waves, element k receives `Σ C_kj exp(i 2π f/c u·(l_j − l_k))` times its own wave, u the
-//! direction towards the source and l the lever arms (van Trees 2002, section 2.2 for the phases). Limits:
-//! coupling has neither delay nor frequency; a delay turns the carrier as a cable at radio frequency does.
+//! Elements share the body, its clock and its sky; their positions are lever arms, and the geometry of each
+//! is its own. Here is what the geometry does not have: errors of an element's channel (phase and delay),
+//! and the mutual coupling of the antennas, a matrix that acts on the waves before the noise of the
+//! amplifiers. With plane waves, element k receives `Σ C_kj exp(i 2π f/c u·(l_j − l_k))` times its own wave,
+//! u the direction towards the source and l the lever arms (van Trees 2002, section 2.2 for the phases).
+//! Limits: coupling has neither delay nor frequency; a delay turns the carrier as a cable at radio frequency
+//! does.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -32,7 +33,8 @@ pub struct Element {
     pub lever_arms_m: Arc<[Vector3<f64>]>,
     /// Row of the coupling matrix; empty without coupling.
     pub coupling: Vec<Complex64>,
-    /// Gain of the channel as a factor on amplitudes, which its noise has too. It is part of the samples' gain.
+    /// Gain of the channel as a factor on amplitudes, which its noise has too. It is part of the samples'
+    /// gain.
     pub gain: f64,
     /// Phase by which the channel is ahead, in cycles.
     pub phase_cycles: f64,

@@ -29,6 +29,7 @@ mod parts;
 mod propagation;
 mod pushed;
 pub mod read;
+mod receiver;
 mod satellite;
 pub mod schema;
 mod scintillation;
@@ -341,7 +342,7 @@ impl Scenario {
         let root = Table::new(source, "", 0, document, keys::SCENARIO);
         let mut refusals = Refusals::default();
         root.check(&mut refusals);
-        let receiver = refusals.take(receiver(&root, text).map_err(|e| source.refused(&e))).flatten();
+        let receiver = refusals.take(receiver::receiver(&root, text).map_err(|e| source.refused(&e))).flatten();
         let overrides = Overrides { allow_outside, ..Overrides::default() };
         // Signals of a file that is refused would be unknown.
         let described = signal_file::read(&root, origin, Files { directory, overrides: &overrides });
@@ -399,11 +400,8 @@ impl Scenario {
         let expect = refusals.take(expect);
         let noise = noise.is_some();
         let allowed_m = allowed_m(power.as_ref().filter(|_| noise).map(Power::strongest_dbhz));
-        let array = array::array(root, refusals);
-        let front_ends = front_end::front_ends(root, allowed_m, refusals).map(|front_ends| match &array {
-            Some(elements) => array::front_ends(root, elements, front_ends, refusals),
-            None => front_ends,
-        });
+        let front_ends = front_end::front_ends(root, allowed_m, refusals);
+        let (array, front_ends) = array::array(root, front_ends, refusals);
         let playback = refusals.take(playback.map(|t| stages::playback(&t)).transpose()).flatten();
         let Choice { mask_rad, only, excluded, include_unhealthy } = chosen?;
         Some(Self {
@@ -539,16 +537,4 @@ fn satellite_list(table: &Table<'_>, key: &str) -> Result<Option<Vec<Sv>>, Scena
     let Some(words) = table.words(key, expected)? else { return Ok(None) };
     let satellites: Result<Vec<Sv>, _> = words.iter().map(|word| word.parse::<Sv>()).collect();
     satellites.map(Some).map_err(|_| table.bad(key, expected))
-}
-
-/// The receiver's table as written, through the ordinary parser.
-fn receiver(root: &Table<'_>, text: &str) -> Result<Option<toml::Table>, toml::de::Error> {
-    if !root.has("receiver") {
-        return Ok(None);
-    }
-    let mut whole: toml::Table = toml::from_str(text)?;
-    match whole.remove("receiver") {
-        Some(toml::Value::Table(table)) => Ok(Some(table)),
-        _ => Err(serde::de::Error::custom("receiver: expected a table")),
-    }
 }

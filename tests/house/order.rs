@@ -131,7 +131,17 @@ pub const ORDER: Order<'static> = &[
         "analysis/expect",
         &[
             &["theory"],
-            &["authenticated", "converter", "followed", "jamming", "message", "quantile", "smoothing", "welch"],
+            &[
+                "array",
+                "authenticated",
+                "converter",
+                "followed",
+                "jamming",
+                "message",
+                "quantile",
+                "smoothing",
+                "welch",
+            ],
             &["sweep"],
             &["front_end", "multiple_access"],
             &["samples"],
@@ -194,6 +204,7 @@ pub const ORDER: Order<'static> = &[
             &["sketch"],
             &["judged"],
             &[
+                "array",
                 "clock",
                 "consistency",
                 "delays",

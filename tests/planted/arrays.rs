@@ -39,7 +39,7 @@ fn satellites_reach_the_elements_with_the_phases_by_which_the_receiver_steers() 
             let ahead = found[0].arrivals[0].carrier_cycles - own.arrivals[0].carrier_cycles;
             let expected = libm::atan2(steered[k].im, steered[k].re) / TAU + ERRORS_DEG[k] / 360.0;
             let off = ahead - expected;
-            // The antenna moves with the Earth while the wave travels: 1.5e-6 of a cycle, and as much by rounding.
+            // The antenna moves with the Earth while the wave travels: 1.5e-6 of a cycle.
             assert!((off - off.round()).abs() < 1e-5, "{sv}, element {k}: {off}");
             checked += 1;
         }

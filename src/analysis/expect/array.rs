@@ -18,7 +18,7 @@ use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::facts::ArrayFacts;
 use gnss::satellite::Sv;
 
-/// What a spatial filter does at each instant of the truth.
+/// Expected work of a spatial filter at each instant of the truth.
 #[derive(Debug, Default)]
 pub struct Filtered {
     ticks: BTreeMap<u64, Tick>,
@@ -150,7 +150,7 @@ impl<'a> Array<'a> {
         is_whole.then(|| Self { facts, kept, loading, wave_per_m, rate_hz: run.scene.sample_rate_hz })
     }
 
-    /// What the elements give of a unit wave from a direction in east, north and up.
+    /// Answer of the elements to a unit wave from a direction in east, north and up.
     fn answer(&self, towards: &Vector3<f64>) -> DVector<Complex64> {
         let along = self.facts.axes.map(|axis| Vector3::from(axis).dot(towards));
         let waves = waves(&self.facts.lever_arms_m, &Vector3::from(along), self.wave_per_m);
@@ -159,7 +159,7 @@ impl<'a> Array<'a> {
         DMatrix::from_row_iterator(count, count, mixing) * waves
     }
 
-    /// What they give of the sources, and the power of each over noise in the samples.
+    /// Answers to the sources by their numbers, and the power of each over noise in the samples.
     fn jammers<'s>(
         &'s self,
         sources: &'s [(usize, f64)],
@@ -234,7 +234,7 @@ impl<'a> Array<'a> {
     }
 }
 
-/// Unit wave at places in a body's axes, from a direction in them.
+/// Unit wave at positions in a body's axes, from a direction in them.
 fn waves(places_m: &[[f64; 3]], towards: &Vector3<f64>, wave_per_m: f64) -> DVector<Complex64> {
     let each = places_m.iter().map(|place| {
         let (sin, cos) = libm::sincos(TAU * wave_per_m * towards.dot(&Vector3::from(*place)));

@@ -1,7 +1,7 @@
 //! Table `[array]`: several antennas on one body, each with a front end of its own.
 //!
 //! A scene with an array is one with several front ends that sample alike: the scene's one `[front_end]`
-//! stands for each. The first element is the one whose place and signals the truth states. Limits: sixteen
+//! stands for each. The first element is the one whose position and signals the truth states. Limits: sixteen
 //! elements; one antenna pattern for all; nothing whose waves come from more directions than the geometry
 //! has (echoes, spoofers without a position), no pushed motion and no modelled correlations.
 
@@ -34,7 +34,7 @@ const BESIDE: [(&str, &str); 4] = [
 pub struct ElementSpec {
     /// Name of its files.
     pub name: String,
-    /// Place in body axes from the antenna of the attitude, in metres.
+    /// Position in body axes from the antenna of the attitude, in metres.
     pub lever_arm_m: Vector3<f64>,
     /// Error of the gain as a factor on amplitudes.
     pub gain: f64,
@@ -46,8 +46,21 @@ pub struct ElementSpec {
     pub coupling: Vec<Complex64>,
 }
 
-/// Reads `[array]`; `None` without one.
-pub(super) fn array(root: &Table<'_>, refusals: &mut Refusals) -> Option<Vec<ElementSpec>> {
+/// Reads `[array]`, `None` without one, and gives each element a front end like the scene's one.
+pub(super) fn array(
+    root: &Table<'_>,
+    front_ends: Option<Vec<FrontEnd>>,
+    refusals: &mut Refusals,
+) -> (Option<Vec<ElementSpec>>, Option<Vec<FrontEnd>>) {
+    let elements = elements(root, refusals);
+    let front_ends = front_ends.map(|all| match &elements {
+        Some(elements) => of_elements(root, elements, all, refusals),
+        None => all,
+    });
+    (elements, front_ends)
+}
+
+fn elements(root: &Table<'_>, refusals: &mut Refusals) -> Option<Vec<ElementSpec>> {
     let table = refusals.take(root.table("array")).flatten()?;
     for (name, reason) in BESIDE.into_iter().filter(|(name, _)| root.has(name)) {
         refusals.add(root.bad(name, format!("nothing beside [array]: {reason}")));
@@ -119,7 +132,7 @@ fn coupling(table: &Table<'_>, count: usize) -> Result<Option<Vec<Vec<Complex64>
 }
 
 /// Front ends of the elements: the scene's only one, as often as there are elements.
-pub(super) fn front_ends(
+fn of_elements(
     root: &Table<'_>,
     elements: &[ElementSpec],
     front_ends: Vec<FrontEnd>,
@@ -180,7 +193,7 @@ impl Scenario {
         })
     }
 
-    /// Makes a scene that of its element, on a body whose antenna moves along `body`: its place, what its
+    /// Makes a scene that of its element, on a body whose antenna moves along `body`: its position, what its
     /// channel does to satellites and emitters, and its gain.
     pub(super) fn at_element(&self, scene: &mut Scene, front_end: &FrontEnd, body: &Trajectory) {
         let (Some(number), Some(spec), Some(all)) = (front_end.element, self.element_of(front_end), &self.array) else {

@@ -57,7 +57,7 @@ struct World {
     seed: u64,
     own_seed: u64,
     nodes: Nodes,
-    /// Motion of the antenna that the attitude states, and of the one whose place the truth states: an
+    /// Motion of the antenna that the attitude states, and of the one whose position the truth states: an
     /// array's first element.
     body: Trajectory,
     trajectory: Trajectory,

@@ -64,8 +64,8 @@ fn scenes(text: &str) -> Vec<Scene> {
     Scenario::parse(text, "array").unwrap().compose_all(Path::new("."), &Overrides::default()).unwrap().0
 }
 
-/// Place of an element at a true time, by rotations of this test: north, east, down turned by yaw, pitch and
-/// roll one after the other.
+/// Position of an element at a true time, by rotations of this test: north, east, down turned by yaw, pitch
+/// and roll one after the other.
 fn element_m(arm: [f64; 3], spin_hz: f64, t_s: f64) -> Vector3<f64> {
     let [latitude, longitude, _] = PLACE.map(f64::to_radians);
     let north = Vector3::new(-latitude.sin() * longitude.cos(), -latitude.sin() * longitude.sin(), latitude.cos());

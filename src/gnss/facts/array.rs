@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Array of a scene as it is at the start.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ArrayFacts {
-    /// Places of the elements along the body's nose, right side and down, in metres.
+    /// Positions of the elements along the body's nose, right side and down, in metres.
     pub lever_arms_m: Vec<[f64; 3]>,
     /// Unit vectors along nose, right side and down, each in east, north and up.
     pub axes: [[f64; 3]; 3],
@@ -16,6 +16,7 @@ pub struct ArrayFacts {
     pub mixing: Vec<[f64; 2]>,
     /// Gain of each channel, which its noise has too, as a factor on amplitudes.
     pub gains: Vec<f64>,
-    /// Unit vectors towards the sources of interference, in east, north and up, in the order of their numbers.
+    /// Unit vectors towards the sources of interference, in east, north and up, in the order of their
+    /// numbers.
     pub towards: Vec<[f64; 3]>,
 }

@@ -2,9 +2,9 @@
 //!
 //! Blocks of `block_ms` are filtered with weights from their own sample covariance (sample-matrix inversion,
 //! Reed, Mallett and Brennan 1974; van Trees 2002, chapters 6 and 7). Satellites lie below the noise, so they
-//! do not take part in it. Limits: one stream, so one beam for all satellites; weights without taps over time,
-//! so waves must be narrow against the array (bandwidth times delay across it); the phase of the beam may
-//! change from block to block by what the estimate of the weights scatters.
+//! do not take part in it. Limits: one stream, so one beam for all satellites; weights without taps over
+//! time, so waves must be narrow against the array (bandwidth times delay across it); the phase of the beam
+//! may change from block to block by what the estimate of the weights scatters.
 
 mod sums;
 #[cfg(test)]
@@ -37,7 +37,7 @@ pub enum ArrayError {
         have: usize,
     },
     /// Streams and lever arms that do not belong together.
-    #[error("array.lever_arms_m: places of {places} elements for {have} streams of samples: expected as many")]
+    #[error("array.lever_arms_m: positions of {places} elements for {have} streams of samples: expected as many")]
     Places {
         /// Lever arms of the settings.
         places: usize,
@@ -79,7 +79,7 @@ pub enum ArrayError {
         /// Elements.
         have: usize,
     },
-    /// Models in place of samples.
+    /// Models instead of samples.
     #[error("array: modelled correlations have no samples to filter: expected samples")]
     Modelled,
 }

@@ -1,7 +1,7 @@
 //! Sums over the samples of a block: the covariance of the elements, and the stream.
 //!
-//! A jammer may be 60 dB over the noise, whose part of the covariance must not be lost: products are summed in
-//! f64. The stream itself is f32, 140 dB below its largest sample.
+//! A jammer may be 60 dB over the noise, whose part of the covariance must not be lost: products are summed
+//! in f64. The stream itself is f32, 140 dB below its largest sample.
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;

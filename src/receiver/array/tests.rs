@@ -261,7 +261,7 @@ fn samples_that_are_not_those_of_one_array_are_refused_by_name() {
     assert!(refused(&vec![one.clone(); 17], &usual).contains("17 streams"));
     let four = beam(&places(4), 1.0, 0.0);
     let text = refused(&vec![one.clone(); 5], &four);
-    assert!(text.contains("array.lever_arms_m: places of 4 elements for 5 streams"), "{text}");
+    assert!(text.contains("array.lever_arms_m: positions of 4 elements for 5 streams"), "{text}");
     let other = IfMetadata { rate: Rate::from_hz(5e6).unwrap(), ..one.clone() };
     assert!(refused(&[one.clone(), other], &usual).contains("element 2 has other samples than element 1"));
     let real = IfMetadata { format: Format::Ri8, ..one.clone() };

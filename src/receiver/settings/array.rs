@@ -26,15 +26,15 @@ described! {
 #[serde(deny_unknown_fields, default)]
 pub struct ArraySettings {
     /// Weights of the elements, whose samples become one stream before correlation. none: the first element
-    /// alone. power_inversion: least power with the first weight at 1; it needs no places and no direction.
-    /// mvdr: least power with a gain of 1 towards `azimuth_deg` and `elevation_deg`, one beam for all
-    /// satellites.
+    /// alone. power_inversion: least power with the first weight at 1; it needs no positions and no
+    /// direction. mvdr: least power with a gain of 1 towards `azimuth_deg` and `elevation_deg`, one beam for
+    /// all satellites.
     pub filter: SpatialFilter,
     /// Time from whose samples the covariance of the elements is taken, and the weights for the same samples.
     pub block_ms: f64,
     /// Power that is added to the covariance's diagonal, over its smallest eigenvalue.
     pub loading_db: f64,
-    /// Places of the elements in metres along the body's nose, right side and down, in the order of their
+    /// Positions of the elements in metres along the body's nose, right side and down, in the order of their
     /// samples. They must be as many as there are streams. With power_inversion they may be absent.
     pub lever_arms_m: Vec<[f64; 3]>,
     /// Azimuth of the beam of mvdr in the body's axes, from the nose to the right.

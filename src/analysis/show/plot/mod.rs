@@ -230,9 +230,9 @@ pub(crate) const PICTURES: [Picture; 21] = [
     Picture {
         name: "array",
         title: "pattern of the array",
-        caption: "Gain of the spatial filter over azimuth at 5° of elevation, for each set of jammers that were on, from \
-                  the covariance that the scene implies: power over noise against that of the first element. Dashes \
-                  are the jammers, and a null belongs on each.",
+        caption: "Gain of the spatial filter over azimuth at 5° of elevation, for each set of jammers that were on, \
+                  from the covariance that the scene implies: power over noise against that of the first element. \
+                  Dashes are the jammers, and a null belongs on each.",
         numbers: &["truth/scene.json", "rx/receiver.json"],
         sketch: array::array,
     },

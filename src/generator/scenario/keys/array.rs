@@ -12,7 +12,8 @@ pub(crate) const ARRAY: &[Key] = &[
         -200.0,
         20.0,
         "dB",
-        "mutual coupling of the antennas: size of the wave of element j in element k, row k after row; with coupling_deg",
+        "mutual coupling of the antennas: size of the wave of element j in element k, row k after row; with \
+         coupling_deg",
     )
     .or_else("no coupling"),
     list("coupling_deg", -360.0, 360.0, "deg", "phases of coupling_db").or_else("no coupling"),

@@ -77,8 +77,8 @@ pub const SCENARIO: &[Key] = &[
     table(
         "array",
         array::ARRAY,
-        "Antennas on the body of `[attitude]`, each with a front end like the scene's one and a file of its own. Absent: \
-         one antenna.",
+        "Antennas on the body of `[attitude]`, each with a front end like the scene's one and a file of its own. \
+         Absent: one antenna.",
     ),
     table("power", satellites::POWER, "Received power of the satellites. Absent: a link budget with its defaults."),
     table("city", way::CITY, "Walls and roofs around the antenna, which obstruct and reflect. Absent: none."),
