@@ -84,17 +84,22 @@ impl Filtered {
 
     /// Factor on a satellite's power over noise at a sample.
     pub fn satellite(&self, sample: u64, sv: Sv) -> f64 {
-        self.ticks.get(&sample).and_then(|tick| tick.satellites.get(&sv)).copied().unwrap_or(1.0)
+        self.at(sample).and_then(|tick| tick.satellites.get(&sv)).copied().unwrap_or(1.0)
     }
 
     /// Mean of that factor over the satellites.
     pub fn mean(&self, sample: u64) -> f64 {
-        self.ticks.get(&sample).map_or(1.0, |tick| tick.mean)
+        self.at(sample).map_or(1.0, |tick| tick.mean)
     }
 
     /// Factor on the power of a source of interference over noise at a sample.
     pub fn source(&self, sample: u64, number: usize) -> f64 {
-        self.ticks.get(&sample).and_then(|tick| tick.sources.get(&number)).copied().unwrap_or(1.0)
+        self.at(sample).and_then(|tick| tick.sources.get(&number)).copied().unwrap_or(1.0)
+    }
+
+    /// Last instant of the truth up to a sample.
+    fn at(&self, sample: u64) -> Option<&Tick> {
+        self.ticks.range(..=sample).next_back().map(|(_, tick)| tick)
     }
 }
 
