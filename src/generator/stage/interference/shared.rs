@@ -18,7 +18,7 @@ const FARTHEST: f64 = 1.0 / 256.0;
 /// Distance in source samples over which the slope is taken, in 2^-32.
 const SLOPE: u64 = 1 << 24;
 /// Runs that are kept: 64 KB each.
-const KEPT: usize = 512;
+const KEPT: usize = 256;
 
 /// Unit wave over one run at the first element, and its slope per sample of the source.
 #[derive(Debug)]
