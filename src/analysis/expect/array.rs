@@ -188,10 +188,10 @@ impl<'a> Array<'a> {
         let covariance = self
             .jammers(sources)
             .fold(noise, |sum, (_, power, answer)| sum + &answer * answer.adjoint() * Complex64::from(power));
-        let least = covariance.clone().symmetric_eigenvalues().min();
+        let least = eliminated(covariance.clone(), self.kept.clone())?.1;
         let count = self.kept.len();
         let loaded = covariance + DMatrix::from_diagonal_element(count, count, Complex64::from(self.loading * least));
-        let solved = loaded.cholesky()?.solve(&self.kept);
+        let (solved, _) = eliminated(loaded, self.kept.clone())?;
         let gain = self.kept.dotc(&solved);
         Some(solved / gain)
     }
@@ -237,6 +237,36 @@ impl<'a> Array<'a> {
             self.jammers(sources).map(|(number, _, answer)| (number, self.passed(weights, &answer))).collect();
         Tick { satellites, mean, sources }
     }
+}
+
+/// Solution of a positive system by elimination without exchange, and its smallest pivot; `None` where one is
+/// not positive.
+fn eliminated(mut left: DMatrix<Complex64>, mut right: DVector<Complex64>) -> Option<(DVector<Complex64>, f64)> {
+    let (count, mut least) = (right.len(), f64::INFINITY);
+    for j in 0..count {
+        let pivot = left[(j, j)].re;
+        if !(pivot.is_finite() && pivot > 0.0) {
+            return None;
+        }
+        least = least.min(pivot);
+        for i in j + 1..count {
+            let share = left[(i, j)] / pivot;
+            for k in j..count {
+                let above = share * left[(j, k)];
+                left[(i, k)] -= above;
+            }
+            let above = share * right[j];
+            right[i] -= above;
+        }
+    }
+    for i in (0..count).rev() {
+        for k in i + 1..count {
+            let below = left[(i, k)] * right[k];
+            right[i] -= below;
+        }
+        right[i] /= left[(i, i)].re;
+    }
+    Some((right, least))
 }
 
 /// Unit wave at positions in a body's axes, from a direction in them.

@@ -117,12 +117,15 @@ fn coupling(table: &Table<'_>, count: usize) -> Result<Option<Vec<Vec<Complex64>
             return Err(table.bad(key, expected));
         }
     }
-    let factor = |(db, deg): (&f64, &f64)| Complex64::from_polar(libm::pow(10.0, db / 20.0), deg.to_radians());
+    let factor = |(db, deg): (&f64, &f64)| {
+        let (sin, cos) = libm::sincos(deg.to_radians());
+        Complex64::new(cos, sin) * libm::pow(10.0, db / 20.0)
+    };
     let factors: Vec<Complex64> = sizes.iter().zip(&phases).map(factor).collect();
     let rows: Vec<Vec<Complex64>> = factors.chunks(count.max(1)).map(<[Complex64]>::to_vec).collect();
     for (k, row) in rows.iter().enumerate() {
-        let whole: f64 = row.iter().map(|factor| factor.norm()).sum();
-        let own = row.get(k).map_or(0.0, |factor| factor.norm());
+        let whole: f64 = row.iter().map(|factor| factor.norm_sqr().sqrt()).sum();
+        let own = row.get(k).map_or(0.0, |factor| factor.norm_sqr().sqrt());
         if whole >= 2.0 * own {
             let expected = format!("row {} with less beside its diagonal, amplitudes added, than on it", k + 1);
             return Err(table.bad("coupling_db", expected));

@@ -68,8 +68,9 @@ fn scenes(text: &str) -> Vec<Scene> {
 /// and roll one after the other.
 fn element_m(arm: [f64; 3], spin_hz: f64, t_s: f64) -> Vector3<f64> {
     let [latitude, longitude, _] = PLACE.map(f64::to_radians);
-    let north = Vector3::new(-latitude.sin() * longitude.cos(), -latitude.sin() * longitude.sin(), latitude.cos());
-    let east = Vector3::new(-longitude.sin(), longitude.cos(), 0.0);
+    let ((sin_b, cos_b), (sin_l, cos_l)) = (libm::sincos(latitude), libm::sincos(longitude));
+    let north = Vector3::new(-sin_b * cos_l, -sin_b * sin_l, cos_b);
+    let east = Vector3::new(-sin_l, cos_l, 0.0);
     let local = Matrix3::from_columns(&[north, east, north.cross(&east)]);
     let [yaw, pitch, roll] = ANGLES.map(f64::to_radians);
     let turn = |axis, angle| Rotation3::from_axis_angle(&axis, angle);
@@ -102,7 +103,7 @@ fn carriers_of_satellites_differ_between_elements_by_the_geometry() {
                 one.prepare_alone(scene, 0, scene.samples).unwrap();
                 for n in &samples {
                     if let Some((turns, _)) = one.phases(scene, *n) {
-                        own.insert((*n, one.sv), turns as f64 / 2_f64.powi(64));
+                        own.insert((*n, one.sv), turns as f64 / 18_446_744_073_709_551_616.0);
                     }
                 }
             }
@@ -191,7 +192,7 @@ fn coupled_elements_receive_sums_of_each_other_s_waves_and_channels_turn_and_del
     let coupled = scenes(&text(0.0, own, &more, waveform));
     let delayed = -360.0 * (L1_HZ + 123_456.0) * 2.5e-9;
     let channel = [(0.0, 0.0), (-3.0, 40.0), (0.0, delayed), (1.0, 0.0)];
-    let factor = |(db, deg): (f64, f64)| Complex64::from_polar(10_f64.powf(db / 20.0), deg.to_radians());
+    let factor = |(db, deg): (f64, f64)| Complex64::from_polar(libm::pow(10.0, db / 20.0), deg.to_radians());
     for (k, scene) in coupled.iter().enumerate() {
         for (n, found) in received(scene, 8192, 4096).iter().enumerate().step_by(97) {
             let sum: Complex64 = row(k).zip(&plain).map(|(own, wave)| factor(own) * wave[n]).sum();
@@ -243,7 +244,7 @@ fn noise_is_each_element_s_own_and_its_size_follows_the_gain() {
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>() / a.len() as f64;
     let sizes: Vec<f64> = planes.iter().map(|plane| product(plane, plane).sqrt()).collect();
     // 512 LSB, of 65536 samples within 5 of 0.28 %.
-    for (size, gain) in sizes.iter().zip([1.0, 10_f64.powf(-0.3), 1.0, 1.0]) {
+    for (size, gain) in sizes.iter().zip([1.0, libm::pow(10.0, -0.3), 1.0, 1.0]) {
         assert!((size / (512.0 * gain) - 1.0).abs() < 0.014, "{size}");
     }
     for (a, b) in [(0, 1), (0, 2), (2, 3)] {

@@ -22,7 +22,8 @@ pub(super) fn facts(scenes: &[Scene], sources: &[(usize, &Interferer)]) -> Optio
     let local = |axis: Vector3<f64>| <[f64; 3]>::from(enu * axis);
     let row = |element: &&Element| {
         let ahead_cycles = element.phase_cycles - first.metadata.center_hz * element.delay_s;
-        let channel = Complex64::from_polar(element.gain, TAU * (ahead_cycles - ahead_cycles.floor()));
+        let (sin, cos) = libm::sincos(TAU * (ahead_cycles - ahead_cycles.floor()));
+        let channel = Complex64::new(cos, sin) * element.gain;
         let own = |j: usize| match element.coupling.get(j) {
             Some(factor) => *factor,
             None if j == element.number => Complex64::ONE,

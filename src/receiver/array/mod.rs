@@ -114,7 +114,7 @@ pub struct Former {
     block: u64,
     /// Elements' answer to the wave that keeps its gain.
     kept: DVector<Complex64>,
-    /// Loading of the diagonal over the smallest eigenvalue.
+    /// Loading of the diagonal over the smallest pivot.
     loading: f64,
     /// Weights of the last whole block, for the rest of the samples.
     last: Option<DVector<Complex64>>,

@@ -122,7 +122,7 @@ fn the_beam_s_signal_over_noise_and_jammers_is_that_of_the_exact_covariance() {
             let answers = answers(&places, jammers);
             // In 4 MHz a satellite of 45 dB-Hz lies 21 dB below the noise: jammers 40 to 70 dB above it.
             for js_db in [40.0, 55.0, 70.0] {
-                let power = 10_f64.powf((js_db - 21.0) / 10.0);
+                let power = libm::pow(10.0, (js_db - 21.0) / 10.0);
                 let covariance = exact(&answers, elements, power);
                 let best = best(&covariance, &a);
                 let bytes = packed(&mut random, (&answers, elements, power), 4000, (Format::Cf32Le, 1.0));

@@ -32,7 +32,7 @@ pub struct ArraySettings {
     pub filter: SpatialFilter,
     /// Time from whose samples the covariance of the elements is taken, and the weights for the same samples.
     pub block_ms: f64,
-    /// Power that is added to the covariance's diagonal, over its smallest eigenvalue.
+    /// Power that is added to the covariance's diagonal, over its smallest pivot, which is about the noise's.
     pub loading_db: f64,
     /// Positions of the elements in metres along the body's nose, right side and down, in the order of their
     /// samples. They must be as many as there are streams. With power_inversion they may be absent.
