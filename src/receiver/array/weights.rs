@@ -37,9 +37,9 @@ pub fn weights(covariance: &DMatrix<Complex64>, kept: &DVector<Complex64>, loadi
     (gain > 0.0).then(|| solved / Complex64::from(gain))
 }
 
-/// Factors `L D Lᴴ` of a covariance, L with ones on its diagonal and D real. A pivot is the power of an element
-/// that those before it do not have, so the smallest one is about the noise's. Sums, products and quotients
-/// alone: the same bits on every processor.
+/// Factors `L D Lᴴ` of a covariance, L with ones on its diagonal and D real. A pivot is the power of an
+/// element that those before it do not have, so the smallest one is about the noise's. Sums, products and
+/// quotients alone: the same bits on every processor.
 struct Factors {
     lower: DMatrix<Complex64>,
     pivots: Vec<f64>,

@@ -49,7 +49,7 @@ impl Default for ArraySettings {
         Self {
             filter: SpatialFilter::PowerInversion,
             block_ms: 10.0,
-            loading_db: 0.0,
+            loading_db: -10.0,
             lever_arms_m: Vec::new(),
             azimuth_deg: 0.0,
             elevation_deg: 90.0,
