@@ -211,7 +211,7 @@ fn grade(name: &str) -> Result<Grade, String> {
 #[derive(Args, Debug, Default)]
 #[command(after_help = "Examples:\n  gnss-twin run scenarios/static.toml --seed 7 --keep-if\n  gnss-twin run \
                         scenarios/static.toml --level correlations\n  gnss-twin run scenarios/rtk_static.toml \
-                        --station base")]
+                        --station base\n  gnss-twin run scenarios/array_jammed.toml")]
 pub struct Run {
     /// Scene to run [default: the embedded scene of GPS and Galileo]
     pub scenario: Option<PathBuf>,

@@ -32,7 +32,7 @@
 //!
 //! 1. [`random`], [`fidelity`]; the world: [`vehicle`], [`clock`], [`orbit_error`], [`precise`],
 //!    [`catalogue`], [`message`];
-//! 2. the channel: [`ray`], [`sky`], [`effect`], [`fast_phase`], [`spoof`];
+//! 2. the channel: [`ray`], [`sky`], [`effect`], [`array`](mod@array), [`fast_phase`], [`spoof`];
 //! 3. the kernels and the front end: [`synth`], [`knots`], [`switches`], [`mod@stage`];
 //! 4. [`scene`], which holds all of these, and what follows from it: [`event`], [`presence`], [`geometry`],
 //!    [`arrival`], [`truth`], [`error`], [`transmit`], [`mod@stream`];
@@ -43,6 +43,7 @@
 #[macro_use(planted)]
 extern crate gnss;
 
+pub mod array;
 pub mod arrival;
 pub mod augmentation;
 pub mod authentication;

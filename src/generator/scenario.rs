@@ -5,6 +5,7 @@
 //! a [`Scene`](crate::scene::Scene). Units are in the names of the keys: degrees and dB here,
 //! radians and ratios from here on. `[receiver]` is kept as written for the receiver's own settings.
 
+mod array;
 mod attitude;
 mod augmentation;
 mod band;
@@ -28,6 +29,7 @@ mod parts;
 mod propagation;
 mod pushed;
 pub mod read;
+mod receiver;
 mod satellite;
 pub mod schema;
 mod scintillation;
@@ -45,6 +47,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 use toml::de::DeTable;
 
+pub use array::ElementSpec;
 pub use augmentation::SbasSpec;
 pub use builder::{Builder, put};
 pub use city::CitySpec;
@@ -252,7 +255,9 @@ pub struct Scenario {
     pub motion: MotionSpec,
     /// Attitude of the body that carries the antenna; absent means an antenna that points up.
     pub attitude: Option<Attitude>,
-    /// One at least.
+    /// Elements of an array on that body; absent means one antenna.
+    pub array: Option<Vec<ElementSpec>>,
+    /// One at least; one for each element of an array.
     pub front_ends: Vec<FrontEnd>,
     /// Power of the signals.
     pub power: Power,
@@ -337,7 +342,7 @@ impl Scenario {
         let root = Table::new(source, "", 0, document, keys::SCENARIO);
         let mut refusals = Refusals::default();
         root.check(&mut refusals);
-        let receiver = refusals.take(receiver(&root, text).map_err(|e| source.refused(&e))).flatten();
+        let receiver = refusals.take(receiver::receiver(&root, text).map_err(|e| source.refused(&e))).flatten();
         let overrides = Overrides { allow_outside, ..Overrides::default() };
         // Signals of a file that is refused would be unknown.
         let described = signal_file::read(&root, origin, Files { directory, overrides: &overrides });
@@ -396,6 +401,7 @@ impl Scenario {
         let noise = noise.is_some();
         let allowed_m = allowed_m(power.as_ref().filter(|_| noise).map(Power::strongest_dbhz));
         let front_ends = front_end::front_ends(root, allowed_m, refusals);
+        let (array, front_ends) = array::array(root, front_ends, refusals);
         let playback = refusals.take(playback.map(|t| stages::playback(&t)).transpose()).flatten();
         let Choice { mask_rad, only, excluded, include_unhealthy } = chosen?;
         Some(Self {
@@ -422,6 +428,7 @@ impl Scenario {
             message_faults,
             motion: motion?,
             attitude: attitude?,
+            array,
             city: city?,
             front_ends: front_ends?,
             power: power?,
@@ -530,16 +537,4 @@ fn satellite_list(table: &Table<'_>, key: &str) -> Result<Option<Vec<Sv>>, Scena
     let Some(words) = table.words(key, expected)? else { return Ok(None) };
     let satellites: Result<Vec<Sv>, _> = words.iter().map(|word| word.parse::<Sv>()).collect();
     satellites.map(Some).map_err(|_| table.bad(key, expected))
-}
-
-/// The receiver's table as written, through the ordinary parser.
-fn receiver(root: &Table<'_>, text: &str) -> Result<Option<toml::Table>, toml::de::Error> {
-    if !root.has("receiver") {
-        return Ok(None);
-    }
-    let mut whole: toml::Table = toml::from_str(text)?;
-    match whole.remove("receiver") {
-        Some(toml::Value::Table(table)) => Ok(Some(table)),
-        _ => Err(serde::de::Error::custom("receiver: expected a table")),
-    }
 }

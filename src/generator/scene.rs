@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use crate::array::Element;
 use crate::authentication::Osnma;
 use crate::catalogue::Catalogue;
 use crate::clock::ReceiverClock;
@@ -54,6 +55,8 @@ pub struct Scene {
     pub metadata: IfMetadata,
     /// Antenna motion over true time since `clock.start`.
     pub trajectory: Trajectory,
+    /// Element of an array that receives it, where the scenario has one.
+    pub element: Option<Arc<Element>>,
     /// Broadcast ephemerides, and true orbits and clocks.
     pub catalogue: Arc<Catalogue>,
     /// Messages that the satellites send besides their own ephemerides.

@@ -4,7 +4,8 @@
 //! [`track`] follows them with [`correlate`], [`decode`] reads their messages, [`observe`] makes observables
 //! at common epochs and [`position`] solves for position and time. [`interference`] watches the spectrum,
 //! [`parting`] how code and carrier part, [`gap`] whether samples are missing. [`authentic`] verifies
-//! Galileo's authenticated messages, [`detect`] tests for jamming and spoofing.
+//! Galileo's authenticated messages, [`detect`] tests for jamming and spoofing. Of an array's elements
+//! [`array`](mod@array) makes one stream before all that.
 //!
 //! A [`Receiver`] takes samples and returns [`output::Record`]s as values; [`receive`] reads a stream to its
 //! end and gives them to any [`output::Sink`], of which the CSV files of [`output::Output`] are one. Several
@@ -34,7 +35,7 @@
 //! Rooms from the ground up; each imports only rooms before it:
 //! source, format, thresholds · [`correlate`] · [`lead`] · [`gap`], [`interference`], [`parting`] ·
 //! [`acquire`], looks · [`track`] · [`decode`] · [`observe`], [`position`] · [`settings`] (of all those) ·
-//! [`diagnosis`], [`output`] · [`authentic`], [`detect`] · outcome · session · run.
+//! [`diagnosis`], [`output`] · [`array`](mod@array), [`authentic`], [`detect`] · outcome · session · run.
 //!
 //! Internal crate: programs use the facade `gnss_twin`. What it does not hand on may change with any version.
 
@@ -42,6 +43,7 @@
 extern crate gnss;
 
 pub mod acquire;
+pub mod array;
 pub mod authentic;
 pub mod correlate;
 pub mod decode;

@@ -6,6 +6,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::acquire::AcquireError;
+use crate::array::{ArrayError, Formed};
 use crate::authentic::{AnchorError, Authenticity};
 use crate::detect::Detected;
 use crate::diagnosis::{Diagnosis, duration};
@@ -52,6 +53,9 @@ pub enum ReceiveError {
     /// Settings that are refused.
     #[error(transparent)]
     Settings(#[from] SettingsError),
+    /// Elements of an array whose samples do not become one stream.
+    #[error(transparent)]
+    Array(#[from] ArrayError),
     /// A search that cannot be made.
     #[error(transparent)]
     Acquire(#[from] AcquireError),
@@ -101,6 +105,8 @@ pub struct Outcome {
     pub osnma: Option<Authenticity>,
     /// Tests of the detectors of jamming and spoofing, if the settings ask for them.
     pub detection: Option<Detected>,
+    /// Work of the spatial filter of an array, if the settings have one.
+    pub array: Option<Formed>,
     /// Gaps and repetitions in the samples.
     pub jumps: Vec<Jump>,
     /// Margins to what is refused.

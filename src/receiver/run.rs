@@ -4,24 +4,25 @@
 //! messages, make observables, solve. Results do not depend on the number of threads. Memory holds one block,
 //! one search window and what the satellites said.
 
+mod summary;
+
 use std::io::{ErrorKind, Read};
 
 use num_complex::Complex;
-use serde_json::json;
 
 use crate::acquire;
+use crate::array::{ArrayError, Former};
 use crate::correlate::correlator::{Model, Span};
 use crate::diagnosis::{Diagnosis, Stage};
-use crate::followed::Followed;
 use crate::format::Check;
 use crate::outcome::{Outcome, ReceiveError};
 use crate::output::{Record, Sink};
 use crate::session::{Session, held};
 use crate::settings::Settings;
-use crate::source::{Queue, Source, Stretch};
+use crate::source::{Packed, Queue, Source, Stretch};
 use gnss::gps::l1ca::L1_CA;
-use gnss::samples::IfMetadata;
-use gnss::satellite::Sv;
+use gnss::samples::{Format, IfMetadata};
+use summary::summary;
 
 /// Length of the blocks that channels work on.
 const BLOCK_MS: u64 = 50;
@@ -53,6 +54,8 @@ pub fn searched(metadata: &[IfMetadata], settings: &Settings) -> Settings {
 /// Records count samples: those of the first front end, where there are several.
 pub struct Reception {
     metadata: Vec<IfMetadata>,
+    /// Formats of the samples that are taken.
+    formats: Vec<Format>,
     settings: Settings,
     checks: Vec<Check>,
     source: Input,
@@ -68,6 +71,14 @@ enum Input {
         queues: Vec<Queue>,
         /// Samples of the first front end in a block.
         block: u64,
+    },
+    /// Elements of an array, of which one stream is made.
+    Array {
+        queues: Vec<Queue>,
+        /// Samples of each element in a block.
+        block: u64,
+        former: Box<Former>,
+        stream: Vec<u8>,
     },
 }
 
@@ -88,13 +99,27 @@ impl Reception {
     /// Errors of [`Reception::new`], and [`ReceiveError::NoFrontEnd`].
     pub fn of_several(metadata: &[IfMetadata], settings: &Settings) -> Result<Self, ReceiveError> {
         settings.validate("settings")?;
+        let former = settings.array.as_ref().map(|array| Former::new(metadata, array)).transpose()?;
+        let formats: Vec<Format> = metadata.iter().map(|metadata| metadata.format).collect();
+        let formed = former.as_ref().map(|former| former.metadata().clone());
+        let metadata = formed.as_ref().map_or(metadata, std::slice::from_ref);
         let settings = &searched(metadata, settings);
         let session = Session::new(metadata, settings)?;
         let interval = u64::from(settings.operation.measurement_interval_ms).min(BLOCK_MS);
         let length = |metadata: &IfMetadata| metadata.rate.first_sample_at(interval, 1000);
-        let source = match metadata {
-            [one] => Input::One(Source::new(one.format, length(one).min(BLOCK_SAMPLES) as usize)),
-            several => {
+        let array = |former: &Former, one: &IfMetadata| {
+            let own = former.block_samples();
+            (length(one).min(BLOCK_SAMPLES) / own).max(1) * own
+        };
+        let source = match (former, metadata) {
+            (Some(former), [one]) => Input::Array {
+                queues: formats.iter().map(|format| Queue::new(*format)).collect(),
+                block: array(&former, one),
+                former: Box::new(former),
+                stream: Vec::new(),
+            },
+            (_, [one]) => Input::One(Source::new(one.format, length(one).min(BLOCK_SAMPLES) as usize)),
+            (_, several) => {
                 // No front end has more samples in a block than one alone may have.
                 let longest = several.iter().map(length).max().unwrap_or(1).max(1);
                 let first = several.first().map_or(1, length);
@@ -110,7 +135,8 @@ impl Reception {
         Ok(Self {
             metadata: metadata.to_vec(),
             settings: settings.clone(),
-            checks: metadata.iter().map(|metadata| Check::new(metadata.format)).collect(),
+            checks: formats.iter().map(|format| Check::new(*format)).collect(),
+            formats,
             source,
             modelled: 0,
             session,
@@ -152,6 +178,18 @@ impl Reception {
                     take_blocks(&mut self.session, queues, &ends, sink)?;
                 }
             }
+            Input::Array { queues, block, former, stream } => {
+                if let Some(queue) = queues.get_mut(number) {
+                    queue.push(bytes);
+                }
+                loop {
+                    let end = queues.first().map_or(0, Queue::samples) + *block;
+                    if queues.iter().any(|queue| queue.end() < end) {
+                        break;
+                    }
+                    take_elements(&mut self.session, queues, end, (former, stream), sink)?;
+                }
+            }
         }
         Ok(())
     }
@@ -171,6 +209,7 @@ impl Reception {
         let block = match &self.source {
             Input::One(source) => source.block_samples(),
             Input::Several { block, .. } => *block,
+            Input::Array { .. } => return Err(ArrayError::Modelled.into()),
         };
         while self.modelled + block <= to || (last && self.modelled < to) {
             let end = to.min(self.modelled + block);
@@ -193,7 +232,7 @@ impl Reception {
     fn piece_bytes(&self) -> usize {
         match &self.source {
             Input::One(source) => source.block_bytes(),
-            Input::Several { .. } => READ_BYTES,
+            Input::Several { .. } | Input::Array { .. } => READ_BYTES,
         }
     }
 
@@ -201,7 +240,9 @@ impl Reception {
     pub fn samples(&self) -> u64 {
         match &self.source {
             Input::One(source) => source.samples() + self.modelled,
-            Input::Several { queues, .. } => queues.first().map_or(0, Queue::samples) + self.modelled,
+            Input::Several { queues, .. } | Input::Array { queues, .. } => {
+                queues.first().map_or(0, Queue::samples) + self.modelled
+            }
         }
     }
 
@@ -231,6 +272,14 @@ impl Reception {
                 }
                 Ok(queues.iter().map(Queue::cut_bytes).sum())
             }
+            Input::Array { queues, former, stream, .. } => {
+                let first = queues.first().map_or(0, Queue::samples);
+                let end = queues.iter().map(Queue::end).min().unwrap_or(first);
+                if end > first {
+                    take_elements(&mut self.session, queues, end, (former, stream), sink)?;
+                }
+                Ok(queues.iter().map(Queue::cut_bytes).sum())
+            }
         }
     }
 
@@ -252,6 +301,9 @@ impl Reception {
         outcome.seconds = seconds;
         outcome.cut_bytes = cut_bytes;
         outcome.format_warning = self.checks.iter().find_map(Check::warning);
+        if let Input::Array { former, .. } = &self.source {
+            outcome.array = Some(former.formed());
+        }
         if outcome.fixes == 0 {
             let stage = if self.session.has_searched() {
                 self.session.failed_stage()
@@ -288,6 +340,22 @@ fn take_blocks(
     let blocks: Vec<Stretch> = queues.iter().zip(ends).map(|(queue, end)| Stretch::Packed(queue.block(*end))).collect();
     session.process(&blocks, sink)?;
     queues.iter_mut().zip(ends).for_each(|(queue, end)| queue.take(*end));
+    Ok(())
+}
+
+/// Takes the samples before `end` of all elements through the spatial filter and the session.
+fn take_elements(
+    session: &mut Session,
+    queues: &mut [Queue],
+    end: u64,
+    (former, stream): (&mut Former, &mut Vec<u8>),
+    sink: &mut dyn Sink,
+) -> Result<(), ReceiveError> {
+    let blocks: Vec<Packed<'_>> = queues.iter().map(|queue| queue.block(end)).collect();
+    let first = blocks.first().map_or(0, |block| block.first);
+    former.form(&blocks, stream)?;
+    session.process(&[Stretch::Packed(Packed::new(first, former.metadata().format, stream))], sink)?;
+    queues.iter_mut().for_each(|queue| queue.take(end));
     Ok(())
 }
 
@@ -342,7 +410,7 @@ impl Receiver {
     /// # Errors
     /// [`ReceiveError::Real`] for a front end whose samples are real, and errors of [`Receiver::push`].
     pub fn push_complex(&mut self, samples: &[Complex<f32>]) -> Result<Vec<Record>, ReceiveError> {
-        match self.reception.metadata.first().map(|metadata| metadata.format) {
+        match self.reception.formats.first().copied() {
             Some(format) if format.is_complex() => self.push(&format.pack_complex(samples)),
             Some(format) => Err(ReceiveError::Real { format }),
             None => Err(ReceiveError::NoFrontEnd),
@@ -408,65 +476,6 @@ pub fn receive_several<R: Read>(
         }
         progress(reception.samples());
     }
-}
-
-/// Summary of a reception, written as `receiver.json`.
-fn summary(
-    metadata: &[IfMetadata],
-    signals: &[Vec<&'static str>],
-    settings: &Settings,
-    outcome: &Outcome,
-) -> serde_json::Value {
-    let names = |svs: &[Sv]| svs.iter().map(Sv::to_string).collect::<Vec<_>>();
-    let of = |metadata: &IfMetadata| {
-        json!({
-            "format": metadata.format.name(),
-            "sample_rate_hz": metadata.rate.hz(),
-            "center_hz": metadata.center_hz,
-            "inverted": metadata.inverted,
-            "start": metadata.start.map(|start| start.to_string()),
-        })
-    };
-    let all = settings.acquisition.signals();
-    let followed: Vec<Followed> = all.into_iter().filter_map(|signal| Followed::of(signal, settings)).collect();
-    let mut summary = json!({
-        "settings": settings,
-        "followed": followed,
-        "metadata": metadata.first().map(of),
-        "samples": outcome.samples,
-        "seconds": outcome.seconds,
-        "cut_bytes": outcome.cut_bytes,
-        "format_warning": outcome.format_warning,
-        "acquired": names(&outcome.acquired),
-        "used": names(&outcome.used),
-        "fixes": outcome.fixes,
-        "first_fix_s": outcome.first_fix_s,
-        "losses": outcome.losses,
-        "interference": outcome.interfered.as_ref().map(|seen| json!({
-            "seconds": seen.spectra,
-            "strongest": seen.strongest,
-        })),
-        "carrier_offset": outcome.parted,
-        "sample_jumps": outcome.jumps,
-        "conditioning": outcome.conditioning,
-        "warnings": outcome.warnings,
-        "diagnosis": outcome.diagnosis.as_ref().map(ToString::to_string),
-    });
-    if let Some(osnma) = &outcome.osnma {
-        summary["osnma"] = json!(osnma);
-    }
-    if let Some(detection) = &outcome.detection {
-        summary["detection"] = json!(detection);
-    }
-    if metadata.len() > 1 {
-        let each = metadata.iter().zip(signals).map(|(metadata, signals)| {
-            let mut front_end = of(metadata);
-            front_end["signals"] = json!(signals);
-            front_end
-        });
-        summary["front_ends"] = each.collect();
-    }
-    summary
 }
 
 #[cfg(test)]

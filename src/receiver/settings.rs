@@ -4,6 +4,7 @@
 //! All errors of a text are reported at once, in its order. The known keys are those of the defaults
 //! themselves, so the list cannot go stale.
 
+pub mod array;
 pub mod detection;
 pub mod osnma;
 pub mod reference;
@@ -17,6 +18,7 @@ use crate::described::described;
 use crate::position::PositionSettings;
 use crate::position::protection::IntegritySettings;
 use crate::track::{TrackingSettings, TrackingSettingsError};
+use array::ArraySettings;
 use detection::DetectionSettings;
 use gnss::place::{Keys, hint, nearest};
 use gnss::time::{Epoch, TimeError};
@@ -43,6 +45,9 @@ pub struct Settings {
     /// Detectors of jamming and spoofing; absent: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub detection: Option<DetectionSettings>,
+    /// Spatial filter of an array; absent: several front ends are several bands.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub array: Option<ArraySettings>,
 }
 
 described! {
@@ -286,7 +291,8 @@ impl Settings {
         ];
         let of_levels = self.integrity.as_ref().map(IntegritySettings::ranges).into_iter().flatten();
         let of_detectors = self.detection.as_ref().map(DetectionSettings::ranges).into_iter().flatten();
-        for (key, value, low, high) in ranges.into_iter().chain(of_levels).chain(of_detectors) {
+        let of_array = self.array.as_ref().map(ArraySettings::ranges).into_iter().flatten();
+        for (key, value, low, high) in ranges.into_iter().chain(of_levels).chain(of_detectors).chain(of_array) {
             if !(low..=high).contains(&value) {
                 let expected = format!("{low} to {high}");
                 return Err(SettingsError::Range {
@@ -299,6 +305,7 @@ impl Settings {
             }
         }
         let refused = self.osnma.as_ref().map_or(Ok(()), OsnmaSettings::validate);
+        let refused = refused.and_then(|()| self.array.as_ref().map_or(Ok(()), ArraySettings::validate));
         refused.map_err(|(key, value, expected)| SettingsError::Range {
             origin: origin.to_owned(),
             above: String::new(),
@@ -411,6 +418,7 @@ fn known() -> Table {
         osnma: Some(OsnmaSettings::default()),
         integrity: Some(IntegritySettings::default()),
         detection: Some(DetectionSettings::default()),
+        array: Some(ArraySettings::default()),
         ..Settings::default()
     };
     // A structure of numbers, words and truth values is a table.

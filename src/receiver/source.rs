@@ -47,7 +47,17 @@ pub struct Packed<'a> {
     bytes: &'a [u8],
 }
 
-impl Packed<'_> {
+impl<'a> Packed<'a> {
+    /// Creates the samples in `bytes`, packed as `format`, of which the first has number `first`.
+    pub(crate) fn new(first: u64, format: Format, bytes: &'a [u8]) -> Self {
+        Self { first, format, bytes }
+    }
+
+    /// Samples as they are packed.
+    pub(crate) fn bytes(&self) -> &'a [u8] {
+        self.bytes
+    }
+
     /// Number of samples.
     pub fn samples(&self) -> usize {
         self.bytes.len() / self.format.bytes()

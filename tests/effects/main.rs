@@ -1,6 +1,7 @@
 //! Effects and stages: each against its closed form or its published figures, through the samples.
 #![cfg(all(feature = "generator", feature = "receiver", feature = "analysis"))]
 
+mod array;
 mod detection;
 mod front_end;
 mod interference;

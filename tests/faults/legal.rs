@@ -107,6 +107,9 @@ const NUMBERS: &[Row] = &[
     ("integrity", "phmi_vertical phmi_horizontal false_alarm_vertical false_alarm_horizontal p_threshold", No, No),
     ("integrity", "missed_detection hal_m val_m emt_limit_m sigma_v_acc_limit_m", No, No),
     ("detection", "false_alarm interval_s reference_s", No, No),
+    ("array", "block_ms", No, No),
+    ("array", "loading_db azimuth_deg elevation_deg", Yes, Yes),
+    ("array.element", "gain_db phase_deg delay_ns", Yes, Yes),
     ("operation", "search_interval_s reacquisition_interval_s repeated_false_alarm_share frame_limit_s", No, No),
     // A study's own tables; a scene has none of these names.
     ("measure", "settle_s", Yes, No),

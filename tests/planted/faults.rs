@@ -111,6 +111,7 @@ const STATIONS: &str = "witness::pseudorange::two_japanese_stations_fit_the_mode
 const KLOB: &str = "witness::atmosphere::klobuchar_gives_the_worked_value_of_rtklib";
 const SAAS: &str = "witness::atmosphere::saastamoinen_gives_the_worked_value_of_rtklib";
 pub const LOOP: &str = "loops::a_short_ride_under_an_open_sky_keeps_every_limit";
+const ARRAY: &str = "arrays::satellites_reach_the_elements_with_the_phases_by_which_the_receiver_steers";
 const EXACT: &str = "laws::exact_ranges_give_the_exact_position_velocity_and_clock";
 const COV: &str = "laws::the_covariance_is_the_inverse_of_the_weighted_geometry";
 const RAIM: &str = "laws::a_range_that_is_wrong_by_twenty_metres_is_excluded_and_no_other";
@@ -228,6 +229,8 @@ pub const FAULTS: &[Fault] = &[
     fault("generator.sky.light_time", "the satellite is where it is on arrival, not where it was on sending", LOOP),
     fault("generator.sky.clock_sign", "satellite clocks with the wrong sign", LOOP),
     fault("generator.synth.delay", "code delays are 2e-7 of themselves too long", LOOP),
+    fault("generator.array.phase", "phases of an array's channels with the wrong sign", ARRAY),
+    fault("receiver.array.steering", "an array steers to the other side", ARRAY),
     fault("generator.synth.carrier_phase", "the carrier is a tenth of a cycle ahead", LOOP),
     fault("generator.knots.change", "rates within a run are 1 % too high", LOOP),
     fault("generator.synth.doppler_sign", "Doppler of the samples with the wrong sign", LOOP),

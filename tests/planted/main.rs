@@ -4,6 +4,7 @@
 //! target; without a fault the same tests pass in this very run. `GNSS_TWIN_WRITE_PLANTED` names the report
 //! that the run writes.
 
+mod arrays;
 mod bands;
 mod channels;
 mod faults;

@@ -8,8 +8,10 @@
 //! error that reflected rays leave in them, and `beats` what codes add that run alike. [`smoothing`] is what
 //! the carrier makes of the code, [`quantile`] how far random errors may go. [`message`] is what the
 //! satellites sent, [`due`] when each satellite must be found, observed and used, and [`authenticated`] when
-//! data must be authentic. Of the receiver only its settings enter, and the times at which it took its rows.
+//! data must be authentic. [`array`](mod@array) is what a spatial filter leaves. Of the receiver only its
+//! settings enter, and the times at which it took its rows.
 
+pub mod array;
 pub mod authenticated;
 pub(crate) mod beats;
 pub(crate) mod closed;

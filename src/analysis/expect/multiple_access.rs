@@ -6,13 +6,15 @@
 //! sampler that averages over its interval, and a replica that does too, narrow the spectra and raise κ.
 //! Every pair of signals counts whose carriers are within the sample rate, each component by its share of
 //! power at the antenna, of which the sampler leaves its part. Interference adds its own power times its own
-//! separation ([`super::jamming`]). Limits: components
+//! separation ([`super::jamming`]). Behind a spatial filter each counts with what the weights
+//! leave of it, other satellites with their mean ([`super::array`]). Limits: components
 //! of one signal do not disturb each other (what data make of the C/N0 beside a pilot is in
 //! [`super::stated`]); what folds back from beyond the band is left out.
 
 use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap};
 
+use crate::expect::array::Filtered;
 use crate::expect::jamming;
 use crate::read::levels::LevelFinder;
 use crate::read::{Emission, Run};
@@ -29,6 +31,7 @@ pub struct MultipleAccess<'r> {
     kept: HashMap<&'static Signal, f64>,
     sums_hz: RefCell<LevelFinder<'r, Emission>>,
     jammed: Jammed,
+    filtered: Filtered,
 }
 
 /// Noise density that interference adds at a sample, in units of the thermal one. It holds the samples with
@@ -55,12 +58,15 @@ impl<'r> MultipleAccess<'r> {
         let waveform = |signal| Some((signal, Waveform::sent(signal, layers)?));
         let waveforms: HashMap<&'static Signal, Waveform> = signals.into_iter().filter_map(waveform).collect();
         let kept = waveforms.iter().map(|(signal, waveform)| (*signal, waveform.power(&sampler))).collect();
+        // Rows that cannot be read again are an error of the measurement, which reads them all.
+        let filtered = Filtered::of(run).unwrap_or_default();
         Self {
             run,
             kappa_s: separations(run, &emissions, &waveforms, &kept),
             kept,
             sums_hz: RefCell::new(run.cn0_sums_hz.finder()),
-            jammed: jammed(run, &emissions, &waveforms),
+            jammed: jammed(run, &emissions, &waveforms, &filtered),
+            filtered,
         }
     }
 
@@ -81,7 +87,8 @@ impl<'r> MultipleAccess<'r> {
         let shared: f64 = self.kappa_s.get(&own).map_or(&[][..], Vec::as_slice).iter().map(others).sum();
         let thermal = if self.run.scene.noise { 1.0 } else { 0.0 };
         let jammed = self.jammed.get(row.sample, own);
-        10.0 * libm::log10(own_hz / (thermal + shared + jammed))
+        let (gain, mean) = (self.filtered.satellite(row.sample, row.sv), self.filtered.mean(row.sample));
+        10.0 * libm::log10(gain * own_hz / (thermal + mean * shared + jammed))
     }
 
     /// C/N0 of a signal whose true one is `own_hz`, where all power in the samples counts as white noise, its
@@ -96,7 +103,8 @@ impl<'r> MultipleAccess<'r> {
         let all_hz: f64 = met.filter_map(in_samples).sum();
         let thermal = if self.run.scene.noise { 1.0 } else { 0.0 };
         let jammed = self.jammed.get(sample, own);
-        own_hz / (thermal + all_hz / self.run.rate_hz(link.signal) + jammed)
+        let (gain, mean) = (self.filtered.satellite(sample, link.sv), self.filtered.mean(sample));
+        gain * own_hz / (thermal + mean * all_hz / self.run.rate_hz(link.signal) + jammed)
     }
 }
 
@@ -128,7 +136,12 @@ fn separations(
     all
 }
 
-fn jammed(run: &Run, emissions: &BTreeSet<Emission>, waveforms: &HashMap<&'static Signal, Waveform>) -> Jammed {
+fn jammed(
+    run: &Run,
+    emissions: &BTreeSet<Emission>,
+    waveforms: &HashMap<&'static Signal, Waveform>,
+    filtered: &Filtered,
+) -> Jammed {
     if run.interference.is_empty() {
         return Jammed::default();
     }
@@ -150,7 +163,7 @@ fn jammed(run: &Run, emissions: &BTreeSet<Emission>, waveforms: &HashMap<&'stati
             let kappa_s = kappa.get(&row.source).copied().unwrap_or(0.0);
             let place = samples.binary_search(&row.sample).ok();
             if let Some(sum) = place.and_then(|place| sums.get_mut(place)) {
-                *sum += kappa_s * linear(row.jn0_dbhz);
+                *sum += kappa_s * linear(row.jn0_dbhz) * filtered.source(row.sample, row.source);
             }
         }
         of.insert(*emission, sums);

@@ -57,6 +57,9 @@ struct World {
     seed: u64,
     own_seed: u64,
     nodes: Nodes,
+    /// Motion of the antenna that the attitude states, and of the one whose position the truth states: an
+    /// array's first element.
+    body: Trajectory,
     trajectory: Trajectory,
     switches: Option<Arc<Switches>>,
     receiver_clock: ReceiverClock,
@@ -119,6 +122,7 @@ impl Scenario {
         overrides: &Overrides,
     ) -> Result<(Vec<Scene>, Vec<String>), ScenarioError> {
         self.one_station()?;
+        self.suits_array()?;
         let mut warnings = Vec::new();
         let files = Files { directory, overrides };
         let mut bands = Vec::with_capacity(self.front_ends.len());
@@ -138,6 +142,7 @@ impl Scenario {
         for band in bands {
             scenes.push(self.scene_of(&world, band, &files, &mut warnings)?);
         }
+        share_waves(&mut scenes);
         warnings.extend(spoofing_and_jamming::unheard(self, &scenes));
         if let Some(first) = scenes.first() {
             let spoofers = spoofing_and_jamming::spoofers(
@@ -192,7 +197,11 @@ impl Scenario {
     /// Composes the parts that front ends share. They do not depend on the choice of front ends.
     fn world(&self, bands: &[Band<'_>], files: &Files<'_>, warnings: &mut Vec<String>) -> Result<World, ScenarioError> {
         let Files { directory, overrides } = *files;
-        let trajectory = self.turned(self.trajectory_of(&self.motion, directory, overrides, warnings)?)?;
+        let body = self.turned(self.trajectory_of(&self.motion, directory, overrides, warnings)?)?;
+        if self.array.is_some() && body.grown().is_some() {
+            return Err(self.conflict("motion", "is pushed beside [array]: expected another kind".to_owned()));
+        }
+        let trajectory = self.element_motion(&body, 0);
         let speed_mps = trajectory.knots().iter().fold(0.0_f64, |most, knot| most.max(knot.motion.velocity_mps.norm()));
         if speed_mps > LARGEST_SPEED_MPS {
             let reason =
@@ -246,6 +255,7 @@ impl Scenario {
             own_seed,
             nodes,
             switches: trajectory.tick_samples().map(|samples| Arc::new(Switches::new(samples))),
+            body,
             trajectory,
             receiver_clock,
             end_s,
@@ -279,6 +289,7 @@ impl Scenario {
             receiver_clock: world.receiver_clock.clone(),
             nodes: world.nodes,
             trajectory: world.trajectory.clone(),
+            element: None,
             catalogue: Arc::clone(&world.catalogue),
             messages: Arc::clone(&world.messages),
             osnma: world.osnma.clone(),
@@ -306,6 +317,7 @@ impl Scenario {
         scene.interference =
             spoofing_and_jamming::interferers(self, &scene, files.directory, files.overrides, &mut own)?;
         warnings.extend(own.into_iter().map(|warning| front_end.of_it() + &warning));
+        self.at_element(&mut scene, front_end, &world.body);
         Ok(scene)
     }
 
@@ -321,6 +333,17 @@ impl Scenario {
             scene.playback = Some(Playback { bits, step_lsb: step_lsb as f32, attenuation_db });
         }
         Ok(visible)
+    }
+}
+
+/// Makes the elements of an array share the waves of each source.
+fn share_waves(scenes: &mut [Scene]) {
+    let Some((first, others)) = scenes.split_first_mut() else { return };
+    for source in others.iter_mut().flat_map(|scene| &mut scene.interference) {
+        let same = first.interference.iter().find(|known| known.source == source.source);
+        if let (Some(own), Some(known)) = (&mut source.shared, same.and_then(|known| known.shared.as_ref())) {
+            *own = Arc::clone(known);
+        }
     }
 }
 

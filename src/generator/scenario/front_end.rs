@@ -37,6 +37,8 @@ pub enum Tuned {
 pub struct FrontEnd {
     /// Name of the front end's files and key of its random numbers; required in a list of several.
     pub name: Option<String>,
+    /// Number of the array's element that it belongs to, from 0.
+    pub element: Option<usize>,
     /// The sample rate.
     pub rate: Rate,
     /// Tuning: the frequencies that the samples contain.
@@ -174,6 +176,7 @@ impl Reader<'_, '_> {
         let fidelity = refusals.take(fidelity_of(self.fidelity, self.allowed_m));
         Some(FrontEnd {
             name: name?,
+            element: None,
             rate,
             tuned: tuned?,
             inverted: inverted?.unwrap_or(false),

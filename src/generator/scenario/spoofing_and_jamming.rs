@@ -77,14 +77,20 @@ impl Source<'_> {
         self.scenario.conflict("interference", reason)
     }
 
-    /// True if stations hear the source, each on its own path.
+    /// True if stations or elements hear the source, each on its own path.
     fn is_shared(&self) -> bool {
-        self.scenario.station.is_some()
+        self.scenario.station.is_some() || self.scenario.array.is_some()
     }
 
     /// Refuses a source whose power or delay belongs to one antenna, where there are stations.
     fn suits_stations(&self) -> Result<(), ScenarioError> {
-        match (self.is_shared(), self.spec.place, self.spec.strength) {
+        if self.scenario.array.is_some() && self.spec.place.is_none() {
+            return Err(self.refuse(
+                "elements of an array hear it from where it is: write its position (latitude_deg, longitude_deg and \
+                 height_m)",
+            ));
+        }
+        match (self.scenario.station.is_some(), self.spec.place, self.spec.strength) {
             (false, ..) => Ok(()),
             (true, None, _) => Err(self.refuse(
                 "stations hear it from where it is: write its position (latitude_deg, longitude_deg and height_m)",
@@ -147,6 +153,8 @@ impl Source<'_> {
             seed: seed ^ self.number.wrapping_mul(0xd1b5_4a32_d192_ed03),
             tuning: self.tuning.clone(),
             switches: self.scene.switches.clone(),
+            element: None,
+            shared: None,
             description,
         }))
     }

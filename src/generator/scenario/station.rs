@@ -19,7 +19,8 @@ const MOST: usize = 8;
 /// Letters of a name at most.
 const LONGEST_NAME: usize = 32;
 /// Tables of the scene that are made for one antenna, and the reason.
-const OF_ONE: [(&str, &str); 3] = [
+const OF_ONE: [(&str, &str); 4] = [
+    ("array", "its elements are on one body"),
     ("spoofer", "it has no position from which stations could hear it"),
     ("sbas", "its network lies around one antenna"),
     ("playback", "the transmitter plays the samples of one receiver"),

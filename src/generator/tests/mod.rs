@@ -1,5 +1,6 @@
 //! Laws that need the whole generator: rooms below compose scenes and generate samples here.
 
+mod arrays;
 mod authentication;
 mod described;
 mod dynamics;

@@ -197,7 +197,7 @@ fn clock_noise_of_satellites_cancels_between_stations_with_equal_and_with_other_
 
 /// ECEF position of a GPS satellite at a GPS time in seconds after its ephemeris' reference time, in metres:
 /// IS-GPS-200N, table 20-IV, with formulas of this test.
-fn satellite_m(set: &Ephemeris, tk_s: f64) -> Vector3<f64> {
+pub(super) fn satellite_m(set: &Ephemeris, tk_s: f64) -> Vector3<f64> {
     let a_m = set.sqrt_a_sqrtm.powi(2);
     let mean_rad = set.m0_rad + (libm::sqrt(3.986_005e14 / a_m.powi(3)) + set.delta_n_radps) * tk_s;
     let eccentric_rad = (0..30).fold(mean_rad, |e, _| mean_rad + set.eccentricity * libm::sin(e));

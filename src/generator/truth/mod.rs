@@ -5,6 +5,7 @@
 //! Limits: tropospheric and ionospheric shares in `sky.csv` are half the sum and half the difference of code
 //! and carrier delays.
 
+mod array;
 mod place;
 mod record;
 mod rinex;

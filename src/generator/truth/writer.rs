@@ -243,6 +243,7 @@ impl Writer {
             oscillator: (scene.receiver_clock.oscillator.as_ref())
                 .map(|oscillator| OscillatorFacts { h: oscillator.law.levels() }),
             front_ends: if scenes.len() > 1 { scenes.iter().map(front_end).collect() } else { Vec::new() },
+            array: super::array::facts(scenes, &received),
             interference: received.iter().map(|(_, source)| source.fact()).collect(),
             spoofers: scene.spoofers.iter().map(|spoofer| spoofer.describe()).collect(),
             orbits,

@@ -5,6 +5,7 @@
 //! reads them. Both sides use these types: a name that one side does not know is refused, not taken for a
 //! default. Times are seconds from the scene's first sample.
 
+mod array;
 mod front_end;
 mod interference;
 mod osnma;
@@ -13,6 +14,7 @@ mod scene;
 use serde::{Deserialize, Serialize};
 
 use crate::satellite::Sv;
+pub use array::ArrayFacts;
 pub use front_end::{
     BalanceSpec, ConverterSpec, Edge, FilterShape, FilterSpec, StageSpec, converter, filters, oscillator_offset_hz,
 };

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Edge, Expect, Fault, Interference, OsnmaFacts, StageSpec, TimeOffset};
+use super::{ArrayFacts, Edge, Expect, Fault, Interference, OsnmaFacts, StageSpec, TimeOffset};
 use crate::satellite::Sv;
 use crate::signal::Layers;
 
@@ -90,6 +90,9 @@ pub struct SceneFacts {
     /// Facts of each front end, if there are several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub front_ends: Vec<FrontEndFacts>,
+    /// The array whose elements the front ends are, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub array: Option<ArrayFacts>,
     /// Waveforms of the sources of interference, in the order of their numbers.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub interference: Vec<Interference>,

@@ -203,6 +203,7 @@ impl Session {
             parted: self.front_ends.iter().find_map(|front_end| front_end.parted(shared)),
             osnma: shared.authentic.as_ref().map(Authentic::outcome),
             detection: shared.detection.as_ref().map(Detection::outcome),
+            array: None,
             jumps: self.front_ends.iter().flat_map(|front_end| front_end.gap.jumps.iter().copied()).collect(),
             warnings: self.warnings(),
             conditioning: Conditioning {

@@ -5,6 +5,7 @@
 
 use toml::{Table, Value};
 
+use super::array::ArraySettings;
 use super::detection::DetectionSettings;
 use super::osnma::OsnmaSettings;
 use super::{OperationSettings, Settings};
@@ -36,6 +37,7 @@ pub fn tables() -> Vec<(String, Vec<Described>)> {
         ("osnma", OsnmaSettings::MEANINGS),
         ("integrity", IntegritySettings::MEANINGS),
         ("detection", DetectionSettings::MEANINGS),
+        ("array", ArraySettings::MEANINGS),
     ];
     let defaults = super::known();
     let described = |section: &str, name: &str, default: &Value| {

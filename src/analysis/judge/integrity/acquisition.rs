@@ -9,6 +9,7 @@ use std::collections::BTreeSet;
 
 use super::{Finding, Found};
 use crate::error::JudgeError;
+use crate::expect::array::Filtered;
 use crate::expect::due::receiver::front_end_costs_db;
 use crate::expect::followed::{Entry, efficiency};
 use crate::read::Run;
@@ -79,6 +80,7 @@ fn against_truth(run: &Run) -> Result<Vec<Finding>, JudgeError> {
     let (mut doppler, mut code, mut cn0) = (0.0_f64, 0.0_f64, 0.0_f64);
     let mut count = 0;
     let costs_db = front_end_costs_db(run);
+    let filtered = Filtered::of(run)?;
     for link in run.truth.keys() {
         let searches: Vec<&AcquisitionRow> =
             run.acquisition.iter().filter(|row| row.acquired && row.link() == link).collect();
@@ -105,12 +107,14 @@ fn against_truth(run: &Run) -> Result<Vec<Finding>, JudgeError> {
             );
             let off = (row.code_phase_chips - chips).rem_euclid(f64::from(component.code_chips));
             let off = off.min(f64::from(component.code_chips) - off);
-            let cn0_dbhz = true_row.cn0_dbhz - costs_db.get(link.signal).unwrap_or(&0.0);
+            let gain_db = 10.0 * libm::log10(filtered.satellite(row.sample, link.sv));
+            let true_dbhz = true_row.cn0_dbhz + gain_db;
+            let cn0_dbhz = true_dbhz - costs_db.get(link.signal).unwrap_or(&0.0);
             let noise_chips = refinement.as_ref().map_or(0.0, |refinement| refinement.sigma_chips(cn0_dbhz));
             code = code.max(off / (CELLS / cells).max(SIGMAS * noise_chips));
             // Without noise a search finds a C/N0 of its own rounding.
             if run.scene.noise {
-                cn0 = cn0.max((row.cn0_dbhz - true_row.cn0_dbhz).abs());
+                cn0 = cn0.max((row.cn0_dbhz - true_dbhz).abs());
             }
         }
     }

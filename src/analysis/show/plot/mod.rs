@@ -4,9 +4,10 @@
 //! what is drawn, as a sketch that holds all it needs: a run's rows are gone before the first picture is
 //! drawn. A picture with nothing to show is drawn with empty axes, so that a script finds the files it
 //! expects; only `psd.png` and `peaks.png` depend on `psd.csv` and `peaks.csv` being there, `spoofing.png` on
-//! a spoofer, `multipath.png` on `truth/rays.csv`, `stanford.png` on `rx/integrity.csv` and
-//! `detection.png` on `rx/detection.csv`.
+//! a spoofer, `multipath.png` on `truth/rays.csv`, `stanford.png` on `rx/integrity.csv`, `array.png` on a
+//! spatial filter and interference, and `detection.png` on `rx/detection.csv`.
 
+mod array;
 pub mod canvas;
 pub mod chart;
 mod clip;
@@ -59,7 +60,7 @@ pub(crate) struct Picture {
 }
 
 /// The pictures in the order of the report, where a tall one and a low one share a page.
-pub(crate) const PICTURES: [Picture; 20] = [
+pub(crate) const PICTURES: [Picture; 21] = [
     Picture {
         name: "sky",
         title: "sky",
@@ -225,6 +226,15 @@ pub(crate) const PICTURES: [Picture; 20] = [
                   of clean ones, for thresholds from high to low.",
         numbers: &["detection.csv"],
         sketch: detection::detection,
+    },
+    Picture {
+        name: "array",
+        title: "pattern of the array",
+        caption: "Gain of the spatial filter over azimuth at 5° of elevation, for each set of jammers that were on, \
+                  from the covariance that the scene implies: power over noise against that of the first element. \
+                  Dashes are the jammers, and a null belongs on each.",
+        numbers: &["truth/scene.json", "rx/receiver.json"],
+        sketch: array::array,
     },
 ];
 

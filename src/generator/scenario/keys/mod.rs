@@ -1,5 +1,6 @@
 //! Keys of a scenario, each declared once: see [`super::schema`].
 
+pub(crate) mod array;
 pub(crate) mod hardware;
 pub(crate) mod motion;
 pub(crate) mod osnma;
@@ -72,6 +73,12 @@ pub const SCENARIO: &[Key] = &[
         "attitude",
         motion::ATTITUDE,
         "Attitude of the body that carries the antenna. Absent: the boresight points up, without wind-up.",
+    ),
+    table(
+        "array",
+        array::ARRAY,
+        "Antennas on the body of `[attitude]`, each with a front end like the scene's one and a file of its own. \
+         Absent: one antenna.",
     ),
     table("power", satellites::POWER, "Received power of the satellites. Absent: a link budget with its defaults."),
     table("city", way::CITY, "Walls and roofs around the antenna, which obstruct and reflect. Absent: none."),

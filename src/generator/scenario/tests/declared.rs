@@ -16,6 +16,7 @@ pub(super) fn with(table: &str, line: &str) -> String {
         "osnma.transition" => format!("{MINIMAL}{STATIC}[[osnma.transition]]\n{line}\n"),
         "obstruction" => format!("{MINIMAL}{STATIC}[[obstruction]]\n{line}\n"),
         "multipath" => format!("{MINIMAL}{STATIC}[[multipath]]\n{line}\n"),
+        "array.element" => format!("{MINIMAL}{STATIC}[[array.element]]\n{line}\n"),
         "station" => format!("{MINIMAL}{STATIC}[[station]]\n{line}\n"),
         "station.power" => format!("{MINIMAL}{STATIC}[[station]]\nname = \"a\"\n[station.power]\n{line}\n"),
         table => format!("{MINIMAL}{STATIC}[{table}]\n{line}\n"),
@@ -182,7 +183,8 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
                     let own = "file = \"a.json\"\npermittivity = 4\nconductivity_spm = 0.1";
                     cases.push((with("city", own), table, key));
                 }
-                ("", "station") => cases.push((with("", "station = 1"), table, key)),
+                ("", "array" | "station") => cases.push((with("", &format!("{key} = 1")), table, key)),
+                ("array" | "array.element", _) => cases.push((with(table, &format!("{key} = 1")), table, key)),
                 ("station", "name") => cases.push((with("station", "name = 1"), table, key)),
                 ("station", _) => cases.push((with("station", &format!("name = \"a\"\n{key} = 1")), table, key)),
                 ("station.power", _) => cases.push((with("station.power", &format!("{key} = 1")), table, key)),

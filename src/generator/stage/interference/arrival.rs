@@ -113,7 +113,7 @@ fn zone_of(metadata: &IfMetadata, signals: &[&Signal], half_hz: f64) -> f64 {
 }
 
 /// Cycles modulo one, in 2^-64 turn.
-fn fraction_turns(cycles: f64) -> u64 {
+pub(super) fn fraction_turns(cycles: f64) -> u64 {
     ((cycles - cycles.floor()) * 18_446_744_073_709_551_616.0) as u64
 }
 
@@ -131,6 +131,13 @@ impl Path {
     /// straight line in vacuum.
     pub fn travel_s(&self, t_s: f64) -> f64 {
         self.travel_to_s(&self.antenna.at(t_s).position_m)
+    }
+
+    /// Unit vector in ECEF from the antenna towards the emitter `t_s` true seconds after the scene's start.
+    pub fn towards(&self, t_s: f64) -> Vector3<f64> {
+        let antenna_m = self.antenna.at(t_s).position_m;
+        let direct_s = (self.emitter_m - antenna_m).norm() / SPEED_OF_LIGHT_MPS;
+        (rotate_earth(&self.emitter_m, direct_s) - antenna_m).normalize()
     }
 
     /// Travel time in seconds when the scene starts.

@@ -10,15 +10,18 @@
 
 pub mod arrival;
 pub mod period;
+mod shared;
 mod waveform;
 
 use std::ops::Range;
 use std::sync::Arc;
 
-use arrival::{Path, Repetition, Tuning};
+use arrival::{Path, Repetition, Tuning, fraction_turns};
 use period::Period;
+pub use shared::Shared;
 pub use waveform::{ChipEdge, Recorded, Waveform};
 
+use crate::array::Element;
 use crate::random::mix;
 use crate::stage::{Block, Stage};
 use crate::switches::{Source, Switches};
@@ -29,6 +32,7 @@ use crate::synth::noise::BLOCK_SAMPLES;
 use crate::synth::resample::{Interpolator, Position, draw};
 use crate::synth::tone::{Modulation, Tone};
 use crate::synth::{CODE_ONE, Run};
+use crate::vehicle::Trajectory;
 use gnss::facts::Interference;
 use gnss::record::InterferenceRow;
 
@@ -66,6 +70,10 @@ pub struct Interferer {
     pub tuning: Tuning,
     /// Switches that act while the scene is sent.
     pub switches: Option<Arc<Switches>>,
+    /// Channel and coupling of the element of an array that hears it, if they are not ideal.
+    pub element: Option<Arc<Element>>,
+    /// Waves that the elements of an array share.
+    pub shared: Option<Arc<Shared>>,
     /// Description for the plan.
     pub description: String,
 }
@@ -83,6 +91,25 @@ struct Anchor {
 }
 
 impl Interferer {
+    /// Makes the source, which is that of an array's first element without errors, the one that another
+    /// element hears: its antenna moves along `antenna`.
+    pub fn at_element(&mut self, antenna: Trajectory, tuning: Tuning, element: Option<Arc<Element>>) {
+        self.shared = Some(Arc::new(Shared::new(self.clone())));
+        if let Some(path) = &mut self.path {
+            let first_s = path.first_travel_s();
+            path.antenna = antenna;
+            self.jn0_hz *= (first_s / path.first_travel_s()).powi(2);
+        }
+        (self.tuning, self.element) = (tuning, element);
+    }
+
+    /// Factor on the power and phase ahead in cycles, at sample `n`, of the element that hears it.
+    fn heard(&self, n: u64) -> (f64, f64) {
+        let (Some(element), Some(path)) = (&self.element, &self.path) else { return (1.0, 0.0) };
+        let t_s = self.tuning.elapsed_s(n);
+        element.response(&path.towards(t_s), t_s, self.carrier_hz)
+    }
+
     fn travel_s(&self, n: u64) -> f64 {
         self.path.as_ref().map_or(0.0, |path| path.travel_s(self.tuning.elapsed_s(n)))
     }
@@ -90,7 +117,8 @@ impl Interferer {
     /// Time of the receiver's clock at sample `n` minus the transmission time of the wave, in seconds.
     fn behind_s(&self, n: u64) -> f64 {
         let (clock, local) = (&self.tuning.clock, self.tuning.clock.epoch(n));
-        local.since(self.tuning.receiver_clock.true_time(clock.start, local)) + self.travel_s(n)
+        let late_s = self.element.as_ref().map_or(0.0, |element| element.delay_s);
+        local.since(self.tuning.receiver_clock.true_time(clock.start, local)) + self.travel_s(n) + late_s
     }
 
     /// Power over noise density at sample `n`, while on: falls with the square of the distance.
@@ -192,13 +220,24 @@ impl Interferer {
         let (n, length) = (span.start, span.end - span.start);
         let behind_s = [self.behind_s(n), self.behind_s(n + length)];
         let tuning = &self.tuning;
+        let (turns, turns_step) = (
+            tuning.turns(self.carrier_hz, n, behind_s[0]),
+            tuning.turns_step(self.carrier_hz, behind_s[1] - behind_s[0], length),
+        );
+        let jn0_hz = self.jn0_at(n + length / 2);
+        if self.element.is_none() {
+            let amplitude = tuning.amplitude_lsb(jn0_hz);
+            return Anchor { n, length, behind_s, turns, turns_step, amplitude };
+        }
+        let [(_, first), (power, _), (_, last)] = [n, n + length / 2, n + length].map(|n| self.heard(n));
+        let turned = |cycles: f64| fraction_turns(tuning.sign() * cycles);
         Anchor {
             n,
             length,
             behind_s,
-            turns: tuning.turns(self.carrier_hz, n, behind_s[0]),
-            turns_step: tuning.turns_step(self.carrier_hz, behind_s[1] - behind_s[0], length),
-            amplitude: tuning.amplitude_lsb(self.jn0_at(n + length / 2)),
+            turns: turns.wrapping_add(turned(first)),
+            turns_step: turns_step.wrapping_add(turned((last - first) / length as f64)),
+            amplitude: tuning.amplitude_lsb(jn0_hz * power),
         }
     }
 
@@ -244,12 +283,13 @@ impl Interferer {
                 resampled(level, (by, position, source), anchor.turned(from), i, q);
             }
             Waveform::Emitted { rate, by, .. } => {
-                let position = self.position(anchor, from, *rate, 0.0);
-                let (wi, mut wq) = draw(level, self.seed, Interpolator::reach(position, i.len()));
-                if self.tuning.inverted {
-                    wq.iter_mut().for_each(|x| *x = -*x);
+                let shared = self.shared.as_ref();
+                if shared.is_some_and(|shared| shared.add(level, self, (anchor, from), (&mut *i, &mut *q))) {
+                    return;
                 }
-                resampled(level, (by, position, (wi, wq)), anchor.turned(from), i, q);
+                let position = self.position(anchor, from, *rate, 0.0);
+                let source = self.drawn(level, Interpolator::reach(position, i.len()));
+                resampled(level, (by, position, source), anchor.turned(from), i, q);
             }
             Waveform::Recording { samples, rate, by, repeat } => {
                 // Its first sample is sent when it is switched on.
@@ -259,6 +299,15 @@ impl Interferer {
                 resampled(level, (by, position, source), anchor.turned(from), i, q);
             }
         }
+    }
+
+    /// Noise of the source from its sample `reach.0` to `reach.1`, exclusive.
+    fn drawn(&self, level: Level, reach: (i64, i64)) -> (Vec<f32>, Vec<f32>) {
+        let (wi, mut wq) = draw(level, self.seed, reach);
+        if self.tuning.inverted {
+            wq.iter_mut().for_each(|x| *x = -*x);
+        }
+        (wi, wq)
     }
 
     /// Position among the source's samples at sample `from` of the run, the first of them sent at `late_s`.
