@@ -77,7 +77,7 @@ fn frames_are_read_from_any_symbol_inverted_or_not_to_what_was_sent() {
             }
         }
         let read = news.iter().find_map(|read| if let Read::Ephemeris(set) = read { Some(&**set) } else { None });
-        let expected = (B_CNAV1.quantised)(set).unwrap().timed(|at| BDT.label(at));
+        let expected = B_CNAV1.fields.quantised(set).unwrap().timed(|at| BDT.label(at));
         assert_eq!(*read.unwrap(), Ephemeris { transmitted: read.unwrap().transmitted, ..expected });
     }
     // Of another satellite nothing is read.
@@ -90,7 +90,7 @@ fn a_set_of_d1_carried_to_b_cnav1_is_the_same_orbit_and_clock_to_its_steps() {
     let (mut farthest_m, mut latest_m) = (0.0_f64, 0.0_f64);
     let sets = sets();
     for set in &sets {
-        let carried = (B_CNAV1.quantised)(set).unwrap();
+        let carried = B_CNAV1.fields.quantised(set).unwrap();
         assert_eq!(BDT.label(carried.toe).seconds() % 300, 0);
         for minutes in [-60, 0, 33, 120, 240] {
             let at = set.toe.plus_s(60.0 * f64::from(minutes));

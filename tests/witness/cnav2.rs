@@ -142,7 +142,7 @@ fn shipped_frames_are_coded_again_symbol_by_symbol_read_inverted_or_not_and_sent
 fn orbit_and_clock(sv: Sv, two: &Vec<bool>, start: Epoch) -> Ephemeris {
     let (_, fields) = cnav2::tables().into_iter().find(|(table, _)| *table == "subframe 2").unwrap();
     let raw = |name: &str| Some(fields.iter().find(|field| field.name == name).map_or(0, |field| field.read(two)));
-    (message(sv).elements)(sv, &raw, start).unwrap()
+    message(sv).fields.elements(sv, &raw, start).unwrap()
 }
 
 #[test]

@@ -167,7 +167,7 @@ fn real_subframes_are_those_of_their_time_and_satellites_and_are_sent_by_us_bit_
                     "iodec" => set.iode = raw as u16,
                     "health" => set.health = raw as u16,
                     "toc_s" => set.toc = start.nearest_tow(field.value(raw) as i64),
-                    _ => assert!((SPS_NAV.adjust)(&mut set, name, field.value(raw)), "{name}"),
+                    _ => assert!(SPS_NAV.fields.adjust(&mut set, name, field.value(raw)), "{name}"),
                 }
             }
             set.toe = set.toc;
@@ -187,7 +187,7 @@ fn real_subframes_are_those_of_their_time_and_satellites_and_are_sent_by_us_bit_
             for (name, raw) in nav::parameters(&own).into_iter().filter(|(name, _)| *name != "toe_s") {
                 let (_, fields) = nav::tables().into_iter().find(|(table, _)| *table == "subframe 2").unwrap();
                 let field = fields.into_iter().find(|field| field.name == name).unwrap();
-                assert!((SPS_NAV.adjust)(&mut set, name, field.value(raw)), "{name}");
+                assert!(SPS_NAV.fields.adjust(&mut set, name, field.value(raw)), "{name}");
             }
             counts[1] += 1;
         }
@@ -272,7 +272,7 @@ fn a_stream_is_read_from_any_symbol_inverted_or_not_to_what_was_sent() {
                         *seen.entry("unit").or_insert(0) += 1;
                     }
                     Read::Ephemeris(found) => {
-                        let sent = nav::quantised(&set).unwrap();
+                        let sent = nav::SPS_NAV.fields.quantised(&set).unwrap();
                         assert_eq!(*found, Ephemeris { transmitted: found.transmitted, ..sent });
                         *seen.entry("set").or_insert(0) += 1;
                     }

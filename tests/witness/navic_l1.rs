@@ -177,7 +177,7 @@ fn a_real_set_is_whole_steps_of_the_fields_stands_over_its_place_and_is_written_
     // NVS-01 stands over 129.5° East and has an inclination of some degrees.
     let place = Geodetic::from_ecef(&set.state(set.toe).unwrap().position_m);
     assert!((place.longitude_rad.to_degrees() - 129.5).abs() < 0.2, "{place:?}");
-    let quantised = l1nav::quantised(&set).unwrap();
+    let quantised = l1nav::L1_NAV.fields.quantised(&set).unwrap();
     // All of it fits: to the thirteen digits printed. The axis was printed from a number of 24 bits.
     let axis_m = |set: &Ephemeris| set.sqrt_a_sqrtm * set.sqrt_a_sqrtm;
     assert!((axis_m(&quantised) - axis_m(&set)).abs() <= 0.5 / 512.0);
@@ -285,7 +285,7 @@ fn a_stream_is_read_from_any_symbol_inverted_or_not_to_what_was_sent() {
                         *seen.entry("unit").or_insert(0) += 1;
                     }
                     Read::Ephemeris(found) => {
-                        let sent = l1nav::quantised(&set).unwrap();
+                        let sent = l1nav::L1_NAV.fields.quantised(&set).unwrap();
                         assert_eq!(*found, Ephemeris { transmitted: found.transmitted, ..sent });
                         *seen.entry("set").or_insert(0) += 1;
                     }
@@ -315,7 +315,7 @@ fn a_set_of_the_older_message_carried_to_l1_nav_is_the_same_orbit_and_clock_to_i
     let sets = rinex::read(bytes, "navic").unwrap().ephemerides;
     let mut compared = 0;
     for set in sets.iter().filter(|set| set.sv == NVS_01) {
-        let carried = l1nav::quantised(set).unwrap();
+        let carried = l1nav::L1_NAV.fields.quantised(set).unwrap();
         assert_eq!((carried.toe.tow_whole_s() % 300, carried.toe), (0, carried.toc));
         assert!(carried.toe.since(set.toe).abs() <= 150.0);
         for minutes in [-15, 0, 20] {
@@ -354,5 +354,5 @@ fn a_clock_of_l1_and_l5_serves_all_three_carriers_too() {
     let frame = l1nav::decode(&soft(&symbols, true)).unwrap();
     assert!(frame.0.inverted);
     assert_eq!(frame.0.two.piece((566, 1)), 0);
-    assert_eq!(l1nav::quantised(&own).unwrap().reference_flag, 0);
+    assert_eq!(l1nav::L1_NAV.fields.quantised(&own).unwrap().reference_flag, 0);
 }

@@ -10,14 +10,14 @@ use std::fmt;
 use std::sync::LazyLock;
 
 use super::blocks::Content;
-use super::{Accuracies, Tables, accuracies_in, blank, electrons_in, integers_in, of_integers, sent_at};
+use super::{Accuracies, Tables, accuracies_in, blank, electrons_in, integers_in, sent_at};
 use crate::bits::{Field, FieldError, bits_of, read_all, write_all};
 use crate::broadcast::Ephemeris;
 use crate::crc::crc24q;
 use crate::fec::frames::Frames;
 use crate::fec::ldpc64::Ldpc64;
 use crate::framed::Reported;
-use crate::message::{Common, Message, Parameters, Raw, Read, Reader, Sender, UtcNumbers};
+use crate::message::{Common, Message, Parameters, Read, Reader, Sender, UtcNumbers};
 use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
@@ -130,11 +130,6 @@ impl Layout {
         let (bits, _) = self.decode(&soft)?;
         let found = integers_in(self.of_type(self.type_of(&bits)), &bits);
         (!found.is_empty()).then_some((true, found))
-    }
-
-    /// The elements that raw integers give, as if they had been sent at `near`.
-    pub fn elements(&self, set: &'static Tables, sv: Sv, raw: Raw<'_>, near: Epoch) -> Option<Ephemeris> {
-        of_integers((set, self.message.sets), sv, raw, near).and_then(self.complete)
     }
 
     /// Type of a message, as it states it.
@@ -289,7 +284,7 @@ impl TypedReader {
         }
         let sent = parts.iter().find_map(|part| layout.sent_at(&part.bits, near))?;
         let mut content = blank(Ephemeris { form: layout.message.sets, ..Ephemeris::blank(self.sv, sent) });
-        let own = (layout.message.set_parameters)();
+        let own = layout.message.fields.parameters();
         let mut all = Parameters::new();
         for Part { kind, bits, .. } in parts {
             let tables = layout.of_type(*kind);

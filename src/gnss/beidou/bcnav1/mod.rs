@@ -23,7 +23,7 @@ use std::sync::LazyLock;
 use crate::beidou::b1c::{B1C, CARRIER_HZ as B1C_HZ};
 use crate::beidou::b2a::B2A;
 use crate::beidou::bcnav::blocks::Content;
-use crate::beidou::bcnav::{self, Tables, blank, integers_in, record_lines, sent_at};
+use crate::beidou::bcnav::{self, OfSet, Tables, blank, integers_in, record_lines, sent_at};
 use crate::beidou::bcnav2::B_CNAV2;
 use crate::bits::{FieldError, bits_of, number, read_all, write_all};
 use crate::broadcast::{Ephemeris, SetForm};
@@ -59,16 +59,12 @@ pub static B_CNAV1: Message = Message {
     set: &[1],
     reduced: &[],
     ionosphere: bcnav::ionosphere(is_first),
-    set_parameters: || bcnav::set_parameters(SET),
-    elements: |sv, raw, near| bcnav::of_integers((SET, &B_CNAV1_SETS), sv, raw, near),
+    fields: &FIELDS,
     parameters: opened,
     reader: |sv| Box::new(BCnav1Reader::new(sv)),
     form,
     sets: &B_CNAV1_SETS,
-    quantised,
-    adjustable: || bcnav::adjustable(SET),
     alert: None,
-    adjust: |set, parameter, by| bcnav::adjust(SET, set, parameter, by),
     rinex: Some(Records {
         set: |_| "CNV1",
         common: "CNVX",
@@ -280,13 +276,8 @@ fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
     Some((true, found))
 }
 
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    bcnav::quantised(SET, form(ephemeris))
-}
+/// Tables of the ephemeris.
+static FIELDS: OfSet = bcnav::set_tables(&B_CNAV1_SETS, SET, |own, set| bcnav::rounded(own, form(set)));
 
 /// The raw integers of the ephemeris in subframes 2 and 3.
 fn of_set_in(two: &Vec<bool>, three: &Vec<bool>) -> Parameters {

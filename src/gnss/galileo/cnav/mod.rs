@@ -23,7 +23,7 @@ use crate::crc::crc24q;
 use crate::fec::interleaver::Interleaver;
 use crate::galileo::inav::{INAV, INAV_SETS, code};
 use crate::ionosphere::Model;
-use crate::message::{IonosphereForm, Message, Parameters, Sender};
+use crate::message::{IonosphereForm, Message, Parameters, Sender, SetFields};
 use crate::time::Epoch;
 pub use reader::CnavReader;
 
@@ -43,8 +43,7 @@ pub static CNAV: Message = Message {
     set: &[],
     reduced: &[],
     ionosphere: IonosphereForm { model: Model::NequickG, unit: |_| false, coefficients: |_| None },
-    set_parameters: Vec::new,
-    elements: |_, _, _| None,
+    fields: &NoFields,
     parameters: |symbols| {
         let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
         decode_soft(&soft).map(|(page, _)| (false, parameters(&page)))
@@ -52,12 +51,14 @@ pub static CNAV: Message = Message {
     reader: |sv| Box::new(CnavReader::new(sv)),
     form: |set| (INAV.form)(set),
     sets: &INAV_SETS,
-    quantised: |set| Ok(set.clone()),
-    adjustable: Vec::new,
     alert: None,
-    adjust: |_, _, _| false,
     rinex: None,
 };
+
+/// Fields of ephemerides where there are none.
+struct NoFields;
+
+impl SetFields for NoFields {}
 
 /// Seconds of a page.
 const PAGE_S: i64 = 1;

@@ -44,8 +44,7 @@ pub static FNAV: Message = Message {
     set: &PAGES_OF_SET,
     reduced: &[],
     ionosphere: IonosphereForm { model: Model::NequickG, unit: |start| page_at(start) == 1, coefficients: ionosphere },
-    set_parameters: || OF_SET.parameters(),
-    elements: |sv, raw, near| OF_SET.elements(sv, raw, near),
+    fields: &OF_SET,
     parameters: |symbols| {
         let soft: Vec<f32> = symbols.iter().map(|&bit| if bit { -1.0 } else { 1.0 }).collect();
         let (page, _) = decode_soft(&soft)?;
@@ -57,10 +56,7 @@ pub static FNAV: Message = Message {
         Ephemeris { form: &FNAV_SETS, af0_s: set.af0_s + ahead_s, ..set.clone() }
     },
     sets: &FNAV_SETS,
-    quantised,
-    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "FNAV", common: "IFNV", fields: tables, lines: None }),
 };
 
@@ -199,27 +195,19 @@ pub fn parameters(page: &Vec<bool>) -> Option<Parameters> {
 
 /// Tables of the ephemeris.
 static OF_SET: SetTables<Orbit, Vec<bool>> = SetTables {
-    parts: &[&PAGE_1, &PAGE_2, &PAGE_3, &PAGE_4],
     passing: &["tow_s"],
     fixed: &[&FIXED],
-    sets: &FNAV_SETS,
-    blank: || vec![false; DATA_BITS],
-    content: Orbit::of,
-    ephemeris: |orbit| orbit.ephemeris,
+    ..SetTables::of(
+        &FNAV_SETS,
+        &[&PAGE_1, &PAGE_2, &PAGE_3, &PAGE_4],
+        || vec![false; DATA_BITS],
+        (Orbit::of, |orbit| orbit.ephemeris),
+    )
 };
 
 /// The coefficients of the ionosphere that raw integers of page 1 give.
 fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
     coefficients(|name| OF_SET.value(name, raw))
-}
-
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays, and so does what
-/// the message does not state.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    OF_SET.quantised(ephemeris.clone())
 }
 
 /// The elements in pages 1 to 4 with the time at which page 1 was sent; `None` where the issues differ or

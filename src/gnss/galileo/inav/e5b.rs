@@ -5,10 +5,7 @@
 //! what satellites sent in 2025 (`tests/witness`).
 
 use super::reader::InavReader;
-use super::{
-    INAV, INAV_SETS, On, PAGE_S, Pages, SPARE, SUBFRAME_S, alerted, form, ionosphere, of_issue, opened, quantised,
-    tables,
-};
+use super::{INAV, INAV_SETS, On, PAGE_S, Pages, SPARE, SUBFRAME_S, alerted, form, ionosphere, opened, tables};
 use crate::ionosphere::Model;
 use crate::message::{IonosphereForm, Message, Records};
 use crate::time::Epoch;
@@ -29,16 +26,12 @@ pub static INAV_E5B: Message = Message {
     set: &[1, 2, 3, 4, 5],
     reduced: &[],
     ionosphere: IonosphereForm { model: Model::NequickG, unit: |start| word_at(start) == 5, coefficients: ionosphere },
-    set_parameters: of_issue,
-    elements: INAV.elements,
+    fields: INAV.fields,
     parameters: opened,
     reader: |sv| Box::new(InavReader::on(&INAV_E5B, sv)),
     form,
     sets: &INAV_SETS,
-    quantised,
-    adjustable: INAV.adjustable,
     alert: Some(alerted),
-    adjust: INAV.adjust,
     rinex: Some(Records { set: |_| "INAV", common: "IFNV", fields: tables, lines: None }),
 };
 

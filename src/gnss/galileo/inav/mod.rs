@@ -55,16 +55,12 @@ pub static INAV: Message = Message {
     set: &[1, 2, 3, 4, 5],
     reduced: &[REDUCED],
     ionosphere: IonosphereForm { model: Model::NequickG, unit: |start| word_at(start) == 5, coefficients: ionosphere },
-    set_parameters: of_issue,
-    elements: |sv, raw, near| OF_SET.elements(sv, raw, near),
+    fields: &OF_SET,
     parameters: opened,
     reader: |sv| Box::new(InavReader::new(sv)),
     form,
     sets: &INAV_SETS,
-    quantised,
-    adjustable: || OF_SET.adjustable(),
     alert: Some(alerted),
-    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "INAV", common: "IFNV", fields: tables, lines: None }),
 };
 
@@ -152,12 +148,6 @@ fn opened(symbols: &[bool]) -> Option<(bool, Vec<(&'static str, i64)>)> {
     let (bits, _) = decode_page(symbols)?;
     let word = word_of(&bits);
     parameters(&word).map(|found| (WORDS_OF_SET.contains(&word_type(&word)), found))
-}
-
-/// Names of the parameters in words 1 to 4.
-fn of_issue() -> Vec<&'static str> {
-    let words = tables().into_iter().filter(|(name, _)| ["word 1", "word 2", "word 3", "word 4"].contains(name));
-    words.flat_map(|(_, fields)| fields).map(|field| field.name).collect()
 }
 
 /// Type of the word that begins at a time, by the nominal sequence of E1-B (4.3.5, table 38). Before 2023,
@@ -423,23 +413,18 @@ fn ionosphere(raw: &dyn Fn(&str) -> Option<i64>) -> Option<Coefficients> {
 
 /// Tables of the ephemeris.
 static OF_SET: SetTables<Orbit, u128> = SetTables {
-    parts: &[&WORD_1, &WORD_2, &WORD_3, &WORD_4, &WORD_5],
+    // Word 5 has no issue.
+    issued: 4,
     // The week and time of word 5 are those of its sending, which the ephemeris has already.
     passing: &["tow_s"],
     fixed: &[&FIXED],
-    sets: &INAV_SETS,
-    blank: || 0,
-    content: Orbit::of,
-    ephemeris: |orbit| orbit.ephemeris,
+    ..SetTables::of(
+        &INAV_SETS,
+        &[&WORD_1, &WORD_2, &WORD_3, &WORD_4, &WORD_5],
+        || 0,
+        (Orbit::of, |orbit| orbit.ephemeris),
+    )
 };
-
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    OF_SET.quantised(ephemeris.clone())
-}
 
 /// The elements in short in word 16, sent at `start`, with the group delays and the health of word 5 where it
 /// was read.

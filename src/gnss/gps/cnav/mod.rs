@@ -57,16 +57,12 @@ pub static CNAV: Message = Message {
         unit: |start| type_at(&CNAV, start) == IONOSPHERE,
         coefficients: ionosphere,
     },
-    set_parameters: || OF_SET.parameters(),
-    elements: |sv, raw, near| OF_SET.elements(sv, raw, near),
+    fields: &OF_SET,
     parameters: opened,
     reader: |sv| Box::new(CnavReader::of(&CNAV, sv)),
     form,
     sets: &CNAV_SETS,
-    quantised,
-    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "CNAV", common: "CNVX", fields: tables, lines: Some(record_lines) }),
 };
 
@@ -290,8 +286,6 @@ pub fn parameters(bits: &Vec<bool>) -> Option<Parameters> {
 /// Parameters by which ephemerides are distinguished, that are no ephemeris's, or that all satellites state
 /// alike, are fixed.
 static OF_SET: SetTables<Content, Vec<bool>> = SetTables {
-    parts: &[&ORBIT_1, &ORBIT_2, &CLOCKS, &DELAY],
-    passing: &[],
     fixed: &[
         &[
             "week",
@@ -306,10 +300,13 @@ static OF_SET: SetTables<Content, Vec<bool>> = SetTables {
         ],
         &Klobuchar::PARAMETERS,
     ],
-    sets: &CNAV_SETS,
-    blank: || vec![false; DATA_BITS],
-    content: blank,
-    ephemeris: |content| content.set,
+    quantised: |own, set| own.rounded(form(set)),
+    ..SetTables::of(
+        &CNAV_SETS,
+        &[&ORBIT_1, &ORBIT_2, &CLOCKS, &DELAY],
+        || vec![false; DATA_BITS],
+        (blank, |content| content.set),
+    )
 };
 
 /// Creates content in which nothing has been decoded.
@@ -333,14 +330,6 @@ fn blank(set: Ephemeris) -> Content {
 /// The coefficients of the ionosphere that raw integers of message 30 give.
 fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
     Klobuchar::named(|name| OF_SET.value(name, raw)).map(Coefficients::Klobuchar)
-}
-
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    OF_SET.quantised(form(ephemeris))
 }
 
 /// The ephemeris in messages 10, 11 and 30 of the same reference time, the first sent at `sent`; `None` where

@@ -57,16 +57,12 @@ pub static CNAV2: Message = Message {
     set: &[1],
     reduced: &[],
     ionosphere: IonosphereForm { model: Model::Klobuchar, unit: is_first, coefficients: ionosphere },
-    set_parameters: || OF_SET.parameters(),
-    elements: |sv, raw, near| OF_SET.elements(sv, raw, near),
+    fields: &OF_SET,
     parameters: opened,
     reader: |sv| Box::new(Cnav2Reader::new(sv)),
     form,
     sets: &CNAV2_SETS,
-    quantised,
-    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "CNV2", common: "CNVX", fields: tables, lines: Some(record_lines) }),
 };
 
@@ -273,7 +269,6 @@ fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
 /// Parameters by which ephemerides are distinguished, that are no ephemeris's, or that all satellites state
 /// alike, are fixed.
 static OF_SET: SetTables<Content, Vec<bool>> = SetTables {
-    parts: &[&SET, &DELAY],
     passing: &["week", "itow_2h"],
     fixed: &[
         &[
@@ -290,10 +285,8 @@ static OF_SET: SetTables<Content, Vec<bool>> = SetTables {
         ],
         &Klobuchar::PARAMETERS,
     ],
-    sets: &CNAV2_SETS,
-    blank: || vec![false; BITS_2],
-    content: blank,
-    ephemeris: |content| content.set,
+    quantised: |own, set| own.rounded(form(set)),
+    ..SetTables::of(&CNAV2_SETS, &[&SET, &DELAY], || vec![false; BITS_2], (blank, |content| content.set))
 };
 
 /// The raw integers of the ephemeris in subframe 2.
@@ -355,14 +348,6 @@ fn klobuchar(page_1: &Vec<bool>) -> Klobuchar {
     let mut content = nothing();
     read_all(&DELAY, page_1, &mut content);
     content.klobuchar
-}
-
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    OF_SET.quantised(form(ephemeris))
 }
 
 #[cfg(test)]

@@ -57,16 +57,12 @@ pub static L1_NAV: Message = Message {
     set: &[1],
     reduced: &[],
     ionosphere: IonosphereForm { model: Model::KlobucharNavic, unit: |_| true, coefficients: ionosphere },
-    set_parameters: || OF_SET.parameters(),
-    elements: |sv, raw, near| OF_SET.elements(sv, raw, near),
+    fields: &OF_SET,
     parameters: opened,
     reader: |sv| Box::new(L1NavReader::new(sv)),
     form,
     sets: &L1_NAV_SETS,
-    quantised,
-    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "L1NV", common: "L1NV KLOB", fields: tables, lines: Some(record_lines) }),
 };
 
@@ -242,13 +238,10 @@ fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
 
 /// Parameters by which ephemerides are distinguished, or that have a fault of their own, are fixed.
 static OF_SET: SetTables<Content, Vec<bool>> = SetTables {
-    parts: &[&SET],
     passing: &["week", "itow_2h", "alert", "prn"],
     fixed: &[&["week", "itow_2h", "alert", "prn", "toe_5min", "iodec", "l1_health", "reference_flag"]],
-    sets: &L1_NAV_SETS,
-    blank: || vec![false; BITS_2],
-    content: blank,
-    ephemeris: |content| content.set,
+    quantised: |own, set| own.rounded(form(set)),
+    ..SetTables::of(&L1_NAV_SETS, &[&SET], || vec![false; BITS_2], (blank, |content| content.set))
 };
 
 /// The raw integers of the ephemeris in subframe 2.
@@ -302,14 +295,6 @@ fn coefficients_in(three: &Vec<bool>) -> Coefficients {
     let mut content = blank(Ephemeris::blank(Sv::gps(1), Epoch::new(0, 0.0)));
     read_all(&IONOSPHERE, three, &mut content);
     Coefficients::KlobucharNavic(content.klobuchar)
-}
-
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    OF_SET.quantised(form(ephemeris))
 }
 
 /// The lines of a record (RINEX 4.02, table A32): of the two pairs of carriers that the clock may be of, the

@@ -55,8 +55,7 @@ pub static SPS_NAV: Message = Message {
             Some(coefficients(&page))
         },
     },
-    set_parameters: || OF_SET.parameters(),
-    elements: |sv, raw, near| OF_SET.elements(sv, raw, near).filter(is_whole),
+    fields: &OF_SET,
     parameters: |symbols| {
         let subframe = decode_soft(&soft(symbols))?;
         let found = parameters(&subframe);
@@ -65,10 +64,7 @@ pub static SPS_NAV: Message = Message {
     reader: |sv| Box::new(NavReader::new(sv)),
     form: Ephemeris::clone,
     sets: &PLAIN,
-    quantised,
-    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "LNAV", common: "LNAV", fields: tables, lines: None }),
 };
 
@@ -154,7 +150,7 @@ impl Sender for Subframes {
         let on_air = Ephemeris { transmitted: start, ..ephemeris.clone() };
         match subframe_at(start) {
             1 => {
-                check(ephemeris)?;
+                ephemeris.with_one_reference()?;
                 write_all(&SUBFRAME_1, &on_air, &mut subframe)?;
             }
             2 => write_all(&SUBFRAME_2, &on_air, &mut subframe)?,
@@ -241,13 +237,10 @@ fn coefficients(subframe: &Subframe) -> Coefficients {
 /// Parameters by which ephemerides are distinguished, and the health, which has a fault of its own, are
 /// fixed.
 static OF_SET: SetTables<Ephemeris, Subframe> = SetTables {
-    parts: &[&SUBFRAME_1, &SUBFRAME_2],
-    passing: &[],
     fixed: &[&["week", "iodec", "toc_s", "toe_s", "health"]],
-    sets: &PLAIN,
-    blank,
-    content: |ephemeris| ephemeris,
-    ephemeris: |ephemeris| ephemeris,
+    elements: |own, sv, raw, near| own.of_integers(sv, raw, near).filter(is_whole),
+    quantised: |own, set| own.rounded(set.with_one_reference()?.clone()),
+    ..SetTables::of(&PLAIN, &[&SUBFRAME_1, &SUBFRAME_2], blank, (|set| set, |set| set))
 };
 
 /// Equal reference times show that subframes 1 and 2 are of one ephemeris.
@@ -266,25 +259,6 @@ pub fn sent_at(one: &Subframe, near: Epoch) -> Option<Epoch> {
     let week = integers(&SUBFRAME_1, one).iter().find(|(name, _)| *name == "week").map(|(_, raw)| *raw)?;
     let week = near.nearest_week(week + NAVIC_WEEK, 1024);
     Some(Epoch::new(week * WEEK_S + began_s(one)?, 0.0))
-}
-
-/// Checks that the reference times of orbit and clock are equal. Receivers have no other sign that subframes
-/// 1 and 2 belong together.
-fn check(ephemeris: &Ephemeris) -> Result<(), FieldError> {
-    if ephemeris.toe == ephemeris.toc {
-        Ok(())
-    } else {
-        Err(FieldError::References { toe_s: ephemeris.toe.tow_s(), toc_s: ephemeris.toc.tow_s() })
-    }
-}
-
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    check(ephemeris)?;
-    OF_SET.quantised(ephemeris.clone())
 }
 
 #[cfg(test)]

@@ -52,17 +52,12 @@ pub static SBAS: Message = Message {
     reduced: &[],
     // Its grid is left out.
     ionosphere: IonosphereForm { model: Model::Klobuchar, unit: |_| false, coefficients: |_| None },
-    set_parameters: || OF_SET.parameters(),
-    // Blocks begin with seconds.
-    elements: |sv, raw, near| OF_SET.elements(sv, raw, Epoch::new(near.seconds(), 0.0)),
+    fields: &OF_SET,
     parameters: opened,
     reader: |sv| Box::new(SbasReader::new(sv)),
     form: Ephemeris::clone,
     sets: &SBAS_SETS,
-    quantised,
-    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "SBAS", common: "SBAS", fields: tables, lines: None }),
 };
 
@@ -190,19 +185,8 @@ fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
 
 /// Parameters by which ephemerides are distinguished, and the accuracy, which is the health, are fixed.
 static OF_SET: SetTables<Ephemeris, Vec<bool>> = SetTables {
-    parts: &[&GEO],
-    passing: &[],
     fixed: &[&["iodn", "t0_16s", "ura_index"]],
-    sets: &SBAS_SETS,
-    blank: || vec![false; DATA_BITS],
-    content: |ephemeris| ephemeris,
-    ephemeris: |ephemeris| ephemeris,
+    // Blocks begin with seconds.
+    elements: |own, sv, raw, near| own.of_integers(sv, raw, Epoch::new(near.seconds(), 0.0)),
+    ..SetTables::of(&SBAS_SETS, &[&GEO], || vec![false; DATA_BITS], (|set| set, |set| set))
 };
-
-/// The ephemeris that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    OF_SET.quantised(ephemeris.clone())
-}
