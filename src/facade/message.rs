@@ -23,8 +23,8 @@
 //! ```
 //!
 //! A [`Message`] of one's own is a `static` too. [`FieldError`] is what a sender returns for a value that the
-//! message cannot carry, [`SetForm`] what clock and health of its ephemerides refer to. The example
-//! `own_signal` has a whole message.
+//! message cannot carry, [`SetForm`] what clock and health of its ephemerides refer to, [`SetFields`] what
+//! their parameters are. The example `own_signal` has a whole message.
 //!
 //! ```
 //! use gnss_twin::message::{INAV, LNAV, Message};

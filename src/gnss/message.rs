@@ -334,7 +334,17 @@ pub struct SentPage {
     pub parts: [u128; 2],
 }
 
+/// Raw integer of a parameter by its name.
+pub(crate) fn raw_of(all: &Parameters, name: &str) -> Option<i64> {
+    all.iter().find(|(other, _)| *other == name).map(|(_, raw)| *raw)
+}
+
 impl Read {
+    /// Raw parameters of a satellite as decoded from a message.
+    pub(crate) fn parameters(sv: Sv, message: &Message, issue: u32, parameters: Parameters) -> Self {
+        Self::Parameters(NavigationRow::each(sv, message.name, issue, parameters).collect())
+    }
+
     /// Failure for a unit that names another satellite than the tracked one.
     pub(crate) fn names_another(unit: &str, said: impl fmt::Display) -> Self {
         Self::Refused(format!("{unit} names satellite {said}, which is another one"))
@@ -364,6 +374,15 @@ pub trait Reader: fmt::Debug + Send + Sync {
 }
 
 impl Message {
+    /// Refuses a time at which no unit begins.
+    pub(crate) fn check_start(&self, start: Epoch, expected: &'static str) -> Result<(), FieldError> {
+        let late_s = (start.seconds() - self.first_s).rem_euclid(self.unit_s);
+        if late_s == 0 && start.fraction() == 0.0 {
+            return Ok(());
+        }
+        Err(FieldError::Start { message: self.name, start_s: start.tow_s(), expected })
+    }
+
     /// True if the message states its own time.
     pub fn is_dated(&self) -> bool {
         !self.timed.is_empty()

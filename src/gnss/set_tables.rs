@@ -6,6 +6,9 @@ use crate::message::{Raw, SetFields};
 use crate::satellite::Sv;
 use crate::time::Epoch;
 
+/// Functions that return the content of an ephemeris, everything else blank, and the ephemeris of a content.
+pub(crate) type Conversions<C> = (fn(Ephemeris) -> C, fn(C) -> Ephemeris);
+
 /// Tables with the parameters of a message's ephemeris. `C` is the content that the tables describe, `S` the
 /// bits of a part: a subframe, a word.
 pub(crate) struct SetTables<C: 'static, S: 'static> {
@@ -22,8 +25,8 @@ pub(crate) struct SetTables<C: 'static, S: 'static> {
     pub fixed: &'static [&'static [&'static str]],
     /// Function that returns a part without content.
     pub blank: fn() -> S,
-    /// Function that returns the content of an ephemeris, everything else blank, and its inverse.
-    pub content: (fn(Ephemeris) -> C, fn(C) -> Ephemeris),
+    /// Conversions between ephemeris and content.
+    pub content: Conversions<C>,
     /// Function that decodes an ephemeris from raw integers ([`Self::of_integers`]) and judges it.
     pub elements: fn(&Self, Sv, Raw<'_>, Epoch) -> Option<Ephemeris>,
     /// Function that brings an ephemeris to the form of the message and rounds it ([`Self::rounded`]).
@@ -36,7 +39,7 @@ impl<C, S: Store> SetTables<C, S> {
         sets: &'static SetForm,
         parts: &'static [&'static [Element<C>]],
         blank: fn() -> S,
-        content: (fn(Ephemeris) -> C, fn(C) -> Ephemeris),
+        content: Conversions<C>,
     ) -> Self {
         Self {
             sets,

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use gnss::bits::{Store, number};
 use gnss::broadcast::Ephemeris;
 use gnss::crc::crc24q;
-use gnss::earth::{GPS_PI, Geodetic};
+use gnss::earth::Geodetic;
 use gnss::exchange::{NavigationSets, Version};
 use gnss::ionosphere::Coefficients;
 use gnss::klobuchar::Klobuchar;
@@ -21,7 +21,7 @@ use gnss::satellite::{Sv, System};
 use gnss::time::Epoch;
 
 use super::codes::holds;
-use super::data::keplerian;
+use super::data::{Printed, fields_are_as_printed, keplerian};
 
 /// Signal, PRN, ones, first and last 24 chips in hexadecimal, SHA-256 of a byte 0 or 1 for each chip.
 const CODES: &str = include_str!("../../data/witness/navic_codes.csv");
@@ -49,7 +49,7 @@ const NVS_01: Sv = Sv { system: System::Navic, number: 10 };
 
 /// Start bit, length, sign and power of two of every field, by subframe, as decoders have them, written here
 /// again; angles in semicircles.
-const PRINTED: [(&str, &str, u16, u8, bool, i32, bool); 47] = [
+const PRINTED: [Printed; 47] = [
     ("subframe 2", "week", 0, 13, false, 0, false),
     ("subframe 2", "itow_2h", 13, 8, false, 0, false),
     ("subframe 2", "alert", 21, 1, false, 0, false),
@@ -101,21 +101,7 @@ const PRINTED: [(&str, &str, u16, u8, bool, i32, bool); 47] = [
 
 #[test]
 fn every_field_of_navic_s_message_on_l1_has_the_place_sign_and_scale_that_decoders_have() {
-    let tables = l1nav::tables();
-    let fields: usize = tables.iter().map(|(_, fields)| fields.len()).sum();
-    assert_eq!(fields, PRINTED.len());
-    for (table, name, first, length, signed, exponent, semicircles) in PRINTED {
-        let (_, fields) = tables.iter().find(|(own, _)| *own == table).unwrap();
-        let field = fields.iter().find(|field| field.name == name).unwrap();
-        let unit = libm::exp2(f64::from(exponent)) * if semicircles { GPS_PI } else { 1.0 };
-        for bit in 0..length {
-            let mut subframe = vec![false; 600];
-            subframe[usize::from(first + u16::from(bit))] = true;
-            let weight = libm::exp2(f64::from(length - 1 - bit)) * if signed && bit == 0 { -1.0 } else { 1.0 };
-            let found = field.value(field.read(&subframe));
-            assert!((found / (weight * unit) - 1.0).abs() < 1e-15, "{table}: {name}, bit {bit}: {found}");
-        }
-    }
+    fields_are_as_printed(&l1nav::tables(), &PRINTED, 600);
     // What no field has: three bits before the number; the Earth's orientation and two bits at the end.
     let of = |table: &str| PRINTED.iter().filter(|row| row.0 == table).map(|row| usize::from(row.3)).sum::<usize>();
     assert_eq!((of("subframe 2"), of("subframe 3, message 10")), (576 - 3, 250 - 138 - 2));

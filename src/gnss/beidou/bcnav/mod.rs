@@ -19,12 +19,12 @@ pub(super) mod typed;
 
 use crate::bdgim::Bdgim;
 use crate::beidou::d1d2::{D1_SETS, issue};
-use crate::bits::{Field, FieldError, Store, integers};
+use crate::bits::{self, Field, FieldError, Store, integers};
 use crate::broadcast::{Ephemeris, SetForm};
 use crate::exchange::modern;
 use crate::ionosphere::{Coefficients, Model};
-use crate::message::{Common, IonosphereForm, Parameters, Raw, RecordLine, UtcNumbers};
-use crate::set_tables::SetTables;
+use crate::message::{Common, IonosphereForm, Parameters, Raw, RecordLine, UtcNumbers, raw_of};
+use crate::set_tables::{Conversions, SetTables};
 use crate::signal::Signal;
 use crate::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
 use blocks::{Content, Of, STEP_S, electrons, kind, signed};
@@ -48,7 +48,7 @@ pub(super) fn coefficients(raw: Raw<'_>) -> Option<Coefficients> {
 
 /// The coefficients of BDGIM among the parameters of a unit, with their raw integers.
 pub(super) fn electrons_in(all: &Parameters) -> Option<(Coefficients, Parameters)> {
-    let raw = |name: &str| all.iter().find(|(other, _)| *other == name).map(|(_, raw)| *raw);
+    let raw = |name: &str| raw_of(all, name);
     let own = all.iter().filter(|(name, _)| ELECTRONS.iter().any(|element| element.field.name == *name));
     Some((coefficients(&raw)?, own.copied().collect()))
 }
@@ -93,8 +93,7 @@ pub(super) type Tables = [&'static [Of]];
 
 /// Lists every field by the table that has it.
 pub(super) fn fields(all: &[(&'static str, &'static Tables)]) -> Vec<(&'static str, Vec<&'static Field>)> {
-    let of = |tables: &'static Tables| tables.iter().flat_map(|table| table.iter()).map(|own| &own.field).collect();
-    all.iter().map(|(name, tables)| (*name, of(tables))).collect()
+    all.iter().map(|(name, tables)| (*name, bits::fields(tables))).collect()
 }
 
 /// The lines of a record of RINEX of B-CNAV1 and B-CNAV2 with their delays; predicted accuracies that were
@@ -222,7 +221,7 @@ pub(super) const fn set_tables(
     parts: &'static Tables,
     quantised: fn(&OfSet, &Ephemeris) -> Result<Ephemeris, FieldError>,
 ) -> OfSet {
-    let content: (fn(Ephemeris) -> Content, fn(Content) -> Ephemeris) = (blank, |content| content.set);
+    let content: Conversions<Content> = (blank, |content| content.set);
     let of = SetTables::of(sets, parts, || vec![false; LONGEST_BITS], content);
     SetTables { passing: &PASSING, fixed: &[&FIXED_PARAMETERS, &PASSING], quantised, ..of }
 }

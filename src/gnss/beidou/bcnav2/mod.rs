@@ -17,7 +17,7 @@ use crate::beidou::b2a::B2A;
 use crate::beidou::bcnav::blocks::{self, Of};
 use crate::beidou::bcnav::typed::{Layout, Messages, TypedReader};
 use crate::beidou::bcnav::{self, OfSet, Tables, record_lines};
-use crate::beidou::bcnav1::B_CNAV1_SETS;
+use crate::beidou::bcnav1::{B_CNAV1, B_CNAV1_SETS};
 use crate::bits::Kind::{Signed, Whole};
 use crate::bits::{Field, plain};
 use crate::broadcast::{Ephemeris, SetForm};
@@ -28,30 +28,25 @@ use crate::message::{Message, Records};
 pub static B_CNAV2: Message = Message {
     name: "B-CNAV2",
     symbol_s: 0.005,
-    bit: |_| &[1],
     unit_s: MESSAGE_S,
-    decided_after: 0,
     set_s: MESSAGE_S * ORDER.len() as i64,
-    first_s: 0,
     sender: |common| bcnav::check(common).map(|()| Box::new(Messages { layout: &LAYOUT, common: common.clone() }) as _),
     number: |start| LAYOUT.type_at(start),
     timed: &ORDER,
-    dated: &[],
     set: &OF_SET,
-    reduced: &[],
     ionosphere: bcnav::ionosphere(|start| LAYOUT.type_at(start) == 30),
     fields: &FIELDS,
     parameters: |symbols| LAYOUT.opened(symbols),
     reader: |sv| Box::new(TypedReader::new(&LAYOUT, sv)),
     form,
     sets: &B_CNAV2_SETS,
-    alert: None,
     rinex: Some(Records {
         set: |_| "CNV2",
         common: "CNVX",
         fields: tables,
         lines: Some(|set, raw| record_lines(set, raw, [None, Some(set.isc_s[0]), Some(set.tgd_s), Some(set.tgd2_s)])),
     }),
+    ..B_CNAV1
 };
 
 /// Ephemerides of B-CNAV2: as those of B-CNAV1.

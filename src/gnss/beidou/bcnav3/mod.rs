@@ -16,6 +16,7 @@ use crate::beidou::b2b::{B2B, CARRIER_HZ};
 use crate::beidou::bcnav::blocks::{self, Of};
 use crate::beidou::bcnav::typed::{Layout, Messages, TypedReader};
 use crate::beidou::bcnav::{self, OfSet, Tables, record_lines_of_b2b};
+use crate::beidou::bcnav1::B_CNAV1;
 use crate::beidou::d1d2::issue;
 use crate::bits::Kind::{Signed, Whole};
 use crate::bits::{Field, plain};
@@ -27,25 +28,20 @@ use crate::message::{Message, Records};
 pub static B_CNAV3: Message = Message {
     name: "B-CNAV3",
     symbol_s: 0.001,
-    bit: |_| &[1],
     unit_s: MESSAGE_S,
-    decided_after: 0,
     set_s: MESSAGE_S * ORDER.len() as i64,
-    first_s: 0,
     sender: |common| bcnav::check(common).map(|()| Box::new(Messages { layout: &LAYOUT, common: common.clone() }) as _),
     number: |start| LAYOUT.type_at(start),
     timed: &ORDER,
-    dated: &[],
     set: &ORDER,
-    reduced: &[],
     ionosphere: bcnav::ionosphere(|start| LAYOUT.type_at(start) == 30),
     fields: &FIELDS,
     parameters: |symbols| LAYOUT.opened(symbols),
     reader: |sv| Box::new(TypedReader::new(&LAYOUT, sv)),
     form,
     sets: &B_CNAV3_SETS,
-    alert: None,
     rinex: Some(Records { set: |_| "CNV3", common: "CNVX", fields: tables, lines: Some(record_lines_of_b2b) }),
+    ..B_CNAV1
 };
 
 /// Ephemerides of B-CNAV3: T_GD of B2b in the field of the first group delay; health of the satellite.

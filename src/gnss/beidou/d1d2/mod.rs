@@ -143,10 +143,7 @@ struct Frames {
 
 impl Sender for Frames {
     fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
-        if start.tow_whole_s() % UNIT_S != 0 || start.fraction() != 0.0 {
-            let expected = "a multiple of 30 s of BDT";
-            return Err(FieldError::Start { message: D1_D2.name, start_s: start.tow_s(), expected });
-        }
+        D1_D2.check_start(start, "a multiple of 30 s of BDT")?;
         let on_air = Ephemeris { transmitted: start, ..ephemeris.clone() };
         let klobuchar = self.klobuchar.unwrap_or(Klobuchar::ZERO);
         let orbit = Orbit { ephemeris: on_air, klobuchar };

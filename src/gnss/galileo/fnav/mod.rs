@@ -11,10 +11,10 @@
 mod fields;
 mod reader;
 
-use crate::bits::{Element, FieldError, Store, bits_of, integers, number, write_all};
+use crate::bits::{Element, FieldError, Store, integers, soft, write_all};
 use crate::broadcast::{Ephemeris, SetForm};
-use crate::crc::crc24q;
 use crate::fec::interleaver::Interleaver;
+use crate::fec::pages::Form;
 use crate::galileo::inav::almanac::{Offset, TRIPLES, Triple, offset_of};
 use crate::galileo::inav::fields::{FIXED, Orbit, Utc, coefficients};
 use crate::galileo::inav::{GST_WEEK, INAV, INAV_E5B, code};
@@ -46,8 +46,7 @@ pub static FNAV: Message = Message {
     ionosphere: IonosphereForm { model: Model::NequickG, unit: |start| page_at(start) == 1, coefficients: ionosphere },
     fields: &OF_SET,
     parameters: |symbols| {
-        let soft: Vec<f32> = symbols.iter().map(|&bit| if bit { -1.0 } else { 1.0 }).collect();
-        let (page, _) = decode_soft(&soft)?;
+        let (page, _) = decode_soft(&soft(symbols))?;
         parameters(&page).map(|found| (true, found))
     },
     reader: |sv| Box::new(FnavReader::new(sv)),
@@ -78,16 +77,20 @@ const PAGE_S: i64 = 10;
 const SUBFRAME_S: i64 = 50;
 const PAIR_S: i64 = 2 * SUBFRAME_S;
 /// Symbols of the pattern with which a page begins (4.2.2.1), and of a page.
-const PATTERN: [bool; 12] = [true, false, true, true, false, true, true, true, false, false, false, false];
+const PATTERN: (u128, usize) = (0b1011_0111_0000, 12);
 const PAGE_SYMBOLS: usize = 500;
-/// Bits of a page without and with its check, and with the tail of zeros (4.2.2.2).
+/// Bits of a page without its check and the tail of six zeros (4.2.2.2).
 const DATA_BITS: usize = 214;
-const CHECK_BITS: usize = 24;
-const PAGE_BITS: usize = 244;
 /// The pages of an ephemeris, all of which state their time.
 const PAGES_OF_SET: [u8; 4] = [1, 2, 3, 4];
 
-const INTERLEAVER: Interleaver = Interleaver { columns: 61, rows: 8 };
+const FORM: Form = Form {
+    pattern: PATTERN,
+    data_bits: DATA_BITS,
+    tail_bits: 6,
+    code,
+    interleaver: Interleaver { columns: 61, rows: 8 },
+};
 
 /// Bits that nobody reads, as satellites sent them in 2025: ones and zeros in turn, by page with the first
 /// position and the first bit.
@@ -115,10 +118,7 @@ struct Pages {
 
 impl Sender for Pages {
     fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
-        if start.tow_whole_s() % PAGE_S != 0 || start.fraction() != 0.0 {
-            let expected = "a multiple of 10 s";
-            return Err(FieldError::Start { message: FNAV.name, start_s: start.tow_s(), expected });
-        }
+        FNAV.check_start(start, "a multiple of 10 s")?;
         Ok(encode_page(&self.page(page_at(start), ephemeris, start)?))
     }
 }
@@ -157,27 +157,13 @@ impl Pages {
 
 /// The symbols of a page of 214 bits: pattern, then the bits with check and tail, coded and interleaved.
 pub fn encode_page(page: &[bool]) -> Vec<bool> {
-    let check = crc24q(page.iter().copied());
-    let mut bits: Vec<bool> = page.iter().copied().chain(bits_of(u128::from(check), CHECK_BITS)).collect();
-    bits.resize(PAGE_BITS, false);
-    let coded = INTERLEAVER.interleave(&code().encode(&bits));
-    PATTERN.into_iter().chain(coded).collect()
+    FORM.pattern().chain(FORM.coded(page)).collect()
 }
 
 /// The 214 bits in the 500 soft symbols of a page, and whether they are inverted; `None` where the check
 /// is wrong.
 pub fn decode_soft(symbols: &[f32]) -> Option<(Vec<bool>, bool)> {
-    if symbols.len() != PAGE_SYMBOLS {
-        return None;
-    }
-    let sum: f32 = symbols.iter().zip(PATTERN).map(|(soft, bit)| if bit { -soft } else { *soft }).sum();
-    let inverted = sum < 0.0;
-    let sense = if inverted { -1.0 } else { 1.0 };
-    let coded: Vec<f32> = symbols[PATTERN.len()..].iter().map(|soft| soft * sense).collect();
-    let mut bits = code().decode(&INTERLEAVER.deinterleave(&coded));
-    let check = number(&bits[DATA_BITS..DATA_BITS + CHECK_BITS]) as u32;
-    bits.truncate(DATA_BITS);
-    (crc24q(bits.iter().copied()) == check).then_some((bits, inverted))
+    FORM.decode(symbols)
 }
 
 /// The raw integers of all parameters of a page but its time; `None` for almanacs.

@@ -14,16 +14,16 @@ mod reader;
 mod reduced;
 mod redundancy;
 
-use crate::bits::{Element, FieldError, Store, bits_of, integers, number, read_all, write_all};
+use crate::bits::{Element, FieldError, Store, bits_of, integers, number, read_all, soft, write_all};
 use crate::broadcast::{Ephemeris, SetForm};
-use crate::crc::crc24q;
+use crate::crc::{CHECK_BITS, crc24q};
 use crate::fec::convolutional::Convolutional;
 use crate::fec::interleaver::Interleaver;
 use crate::galileo::cnav::CNAV;
 use crate::galileo::fnav::FNAV_SETS;
 use crate::galileo::status::{self, Band};
 use crate::ionosphere::{Coefficients, Model};
-use crate::message::{Common, IonosphereForm, Message, Records, Sender};
+use crate::message::{Common, IonosphereForm, Message, Records, Sender, raw_of};
 use crate::satellite::Sv;
 use crate::set_tables::SetTables;
 use crate::time::{Epoch, WEEK_S};
@@ -119,7 +119,6 @@ const EVEN_WORD_BITS: usize = 112;
 const WORD_BEGIN: usize = 2;
 /// First bit of the check in the odd part (5.1.9.4). The check covers everything before it.
 const CHECK_BEGIN: usize = 82;
-const CHECK_BITS: usize = 24;
 /// First bit in the odd part of the bits before the check, and of those after it (4.3.2.3).
 const RESERVED_BEGIN: usize = 18;
 const RESERVED_BITS: usize = 64;
@@ -186,10 +185,8 @@ struct Pages {
 impl Sender for Pages {
     fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
         let On { message, word_at, rest } = self.carrier;
-        if start.tow_whole_s() % PAGE_S != message.first_s || start.fraction() != 0.0 {
-            let expected = if message.first_s == 1 { "an odd whole second" } else { "an even whole second" };
-            return Err(FieldError::Start { message: message.name, start_s: start.tow_s(), expected });
-        }
+        message
+            .check_start(start, if message.first_s == 1 { "an odd whole second" } else { "an even whole second" })?;
         let word = self.word(word_at(start), ephemeris, start)?;
         Ok(encode_page(&page_with(&word, self.signed(ephemeris.sv, start, rest(start)))))
     }
@@ -337,8 +334,7 @@ pub fn encode_page(parts: &[Vec<bool>; 2]) -> Vec<bool> {
 
 /// The parts of 120 bits in the 500 symbols of a page without errors.
 fn decode_page(symbols: &[bool]) -> Option<([Vec<bool>; 2], bool)> {
-    let soft: Vec<f32> = symbols.iter().map(|&bit| if bit { -1.0 } else { 1.0 }).collect();
-    decode_soft(&soft)
+    decode_soft(&soft(symbols))
 }
 
 /// The parts of 120 bits in the 500 soft symbols of a page, and whether they are inverted; `None` where
@@ -459,7 +455,7 @@ pub fn ephemeris_of(sv: Sv, words: &[u128; 5], near: Epoch) -> Option<Ephemeris>
 /// Coefficients of the ionosphere in a word 5.
 pub fn ionosphere_of(word: &u128) -> Option<Coefficients> {
     let all = parameters(word)?;
-    ionosphere(&|name: &str| all.iter().find(|(other, _)| *other == name).map(|(_, raw)| *raw))
+    ionosphere(&|name: &str| raw_of(&all, name))
 }
 
 /// The start of the page by its own week and time of week, the week near `near`; `None` for words without

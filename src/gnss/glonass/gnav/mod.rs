@@ -20,7 +20,7 @@ mod reader;
 
 use std::ops::RangeInclusive;
 
-use crate::bits::{FieldError, Store, bits_of, integers, write_all};
+use crate::bits::{FieldError, Store, bits_of, integers, soft, write_all};
 use crate::broadcast::{Ephemeris, SetForm};
 use crate::ionosphere::Model;
 use crate::message::{IonosphereForm, Message, Raw, Records, Sender};
@@ -50,8 +50,7 @@ pub static GNAV: Message = Message {
     ionosphere: IonosphereForm { model: Model::Klobuchar, unit: |_| false, coefficients: |_| None },
     fields: &OF_SET,
     parameters: |symbols| {
-        let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
-        let string = decode_soft(&soft)?;
+        let string = decode_soft(&soft(symbols))?;
         let found = parameters(&string);
         (!found.is_empty()).then(|| (id(&string) <= 4, found))
     },
@@ -135,10 +134,7 @@ struct Strings;
 
 impl Sender for Strings {
     fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
-        if start.seconds() % STRING_S != 0 || start.fraction() != 0.0 {
-            let expected = "an even second of GLONASS time";
-            return Err(FieldError::Start { message: GNAV.name, start_s: start.tow_s(), expected });
-        }
+        GNAV.check_start(start, "an even second of GLONASS time")?;
         let mut string = GlonassString::default();
         let number = string_at(start);
         let frame = Epoch::new(start.seconds() - i64::from(number - 1) * STRING_S, 0.0);
@@ -338,8 +334,7 @@ mod tests {
         for second in (0..60).step_by(2) {
             let mut symbols = sender.unit(&set, start.plus_s(f64::from(second))).unwrap();
             if second % 30 == 8 {
-                let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
-                let mut string = decode_soft(&soft).unwrap();
+                let mut string = decode_soft(&soft(&symbols)).unwrap();
                 write_all(&STRING_5, &SystemTime { four_years: sent as f64, ..SystemTime::default() }, &mut string)
                     .unwrap();
                 symbols = encode(&string);
@@ -417,8 +412,7 @@ mod tests {
             };
             for number in 1..=15 {
                 let symbols = sender.unit(&set, near.plus_s(f64::from(2 * (number - 1)))).unwrap();
-                let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
-                let string = decode_soft(&soft).unwrap();
+                let string = decode_soft(&soft(&symbols)).unwrap();
                 // Numbered from the last bit on, bit 65 of string 3 and bit 9 of the others (ICD 5.1, table
                 // 4.6).
                 let bit = |number: usize| string.0[STRING_BITS - number];

@@ -21,9 +21,9 @@ mod schedule;
 use std::sync::Arc;
 
 use crate::augmentation::{Content, Network};
-use crate::bits::{FieldError, bits_of, integers, number, write_all};
+use crate::bits::{FieldError, bits_of, integers, number, soft, write_all};
 use crate::broadcast::{Ephemeris, SetForm};
-use crate::crc::crc24q;
+use crate::crc::{CHECK_BITS, is_checked, with_check};
 use crate::fec::convolutional::Convolutional;
 use crate::fec::running::MARGIN;
 use crate::ionosphere::Model;
@@ -82,7 +82,6 @@ const ORDER: [u8; 6] = [OF_TIME, OF_PLACE, EMPTY, EMPTY, EMPTY, EMPTY];
 const PREAMBLES: [u128; 3] = [0x53, 0x9A, 0xC6];
 /// Bits of a block without and with its check; symbols of a second.
 const DATA_BITS: usize = 226;
-const CHECK_BITS: usize = 24;
 const BITS: usize = DATA_BITS + CHECK_BITS;
 const RATE_HZ: f64 = 500.0;
 /// Bits of the block before that the code remembers.
@@ -124,10 +123,7 @@ impl Sender for Blocks {
     }
 
     fn unit_after(&self, before: &Ephemeris, set: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
-        if start.fraction() != 0.0 {
-            let expected = "a whole second";
-            return Err(FieldError::Start { message: SBAS.name, start_s: start.tow_s(), expected });
-        }
+        SBAS.check_start(start, "a whole second")?;
         let past = self.block(before, start.plus_s(-1.0))?;
         let memory = past.get(BITS - MEMORY_BITS..).unwrap_or_default();
         let all: Vec<bool> = memory.iter().chain(&self.block(set, start)?).copied().collect();
@@ -154,16 +150,14 @@ impl Blocks {
             }
             (None, _) => {}
         }
-        let check = crc24q(bits.iter().copied());
-        bits.extend(bits_of(u128::from(check), CHECK_BITS));
-        Ok(bits)
+        Ok(with_check(bits))
     }
 }
 
 /// True if bits form a block: one of the three preambles, and a correct check.
 fn is_block(bits: &[bool]) -> bool {
     let begins = bits.get(..8).is_some_and(|begin| PREAMBLES.contains(&number(begin)));
-    begins && bits.len() == BITS && crc24q(bits.iter().copied()) == 0
+    begins && bits.len() == BITS && is_checked(bits)
 }
 
 /// Type of a block, as it states it.
@@ -173,8 +167,7 @@ fn type_of(bits: &[bool]) -> u8 {
 
 /// The parameters of a unit's symbols.
 fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
-    let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
-    let bits = CODE.decode_open(&soft);
+    let bits = CODE.decode_open(&soft(symbols));
     let kind = is_block(&bits).then(|| type_of(&bits))?;
     if kind == OF_PLACE {
         return Some((true, integers(&GEO, &bits)));
