@@ -12,7 +12,8 @@ use std::sync::Arc;
 
 use gnss_twin::judge::Status;
 use gnss_twin::message::{
-    Common, FieldError, IonosphereForm, IonosphereModel, Message, Parameters, Raw, Read, Reader, Sender, SetForm,
+    Common, FieldError, IonosphereForm, IonosphereModel, Message, Parameters, Raw, Read, Reader, Sender, SetFields,
+    SetForm,
 };
 use gnss_twin::orbit::embedded_navigation;
 use gnss_twin::prelude::*;
@@ -75,16 +76,12 @@ static FRAMES: Message = Message {
     set: &[1],
     reduced: &[],
     ionosphere: IonosphereForm { model: IonosphereModel::Klobuchar, unit: |_| false, coefficients: |_| None },
-    set_parameters: || vec!["issue"],
-    elements,
+    fields: &Fields,
     parameters: |symbols| opened(symbols).map(|(_, parameters)| (true, parameters)),
     reader: |sv| Box::new(FrameReader { sv, symbols: VecDeque::new(), last: None }),
     form: |set| Ephemeris { form: &SETS, ..set.clone() },
     sets: &SETS,
-    quantised: |set| Ok(set.clone()),
-    adjustable: Vec::new,
     alert: None,
-    adjust: |_, _, _| false,
     rinex: None,
 };
 
@@ -184,17 +181,25 @@ fn opened(frame: &[bool]) -> Option<(Epoch, Parameters)> {
     (check(frame.get(WORD..at - WORD)?) == stated).then_some((start, parameters))
 }
 
-/// Ephemeris of raw parameters.
-fn elements(sv: Sv, raw: Raw<'_>, _: Epoch) -> Option<Ephemeris> {
-    let time = |name| raw(name).map(|seconds| Epoch::new(seconds, 0.0));
-    let mut set = Ephemeris { form: &SETS, toc: time("toc_s")?, ..Ephemeris::blank(sv, time("toe_s")?) };
-    set.iode = raw("issue")? as u16;
-    set.iodc = set.iode;
-    set.health = raw("health")? as u16;
-    for (name, real) in REALS {
-        *real(&mut set) = f64::from_bits(raw(name)? as u64);
+/// Fields of ephemerides; no fault changes one.
+struct Fields;
+
+impl SetFields for Fields {
+    fn parameters(&self) -> Vec<&'static str> {
+        vec!["issue"]
     }
-    Some(set)
+
+    fn elements(&self, sv: Sv, raw: Raw<'_>, _: Epoch) -> Option<Ephemeris> {
+        let time = |name| raw(name).map(|seconds| Epoch::new(seconds, 0.0));
+        let mut set = Ephemeris { form: &SETS, toc: time("toc_s")?, ..Ephemeris::blank(sv, time("toe_s")?) };
+        set.iode = raw("issue")? as u16;
+        set.iodc = set.iode;
+        set.health = raw("health")? as u16;
+        for (name, real) in REALS {
+            *real(&mut set) = f64::from_bits(raw(name)? as u64);
+        }
+        Some(set)
+    }
 }
 
 /// Finds frames in soft symbols.
@@ -220,7 +225,7 @@ impl Reader for FrameReader {
         let mut news = vec![Read::Unit { symbols, of_week_s, inverted }, Read::Time(start)];
         if self.last.as_ref() != Some(&parameters) {
             let raw = |wanted: &str| parameters.iter().find(|(name, _)| *name == wanted).map(|(_, raw)| *raw);
-            if let Some(set) = elements(self.sv, &raw, near) {
+            if let Some(set) = Fields.elements(self.sv, &raw, near) {
                 let issue = u32::from(set.iode);
                 news.push(Read::Ephemeris(Box::new(set)));
                 let rows = NavigationRow::each(self.sv, FRAMES.name, issue, parameters.clone());

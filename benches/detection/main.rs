@@ -12,6 +12,8 @@ mod machine;
 mod page;
 mod picture;
 mod roc;
+#[path = "../shared/run.rs"]
+mod run;
 mod runs;
 mod scenes;
 #[path = "../shared/share.rs"]

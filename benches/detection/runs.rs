@@ -1,19 +1,15 @@
 //! Runs of all cases from a drawn time and position, and what the judge's labels say about their tests.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use analysis::measure::detection::{Detection, Label};
 use analysis::measure::independent::Correlated;
-use analysis::read::Run;
-use generator::scenario::{Overrides, Scenario};
 use gnss::record::Detector;
 use gnss::satellite::Sv;
-use receiver::output::Output;
-use receiver::settings::Settings;
 use serde::Serialize;
 
 use super::drawn::{Random, Start};
+use super::run::run_of_scene;
 use super::scenes::{ATTACKS, CLEAN, Case, scene};
 
 /// One detector in one run: a line of `detection.csv`.
@@ -83,17 +79,7 @@ pub fn attacked(number: u64) -> Vec<Found> {
 
 /// Runs a scene; its satellites too.
 fn run(case: Case, level: &'static str, seed: u64, start: &Start, text: &str) -> (Vec<Found>, Vec<Sv>) {
-    let scenario = Scenario::parse(text, case.name).unwrap();
-    let (scenes, _) = scenario.compose_all(Path::new("."), &Overrides::default()).unwrap();
-    let settings = Settings::of_scenario(text, case.name).unwrap();
-    let here = tempfile::tempdir().unwrap();
-    let [truth_path, rx_path] = ["truth", "rx"].map(|name| here.path().join(name));
-    [&truth_path, &rx_path].into_iter().for_each(|path| std::fs::create_dir(path).unwrap());
-    let mut truth = generator::truth::Writer::create(&truth_path).unwrap();
-    let mut output = Output::create(&rx_path).unwrap();
-    twin::run(&scenes, &settings, &mut truth, &mut output).unwrap();
-    drop((truth, output));
-    let run = Run::read_parts(here.path(), &truth_path, &rx_path).unwrap();
+    let (run, _here) = run_of_scene(text, case.name);
     let detection = Detection::measure(&run).unwrap();
     let line = |detector: Detector| Line {
         case: case.name,

@@ -7,6 +7,8 @@
 #[path = "../shared/machine.rs"]
 mod machine;
 mod page;
+#[path = "../shared/run.rs"]
+mod run;
 mod runs;
 
 use std::path::Path;

@@ -1,17 +1,15 @@
 //! Runs of every case from a drawn time and position, and what the judge counts in them.
 
 use std::collections::HashMap;
-use std::path::Path;
 
 use analysis::measure::errors::Errors;
 use analysis::measure::protection::{Protected, Protection};
 use analysis::read::Run;
 use generator::random::mix;
-use generator::scenario::{Overrides, Scenario};
 use gnss::satellite::Sv;
-use receiver::output::Output;
-use receiver::settings::Settings;
 use serde::Serialize;
+
+use super::run::run_of_scene;
 
 const SCENE: &str = include_str!("scene.toml");
 /// Sizes of a fault: between these distances of light, of either sign.
@@ -131,17 +129,7 @@ fn run(case: &Case, seed: u64, start: &str, position: [f64; 2], steps: &[(Sv, f6
         text +=
             &format!("\n[[satellite_fault]]\nkind = \"clock_step\"\nsatellites = [\"{sv}\"]\nstep_s = {step_s:e}\n");
     }
-    let scenario = Scenario::parse(&text, "protection").unwrap();
-    let (scenes, _) = scenario.compose_all(Path::new("."), &Overrides::default()).unwrap();
-    let settings = Settings::of_scenario(&text, "protection").unwrap();
-    let here = tempfile::tempdir().unwrap();
-    let [truth_path, rx_path] = ["truth", "rx"].map(|name| here.path().join(name));
-    [&truth_path, &rx_path].into_iter().for_each(|path| std::fs::create_dir(path).unwrap());
-    let mut truth = generator::truth::Writer::create(&truth_path).unwrap();
-    let mut output = Output::create(&rx_path).unwrap();
-    twin::run(&scenes, &settings, &mut truth, &mut output).unwrap();
-    drop((truth, output));
-    let run = Run::read_parts(here.path(), &truth_path, &rx_path).unwrap();
+    let (run, _here) = run_of_scene(&text, "protection");
     let errors = Errors::measure(&run).unwrap();
     let protection = Protection::measure(&run, &errors).unwrap();
     let in_view = run.in_view_at_start.iter().copied().collect();

@@ -23,8 +23,8 @@
 //! ```
 //!
 //! A [`Message`] of one's own is a `static` too. [`FieldError`] is what a sender returns for a value that the
-//! message cannot carry, [`SetForm`] what clock and health of its ephemerides refer to. The example
-//! `own_signal` has a whole message.
+//! message cannot carry, [`SetForm`] what clock and health of its ephemerides refer to, [`SetFields`] what
+//! their parameters are. The example `own_signal` has a whole message.
 //!
 //! ```
 //! use gnss_twin::message::{INAV, LNAV, Message};
@@ -44,4 +44,4 @@ pub use ::gnss::gps::lnav::LNAV;
 #[doc(inline)]
 pub use ::gnss::ionosphere::Model as IonosphereModel;
 #[doc(inline)]
-pub use ::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, Read, Reader, Sender};
+pub use ::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, Read, Reader, Sender, SetFields};

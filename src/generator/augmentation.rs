@@ -157,7 +157,7 @@ impl GroundNetwork {
     fn sent(&self, sv: Sv, at: Epoch) -> Option<Ephemeris> {
         let set = self.ground.catalogue.sent_at(sv, at)?;
         let sent = spoiled(&self.ground.message_faults, &LNAV, sv, set, at).unwrap_or_else(|| (LNAV.form)(set));
-        Some((LNAV.quantised)(&sent).unwrap_or(sent))
+        Some(LNAV.fields.quantised(&sent).unwrap_or(sent))
     }
 }
 

@@ -108,8 +108,8 @@ impl Kind {
     /// Reason for which the fault cannot occur in a message; `None` if it can.
     pub fn foreign(&self, message: &Message) -> Option<String> {
         match self {
-            Self::Parameter { name, .. } if !(message.adjustable)().contains(name) => {
-                let names = (message.adjustable)().join(", ");
+            Self::Parameter { name, .. } if !message.fields.adjustable().contains(name) => {
+                let names = message.fields.adjustable().join(", ");
                 Some(format!("{} has no parameter {name}: expected one of {names}", message.name))
             }
             Self::Alert if message.alert.is_none() => Some(format!("{} has no alert pages", message.name)),
@@ -165,7 +165,7 @@ impl MessageFault {
         match self.kind {
             Kind::Health(health) => ephemeris.health = health,
             Kind::Parameter { name, add } => {
-                (message.adjust)(ephemeris, name, add);
+                message.fields.adjust(ephemeris, name, add);
             }
             Kind::BitErrors { .. } | Kind::Bit { .. } | Kind::Alert => {}
         }

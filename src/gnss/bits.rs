@@ -166,6 +166,16 @@ pub fn bits_of(number: u128, count: usize) -> impl Iterator<Item = bool> {
     (0..count).rev().map(move |place| number >> place & 1 == 1)
 }
 
+/// Soft symbols of bits, ±1; a logical 1 is negative.
+pub fn soft(bits: &[bool]) -> Vec<f32> {
+    bits.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect()
+}
+
+/// Soft symbols as they would be if they had not been inverted.
+pub(crate) fn upright(symbols: &[f32], inverted: bool) -> Vec<f32> {
+    symbols.iter().map(|soft| if inverted { -soft } else { *soft }).collect()
+}
+
 /// One parameter's position and scale.
 #[derive(Clone, Copy, Debug)]
 pub struct Field {
@@ -350,6 +360,11 @@ pub fn add_to<T>(table: &[Element<T>], name: &str, into: &mut T, by: f64) -> boo
     let Some(element) = table.iter().find(|element| element.field.name == name) else { return false };
     (element.set)(into, (element.get)(into) + by);
     true
+}
+
+/// Fields of tables, in their order.
+pub(crate) fn fields<T>(tables: &[&'static [Element<T>]]) -> Vec<&'static Field> {
+    tables.iter().copied().flatten().map(|element| &element.field).collect()
 }
 
 /// Reads the integers of all fields of `table` from `data`.

@@ -7,6 +7,7 @@
 
 use nalgebra::Vector3;
 
+use crate::bits::FieldError;
 use crate::earth::{EARTH_ROTATION_RADPS, GPS_MU_M3PS2};
 use crate::satellite::{Sv, System};
 use crate::signal::Signal;
@@ -258,6 +259,16 @@ impl Ephemeris {
             signal_delays_s: Vec::new(),
             vector: None,
         }
+    }
+
+    /// The ephemeris if its reference times of orbit and clock are equal: some messages send one for both, or
+    /// show by them which of their units belong together.
+    ///
+    /// # Errors
+    /// Reference times that differ.
+    pub(crate) fn with_one_reference(&self) -> Result<&Self, FieldError> {
+        let (toe_s, toc_s) = (self.toe.tow_s(), self.toc.tow_s());
+        if self.toe == self.toc { Ok(self) } else { Err(FieldError::References { toe_s, toc_s }) }
     }
 
     /// Returns the ephemeris with each of its times replaced by `change(time)`.

@@ -1,5 +1,10 @@
 //! Cyclic redundancy checks of navigation messages.
 
+use crate::bits::{Element, FieldError, bits_of, write_all};
+
+/// Bits of a check.
+pub const CHECK_BITS: usize = 24;
+
 /// Remainder of CRC-24Q, which Galileo and modernised GPS messages use.
 ///
 /// Generator 0x1864CFB, register from zero, bits in the order in which they are sent (Galileo OS SIS ICD 2.1,
@@ -10,6 +15,25 @@ pub fn crc24q(bits: impl IntoIterator<Item = bool>) -> u32 {
         let shifted = register << 1 & 0xFF_FFFF;
         if carry { shifted ^ planted!("gnss.crc.polynomial", 0x86_4CFB, 0x86_4CFA) } else { shifted }
     })
+}
+
+/// Bits with their check after them.
+pub fn with_check(mut bits: Vec<bool>) -> Vec<bool> {
+    let check = crc24q(bits.iter().copied());
+    bits.extend(bits_of(u128::from(check), CHECK_BITS));
+    bits
+}
+
+/// True if bits end with their check.
+pub fn is_checked(bits: &[bool]) -> bool {
+    crc24q(bits.iter().copied()) == 0
+}
+
+/// The contents of tables in `count` bits, the last of which are the check.
+pub(crate) fn checked<T>(tables: &[&[Element<T>]], content: &T, count: usize) -> Result<Vec<bool>, FieldError> {
+    let mut bits = vec![false; count - CHECK_BITS];
+    tables.iter().try_for_each(|table| write_all(table, content, &mut bits))?;
+    Ok(with_check(bits))
 }
 
 #[cfg(test)]

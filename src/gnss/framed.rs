@@ -8,6 +8,7 @@ use crate::broadcast::Ephemeris;
 use crate::fec::frames::Frames;
 use crate::message::{Parameters, Read, Reader};
 use crate::record::NavigationRow;
+use crate::satellite::Sv;
 use crate::time::Epoch;
 
 /// Symbols that begin or end a frame.
@@ -48,6 +49,8 @@ pub trait Content: Clone + fmt::Debug + Send + Sync {
     /// Frames in a row that fail where they are expected before they are sought elsewhere.
     const FAILURES: u32 = 4;
 
+    /// Content of a satellite before the first frame.
+    fn new(sv: Sv) -> Self;
     /// True if a frame may begin with the first of these symbols, as many as a frame has.
     fn may_begin(&self, symbols: &[f32]) -> bool;
     /// Decodes the symbols of a frame, normal or inverted. `None` if its checks fail.
@@ -74,6 +77,11 @@ pub struct Framed<C> {
 
 impl<C: Content> Framed<C> {
     /// Creates a reader that has received no symbols.
+    pub fn new(sv: Sv) -> Self {
+        Self::of(C::new(sv))
+    }
+
+    /// Creates a reader that continues content.
     pub(crate) fn of(content: C) -> Self {
         Self { frames: Frames::new(C::SYMBOLS, C::FAILURES), content }
     }

@@ -68,6 +68,7 @@ pub mod sigmf;
 pub mod signal;
 pub mod sp3;
 pub mod time;
+pub mod troposphere;
 pub mod vienna;
 pub mod vmf3;
 pub mod weil;

@@ -56,11 +56,8 @@ pub struct Message {
     pub reduced: &'static [u8],
     /// Ionosphere model and the units that carry its coefficients.
     pub ionosphere: IonosphereForm,
-    /// Names of the ephemeris parameters that carry its issue.
-    pub set_parameters: fn() -> Vec<&'static str>,
-    /// Function that decodes a satellite's ephemeris from raw parameters near a time. `None` if some are
-    /// missing or contradict each other.
-    pub elements: fn(Sv, Raw<'_>, Epoch) -> Option<Ephemeris>,
+    /// Fields of the ephemerides.
+    pub fields: &'static dyn SetFields,
     /// Function that reads a unit's parameters from its symbols, with true if they belong to an ephemeris.
     /// `None` if the unit fails its checks or has no parameters.
     pub parameters: fn(&[bool]) -> Option<(bool, Parameters)>,
@@ -71,19 +68,45 @@ pub struct Message {
     pub form: fn(&Ephemeris) -> Ephemeris,
     /// Meaning of clock and health in ephemerides of this message.
     pub sets: &'static SetForm,
-    /// Function that returns the ephemeris as a receiver decodes it after transmission.
-    pub quantised: fn(&Ephemeris) -> Result<Ephemeris, FieldError>,
-    /// Names of the ephemeris parameters that a fault may change while checks stay right. Parameters that
-    /// identify ephemeris or sender are excluded.
-    pub adjustable: fn() -> Vec<&'static str>,
     /// Function that turns a unit into an alert page; absent if the message has none.
     pub alert: Option<Alert>,
-    /// Function that adds a value to the named ephemeris parameter, in its unit. It returns false if there is
-    /// no such parameter.
-    pub adjust: fn(&mut Ephemeris, &str, f64) -> bool,
     /// RINEX record names of the message. Absent if RINEX has the message in a form that this crate does not
     /// write.
     pub rinex: Option<Records>,
+}
+
+/// Fields of the ephemerides of a message. Without functions of its own a type has none.
+pub trait SetFields: Send + Sync {
+    /// Names of the parameters that carry the issue of the ephemeris.
+    fn parameters(&self) -> Vec<&'static str> {
+        Vec::new()
+    }
+
+    /// Decodes a satellite's ephemeris from raw parameters near a time. `None` if some are missing or
+    /// contradict each other.
+    fn elements(&self, _sv: Sv, _raw: Raw<'_>, _near: Epoch) -> Option<Ephemeris> {
+        None
+    }
+
+    /// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays, and so does
+    /// what the message does not state.
+    ///
+    /// # Errors
+    /// A value that the message cannot carry.
+    fn quantised(&self, ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
+        Ok(ephemeris.clone())
+    }
+
+    /// Names of the parameters that a fault may change while checks stay right. Parameters that identify
+    /// ephemeris or sender are excluded.
+    fn adjustable(&self) -> Vec<&'static str> {
+        Vec::new()
+    }
+
+    /// Adds a value to the named parameter, in its unit. Returns false if there is no such parameter.
+    fn adjust(&self, _ephemeris: &mut Ephemeris, _parameter: &str, _by: f64) -> bool {
+        false
+    }
 }
 
 /// Names of a message's records in navigation files of RINEX 4 (RINEX 4.02, tables 24 and 25).
@@ -311,7 +334,17 @@ pub struct SentPage {
     pub parts: [u128; 2],
 }
 
+/// Raw integer of a parameter by its name.
+pub(crate) fn raw_of(all: &Parameters, name: &str) -> Option<i64> {
+    all.iter().find(|(other, _)| *other == name).map(|(_, raw)| *raw)
+}
+
 impl Read {
+    /// Raw parameters of a satellite as decoded from a message.
+    pub(crate) fn parameters(sv: Sv, message: &Message, issue: u32, parameters: Parameters) -> Self {
+        Self::Parameters(NavigationRow::each(sv, message.name, issue, parameters).collect())
+    }
+
     /// Failure for a unit that names another satellite than the tracked one.
     pub(crate) fn names_another(unit: &str, said: impl fmt::Display) -> Self {
         Self::Refused(format!("{unit} names satellite {said}, which is another one"))
@@ -341,6 +374,15 @@ pub trait Reader: fmt::Debug + Send + Sync {
 }
 
 impl Message {
+    /// Refuses a time at which no unit begins.
+    pub(crate) fn check_start(&self, start: Epoch, expected: &'static str) -> Result<(), FieldError> {
+        let late_s = (start.seconds() - self.first_s).rem_euclid(self.unit_s);
+        if late_s == 0 && start.fraction() == 0.0 {
+            return Ok(());
+        }
+        Err(FieldError::Start { message: self.name, start_s: start.tow_s(), expected })
+    }
+
     /// True if the message states its own time.
     pub fn is_dated(&self) -> bool {
         !self.timed.is_empty()

@@ -1,4 +1,4 @@
-//! Carriers and chips of signals by their RINEX codes, of foreign receivers too.
+//! Chips of signals by their RINEX codes, of foreign receivers too.
 //!
 //! Source: RINEX 4.02, tables 10 to 16 (bands and codes), and the interface documents of the systems for the
 //! rates of the chips. A receiver of another make may track what this program does not generate, P(Y) for
@@ -6,7 +6,7 @@
 
 use std::fmt;
 
-use gnss::satellite::{Sv, System};
+use gnss::satellite::System;
 
 /// Band and attribute of a signal as RINEX has them, such as `1C`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -28,31 +28,6 @@ impl fmt::Display for Code {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(&String::from_utf8_lossy(&self.0))
     }
-}
-
-/// Carrier of a satellite's signal; of GLONASS by the satellite's channel. `None` for a band that the system
-/// does not have.
-pub fn carrier_hz(sv: Sv, code: Code, channel: Option<i8>) -> Option<f64> {
-    let on_channel = |middle_hz: f64, step_hz: f64| channel.map(|channel| middle_hz + step_hz * f64::from(channel));
-    let hz = match (sv.system, code.band()) {
-        (System::Glonass, b'1') => return on_channel(1_602.0e6, 0.5625e6),
-        (System::Glonass, b'2') => return on_channel(1_246.0e6, 0.4375e6),
-        (System::Glonass, b'3') => 1_202.025e6,
-        (System::Glonass, b'4') => 1_600.995e6,
-        (System::Glonass, b'6') => 1_248.06e6,
-        (System::BeiDou, b'2') => 1_561.098e6,
-        (System::BeiDou, b'6') => 1_268.52e6,
-        (System::Gps | System::Qzss, b'2') => 1_227.6e6,
-        (System::Galileo | System::Qzss, b'6') => 1_278.75e6,
-        (System::Galileo | System::BeiDou, b'7') => 1_207.14e6,
-        (System::Galileo | System::BeiDou, b'8') => 1_191.795e6,
-        (System::Navic, b'9') => 2_492.028e6,
-        (System::Glonass, _) => return None,
-        (_, b'5') => 1_176.45e6,
-        (_, b'1') => 1_575.42e6,
-        _ => return None,
-    };
-    Some(hz)
 }
 
 /// True if the satellites of a system send a signal on carriers of their own, whose double differences have
@@ -79,7 +54,7 @@ pub fn chips_hz(system: System, code: Code) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gnss::signal::all;
+    use gnss::signal::{all, band_hz};
 
     #[test]
     fn carriers_and_chips_are_those_of_the_registered_signals() {
@@ -87,7 +62,7 @@ mod tests {
         for signal in all() {
             let Some(code) = Code::new(signal.rinex) else { continue };
             for sv in signal.satellites().filter(|sv| sv.system != System::Sbas).take(3) {
-                let found = carrier_hz(sv, code, signal.link(sv).channel());
+                let found = band_hz(sv.system, code.band(), signal.link(sv).channel());
                 assert_eq!(found, Some(signal.carrier_hz(sv)), "{signal} {sv}");
                 compared += 1;
             }
@@ -101,8 +76,8 @@ mod tests {
     #[test]
     fn a_band_that_a_system_does_not_have_has_no_carrier() {
         let code = |text| Code::new(text).unwrap();
-        assert_eq!(carrier_hz(Sv::gps(1), code("7Q"), None), None);
-        assert_eq!(carrier_hz(Sv { system: System::Glonass, number: 1 }, code("1C"), None), None);
+        assert_eq!(band_hz(System::Gps, code("7Q").band(), None), None);
+        assert_eq!(band_hz(System::Glonass, code("1C").band(), None), None);
         assert_eq!(["1", "é", "1CA"].map(Code::new), [None; 3]);
     }
 }

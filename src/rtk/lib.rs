@@ -23,5 +23,4 @@ pub mod run;
 pub mod site;
 pub mod slips;
 pub mod solver;
-mod troposphere;
 pub mod truth;

@@ -25,6 +25,8 @@ pub struct Emission {
     pub position_m: Vector3<f64>,
     /// Satellite's clock against GPS time, without group delays, which differences do not contain.
     pub clock_s: f64,
+    /// Day of the year.
+    pub day: f64,
 }
 
 impl Orbits {
@@ -61,7 +63,7 @@ pub fn emission(set: &Ephemeris, label: Epoch, pseudorange_m: f64) -> Option<Emi
     let emitted = sent.plus_s(-rough.offset_s);
     let clock_s = set.clock(emitted).ok()?.offset_s;
     let emitted = sent.plus_s(-clock_s);
-    Some(Emission { position_m: set.state(emitted).ok()?.position_m, clock_s })
+    Some(Emission { position_m: set.state(emitted).ok()?.position_m, clock_s, day: emitted.day_of_year() })
 }
 
 impl Emission {

@@ -8,16 +8,17 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Vector3;
 
-use crate::carrier::{Code, carrier_hz};
+use crate::carrier::Code;
 use crate::error::{LEAST, RtkError};
 use crate::files::Receiver;
 use crate::orbits::{Emission, Orbits, emission};
 use crate::site::Site;
-use crate::troposphere::delay_m;
 use analysis::read::rinex_obs::{ObservedEpoch, Values};
 use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::satellite::{Sv, System};
+use gnss::signal::band_hz;
 use gnss::time::Epoch;
+use gnss::troposphere::delay_m;
 
 /// Signal of a satellite.
 pub type Track = (Sv, Code);
@@ -147,7 +148,7 @@ fn shared(
         let Some(code) = Code::new(text).filter(|code| choice.takes((*sv, *code))) else { continue };
         let (Some(of_other), Some(of_own)) = (other.pseudorange_m, own.pseudorange_m) else { continue };
         let channel = rover.channels.get(sv).or_else(|| base.channels.get(sv)).copied();
-        let Some(hz) = carrier_hz(*sv, code, channel) else { continue };
+        let Some(hz) = band_hz(sv.system, code.band(), channel) else { continue };
         let both = emissions.entry(*sv).or_insert_with(|| {
             let set = orbits.serving(*sv, of_base.label)?;
             Some([emission(set, of_base.label, of_other)?, emission(set, of_rover.label, of_own)?])
@@ -181,7 +182,7 @@ pub fn modelled(emission: &Emission, site: &Site) -> (f64, Vector3<f64>, f64) {
     let sight_m = emission.to(&site.position_m);
     let range_m = sight_m.norm();
     let direction = sight_m / range_m;
-    let elevation_rad = libm::asin((-direction.dot(&site.up)).clamp(-1.0, 1.0));
-    let air_m = delay_m(site.height_m, elevation_rad);
-    (range_m - SPEED_OF_LIGHT_MPS * emission.clock_s + air_m, direction, elevation_rad)
+    let sine = (-direction.dot(&site.up)).clamp(-1.0, 1.0);
+    let air_m = delay_m(site.geodetic, sine, emission.day);
+    (range_m - SPEED_OF_LIGHT_MPS * emission.clock_s + air_m, direction, libm::asin(sine))
 }

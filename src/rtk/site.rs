@@ -9,8 +9,8 @@ use gnss::earth::Geodetic;
 pub struct Site {
     /// ECEF position, metres.
     pub position_m: Vector3<f64>,
-    /// Height above the ellipsoid, metres.
-    pub height_m: f64,
+    /// Geodetic coordinates.
+    pub geodetic: Geodetic,
     /// Unit vector of the local vertical, ECEF.
     pub up: Vector3<f64>,
     /// Matrix whose rows are east, north and up.
@@ -22,6 +22,6 @@ impl Site {
     pub fn new(position_m: Vector3<f64>) -> Self {
         let geodetic = Geodetic::from_ecef(&position_m);
         let axes = geodetic.ecef_to_enu();
-        Self { position_m, height_m: geodetic.height_m, up: axes.row(2).transpose(), axes }
+        Self { position_m, geodetic, up: axes.row(2).transpose(), axes }
     }
 }

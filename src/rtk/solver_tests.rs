@@ -63,10 +63,10 @@ impl Sky {
         let places = [Site::new(self.base_m), Site::new(self.rover_m)];
         let mut shared = Vec::new();
         for (sv, position_m) in self.satellites.clone() {
-            let emission = Emission { position_m, clock_s: 1e-4 };
+            let emission = Emission { position_m, clock_s: 1e-4, day: at.day_of_year() };
             for text in codes {
                 let code = Code::new(text).unwrap();
-                let wavelength_m = SPEED_OF_LIGHT_MPS / crate::carrier::carrier_hz(sv, code, None).unwrap();
+                let wavelength_m = SPEED_OF_LIGHT_MPS / gnss::signal::band_hz(sv.system, code.band(), None).unwrap();
                 // The rover's alone: a pattern over the satellites, on each carrier by its square.
                 let ratio = wavelength_m / L1_M;
                 let delays_m = [0.0, self.ionosphere_m * libm::sin(2.2 * f64::from(sv.number)) * ratio * ratio];

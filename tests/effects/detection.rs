@@ -1,23 +1,12 @@
 //! A jammer and a spoofer against the receiver's detectors, through samples, receiver and judge.
 
-use std::path::Path;
-use std::process::Command;
-
 use serde_json::Value;
+
+use super::ran_shipped;
 
 #[test]
 fn a_jammer_and_a_spoofer_are_detected_and_a_clean_sky_raises_no_more_alarms_than_stated() {
-    let directory = tempfile::tempdir().unwrap();
-    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/detection.toml");
-    let output = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
-        .arg("run")
-        .arg(&scenario)
-        .current_dir(directory.path())
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let run = directory.path().join("reports/detection");
-    let summary: Value = serde_json::from_slice(&std::fs::read(run.join("summary.json")).unwrap()).unwrap();
+    let (_directory, run, summary) = ran_shipped("detection");
     let number = |pointer: &str| summary.pointer(pointer).and_then(Value::as_f64).unwrap_or(f64::NAN);
     assert_eq!([number("/detection/attacks"), number("/detection/attacks_detected")], [2.0, 2.0], "{summary}");
     // The jammer has 1.9 times the power of the noise in 2.6 MHz, the spoofer half of it.

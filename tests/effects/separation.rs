@@ -1,7 +1,6 @@
 //! Loss of C/N0 in a correlator under interference, against spectral separation and the code's own lines.
 
 use std::f64::consts::{PI, TAU};
-use std::process::Command;
 
 use generator::scene::Scene;
 use generator::truth;
@@ -10,6 +9,7 @@ use gnss::record::Observation;
 use gnss::satellite::Sv;
 
 use super::interference::{alone, generated, scene};
+use super::ran;
 
 /// A code period of the ideal correlator.
 struct Period {
@@ -194,16 +194,10 @@ fn the_receiver_measures_the_cn0_that_spectral_separation_leaves() {
     let head = head.replace("duration_s = 75", "duration_s = 27").replace("= 4e6", "= 2.6e6");
     let jammers = "[[interference]]\nkind = \"noise\"\nbandwidth_hz = 2.046e6\njs_db = 22\non_s = 11\noff_s = 18\n\
         [[interference]]\nkind = \"chirp\"\nsweep_hz = 2e6\nsweep_s = 4.873e-4\njs_db = 25\non_s = 20\n";
-    let directory = tempfile::tempdir().unwrap();
-    let path = directory.path().join("scene.toml");
+    let place = tempfile::tempdir().unwrap();
+    let path = place.path().join("scene.toml");
     std::fs::write(&path, format!("{head}{jammers}")).unwrap();
-    let output = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
-        .arg("run")
-        .arg(&path)
-        .current_dir(directory.path())
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let directory = ran(&path);
     let rows: Vec<Observation> = csv::Reader::from_path(directory.path().join("reports/jammed/rx/observations.csv"))
         .unwrap()
         .deserialize()

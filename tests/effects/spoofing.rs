@@ -1,23 +1,12 @@
 //! A spoofer that takes the receiver along, through samples, receiver and judge.
 
-use std::path::Path;
-use std::process::Command;
-
 use serde_json::Value;
+
+use super::ran_shipped;
 
 #[test]
 fn a_drag_off_is_followed_while_the_truth_says_otherwise() {
-    let directory = tempfile::tempdir().unwrap();
-    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/spoofed.toml");
-    let output = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
-        .arg("run")
-        .arg(&scenario)
-        .current_dir(directory.path())
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let run = directory.path().join("reports/spoofed");
-    let summary: Value = serde_json::from_slice(&std::fs::read(run.join("summary.json")).unwrap()).unwrap();
+    let (_directory, run, summary) = ran_shipped("spoofed");
     let number = |pointer: &str| summary.pointer(pointer).and_then(Value::as_f64).unwrap_or(f64::NAN);
     // 5 m/s from 35 s on, half a second lost to the acceleration, to the end at 75 s.
     let claimed_m = number("/spoofing/claimed_displacement_max_m");

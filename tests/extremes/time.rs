@@ -122,7 +122,7 @@ fn reference_times_half_a_week_away_and_in_the_next_week_give_no_step() {
             for sent_s in [WEEK_S - 30, WEEK_S] {
                 let base = 1590 * WEEK_S;
                 let delta_s = base + toe_s - set.toe.seconds();
-                let own = lnav::quantised(&moved(set, delta_s)).unwrap();
+                let own = lnav::LNAV.fields.quantised(&moved(set, delta_s)).unwrap();
                 wrong += usize::from(decoded(&own, base + sent_s, base + sent_s).is_none_or(|found| {
                     let at = Epoch::new(base + sent_s, 0.25);
                     let apart = found.state(at).unwrap().position_m - own.state(at).unwrap().position_m;
@@ -157,7 +157,7 @@ fn the_ten_bits_of_the_week_are_resolved_for_ten_years_around() {
                 continue;
             }
             let sent_s = week * WEEK_S + 302_400;
-            let own = lnav::quantised(&moved(set, sent_s + 7200 - set.toe.seconds())).unwrap();
+            let own = lnav::LNAV.fields.quantised(&moved(set, sent_s + 7200 - set.toe.seconds())).unwrap();
             let found = decoded(&own, sent_s, (week + away) * WEEK_S).unwrap();
             of += 1;
             held += usize::from(found.toe == own.toe && found.transmitted == Epoch::new(sent_s, 0.0));

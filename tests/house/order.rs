@@ -12,8 +12,10 @@ pub const ORDER: Order<'static> = &[
         "gnss",
         &[
             &["plant", "renamed"],
-            &["time", "earth", "geoid", "satellite", "crc", "fec", "inflate", "place", "weil"],
+            &["time", "earth", "geoid", "satellite", "inflate", "place", "weil"],
             &["bits", "bdgim", "cityjson", "klobuchar", "nequick", "ionex", "projection", "samples", "vienna"],
+            &["crc", "troposphere"],
+            &["fec"],
             &["ionosphere"],
             &["packed", "signal", "vmf3"],
             &["recording"],
@@ -237,7 +239,7 @@ pub const ORDER: Order<'static> = &[
     (
         "rtk",
         &[
-            &["carrier", "lambda", "normal", "orbits", "site", "troposphere"],
+            &["carrier", "lambda", "normal", "orbits", "site"],
             &["error"],
             &["files"],
             &["pairs"],

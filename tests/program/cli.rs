@@ -4,26 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use crate::command::{TWIN, code, stderr, twin};
-
-/// A static scene of two seconds that needs nothing but the program.
-const SHORT: &str = r#"
-name = "short"
-start = "2010-07-01T08:00:00"
-duration_s = 2
-seed = 1
-[motion]
-kind = "static"
-latitude_deg = 26.5123
-longitude_deg = 80.2329
-height_m = 130.0
-[front_end]
-sample_rate_hz = 2.6e6
-format = "ci8"
-[power]
-cn0_dbhz = 45.0
-[noise]
-"#;
+use crate::command::{SHORT, TWIN, code, stderr, twin};
 
 /// A directory with `short.toml` in it.
 fn workplace() -> tempfile::TempDir {

@@ -6,25 +6,12 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::command::{TWIN, code, stderr, twin};
+use crate::command::{SHORT, TWIN, code, stderr, twin};
 
-/// A static scene that needs nothing but the program.
-const SCENE: &str = r#"
-name = "short"
-start = "2010-07-01T08:00:00"
-duration_s = 3
-[motion]
-kind = "static"
-latitude_deg = 26.5123
-longitude_deg = 80.2329
-height_m = 130.0
-[front_end]
-sample_rate_hz = 2.6e6
-format = "ci8"
-[power]
-cn0_dbhz = 45.0
-[noise]
-"#;
+/// The short scene, a second longer and with the usual seed.
+fn scene() -> String {
+    SHORT.replace("duration_s = 2\nseed = 1", "duration_s = 3")
+}
 
 /// Three entries, one of which a limit breaks, and a test that is not said.
 const PACK: &str = r#"
@@ -63,7 +50,7 @@ fn workplace() -> tempfile::TempDir {
     let pack = here.path().join("small");
     fs::create_dir(&pack).unwrap();
     fs::write(pack.join("pack.toml"), PACK).unwrap();
-    fs::write(pack.join("short.toml"), SCENE).unwrap();
+    fs::write(pack.join("short.toml"), scene()).unwrap();
     fs::write(pack.join("limits.toml"), "\"satellites.used\" = { min = 40 }\n").unwrap();
     here
 }
@@ -182,7 +169,7 @@ fn threads_change_no_byte_and_a_killed_run_goes_on_to_the_same_bytes() {
     assert_eq!(fs::metadata(entries.join("plain/entry.json")).unwrap().modified().unwrap(), made);
 
     // Another scene under the same name is computed again, and its record has other bytes.
-    fs::write(here.path().join("small/short.toml"), SCENE.replace("45.0", "44.0")).unwrap();
+    fs::write(here.path().join("small/short.toml"), scene().replace("45.0", "44.0")).unwrap();
     let other = run("three", "1");
     assert!(differences(&whole, &other).contains(&"entries/plain/entry.json".to_owned()));
 }

@@ -77,7 +77,7 @@ fn frames_are_read_from_any_symbol_inverted_or_not_to_what_was_sent() {
             }
         }
         let read = news.iter().find_map(|read| if let Read::Ephemeris(set) = read { Some(&**set) } else { None });
-        let expected = (B_CNAV1.quantised)(set).unwrap().timed(|at| BDT.label(at));
+        let expected = B_CNAV1.fields.quantised(set).unwrap().timed(|at| BDT.label(at));
         assert_eq!(*read.unwrap(), Ephemeris { transmitted: read.unwrap().transmitted, ..expected });
     }
     // Of another satellite nothing is read.
@@ -90,7 +90,7 @@ fn a_set_of_d1_carried_to_b_cnav1_is_the_same_orbit_and_clock_to_its_steps() {
     let (mut farthest_m, mut latest_m) = (0.0_f64, 0.0_f64);
     let sets = sets();
     for set in &sets {
-        let carried = (B_CNAV1.quantised)(set).unwrap();
+        let carried = B_CNAV1.fields.quantised(set).unwrap();
         assert_eq!(BDT.label(carried.toe).seconds() % 300, 0);
         for minutes in [-60, 0, 33, 120, 240] {
             let at = set.toe.plus_s(60.0 * f64::from(minutes));
@@ -140,7 +140,7 @@ fn subframes_that_a_receiver_printed_are_what_it_decoded_and_are_sent_by_us_bit_
     let time = number(&first[6..14]) as u32;
     let symbols = bcnav1::encoded(35, time, &whole(two.clone()), &whole(three.clone()));
     let frame: Frame = bcnav1::decode(35, &soft(&symbols, false).collect::<Vec<f32>>()).unwrap();
-    assert!(frame.two[..576] == two && frame.three.as_ref().unwrap()[..240] == three);
+    assert!(frame.0.two[..576] == two && frame.0.three.as_ref().unwrap()[..240] == three);
     let sv = Sv { system: System::BeiDou, number: 35 };
     let near = BDT.label(Epoch::from_week(2209, row("BCNAV1_SF2", "35")[2].parse().unwrap()));
     // The receiver writes a subframe down when the frame has ended.
@@ -187,9 +187,9 @@ fn subframes_that_a_receiver_printed_are_what_it_decoded_and_are_sent_by_us_bit_
     let sender = (B_CNAV1.sender)(&Common::default()).unwrap();
     let ours = sender.unit(set, frame.sent_at(near)).unwrap();
     let ours = bcnav1::decode(35, &soft(&ours, false).collect::<Vec<f32>>()).unwrap();
-    assert_eq!(ours.time, frame.time);
+    assert_eq!(ours.0.time, frame.0.time);
     // All but what is reserved.
-    let differ: Vec<usize> = (0..569).filter(|place| ours.two[*place] != two[*place]).collect();
+    let differ: Vec<usize> = (0..569).filter(|place| ours.0.two[*place] != two[*place]).collect();
     assert!(differ.is_empty(), "{differ:?}");
 }
 
@@ -260,7 +260,7 @@ fn pages_take_turns_and_almanacs_are_near_the_orbits_of_their_satellites() {
         let sender = (B_CNAV1.sender)(&common).unwrap();
         let unit = |frame: usize| sender.unit(&carried, begin.plus_s(18.0 * frame as f64)).unwrap();
         let three = |symbols: Vec<bool>| {
-            bcnav1::decode(carried.sv.number, &soft(&symbols, false).collect::<Vec<f32>>()).unwrap().three.unwrap()
+            bcnav1::decode(carried.sv.number, &soft(&symbols, false).collect::<Vec<f32>>()).unwrap().0.three.unwrap()
         };
         (0..frames).map(|frame| three(unit(frame))).collect()
     };

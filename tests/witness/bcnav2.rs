@@ -96,7 +96,7 @@ fn messages_are_read_from_any_symbol_inverted_or_not_to_what_was_sent() {
                 }
             }
             let read = decoded(&news).next().unwrap();
-            let expected = (message.quantised)(set).unwrap().timed(|at| BDT.label(at));
+            let expected = message.fields.quantised(set).unwrap().timed(|at| BDT.label(at));
             assert_eq!(*read, Ephemeris { transmitted: read.transmitted, ..expected });
             // Nothing is new until the set is, and no set needs longer than all messages and one that had
             // begun.
@@ -133,7 +133,7 @@ fn a_set_that_follows_another_is_never_mixed_with_it_wherever_reading_begins_or_
         let all: Vec<bool> =
             [stream(message, &both[0], begin, 2 * units as u32), stream(message, &both[1], half, 2 * units as u32)]
                 .concat();
-        let expected = [set, &later].map(|set| (message.quantised)(set).unwrap().timed(|at| BDT.label(at)));
+        let expected = [set, &later].map(|set| message.fields.quantised(set).unwrap().timed(|at| BDT.label(at)));
         // One of the messages is lost, or none, and reading begins with any.
         for lost in 0..=4 * units as usize {
             for first in 0..units as usize {
@@ -160,7 +160,7 @@ fn a_set_of_d1_carried_to_b_cnav2_and_b_cnav3_is_the_same_orbit_and_clock_to_its
     for (message, signal) in BOTH {
         let (mut farthest_m, mut latest_m) = (0.0_f64, 0.0_f64);
         for set in &sets {
-            let carried = (message.quantised)(set).unwrap();
+            let carried = message.fields.quantised(set).unwrap();
             assert_eq!(BDT.label(carried.toe).seconds() % 300, 0);
             for minutes in [-60, 0, 33, 120, 240] {
                 let at = set.toe.plus_s(60.0 * f64::from(minutes));

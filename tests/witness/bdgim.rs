@@ -119,7 +119,7 @@ fn bits(message: &Message, kind: u8, sv: u8, symbols: &[bool]) -> Option<Vec<boo
     let soft: Vec<f32> = soft(symbols, false).collect();
     let typed = |bits: Vec<bool>, place: usize| (number(&bits[place..place + 6]) == u128::from(kind)).then_some(bits);
     match message.name {
-        "B-CNAV1" => bcnav1::decode(sv, &soft)?.three,
+        "B-CNAV1" => bcnav1::decode(sv, &soft)?.0.three,
         "B-CNAV2" => typed(bcnav2::decode(&soft)?.0, 6),
         _ => typed(bcnav3::decode(&soft)?.0, 0),
     }

@@ -340,8 +340,8 @@ fn a_set_of_lnav_carried_to_cnav_is_the_same_orbit_and_clock_to_its_steps() {
         if set.sv.number > 32 || set.form != &gnss::gps::lnav::LNAV_SETS {
             continue;
         }
-        let carried = (CNAV.quantised)(set).unwrap();
-        let second = (CNAV2.quantised)(set).unwrap();
+        let carried = CNAV.fields.quantised(set).unwrap();
+        let second = CNAV2.fields.quantised(set).unwrap();
         // The same, but for its form and corrections of its own.
         assert_eq!(Ephemeris { form: carried.form, health: carried.health, ..second.clone() }, carried);
         assert!((carried.toe.since(set.toe)).abs() <= 150.0 && carried.toe.seconds() % 300 == 0);

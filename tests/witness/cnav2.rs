@@ -65,11 +65,11 @@ fn soft(symbols: &[bool], inverted: bool) -> Vec<f32> {
 /// Times, checks, and that its information is coded again to all 1800 symbols.
 fn holds(sent: &Sent) -> Frame {
     let frame = cnav2::decode(&soft(&cnav2::interleaved(&sent.symbols), false)).unwrap();
-    assert!(!frame.inverted);
+    assert!(!frame.0.inverted);
     assert_eq!(frame.sent_at(sent.start), sent.start, "{} {}", sent.sv, sent.start);
-    let three = frame.three.as_ref().unwrap();
+    let three = frame.0.three.as_ref().unwrap();
     assert_eq!(number(&three[..8]), 192 + u128::from(sent.sv.number));
-    assert!(cnav2::coded(frame.time, &frame.two, three) == sent.symbols, "{} {}", sent.sv, sent.start);
+    assert!(cnav2::coded(frame.0.time, &frame.0.two, three) == sent.symbols, "{} {}", sent.sv, sent.start);
     frame
 }
 
@@ -101,7 +101,7 @@ fn is_sent(set: &Ephemeris, start: Epoch, two: &[bool]) {
     let ours = cnav2::decode(&soft(&symbols, false)).unwrap();
     assert_eq!(ours.sent_at(start), start);
     let compared = |place: &usize| !(21..32).contains(place) && !(459..470).contains(place) && *place < 565;
-    let differ: Vec<usize> = (0..576).filter(compared).filter(|place| ours.two[*place] != two[*place]).collect();
+    let differ: Vec<usize> = (0..576).filter(compared).filter(|place| ours.0.two[*place] != two[*place]).collect();
     assert!(differ.is_empty(), "{} {start} {differ:?}", set.sv);
 }
 
@@ -110,7 +110,7 @@ fn shipped_frames_are_coded_again_symbol_by_symbol_read_inverted_or_not_and_sent
     let all = shipped();
     let frames: Vec<Frame> = all.iter().map(holds).collect();
     // Two are the last of their two hours: the count is that of the next, the interval their own.
-    assert_eq!(frames.iter().filter(|frame| frame.time == 0).count(), 2);
+    assert_eq!(frames.iter().filter(|frame| frame.0.time == 0).count(), 2);
     let mut satellites = 0;
     for of_one in all.iter().collect::<Vec<_>>().chunk_by(|a, b| a.sv == b.sv) {
         satellites += 1;
@@ -128,9 +128,9 @@ fn shipped_frames_are_coded_again_symbol_by_symbol_read_inverted_or_not_and_sent
                 .collect();
             assert!(!sets.is_empty());
             for (sent, frame) in all.iter().zip(&frames).filter(|(sent, _)| sent.sv == of_one[0].sv) {
-                let toe = number(&frame.two[38..49]) as i64 * 300;
+                let toe = number(&frame.0.two[38..49]) as i64 * 300;
                 if let Some(set) = sets.iter().find(|set| set.toe.tow_whole_s() == toe) {
-                    is_sent(set, sent.start, &frame.two);
+                    is_sent(set, sent.start, &frame.0.two);
                 }
             }
         }
@@ -142,7 +142,7 @@ fn shipped_frames_are_coded_again_symbol_by_symbol_read_inverted_or_not_and_sent
 fn orbit_and_clock(sv: Sv, two: &Vec<bool>, start: Epoch) -> Ephemeris {
     let (_, fields) = cnav2::tables().into_iter().find(|(table, _)| *table == "subframe 2").unwrap();
     let raw = |name: &str| Some(fields.iter().find(|field| field.name == name).map_or(0, |field| field.read(two)));
-    (message(sv).elements)(sv, &raw, start).unwrap()
+    message(sv).fields.elements(sv, &raw, start).unwrap()
 }
 
 #[test]
@@ -154,7 +154,7 @@ fn every_real_frame_is_coded_again_and_its_sets_are_the_records_of_the_hour() {
         for of_one in all.chunk_by(|a, b| a.sv == b.sv) {
             let sv = of_one[0].sv;
             for sent in of_one {
-                let set = orbit_and_clock(sent.sv, &holds(sent).two, sent.start);
+                let set = orbit_and_clock(sent.sv, &holds(sent).0.two, sent.start);
                 sets.insert((sv, set.toe.seconds()), set);
             }
             // Sets are whole from the first page 1 on.
@@ -276,7 +276,7 @@ fn almanacs_that_we_send_of_qzss_are_those_that_its_satellites_sent() {
     let own = |frame: i64| {
         let set = (civil::CNAV2.form)(&almanac[0]);
         let symbols = sender.unit(&set, Epoch::from_week(2380, 370_800.0 + 18.0 * frame as f64)).unwrap();
-        cnav2::decode(&soft(&symbols, false)).unwrap().three.unwrap()
+        cnav2::decode(&soft(&symbols, false)).unwrap().0.three.unwrap()
     };
     let pages: Vec<Vec<bool>> = (0..18).map(own).collect();
     // 370 800 s are 20 600 frames, and one of three in a week has almanacs: the second. A round

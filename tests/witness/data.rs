@@ -3,7 +3,9 @@
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use gnss::bits::Field;
 use gnss::broadcast::Ephemeris;
+use gnss::earth::GPS_PI;
 use gnss::time::Epoch;
 
 /// Orbit and clock of a RINEX 4 record by fixed columns, from its line of satellite and epoch on, and a
@@ -38,6 +40,49 @@ pub fn keplerian<'a>(record: &'a [&'a str]) -> (Ephemeris, impl Fn(usize, usize)
         ..Ephemeris::blank(head[..3].parse().unwrap(), toe)
     };
     (set, v)
+}
+
+/// Field of a table as a document prints it: table, name, first bit, length, true with a sign, power of two,
+/// true for semicircles.
+pub type Printed = (&'static str, &'static str, u16, u8, bool, i32, bool);
+
+/// Every field of tables has its printed position, sign and scale, bit by bit of parts of a length, and there
+/// is no other.
+pub fn fields_are_as_printed(tables: &[(&str, Vec<&Field>)], printed: &[Printed], part_bits: usize) {
+    let fields: usize = tables.iter().map(|(_, fields)| fields.len()).sum();
+    assert_eq!(fields, printed.len());
+    for &(table, name, first, length, signed, exponent, semicircles) in printed {
+        let (_, fields) = tables.iter().find(|(own, _)| *own == table).unwrap();
+        let field = fields.iter().find(|field| field.name == name).unwrap();
+        let unit = libm::exp2(f64::from(exponent)) * if semicircles { GPS_PI } else { 1.0 };
+        for bit in 0..length {
+            let mut part = vec![false; part_bits];
+            part[usize::from(first + u16::from(bit))] = true;
+            let weight = libm::exp2(f64::from(length - 1 - bit)) * if signed && bit == 0 { -1.0 } else { 1.0 };
+            let found = field.value(field.read(&part));
+            assert!((found / (weight * unit) - 1.0).abs() < 1e-15, "{table}: {name}, bit {bit}: {found}");
+        }
+    }
+}
+
+/// Orbit of an ephemeris by the record that a converter made of it, where one of Galileo and of BeiDou have
+/// one scale; twelve digits are printed after the first.
+pub fn orbit_is_recorded(set: &Ephemeris, record: &Ephemeris) {
+    let semicircles = |exponent: i32| libm::exp2(f64::from(exponent)) * GPS_PI;
+    for (name, of, step) in [
+        ("m0", (|set| set.m0_rad) as fn(&Ephemeris) -> f64, semicircles(-31)),
+        ("omega0", |set| set.omega0_rad, semicircles(-31)),
+        ("omega", |set| set.omega_rad, semicircles(-31)),
+        ("i0", |set| set.i0_rad, semicircles(-31)),
+        ("omega dot", |set| set.omega_dot_radps, semicircles(-43)),
+        ("delta n", |set| set.delta_n_radps, semicircles(-43)),
+        ("idot", |set| set.idot_radps, semicircles(-43)),
+        ("e", |set| set.eccentricity, libm::exp2(-33.0)),
+        ("sqrt a", |set| set.sqrt_a_sqrtm, libm::exp2(-19.0)),
+    ] {
+        let (one, other) = (of(set), of(record));
+        assert!((one - other).abs() <= 0.5 * step + 1e-12 * one.abs(), "{} {name}: {one} {other}", set.sv);
+    }
 }
 
 /// The path of a file under `GNSS_TWIN_DATA`, or `None` where it is not there. `tests/common/skipped.rs`

@@ -163,7 +163,7 @@ fn shipped_pages_of_e5a_and_e5b_hold_and_are_sent_by_us_bit_by_bit() {
             let all = words[sv].iter().filter(|(kind, _)| **kind <= 5);
             all.filter_map(|(_, word)| inav::parameters(word)).flatten().find(|(other, _)| *other == name).map(|p| p.1)
         };
-        let other = (INAV.elements)(*sv, &raw, set.transmitted).unwrap();
+        let other = INAV.fields.elements(*sv, &raw, set.transmitted).unwrap();
         let orbit = |set: &Ephemeris| {
             let e = set;
             let rates = [e.delta_n_radps, e.omega_dot_radps, e.idot_radps, e.cuc_rad, e.cus_rad, e.crc_m, e.crs_m];
@@ -240,7 +240,7 @@ fn every_real_page_of_e5a_holds_and_its_sets_are_the_records_of_two_converters()
             for record in fnav_records(&path) {
                 let Some(own) = sets.get(&(record.sv, record.iode)) else { continue };
                 // Delays and status may change within an issue.
-                let rounded = (FNAV.quantised)(&record).unwrap();
+                let rounded = FNAV.fields.quantised(&record).unwrap();
                 let alike = |set: &Ephemeris| {
                     let tgd_s = rounded.tgd_s;
                     *set == Ephemeris { transmitted: set.transmitted, health: set.health, tgd_s, ..rounded.clone() }

@@ -271,7 +271,7 @@ fn strings_that_we_send_of_a_real_set_have_the_real_bits() {
         let news = read(sv, sv, 0, false);
         let set = news.iter().find_map(|(_, read)| if let Read::Ephemeris(set) = read { Some(set) } else { None });
         let set = set.unwrap_or_else(|| panic!("no set of {sv}"));
-        assert_eq!(gnav::quantised(set).unwrap(), **set, "{sv}");
+        assert_eq!(gnav::GNAV.fields.quantised(set).unwrap(), **set, "{sv}");
         for Real { at, string, .. } in real().iter().filter(|real| real.sv == sv) {
             let number = gnav::id(string);
             let sent = sender.unit(set, GLONASST.label(*at)).unwrap();

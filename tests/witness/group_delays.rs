@@ -98,7 +98,7 @@ fn compare(text: &str, sets: &[Ephemeris]) -> BTreeMap<&'static str, (usize, usi
             let message = signal.components.iter().find_map(|component| component.message).unwrap();
             // Twelve or thirteen bits, with a step of 2⁻³⁴ s in BeiDou's messages and 2⁻³⁵ s in the others.
             let step_s = libm::exp2(if set.sv.system == System::BeiDou { -34.0 } else { -35.0 });
-            let sent = (message.quantised)(set).unwrap();
+            let sent = message.fields.quantised(set).unwrap();
             let mut apart = [set.group_delay_s(signal) - own_s, sent.group_delay_s(signal) - own_s].to_vec();
             apart.extend(of_data_s.map(|of_data_s| data_s(&sent, signal) - of_data_s));
             let worst_s = apart.iter().fold(0.0_f64, |most, apart_s| most.max(apart_s.abs()));

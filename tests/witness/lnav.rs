@@ -127,7 +127,7 @@ fn real_subframes_decode_to_the_rinex_file_and_it_encodes_to_them() {
         let Some(record) = records.iter().find(|r| r.sv == *sv && r.iodc == heard.iodc && r.toe == heard.toe) else {
             continue;
         };
-        let mut rounded = lnav::quantised(record).unwrap();
+        let mut rounded = lnav::LNAV.fields.quantised(record).unwrap();
         (rounded.aodo, rounded.transmitted) = (heard.aodo, heard.transmitted);
         assert_eq!(rounded, heard);
         sets += 1;
@@ -298,11 +298,14 @@ fn every_field_extreme_round_trips_and_one_step_more_is_refused() {
 #[test]
 fn what_does_not_fit_or_contradicts_itself_is_an_error_with_its_name() {
     let wide = Ephemeris { crs_m: 2000.0, ..example() };
-    assert!(matches!(lnav::quantised(&wide), Err(FieldError::OutOfRange { name: "crs_m", value: 2000.0, .. })));
+    assert!(matches!(
+        lnav::LNAV.fields.quantised(&wide),
+        Err(FieldError::OutOfRange { name: "crs_m", value: 2000.0, .. })
+    ));
     let odd = Ephemeris { toe: example().toe.plus_s(8.0), ..example() };
-    assert!(matches!(lnav::quantised(&odd), Err(FieldError::NotMultiple { name: "toe_s", .. })));
+    assert!(matches!(lnav::LNAV.fields.quantised(&odd), Err(FieldError::NotMultiple { name: "toe_s", .. })));
     let issue = Ephemeris { iode: 43, ..example() };
-    assert!(matches!(lnav::quantised(&issue), Err(FieldError::Issue { .. })));
+    assert!(matches!(lnav::LNAV.fields.quantised(&issue), Err(FieldError::Issue { .. })));
 }
 
 #[test]
@@ -319,7 +322,7 @@ fn a_week_s_last_frame_carries_its_own_week_and_the_next_week_s_first_count() {
     };
     assert_eq!((at(4).id, at(4).tow_count, at(5).id, at(5).tow_count), (5, 0, 1, 1));
     let heard = lnav::ephemeris(sent.sv, &at(0), &at(1), &at(2), Epoch::from_week(3100, 5.0)).unwrap();
-    assert_eq!(heard, Ephemeris { transmitted: start, ..lnav::quantised(&sent).unwrap() });
+    assert_eq!(heard, Ephemeris { transmitted: start, ..lnav::LNAV.fields.quantised(&sent).unwrap() });
     assert!(matches!(
         lnav::ephemeris(sent.sv, &at(0), &at(2), &at(1), start),
         Err(SubframeError::Id { id: 3, expected: "2" })
@@ -348,8 +351,8 @@ proptest! {
         i0_rad in -3.1..3.1_f64, af0_s in -9e-4..9e-4_f64, crs_m in -1000.0..1000.0_f64,
     ) {
         let given = Ephemeris { m0_rad, omega0_rad, eccentricity, i0_rad, af0_s, crs_m, ..example() };
-        let once = lnav::quantised(&given).unwrap();
-        prop_assert_eq!(&lnav::quantised(&once).unwrap(), &once);
+        let once = lnav::LNAV.fields.quantised(&given).unwrap();
+        prop_assert_eq!(&lnav::LNAV.fields.quantised(&once).unwrap(), &once);
         let broadcast = Broadcast::new(None, 18, &[], given.toe).unwrap();
         let start = given.transmitted;
         let heard: Vec<Subframe> = (0..3)

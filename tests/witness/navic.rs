@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use gnss::bits::{Bits, Store, bits_of};
 use gnss::broadcast::Ephemeris;
 use gnss::crc::crc24q;
-use gnss::earth::{GPS_PI, Geodetic};
+use gnss::earth::Geodetic;
 use gnss::klobuchar::Klobuchar;
 use gnss::message::{Common, Read};
 use gnss::navic::nav::{self, DATA_BITS, SPS_NAV, Subframe};
@@ -15,7 +15,7 @@ use gnss::satellite::{Sv, System};
 use gnss::time::Epoch;
 
 use super::codes::holds;
-use super::data::{external, keplerian};
+use super::data::{Printed, external, fields_are_as_printed, keplerian};
 use super::orbit::outside;
 
 /// Signal, PRN, ones, first and last 24 chips in hexadecimal, SHA-256 of a byte 0 or 1 for each chip.
@@ -42,7 +42,7 @@ fn navic(number: u8) -> Sv {
 
 /// Start bit, length, sign and power of two of every field, by subframe or message, as the document prints
 /// them, written here again; angles in semicircles.
-const PRINTED: [(&str, &str, u16, u8, bool, i32, bool); 54] = [
+const PRINTED: [Printed; 54] = [
     ("subframe 1", "week", 30, 10, false, 0, false),
     ("subframe 1", "af0_s", 40, 22, true, -31, false),
     ("subframe 1", "af1_sps", 62, 16, true, -43, false),
@@ -101,21 +101,7 @@ const PRINTED: [(&str, &str, u16, u8, bool, i32, bool); 54] = [
 
 #[test]
 fn every_field_of_navic_s_message_has_the_printed_place_sign_and_scale() {
-    let tables = nav::tables();
-    let fields: usize = tables.iter().map(|(_, fields)| fields.len()).sum();
-    assert_eq!(fields, PRINTED.len());
-    for (table, name, first, length, signed, exponent, semicircles) in PRINTED {
-        let (_, fields) = tables.iter().find(|(own, _)| *own == table).unwrap();
-        let field = fields.iter().find(|field| field.name == name).unwrap();
-        let unit = libm::exp2(f64::from(exponent)) * if semicircles { GPS_PI } else { 1.0 };
-        for bit in 0..length {
-            let mut subframe = Subframe::default();
-            subframe.0[usize::from(first + u16::from(bit))] = true;
-            let weight = libm::exp2(f64::from(length - 1 - bit)) * if signed && bit == 0 { -1.0 } else { 1.0 };
-            let found = field.value(field.read(&subframe));
-            assert!((found / (weight * unit) - 1.0).abs() < 1e-15, "{table}: {name}, bit {bit}: {found}");
-        }
-    }
+    fields_are_as_printed(&nav::tables(), &PRINTED, DATA_BITS);
 }
 
 /// Kind, satellite and bits of the real subframes that a receiver's manual prints.
@@ -167,7 +153,7 @@ fn real_subframes_are_those_of_their_time_and_satellites_and_are_sent_by_us_bit_
                     "iodec" => set.iode = raw as u16,
                     "health" => set.health = raw as u16,
                     "toc_s" => set.toc = start.nearest_tow(field.value(raw) as i64),
-                    _ => assert!((SPS_NAV.adjust)(&mut set, name, field.value(raw)), "{name}"),
+                    _ => assert!(SPS_NAV.fields.adjust(&mut set, name, field.value(raw)), "{name}"),
                 }
             }
             set.toe = set.toc;
@@ -187,7 +173,7 @@ fn real_subframes_are_those_of_their_time_and_satellites_and_are_sent_by_us_bit_
             for (name, raw) in nav::parameters(&own).into_iter().filter(|(name, _)| *name != "toe_s") {
                 let (_, fields) = nav::tables().into_iter().find(|(table, _)| *table == "subframe 2").unwrap();
                 let field = fields.into_iter().find(|field| field.name == name).unwrap();
-                assert!((SPS_NAV.adjust)(&mut set, name, field.value(raw)), "{name}");
+                assert!(SPS_NAV.fields.adjust(&mut set, name, field.value(raw)), "{name}");
             }
             counts[1] += 1;
         }
@@ -272,7 +258,7 @@ fn a_stream_is_read_from_any_symbol_inverted_or_not_to_what_was_sent() {
                         *seen.entry("unit").or_insert(0) += 1;
                     }
                     Read::Ephemeris(found) => {
-                        let sent = nav::quantised(&set).unwrap();
+                        let sent = nav::SPS_NAV.fields.quantised(&set).unwrap();
                         assert_eq!(*found, Ephemeris { transmitted: found.transmitted, ..sent });
                         *seen.entry("set").or_insert(0) += 1;
                     }

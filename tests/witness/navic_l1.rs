@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use gnss::bits::{Store, number};
 use gnss::broadcast::Ephemeris;
 use gnss::crc::crc24q;
-use gnss::earth::{GPS_PI, Geodetic};
+use gnss::earth::Geodetic;
 use gnss::exchange::{NavigationSets, Version};
 use gnss::ionosphere::Coefficients;
 use gnss::klobuchar::Klobuchar;
@@ -21,7 +21,7 @@ use gnss::satellite::{Sv, System};
 use gnss::time::Epoch;
 
 use super::codes::holds;
-use super::data::keplerian;
+use super::data::{Printed, fields_are_as_printed, keplerian};
 
 /// Signal, PRN, ones, first and last 24 chips in hexadecimal, SHA-256 of a byte 0 or 1 for each chip.
 const CODES: &str = include_str!("../../data/witness/navic_codes.csv");
@@ -49,7 +49,7 @@ const NVS_01: Sv = Sv { system: System::Navic, number: 10 };
 
 /// Start bit, length, sign and power of two of every field, by subframe, as decoders have them, written here
 /// again; angles in semicircles.
-const PRINTED: [(&str, &str, u16, u8, bool, i32, bool); 47] = [
+const PRINTED: [Printed; 47] = [
     ("subframe 2", "week", 0, 13, false, 0, false),
     ("subframe 2", "itow_2h", 13, 8, false, 0, false),
     ("subframe 2", "alert", 21, 1, false, 0, false),
@@ -101,21 +101,7 @@ const PRINTED: [(&str, &str, u16, u8, bool, i32, bool); 47] = [
 
 #[test]
 fn every_field_of_navic_s_message_on_l1_has_the_place_sign_and_scale_that_decoders_have() {
-    let tables = l1nav::tables();
-    let fields: usize = tables.iter().map(|(_, fields)| fields.len()).sum();
-    assert_eq!(fields, PRINTED.len());
-    for (table, name, first, length, signed, exponent, semicircles) in PRINTED {
-        let (_, fields) = tables.iter().find(|(own, _)| *own == table).unwrap();
-        let field = fields.iter().find(|field| field.name == name).unwrap();
-        let unit = libm::exp2(f64::from(exponent)) * if semicircles { GPS_PI } else { 1.0 };
-        for bit in 0..length {
-            let mut subframe = vec![false; 600];
-            subframe[usize::from(first + u16::from(bit))] = true;
-            let weight = libm::exp2(f64::from(length - 1 - bit)) * if signed && bit == 0 { -1.0 } else { 1.0 };
-            let found = field.value(field.read(&subframe));
-            assert!((found / (weight * unit) - 1.0).abs() < 1e-15, "{table}: {name}, bit {bit}: {found}");
-        }
-    }
+    fields_are_as_printed(&l1nav::tables(), &PRINTED, 600);
     // What no field has: three bits before the number; the Earth's orientation and two bits at the end.
     let of = |table: &str| PRINTED.iter().filter(|row| row.0 == table).map(|row| usize::from(row.3)).sum::<usize>();
     assert_eq!((of("subframe 2"), of("subframe 3, message 10")), (576 - 3, 250 - 138 - 2));
@@ -177,7 +163,7 @@ fn a_real_set_is_whole_steps_of_the_fields_stands_over_its_place_and_is_written_
     // NVS-01 stands over 129.5° East and has an inclination of some degrees.
     let place = Geodetic::from_ecef(&set.state(set.toe).unwrap().position_m);
     assert!((place.longitude_rad.to_degrees() - 129.5).abs() < 0.2, "{place:?}");
-    let quantised = l1nav::quantised(&set).unwrap();
+    let quantised = l1nav::L1_NAV.fields.quantised(&set).unwrap();
     // All of it fits: to the thirteen digits printed. The axis was printed from a number of 24 bits.
     let axis_m = |set: &Ephemeris| set.sqrt_a_sqrtm * set.sqrt_a_sqrtm;
     assert!((axis_m(&quantised) - axis_m(&set)).abs() <= 0.5 / 512.0);
@@ -285,7 +271,7 @@ fn a_stream_is_read_from_any_symbol_inverted_or_not_to_what_was_sent() {
                         *seen.entry("unit").or_insert(0) += 1;
                     }
                     Read::Ephemeris(found) => {
-                        let sent = l1nav::quantised(&set).unwrap();
+                        let sent = l1nav::L1_NAV.fields.quantised(&set).unwrap();
                         assert_eq!(*found, Ephemeris { transmitted: found.transmitted, ..sent });
                         *seen.entry("set").or_insert(0) += 1;
                     }
@@ -315,7 +301,7 @@ fn a_set_of_the_older_message_carried_to_l1_nav_is_the_same_orbit_and_clock_to_i
     let sets = rinex::read(bytes, "navic").unwrap().ephemerides;
     let mut compared = 0;
     for set in sets.iter().filter(|set| set.sv == NVS_01) {
-        let carried = l1nav::quantised(set).unwrap();
+        let carried = l1nav::L1_NAV.fields.quantised(set).unwrap();
         assert_eq!((carried.toe.tow_whole_s() % 300, carried.toe), (0, carried.toc));
         assert!(carried.toe.since(set.toe).abs() <= 150.0);
         for minutes in [-15, 0, 20] {
@@ -354,5 +340,5 @@ fn a_clock_of_l1_and_l5_serves_all_three_carriers_too() {
     let frame = l1nav::decode(&soft(&symbols, true)).unwrap();
     assert!(frame.0.inverted);
     assert_eq!(frame.0.two.piece((566, 1)), 0);
-    assert_eq!(l1nav::quantised(&own).unwrap().reference_flag, 0);
+    assert_eq!(l1nav::L1_NAV.fields.quantised(&own).unwrap().reference_flag, 0);
 }

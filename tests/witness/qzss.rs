@@ -46,7 +46,7 @@ fn real_sets_are_whole_steps_of_the_fields_and_are_sent_and_read_again() {
         let sender = (LNAV.sender)(&Common::default()).unwrap();
         for set in &own {
             // RINEX prints twelve digits of radians: 1e-12 of an angle of π, a hundredth of its step.
-            let sent = (LNAV.quantised)(set).unwrap();
+            let sent = LNAV.fields.quantised(set).unwrap();
             for (one, other, step) in [
                 (sent.m0_rad, set.m0_rad, 1.5e-9),
                 (sent.omega0_rad, set.omega0_rad, 1.5e-9),

@@ -28,7 +28,7 @@ fn day() -> Option<Vec<Ephemeris>> {
 
 /// Checks that a set is whole steps of type 9: numbers of records have twelve digits.
 fn is_whole_steps(set: &Ephemeris) {
-    let sent = (SBAS.quantised)(set).unwrap();
+    let sent = SBAS.fields.quantised(set).unwrap();
     let (ours, theirs) = (sent.vector.unwrap(), set.vector.unwrap());
     // A hundredth of the steps: 8 cm, 0.625 mm/s, 12.5 µm/s².
     for (one, other, least) in [
@@ -56,7 +56,7 @@ fn shipped_sets_are_whole_steps_of_the_fields_and_are_read_again_from_any_symbol
             let derived_mps = (state(1.0).position_m - state(-1.0).position_m) * 0.5;
             assert!((derived_mps - state(0.0).velocity_mps).norm() < 1e-7, "{} {since_s}", set.sv);
         }
-        let sent = (SBAS.quantised)(set).unwrap();
+        let sent = SBAS.fields.quantised(set).unwrap();
         let start = Epoch::new(set.toe.seconds() - 20, 0.0);
         let symbols: Vec<bool> = (0..20)
             .flat_map(|second| sender.unit(set, Epoch::new(start.seconds() + second, 0.0)).unwrap())

@@ -85,7 +85,7 @@ fn read(run: &Run, (sv, name): (Sv, &str)) -> Vec<(u64, u32)> {
     let mut issues: Vec<u32> = Vec::new();
     // One that every ephemeris has.
     let of_message = messages(run, sv).find(|(message, _)| message.name == name);
-    let of_sets = of_message.and_then(|(message, _)| (message.set_parameters)().first().copied()).unwrap_or("");
+    let of_sets = of_message.and_then(|(message, _)| message.fields.parameters().first().copied()).unwrap_or("");
     let own = |row: &&NavigationRow| row.sv == sv && row.message == name && row.parameter == of_sets;
     for row in run.navigation.iter().filter(own) {
         if !issues.contains(&row.issue) {
@@ -110,10 +110,10 @@ fn set(
 ) -> Option<(&'static str, Ephemeris)> {
     messages(run, sv).filter(|(message, _)| message.name == name).find_map(|(message, time)| {
         // What bears an issue is never taken from another one.
-        let bound = (message.set_parameters)();
+        let bound = message.fields.parameters();
         let own = |row: &&&NavigationRow| row.issue == issue || !bound.contains(&row.parameter.as_str());
         let raw = |name: &str| rows.iter().filter(own).find(|row| row.parameter == name).map(|row| row.raw);
-        let set = (message.elements)(sv, &raw, time.label(near))?;
+        let set = message.fields.elements(sv, &raw, time.label(near))?;
         Some((message.name, set.timed(|label| time.instant(label))))
     })
 }
@@ -133,5 +133,5 @@ fn ionosphere(run: &Run, (sv, name): (Sv, &str), rows: &[&NavigationRow]) -> Opt
 
 /// Names of the parameters of ephemerides that bear their issue, of each message of a satellite's signals.
 pub fn orbit_parameters(run: &Run, sv: Sv) -> BTreeMap<&'static str, BTreeSet<&'static str>> {
-    messages(run, sv).map(|(message, _)| (message.name, (message.set_parameters)().into_iter().collect())).collect()
+    messages(run, sv).map(|(message, _)| (message.name, message.fields.parameters().into_iter().collect())).collect()
 }

@@ -119,17 +119,7 @@ impl Sums {
     ) -> LabelledSignal {
         let prompt = self.mean(0);
         let side = |value: f64| (self.sided == self.count).then_some(value / prompt);
-        let [
-            level,
-            cn0_fall,
-            correlation_ratio,
-            correlation_phase,
-            correlation_delta,
-            code_carrier,
-            raim,
-            position_jump,
-            clock_jump,
-        ] = ratios;
+        let ratio = |detector: Detector| ratios[detector as usize];
         LabelledSignal {
             sample,
             time_s,
@@ -151,33 +141,37 @@ impl Sums {
             dll_discriminator_chips: self.mean(8),
             dll_sigma_chips: self.sigma(8),
             pll_sigma_cycles: self.sigma(9),
-            level,
-            cn0_fall,
-            correlation_ratio,
-            correlation_phase,
-            correlation_delta,
-            code_carrier,
-            raim,
-            position_jump,
-            clock_jump,
+            level: ratio(Detector::Level),
+            cn0_fall: ratio(Detector::Cn0Fall),
+            correlation_ratio: ratio(Detector::CorrelationRatio),
+            correlation_phase: ratio(Detector::CorrelationPhase),
+            correlation_delta: ratio(Detector::CorrelationDelta),
+            code_carrier: ratio(Detector::CodeCarrier),
+            raim: ratio(Detector::Raim),
+            position_jump: ratio(Detector::PositionJump),
+            clock_jump: ratio(Detector::ClockJump),
             label: truth.0,
             attack: truth.1,
         }
     }
 }
 
-/// Largest ratio of each detector among the tests of some links, by the ends of all intervals with tests.
-fn ratios(run: &Run, is_own: impl Fn(u32) -> bool) -> Result<BTreeMap<u64, Ratios>, JudgeError> {
-    let mut all: BTreeMap<u64, Ratios> = BTreeMap::new();
+/// Largest ratio of each detector, by the end of the interval.
+type Ends = BTreeMap<u64, Ratios>;
+
+/// Ratios of the whole receiver, which have the end of every interval with tests, and those of each link.
+fn ratios(run: &Run) -> Result<(Ends, BTreeMap<u32, Ends>), JudgeError> {
+    let (mut shared, mut own) = (Ends::new(), BTreeMap::<u32, Ends>::new());
     run.tests.each(|test| {
-        let ratios = all.entry(test.sample).or_default();
-        let place = Detector::ALL.iter().position(|one| *one == test.detector);
-        if let Some(own) = place.filter(|_| is_own(test.link)).and_then(|place| ratios.get_mut(place)) {
-            let ratio = test.statistic / test.threshold;
-            *own = Some(own.map_or(ratio, |known| known.max(ratio)));
-        }
+        let of_receiver = shared.entry(test.sample).or_default();
+        let ratios = match run.tested.get(test.link as usize) {
+            Some([sv, _]) if sv.is_empty() => of_receiver,
+            _ => own.entry(test.link).or_default().entry(test.sample).or_default(),
+        };
+        let (known, ratio) = (&mut ratios[test.detector as usize], test.statistic / test.threshold);
+        *known = Some(known.map_or(ratio, |known| known.max(ratio)));
     })?;
-    Ok(all)
+    Ok((shared, own))
 }
 
 /// Gives every signal of every interval, signal by signal.
@@ -189,12 +183,11 @@ pub fn each(
     detection: &Detection,
     mut see: impl FnMut(LabelledSignal) -> Result<(), JudgeError>,
 ) -> Result<(), JudgeError> {
-    let is_shared = |link: u32| run.tested.get(link as usize).is_some_and(|[sv, _]| sv.is_empty());
-    let shared = ratios(run, is_shared)?;
+    let (shared, mut of_links) = ratios(run)?;
     for link in run.tracking.keys() {
         let name = [link.sv.to_string(), link.signal.name.to_owned()];
         let number = run.tested.iter().position(|own| *own == name);
-        let own = ratios(run, |link| number == Some(link as usize))?;
+        let own = number.and_then(|number| of_links.remove(&(number as u32))).unwrap_or_default();
         let mut row = |end: u64, sums: &Sums| -> Result<(), JudgeError> {
             if sums.count == 0 {
                 return Ok(());

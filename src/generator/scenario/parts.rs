@@ -238,7 +238,7 @@ fn unsendable(scenario: &Scenario, set: &Ephemeris) -> Option<String> {
         let form = (message.form)(set);
         // Messages count reference times by their system's clock, those that round them by GPS time.
         let labelled = form.clone().timed(|at| time.label(at));
-        let error = (message.quantised)(&form).err().and((message.quantised)(&labelled).err())?;
+        let error = message.fields.quantised(&form).err().and(message.fields.quantised(&labelled).err())?;
         Some(format!("{}: left out the ephemeris of {}: {} cannot carry it: {error}", set.sv, set.toe, message.name))
     })
 }

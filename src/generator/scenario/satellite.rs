@@ -402,7 +402,7 @@ pub(super) fn message_faults(
             for message in all {
                 let only = std::slice::from_ref(&fault);
                 let wrong = sent.and_then(|set| spoiled(only, message, *sv, set, fault.on.start));
-                if let Some(Err(error)) = wrong.map(|set| (message.quantised)(&set)) {
+                if let Some(Err(error)) = wrong.map(|set| message.fields.quantised(&set)) {
                     let reason = format!("number {number}, {sv}: {error}");
                     return Err(scenario.conflict("message_fault", reason));
                 }

@@ -58,7 +58,7 @@ impl NavigationSets {
         let complete = self.sets.keys().filter_map(|sent| {
             let (message, time) = messages.get(sent.0.as_str())?;
             let raw = |name: &str| self.raw(sent, name);
-            let set = (message.elements)(sent.1, &raw, time.label(near))?.timed(|label| time.instant(label));
+            let set = message.fields.elements(sent.1, &raw, time.label(near))?.timed(|label| time.instant(label));
             known.insert((sent.1, sent.2, set.form.name)).then_some(set)
         });
         complete.collect()
@@ -128,7 +128,7 @@ impl NavigationSets {
             let Some((message, time)) = messages.get(name.as_str()) else { continue };
             let Some(records) = message.rinex else { continue };
             let raw = |name: &str| self.raw(sent, name);
-            let set = (message.elements)(sent.1, &raw, time.label(near));
+            let set = message.fields.elements(sent.1, &raw, time.label(near));
             let set = set.map(|set| set.timed(|label| time.instant(label)));
             // Version 3 has no records of the newer messages.
             let writes = records.lines.is_none() || version == Version::Four;
@@ -552,7 +552,7 @@ mod tests {
             let mut bytes = Vec::new();
             sets.write(&mut bytes, Version::Four, &[signal], set.toe).unwrap();
             let text = String::from_utf8(bytes).unwrap();
-            let decoded = (message.quantised)(&(message.form)(&set)).unwrap();
+            let decoded = message.fields.quantised(&(message.form)(&set)).unwrap();
             let file = foreign(&text);
             let frames: Vec<_> = file.nav_ephemeris_frames_iter().collect();
             let [(key, frame)] = frames.as_slice() else { panic!("{} frames\n{text}", frames.len()) };

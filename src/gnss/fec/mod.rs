@@ -5,6 +5,7 @@ pub mod frames;
 pub mod interleaver;
 pub mod ldpc;
 pub mod ldpc64;
+pub(crate) mod pages;
 pub mod reed_solomon;
 pub mod register;
 #[cfg(test)]

@@ -12,6 +12,7 @@ use std::sync::LazyLock;
 use super::interleaver::Interleaver;
 use super::ldpc::Ldpc;
 use super::register::RegisterCode;
+use crate::bits::{number, upright};
 
 /// Least agreement of the symbols of a time with the most likely one at which a frame is tried. Symbols with
 /// an amplitude of √2 standard deviations, near which the codes begin to fail, agree by 0.89 ± 0.05. The best
@@ -47,6 +48,18 @@ pub struct Blocks {
     pub two: Vec<bool>,
     /// Bits of the second block with their check; `None` if the check fails.
     pub three: Option<Vec<bool>>,
+}
+
+impl Blocks {
+    /// Week that the first block states in its first thirteen bits.
+    pub fn week(&self) -> i64 {
+        number(self.two.get(..13).unwrap_or_default()) as i64
+    }
+
+    /// Interval of the week, hours or two of them, that the first block states after it.
+    pub fn interval(&self) -> i64 {
+        number(self.two.get(13..21).unwrap_or_default()) as i64
+    }
 }
 
 impl Subframes {
@@ -109,7 +122,7 @@ impl Subframes {
         let (times, _) = self.likely_times(first);
         let rest = self.interleaver.deinterleave(rest);
         times.into_iter().find_map(|(time, inverted)| {
-            let own: Vec<f32> = rest.iter().map(|value| if inverted { -value } else { *value }).collect();
+            let own = upright(&rest, inverted);
             let (two, three) = own.split_at_checked(2 * self.two.1)?;
             let of = |code: &Ldpc, soft| code.decode(soft).filter(|bits| (self.is_right)(bits));
             let two = of(self.two.0, two)?;

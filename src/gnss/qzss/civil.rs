@@ -10,19 +10,17 @@ use crate::broadcast::{Ephemeris, SetForm};
 use crate::gps::{cnav, cnav2};
 use crate::message::{Common, Message};
 use crate::qzss::lnav::{LNAV_SETS, unhealthy};
-use crate::qzss::own::{OwnReader, as_gps, like, named};
+use crate::qzss::own::{OwnFields, OwnReader, as_gps, like, named};
 use crate::satellite::System;
 
 /// Definition of CNAV for L5 of QZSS.
 pub static CNAV: Message = Message {
     name: "CNAV of QZSS",
     sender: |common| Ok(cnav::sender(common, &CNAV)),
-    elements: |sv, raw, near| (cnav::CNAV.elements)(sv, raw, near).map(|set| named(set, &CNAV)),
+    fields: &OwnFields { gps: &cnav::CNAV, message: &CNAV },
     reader: |sv| OwnReader::boxed(&cnav::CNAV, &CNAV, sv),
     form: |set| form(set, &cnav::CNAV, &CNAV),
     sets: &CNAV_SETS,
-    quantised: |set| (cnav::CNAV.quantised)(&as_gps(&(CNAV.form)(set))).map(|set| named(set, &CNAV)),
-    adjust: |set, parameter, by| adjust(set, parameter, by, &cnav::CNAV, &CNAV),
     ..cnav::CNAV
 };
 
@@ -30,12 +28,10 @@ pub static CNAV: Message = Message {
 pub static CNAV_L2C: Message = Message {
     name: "CNAV of QZSS on L2C",
     sender: |common| Ok(cnav::sender(common, &CNAV_L2C)),
-    elements: CNAV.elements,
+    fields: CNAV.fields,
     reader: |sv| OwnReader::boxed(&cnav::CNAV_L2C, &CNAV_L2C, sv),
     form: CNAV.form,
     sets: &CNAV_SETS,
-    quantised: CNAV.quantised,
-    adjust: CNAV.adjust,
     ..cnav::CNAV_L2C
 };
 
@@ -50,12 +46,10 @@ pub static CNAV2: Message = Message {
         });
         (cnav2::CNAV2.sender)(&Common { almanac: almanac.collect(), ..common.clone() })
     },
-    elements: |sv, raw, near| (cnav2::CNAV2.elements)(sv, raw, near).map(|set| named(set, &CNAV2)),
+    fields: &OwnFields { gps: &cnav2::CNAV2, message: &CNAV2 },
     reader: |sv| OwnReader::boxed(&cnav2::CNAV2, &CNAV2, sv),
     form: |set| form(set, &cnav2::CNAV2, &CNAV2),
     sets: &CNAV2_SETS,
-    quantised: |set| (cnav2::CNAV2.quantised)(&as_gps(&(CNAV2.form)(set))).map(|set| named(set, &CNAV2)),
-    adjust: |set, parameter, by| adjust(set, parameter, by, &cnav2::CNAV2, &CNAV2),
     ..cnav2::CNAV2
 };
 
@@ -88,12 +82,4 @@ fn form(set: &Ephemeris, gps: &Message, message: &Message) -> Ephemeris {
     let of_lnav = bits.into_iter().rev().fold(0, |all, bad| all << 1 | u16::from(bad));
     let health = if *set.form == LNAV_SETS { of_lnav } else { made.health };
     Ephemeris { health, ..named(made, message) }
-}
-
-/// Adds to a parameter of an ephemeris of one of these messages. Returns false if there is none.
-fn adjust(set: &mut Ephemeris, parameter: &str, by: f64, gps: &Message, message: &Message) -> bool {
-    let mut own = as_gps(&(message.form)(set));
-    let found = (gps.adjust)(&mut own, parameter, by);
-    *set = named(own, message);
-    found
 }

@@ -9,7 +9,7 @@
 use crate::broadcast::{Ephemeris, SetForm};
 use crate::gps::lnav::{self, Broadcast};
 use crate::message::{Common, Message};
-use crate::qzss::own::{OwnReader, as_gps, like, named};
+use crate::qzss::own::{OwnFields, OwnReader, like, named};
 use crate::qzss::{l1c, l2c, l5};
 use crate::signal::Signal;
 
@@ -17,11 +17,10 @@ use crate::signal::Signal;
 pub static LNAV: Message = Message {
     name: "LNAV of QZSS",
     sender: |common| Ok(Box::new(Broadcast::of(&Common { almanac: Vec::new(), ..common.clone() })?)),
-    elements: |sv, raw, near| (lnav::LNAV.elements)(sv, raw, near).map(|set| named(set, &LNAV)),
+    fields: &OwnFields { gps: &lnav::LNAV, message: &LNAV },
     reader: |sv| OwnReader::boxed(&lnav::LNAV, &LNAV, sv),
     form: |set| named(Ephemeris { signal_delays_s: Vec::new(), ..set.clone() }, &LNAV),
     sets: &LNAV_SETS,
-    quantised: |set| (lnav::LNAV.quantised)(&as_gps(set)).map(|set| named(set, &LNAV)),
     ..lnav::LNAV
 };
 

@@ -1,8 +1,9 @@
 //! QZSS messages that reuse a GPS message: ephemerides and readers under QZSS's own message names.
 
+use crate::bits::FieldError;
 use crate::broadcast::{Ephemeris, SetForm};
 use crate::gps;
-use crate::message::{Message, Read, Reader};
+use crate::message::{Message, Raw, Read, Reader, SetFields};
 use crate::qzss::{civil, l1c, l1ca, l2c, l5, lnav};
 use crate::record::NavigationRow;
 use crate::satellite::Sv;
@@ -38,6 +39,43 @@ pub(super) fn as_gps(set: &Ephemeris) -> Ephemeris {
 /// An ephemeris as a message of QZSS names its form.
 pub(super) fn named(set: Ephemeris, message: &Message) -> Ephemeris {
     Ephemeris { form: message.sets, ..set }
+}
+
+/// Fields of the ephemerides of a message of GPS, which are of one of QZSS.
+pub(super) struct OwnFields {
+    pub gps: &'static Message,
+    pub message: &'static Message,
+}
+
+impl OwnFields {
+    fn as_gps(&self, set: &Ephemeris) -> Ephemeris {
+        as_gps(&(self.message.form)(set))
+    }
+}
+
+impl SetFields for OwnFields {
+    fn parameters(&self) -> Vec<&'static str> {
+        self.gps.fields.parameters()
+    }
+
+    fn elements(&self, sv: Sv, raw: Raw<'_>, near: Epoch) -> Option<Ephemeris> {
+        self.gps.fields.elements(sv, raw, near).map(|set| named(set, self.message))
+    }
+
+    fn quantised(&self, set: &Ephemeris) -> Result<Ephemeris, FieldError> {
+        self.gps.fields.quantised(&self.as_gps(set)).map(|set| named(set, self.message))
+    }
+
+    fn adjustable(&self) -> Vec<&'static str> {
+        self.gps.fields.adjustable()
+    }
+
+    fn adjust(&self, set: &mut Ephemeris, parameter: &str, by: f64) -> bool {
+        let mut own = self.as_gps(set);
+        let found = self.gps.fields.adjust(&mut own, parameter, by);
+        *set = named(own, self.message);
+        found
+    }
 }
 
 /// The reader of a message of GPS, whose ephemerides are of one of QZSS.

@@ -20,6 +20,7 @@ use crate::satellite::{Sv, System};
 use crate::time::{Epoch, TimeScale};
 use crate::{beidou, galileo, glonass, gps, navic, qzss, sbas};
 
+mod bands;
 mod dated;
 pub mod described;
 mod peak;
@@ -30,6 +31,7 @@ pub mod synthetic;
 mod table_tests;
 mod tone;
 
+pub use bands::band_hz;
 pub use peak::PeakTable;
 pub use shape::{Shape, chip_kinds, phasor, sinc, sinc_squared};
 pub use tone::Tone;

@@ -18,6 +18,31 @@ pub static SYNTHETIC: [&Signal; 6] = [&LONG_BOC, &QUADRATURE, &CHANNELS, &MULTIP
 /// Three seconds behind GPS time.
 pub static OWN_TIME: TimeScale = TimeScale { name: "synthetic", behind_gpst_s: 3, has_leap_seconds: false };
 
+/// Base of most of the signals.
+const SIGNAL: Signal = Signal {
+    name: "synthetic",
+    rinex: "1X",
+    system: System::Gps,
+    time: &GPST,
+    constellation: [1, 32],
+    carrier: Carrier::Common(1_575.42e6),
+    sent: always,
+    minimum_power_dbw: None,
+    components: &[],
+};
+
+/// Base of most of their components.
+const COMPONENT: Component = Component {
+    power_share: 0.5,
+    phase_cycles: 0.0,
+    chip_rate_hz: 1.023e6,
+    code_chips: 0,
+    code: &|_| None,
+    layers: &[Layer::BPSK],
+    secondary_code: SecondaryCode::None,
+    message: None,
+};
+
 /// Test signal of two components with codes of 4 ms in BOC(1,1), in a time scale of its own. One has a coded
 /// message of one symbol per period, the other a secondary code of 25 chips.
 pub static LONG_BOC: Signal = Signal {
@@ -26,33 +51,26 @@ pub static LONG_BOC: Signal = Signal {
     system: System::Galileo,
     time: &OWN_TIME,
     constellation: [1, 36],
-    carrier: Carrier::Common(1_575.42e6),
-    sent: always,
-    minimum_power_dbw: None,
     components: &[
         Component {
-            power_share: 0.5,
-            phase_cycles: 0.0,
-            chip_rate_hz: 1.023e6,
             code_chips: 4092,
             code: &|number| assigned(number, 36, || random(4092, u64::from(number))),
             layers: &[Layer::BOC11],
-            secondary_code: SecondaryCode::None,
             message: Some(&INAV),
+            ..COMPONENT
         },
         Component {
-            power_share: 0.5,
             phase_cycles: 0.5,
-            chip_rate_hz: 1.023e6,
             code_chips: 4092,
             code: &|number| assigned(number, 36, || random(4092, 100 + u64::from(number))),
             layers: &[Layer::BOC11],
             secondary_code: SecondaryCode::Shared(&[
                 1, 1, -1, -1, 1, 1, 1, 1, 1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, -1, 1, -1, -1, 1, -1,
             ]),
-            message: None,
+            ..COMPONENT
         },
     ],
+    ..SIGNAL
 };
 
 /// Test signal with ten chips per microsecond, data and pilot in quadrature, and a secondary code on each, on
@@ -60,37 +78,28 @@ pub static LONG_BOC: Signal = Signal {
 pub static QUADRATURE: Signal = Signal {
     name: "synthetic B",
     rinex: "5X",
-    system: System::Gps,
-    time: &GPST,
-    constellation: [1, 32],
     carrier: Carrier::Common(1_176.45e6),
-    sent: always,
-    minimum_power_dbw: None,
     components: &[
         Component {
-            power_share: 0.5,
-            phase_cycles: 0.0,
             chip_rate_hz: 10.23e6,
             code_chips: 10_230,
             code: &|number| assigned(number, 32, || random(10_230, 200 + u64::from(number))),
-            layers: &[Layer::BPSK],
             secondary_code: SecondaryCode::Shared(&[1, 1, 1, 1, -1, -1, 1, -1, 1, -1]),
-            message: None,
+            ..COMPONENT
         },
         Component {
-            power_share: 0.5,
             phase_cycles: -0.25,
             chip_rate_hz: 10.23e6,
             code_chips: 10_230,
             code: &|number| assigned(number, 32, || random(10_230, 300 + u64::from(number))),
-            layers: &[Layer::BPSK],
             secondary_code: SecondaryCode::PerSatellite {
                 chips: 20,
                 of: |number| assigned(number, 32, || random(20, 400 + u64::from(number))),
             },
-            message: None,
+            ..COMPONENT
         },
     ],
+    ..SIGNAL
 };
 
 /// Test signal with quadrature data whose symbols begin where the secondary codes do.
@@ -108,59 +117,40 @@ pub static CHANNELS: Signal = Signal {
     name: "synthetic C",
     rinex: "1P",
     system: System::Glonass,
-    time: &GPST,
     constellation: [1, 24],
     carrier: Carrier::Channels {
         centre_hz: 1_602e6,
         step_hz: 562_500.0,
         channel: |number| (1..=24).contains(&number).then(|| (number % 14) as i8 - 7),
     },
-    sent: always,
-    minimum_power_dbw: None,
     components: &[Component {
         power_share: 1.0,
-        phase_cycles: 0.0,
         chip_rate_hz: 0.511e6,
         code_chips: 511,
         code: &|number| assigned(number, 24, || random(511, 500)),
-        layers: &[Layer::BPSK],
-        secondary_code: SecondaryCode::None,
-        message: None,
+        ..COMPONENT
     }],
+    ..SIGNAL
 };
 
 /// Test signal that alternates chips of codes of 10 230 and 767 250 chips.
 pub static MULTIPLEXED: Signal = Signal {
     name: "synthetic D",
     rinex: "2X",
-    system: System::Gps,
-    time: &GPST,
-    constellation: [1, 32],
     carrier: Carrier::Common(1_227.60e6),
-    sent: always,
-    minimum_power_dbw: None,
     components: &[
         Component {
-            power_share: 0.5,
-            phase_cycles: 0.0,
-            chip_rate_hz: 1.023e6,
             code_chips: 20_460,
             code: &|number| assigned(number, 32, || in_turn(10_230, 0, 600 + u64::from(number))),
-            layers: &[Layer::BPSK],
-            secondary_code: SecondaryCode::None,
-            message: None,
+            ..COMPONENT
         },
         Component {
-            power_share: 0.5,
-            phase_cycles: 0.0,
-            chip_rate_hz: 1.023e6,
             code_chips: 1_534_500,
             code: &|number| assigned(number, 32, || in_turn(767_250, 1, 700 + u64::from(number))),
-            layers: &[Layer::BPSK],
-            secondary_code: SecondaryCode::None,
-            message: None,
+            ..COMPONENT
         },
     ],
+    ..SIGNAL
 };
 
 /// Test signal with multiplexed codes and data of one symbol per period on the shorter code.
@@ -181,16 +171,10 @@ pub static MIXED: Signal = Signal {
     name: "synthetic E",
     rinex: "1L",
     system: System::Qzss,
-    time: &GPST,
     constellation: [1, 10],
-    carrier: Carrier::Common(1_575.42e6),
-    sent: always,
-    minimum_power_dbw: None,
     components: &[
         Component {
             power_share: 0.75,
-            phase_cycles: 0.0,
-            chip_rate_hz: 1.023e6,
             code_chips: 10_230,
             code: &|number| assigned(number, 10, || random(10_230, 800 + u64::from(number))),
             layers: &[Layer { chips: &ONE, ..Layer::BOC11 }, Layer { chips: &SIX, ..Layer::BOC61 }],
@@ -198,19 +182,17 @@ pub static MIXED: Signal = Signal {
                 chips: 1800,
                 of: |number| assigned(number, 10, || random(1800, 900 + u64::from(number))),
             },
-            message: None,
+            ..COMPONENT
         },
         Component {
             power_share: 0.25,
-            phase_cycles: 0.0,
-            chip_rate_hz: 1.023e6,
             code_chips: 10_230,
             code: &|number| assigned(number, 10, || random(10_230, 1000 + u64::from(number))),
             layers: &[Layer::BOC11],
-            secondary_code: SecondaryCode::None,
-            message: None,
+            ..COMPONENT
         },
     ],
+    ..SIGNAL
 };
 
 /// Test signal with data and pilot on the two sidebands of a subcarrier, a tenth as fast as those of
@@ -222,8 +204,6 @@ pub static SIDES: Signal = Signal {
     time: &GST,
     constellation: [1, 36],
     carrier: Carrier::Common(1_191.795e6),
-    sent: always,
-    minimum_power_dbw: None,
     components: &[
         Component {
             phase_cycles: 0.0,
@@ -242,12 +222,12 @@ pub static SIDES: Signal = Signal {
         },
         LOWER_PILOT,
     ],
+    ..SIGNAL
 };
 
 const UPPER_PILOT: Component = Component {
     power_share: 0.25,
     phase_cycles: 0.25,
-    chip_rate_hz: 1.023e6,
     code_chips: 2046,
     code: &|number| assigned(number, 36, || random(2046, 1200 + u64::from(number))),
     layers: &UP,
@@ -255,7 +235,7 @@ const UPPER_PILOT: Component = Component {
         chips: 20,
         of: |number| assigned(number, 36, || random(20, 1300 + u64::from(number))),
     },
-    message: None,
+    ..COMPONENT
 };
 
 const LOWER_PILOT: Component = Component {

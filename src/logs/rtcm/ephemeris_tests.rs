@@ -10,7 +10,7 @@ fn sets() -> Vec<Ephemeris> {
     let fnav = both
         .iter()
         .filter(|set| set.sv.system == System::Galileo)
-        .map(|set| (FNAV.quantised)(&(FNAV.form)(set)).unwrap());
+        .map(|set| FNAV.fields.quantised(&(FNAV.form)(set)).unwrap());
     let fnav: Vec<Ephemeris> = fnav.collect();
     let more = [NAVIC, QZSS].into_iter().flat_map(|file| rinex::read(file, "shipped").unwrap().ephemerides);
     let old = rinex::embedded().unwrap().ephemerides.into_iter().step_by(17);

@@ -6,6 +6,7 @@
 
 use gnss::glonass::fdma;
 use gnss::satellite::{Sv, System};
+use gnss::signal::band_hz;
 
 /// Systems by the tens of their messages' numbers, with the names of MSM4 to MSM7.
 pub const SYSTEMS: [(u64, System, [&str; 4]); 7] = [
@@ -91,22 +92,7 @@ const BEIDOU: &[(u8, &str)] = &[
 
 /// Carrier of a signal, Hz; of GLONASS that of a channel, or of the slot's (RINEX 4.02, table 23).
 pub fn carrier_hz(sv: Sv, code: &str, channel: Option<i8>) -> Option<f64> {
-    let band = code.chars().next()?;
-    let channel = || channel.or_else(|| fdma::channel(sv.number)).map(f64::from);
-    let megahertz = match (sv.system, band) {
-        (System::Glonass, '1') => 1602.0 + 0.5625 * channel()?,
-        (System::Glonass, '2') => 1246.0 + 0.4375 * channel()?,
-        (_, '1') => 1575.42,
-        (System::BeiDou, '2') => 1561.098,
-        (_, '2') => 1227.6,
-        (_, '5') => 1176.45,
-        (System::BeiDou, '6') => 1268.52,
-        (_, '6') => 1278.75,
-        (_, '7') => 1207.14,
-        (_, '8') => 1191.795,
-        _ => return None,
-    };
-    Some(1e6 * megahertz)
+    band_hz(sv.system, *code.as_bytes().first()?, channel.or_else(|| fdma::channel(sv.number)))
 }
 
 #[cfg(test)]

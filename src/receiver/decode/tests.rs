@@ -1,6 +1,6 @@
 use super::*;
 use gnss::gps::l1ca::L1_CA;
-use gnss::gps::lnav::{Broadcast, quantised};
+use gnss::gps::lnav::{Broadcast, LNAV};
 use gnss::rinex;
 
 /// A real ephemeris moved to be sent around `start`.
@@ -46,7 +46,7 @@ fn a_message_either_way_up_gives_the_time_of_every_period_and_the_ephemeris_that
         assert!(news.iter().any(|(_, n)| *n == News::Polarity { inverted }));
         assert!(!news.iter().any(|(_, n)| *n == News::Polarity { inverted: !inverted }));
         let decoded = news.iter().find_map(|(_, n)| if let News::Ephemeris(e) = n { Some(e) } else { None }).unwrap();
-        let expected = quantised(&set).unwrap();
+        let expected = LNAV.fields.quantised(&set).unwrap();
         assert_eq!(decoded.sqrt_a_sqrtm, expected.sqrt_a_sqrtm);
         assert_eq!((decoded.toe, decoded.m0_rad, decoded.af0_s), (expected.toe, expected.m0_rad, expected.af0_s));
         // Period 777 began 137 bits of 20 ms after the frame.

@@ -50,9 +50,10 @@ impl Air {
 
 #[cfg(test)]
 mod tests {
+    use super::super::least_squares::Ionosphere;
     use super::super::tests::{SKY, noise, place, ranges};
-    use super::super::{least_squares::Ionosphere, troposphere};
     use super::*;
+    use gnss::troposphere;
 
     /// Decision on samples with a troposphere or without, under a correction for one or for none.
     fn seen(is_there: bool, is_corrected: bool) -> bool {

@@ -10,15 +10,16 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Matrix4, MatrixXx3, Vector3, Vector4};
 
+use crate::position::NoFix;
 use crate::position::augmentation::{Grid, model_sigma_m};
 use crate::position::ionosphere::{DelayError, Delays};
-use crate::position::{NoFix, troposphere};
 use gnss::broadcast::{ClockState, State};
 use gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, Look, SPEED_OF_LIGHT_MPS, look, rotate_earth};
 use gnss::klobuchar::NOMINAL;
 use gnss::satellite::Sv;
 use gnss::signal::Signal;
 use gnss::time::{Epoch, GPST, TimeScale};
+use gnss::troposphere;
 
 /// Unknown coordinates; each time scale adds a clock.
 pub const COORDINATES: usize = 3;

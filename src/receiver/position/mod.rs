@@ -44,7 +44,6 @@ mod sets;
 pub mod smooth;
 #[cfg(test)]
 mod tests;
-pub mod troposphere;
 
 use air::Air;
 use augmentation::Augmentation;

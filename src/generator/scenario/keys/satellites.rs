@@ -79,7 +79,7 @@ pub(crate) const SATELLITE_FAULT: &[Key] = &[
 pub(crate) fn parameters() -> Vec<&'static str> {
     let messages = SIGNALS.iter().flat_map(|signal| signal.components.iter().filter_map(|c| c.message));
     let mut names: Vec<&'static str> = Vec::new();
-    for name in messages.flat_map(|message| (message.adjustable)()) {
+    for name in messages.flat_map(|message| message.fields.adjustable()) {
         if !names.contains(&name) {
             names.push(name);
         }

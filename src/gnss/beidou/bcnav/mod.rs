@@ -19,12 +19,12 @@ pub(super) mod typed;
 
 use crate::bdgim::Bdgim;
 use crate::beidou::d1d2::{D1_SETS, issue};
-use crate::bits::{Field, FieldError, Store, add_to, integers, quantise_all, read_all};
+use crate::bits::{self, Field, FieldError, Store, integers};
 use crate::broadcast::{Ephemeris, SetForm};
 use crate::exchange::modern;
 use crate::ionosphere::{Coefficients, Model};
-use crate::message::{Common, IonosphereForm, Parameters, Raw, RecordLine, UtcNumbers};
-use crate::satellite::Sv;
+use crate::message::{Common, IonosphereForm, Parameters, Raw, RecordLine, UtcNumbers, raw_of};
+use crate::set_tables::{Conversions, SetTables};
 use crate::signal::Signal;
 use crate::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
 use blocks::{Content, Of, STEP_S, electrons, kind, signed};
@@ -48,7 +48,7 @@ pub(super) fn coefficients(raw: Raw<'_>) -> Option<Coefficients> {
 
 /// The coefficients of BDGIM among the parameters of a unit, with their raw integers.
 pub(super) fn electrons_in(all: &Parameters) -> Option<(Coefficients, Parameters)> {
-    let raw = |name: &str| all.iter().find(|(other, _)| *other == name).map(|(_, raw)| *raw);
+    let raw = |name: &str| raw_of(all, name);
     let own = all.iter().filter(|(name, _)| ELECTRONS.iter().any(|element| element.field.name == *name));
     Some((coefficients(&raw)?, own.copied().collect()))
 }
@@ -93,8 +93,7 @@ pub(super) type Tables = [&'static [Of]];
 
 /// Lists every field by the table that has it.
 pub(super) fn fields(all: &[(&'static str, &'static Tables)]) -> Vec<(&'static str, Vec<&'static Field>)> {
-    let of = |tables: &'static Tables| tables.iter().flat_map(|table| table.iter()).map(|own| &own.field).collect();
-    all.iter().map(|(name, tables)| (*name, of(tables))).collect()
+    all.iter().map(|(name, tables)| (*name, bits::fields(tables))).collect()
 }
 
 /// The lines of a record of RINEX of B-CNAV1 and B-CNAV2 with their delays; predicted accuracies that were
@@ -187,50 +186,14 @@ pub(super) fn carried(
     Ephemeris { iode: issue, iodc: issue, aodo: 0, ..own.carried_to(toe) }
 }
 
-/// The ephemeris, its times GPS time, that a receiver decodes when that one is sent.
-pub(super) fn quantised(tables: &Tables, carried: Ephemeris) -> Result<Ephemeris, FieldError> {
-    let mut content = blank(carried.timed(|at| BDT.label(at)));
-    tables.iter().try_for_each(|table| quantise_all(table, &mut content))?;
-    Ok(content.set.timed(|label| BDT.instant(label)))
-}
-
 /// Parameters that are of a message and not of the ephemeris.
 const PASSING: [&str; 3] = ["week", "how_1h", "page"];
-
-/// Names of the parameters of an ephemeris, each once.
-pub(super) fn set_parameters(tables: &Tables) -> Vec<&'static str> {
-    let mut names: Vec<&'static str> = Vec::new();
-    for name in tables.iter().flat_map(|table| table.iter()).map(|element| element.field.name) {
-        if !PASSING.contains(&name) && !names.contains(&name) {
-            names.push(name);
-        }
-    }
-    names
-}
 
 /// The raw integers in bits whose tables those are, but those of the message itself.
 pub(super) fn integers_in<S: Store>(tables: &Tables, bits: &S) -> Parameters {
     let mut found: Parameters = tables.iter().flat_map(|table| integers(table, bits)).collect();
     found.retain(|(name, _)| !PASSING.contains(name));
     found
-}
-
-/// The elements that raw integers give, as if they had been sent at `near`.
-pub(super) fn of_integers(
-    (tables, form): (&Tables, &'static SetForm),
-    sv: Sv,
-    raw: Raw<'_>,
-    near: Epoch,
-) -> Option<Ephemeris> {
-    let mut content = blank(Ephemeris { form, ..Ephemeris::blank(sv, near) });
-    for table in tables {
-        let mut bits = vec![false; LONGEST_BITS];
-        for field in table.iter().map(|element| &element.field).filter(|field| !PASSING.contains(&field.name)) {
-            field.write(&mut bits, raw(field.name)?);
-        }
-        read_all(table, &bits, &mut content);
-    }
-    Some(content.set)
 }
 
 /// Upper bound of the bits in a subframe or message.
@@ -249,21 +212,25 @@ const FIXED_PARAMETERS: [&str; 9] = [
     "integrity_flags_b1c",
 ];
 
-/// Names of the parameters of an ephemeris that may be wrong with a right check.
-pub(super) fn adjustable(tables: &Tables) -> Vec<&'static str> {
-    let mut names = set_parameters(tables);
-    names.retain(|name| !FIXED_PARAMETERS.contains(name) && !name.starts_with("utc_") && !name.starts_with("leap_"));
-    names
+/// Fields of the ephemerides of one of the messages.
+pub(super) type OfSet = SetTables<Content, Vec<bool>>;
+
+/// Tables of the ephemerides that `quantised` rounds ([`rounded`]).
+pub(super) const fn set_tables(
+    sets: &'static SetForm,
+    parts: &'static Tables,
+    quantised: fn(&OfSet, &Ephemeris) -> Result<Ephemeris, FieldError>,
+) -> OfSet {
+    let content: Conversions<Content> = (blank, |content| content.set);
+    let of = SetTables::of(sets, parts, || vec![false; LONGEST_BITS], content);
+    SetTables { passing: &PASSING, fixed: &[&FIXED_PARAMETERS, &PASSING], quantised, ..of }
 }
 
-/// Adds `by` to a parameter in the unit of the tables. Returns false if there is none.
-pub(super) fn adjust(tables: &Tables, ephemeris: &mut Ephemeris, parameter: &str, by: f64) -> bool {
-    let mut content = blank(ephemeris.clone());
-    let found = tables.iter().any(|table| add_to(table, parameter, &mut content, by));
-    *ephemeris = content.set;
-    found
+/// The ephemeris, its times GPS time, that a receiver decodes when that one is sent.
+pub(super) fn rounded(tables: &OfSet, carried: Ephemeris) -> Result<Ephemeris, FieldError> {
+    let decoded = tables.rounded(carried.timed(|at| BDT.label(at)))?;
+    Ok(decoded.timed(|label| BDT.instant(label)))
 }
-
 /// Transmission time of a message that began at a second of the BDT week. The lower bits of its week and a
 /// time near it resolve the week.
 pub(super) fn sent_at(week: i64, of_week_s: i64, near: Epoch) -> Epoch {

@@ -10,20 +10,18 @@ use std::fmt;
 use std::sync::LazyLock;
 
 use super::blocks::Content;
-use super::{Accuracies, Tables, accuracies_in, blank, electrons_in, integers_in, of_integers, sent_at};
-use crate::bits::{Field, FieldError, bits_of, read_all, write_all};
+use super::{Accuracies, Tables, accuracies_in, blank, electrons_in, integers_in, sent_at};
+use crate::bits::{Field, FieldError, bits_of, read_all, soft, write_all};
 use crate::broadcast::Ephemeris;
-use crate::crc::crc24q;
+use crate::crc::{CHECK_BITS, is_checked, with_check};
 use crate::fec::frames::Frames;
 use crate::fec::ldpc64::Ldpc64;
 use crate::framed::Reported;
-use crate::message::{Common, Message, Parameters, Raw, Read, Reader, Sender, UtcNumbers};
-use crate::record::NavigationRow;
+use crate::message::{Common, Message, Parameters, Read, Reader, Sender, UtcNumbers};
 use crate::satellite::Sv;
 use crate::time::{BDT, BDT_WEEK, Epoch, WEEK_S};
 
 /// Bits of a check, and of a satellite's number.
-const CHECK_BITS: usize = 24;
 const NUMBER_BITS: usize = 6;
 /// Least agreement of soft symbols with the preamble and the satellite's number at which a message is tried:
 /// 0.89 at an amplitude of √2 standard deviations, near which the codes begin to fail. Of data 22 symbols
@@ -110,7 +108,7 @@ impl Layout {
         let preamble = bits_of(u128::from(self.preamble.0), self.preamble.1);
         let inverted = share(preamble, soft) < 0.0;
         let own: Vec<f32> = word.iter().map(|value| if inverted { -value } else { *value }).collect();
-        let bits = self.code.decode(&own).filter(|bits| crc24q(bits.iter().copied()) == 0)?;
+        let bits = self.code.decode(&own).filter(|bits| is_checked(bits))?;
         Some((bits, inverted))
     }
 
@@ -126,15 +124,9 @@ impl Layout {
 
     /// Decodes the parameters from a message's symbols.
     pub fn opened(&self, symbols: &[bool]) -> Option<(bool, Parameters)> {
-        let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
-        let (bits, _) = self.decode(&soft)?;
+        let (bits, _) = self.decode(&soft(symbols))?;
         let found = integers_in(self.of_type(self.type_of(&bits)), &bits);
         (!found.is_empty()).then_some((true, found))
-    }
-
-    /// The elements that raw integers give, as if they had been sent at `near`.
-    pub fn elements(&self, set: &'static Tables, sv: Sv, raw: Raw<'_>, near: Epoch) -> Option<Ephemeris> {
-        of_integers((set, self.message.sets), sv, raw, near).and_then(self.complete)
     }
 
     /// Type of a message, as it states it.
@@ -173,11 +165,7 @@ pub(in crate::beidou) struct Messages {
 impl Sender for Messages {
     fn unit(&self, set: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
         let layout = self.layout;
-        let Message { name, unit_s, .. } = *layout.message;
-        if start.tow_whole_s() % unit_s != 0 || start.fraction() != 0.0 {
-            let expected = "the beginning of a message";
-            return Err(FieldError::Start { message: name, start_s: start.tow_s(), expected });
-        }
+        layout.message.check_start(start, "the beginning of a message")?;
         let kind = layout.type_at(start);
         let utc = UtcNumbers::of(&self.common, start, &BDT, (BDT_WEEK, 0));
         let alpha_tecu = self.common.bdgim.map_or([0.0; 9], |model| model.alpha_tecu);
@@ -187,11 +175,9 @@ impl Sender for Messages {
             field.write(&mut bits, i64::from(set.sv.number));
         }
         layout.kind.write(&mut bits, i64::from(kind));
-        layout.second.write(&mut bits, start.tow_whole_s() / unit_s);
+        layout.second.write(&mut bits, start.tow_whole_s() / layout.message.unit_s);
         layout.of_type(kind).iter().try_for_each(|table| write_all(table, &content, &mut bits))?;
-        let check = crc24q(bits.iter().copied());
-        bits.extend(bits_of(u128::from(check), CHECK_BITS));
-        Ok(layout.encode(set.sv.number, &bits))
+        Ok(layout.encode(set.sv.number, &with_check(bits)))
     }
 }
 
@@ -233,9 +219,7 @@ impl TypedReader {
         news.extend(layout.sent_at(&bits, near).map(Read::Time));
         let all = integers_in(layout.of_type(layout.type_of(&bits)), &bits);
         let sv = self.sv;
-        let rows = |issue: u16, raws| {
-            Read::Parameters(NavigationRow::each(sv, layout.message.name, issue.into(), raws).collect())
-        };
+        let rows = |issue: u16, raws| Read::parameters(sv, layout.message, issue.into(), raws);
         let issue = layout.issue(&bits).map(layout.number_of);
         if let Some((coefficients, raws)) = electrons_in(&all) {
             news.push(Read::Ionosphere(coefficients));
@@ -289,7 +273,7 @@ impl TypedReader {
         }
         let sent = parts.iter().find_map(|part| layout.sent_at(&part.bits, near))?;
         let mut content = blank(Ephemeris { form: layout.message.sets, ..Ephemeris::blank(self.sv, sent) });
-        let own = (layout.message.set_parameters)();
+        let own = layout.message.fields.parameters();
         let mut all = Parameters::new();
         for Part { kind, bits, .. } in parts {
             let tables = layout.of_type(*kind);

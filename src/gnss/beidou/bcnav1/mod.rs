@@ -23,14 +23,15 @@ use std::sync::LazyLock;
 use crate::beidou::b1c::{B1C, CARRIER_HZ as B1C_HZ};
 use crate::beidou::b2a::B2A;
 use crate::beidou::bcnav::blocks::Content;
-use crate::beidou::bcnav::{self, Tables, blank, integers_in, record_lines, sent_at};
+use crate::beidou::bcnav::{self, OfSet, Tables, blank, integers_in, record_lines, sent_at};
 use crate::beidou::bcnav2::B_CNAV2;
-use crate::bits::{FieldError, bits_of, number, read_all, write_all};
+use crate::bits::{FieldError, number, read_all};
 use crate::broadcast::{Ephemeris, SetForm};
-use crate::crc::crc24q;
+use crate::crc::{checked, is_checked};
 use crate::fec::interleaver::Interleaver;
 use crate::fec::ldpc64::Ldpc64;
 use crate::fec::register::RegisterCode;
+use crate::fec::subframes::Blocks;
 use crate::message::{Common, Message, Parameters, Records, Sender, UtcNumbers};
 use crate::satellite::Sv;
 use crate::signal::Signal;
@@ -59,16 +60,12 @@ pub static B_CNAV1: Message = Message {
     set: &[1],
     reduced: &[],
     ionosphere: bcnav::ionosphere(is_first),
-    set_parameters: || bcnav::set_parameters(SET),
-    elements: |sv, raw, near| bcnav::of_integers((SET, &B_CNAV1_SETS), sv, raw, near),
+    fields: &FIELDS,
     parameters: opened,
     reader: |sv| Box::new(BCnav1Reader::new(sv)),
     form,
     sets: &B_CNAV1_SETS,
-    quantised,
-    adjustable: || bcnav::adjustable(SET),
     alert: None,
-    adjust: |set, parameter, by| bcnav::adjust(SET, set, parameter, by),
     rinex: Some(Records {
         set: |_| "CNV1",
         common: "CNVX",
@@ -114,7 +111,6 @@ const HOUR_S: i64 = 3600;
 /// Bits of subframes 2 and 3 with their checks, and of a check.
 const BITS_2: usize = 600;
 const BITS_3: usize = 264;
-const CHECK_BITS: usize = 24;
 /// Symbols of the number and of the time in subframe 1, of it, and of a frame.
 const NUMBER_SYMBOLS: usize = 21;
 const SYMBOLS_1: usize = 72;
@@ -135,28 +131,18 @@ pub(super) static CODE_3: LazyLock<Ldpc64> = LazyLock::new(|| Ldpc64::packed(BIT
 
 /// Decoded frame with correct checks.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Frame {
-    /// Time of the frame's beginning within the hour, in units of eighteen seconds.
-    pub time: u32,
-    /// True if the symbols were inverted.
-    pub inverted: bool,
-    /// Bits of subframe 2 with their check.
-    pub two: Vec<bool>,
-    /// Bits of subframe 3 with their check; `None` if the check fails.
-    pub three: Option<Vec<bool>>,
-}
+pub struct Frame(pub Blocks);
 
 impl Frame {
     /// Seconds of the week of BDT at which it began.
     pub fn of_week_s(&self) -> i64 {
-        let hour = number(self.two.get(13..21).unwrap_or_default()) as i64;
-        let count = i64::from(self.time) - planted!("gnss.bcnav1.time", 0, 1);
-        (hour * HOUR_S + count * FRAME_S).rem_euclid(WEEK_S)
+        let count = i64::from(self.0.time) - planted!("gnss.bcnav1.time", 0, 1);
+        (self.0.interval() * HOUR_S + count * FRAME_S).rem_euclid(WEEK_S)
     }
 
     /// Start time of the frame, with its week near `near`.
     pub fn sent_at(&self, near: Epoch) -> Epoch {
-        sent_at(number(self.two.get(..13).unwrap_or_default()) as i64, self.of_week_s(), near)
+        sent_at(self.0.week(), self.of_week_s(), near)
     }
 }
 
@@ -218,8 +204,8 @@ pub fn decode(number: u8, soft: &[f32]) -> Option<Frame> {
         places.zip(symbols).for_each(|(place, value)| *place = if inverted { -value } else { *value });
     }
     let (two, three) = both.split_at_checked(2 * BITS_2)?;
-    let of = |code: &Ldpc64, soft| code.decode(soft).filter(|bits| crc24q(bits.iter().copied()) == 0);
-    Some(Frame { time, inverted, two: of(&CODE_2, two)?, three: of(&CODE_3, three) })
+    let of = |code: &Ldpc64, soft| code.decode(soft).filter(|bits| is_checked(bits));
+    Some(Frame(Blocks { time, inverted, two: of(&CODE_2, two)?, three: of(&CODE_3, three) }))
 }
 
 /// Makes the frames of satellites.
@@ -230,18 +216,15 @@ struct Frames {
 
 impl Sender for Frames {
     fn unit(&self, set: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
-        if start.tow_whole_s() % FRAME_S != 0 || start.fraction() != 0.0 {
-            let expected = "a multiple of 18 s of BDT";
-            return Err(FieldError::Start { message: B_CNAV1.name, start_s: start.tow_s(), expected });
-        }
-        let [two, three] = self.subframes(set, start)?.map(checked);
+        B_CNAV1.check_start(start, "a multiple of 18 s of BDT")?;
+        let [two, three] = self.subframes(set, start)?;
         let time = start.tow_whole_s() % HOUR_S / FRAME_S;
         Ok(encoded(set.sv.number, time as u32, &two, &three))
     }
 }
 
 impl Frames {
-    /// The bits of subframes 2 and 3 of an ephemeris without their checks.
+    /// The bits of subframes 2 and 3 of an ephemeris with their checks.
     fn subframes(&self, set: &Ephemeris, start: Epoch) -> Result<[Vec<bool>; 2], FieldError> {
         let common = &self.common;
         let (page, entries) = self.almanacs.page_at(common.bdgim.is_some(), start);
@@ -250,23 +233,13 @@ impl Frames {
         let toa = self.almanacs.toa;
         let content =
             Content { sent: start, page: f64::from(page), utc, alpha_tecu, toa, entries, ..blank(set.clone()) };
-        let [mut two, mut three] = [BITS_2, BITS_3].map(|bits| vec![false; bits - CHECK_BITS]);
-        TWO.iter().try_for_each(|table| write_all(table, &content, &mut two))?;
         let beside: &Tables = match page {
             WITH_ELECTRONS => BESIDE,
             WITH_ONE => &OF_MEDIUM,
             _ => &OF_REDUCED,
         };
-        THREE.iter().chain(beside).try_for_each(|table| write_all(table, &content, &mut three))?;
-        Ok([two, three])
+        Ok([checked(TWO, &content, BITS_2)?, checked(&[THREE, beside].concat(), &content, BITS_3)?])
     }
-}
-
-/// The bits of a subframe with their check.
-fn checked(mut bits: Vec<bool>) -> Vec<bool> {
-    let check = crc24q(bits.iter().copied());
-    bits.extend(bits_of(u128::from(check), CHECK_BITS));
-    bits
 }
 
 /// The parameters of a unit's symbols, whose satellite is the one that they name.
@@ -274,19 +247,14 @@ fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
     let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
     let number = number(symbols.get(..6)?) as u8;
     let frame = decode(number, &soft)?;
-    let three = frame.three?;
-    let mut found = of_set_in(&frame.two, &three);
+    let three = frame.0.three?;
+    let mut found = of_set_in(&frame.0.two, &three);
     found.extend(beside_in(&three));
     Some((true, found))
 }
 
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    bcnav::quantised(SET, form(ephemeris))
-}
+/// Tables of the ephemeris.
+static FIELDS: OfSet = bcnav::set_tables(&B_CNAV1_SETS, SET, |own, set| bcnav::rounded(own, form(set)));
 
 /// The raw integers of the ephemeris in subframes 2 and 3.
 fn of_set_in(two: &Vec<bool>, three: &Vec<bool>) -> Parameters {

@@ -7,7 +7,6 @@ use super::{B_CNAV1, Frame, SYMBOLS, SYMBOLS_1, beside_in, decode, elements, lik
 use crate::beidou::bcnav::{Accuracies, accuracies_in, electrons_in};
 use crate::framed::{Content, Framed, Reported};
 use crate::message::{Parameters, Read};
-use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::Epoch;
 
@@ -19,18 +18,6 @@ const LEAST_SHARE: f32 = 0.65;
 /// Reader of B-CNAV1.
 pub type BCnav1Reader = Framed<BCnav1Content>;
 
-impl BCnav1Reader {
-    /// Creates a reader that has received no symbols.
-    pub fn new(sv: Sv) -> Self {
-        Self::of(BCnav1Content {
-            sv,
-            reported: Reported::default(),
-            electrons: None,
-            accuracies: Accuracies::default(),
-        })
-    }
-}
-
 /// Content of a satellite's frames.
 #[derive(Clone, Debug)]
 pub struct BCnav1Content {
@@ -41,15 +28,13 @@ pub struct BCnav1Content {
     accuracies: Accuracies,
 }
 
-impl BCnav1Content {
-    fn rows(&self, issue: u32, parameters: Parameters) -> Vec<NavigationRow> {
-        NavigationRow::each(self.sv, B_CNAV1.name, issue, parameters).collect()
-    }
-}
-
 impl Content for BCnav1Content {
     type Frame = Frame;
     const SYMBOLS: usize = SYMBOLS;
+
+    fn new(sv: Sv) -> Self {
+        Self { sv, reported: Reported::default(), electrons: None, accuracies: Accuracies::default() }
+    }
 
     fn may_begin(&self, symbols: &[f32]) -> bool {
         symbols.get(..SYMBOLS_1).is_some_and(|first| likely_time(self.sv.number, first).1.abs() > LEAST_SHARE)
@@ -61,21 +46,21 @@ impl Content for BCnav1Content {
 
     fn read(&mut self, frame: Frame, _: u64, near: Epoch) -> Vec<Read> {
         let sent = frame.sent_at(near);
-        let unit = Read::Unit { symbols: SYMBOLS as u64, of_week_s: frame.of_week_s(), inverted: frame.inverted };
+        let unit = Read::Unit { symbols: SYMBOLS as u64, of_week_s: frame.of_week_s(), inverted: frame.0.inverted };
         let mut news = vec![unit, Read::Time(sent)];
-        let Some(beside) = &frame.three else { return news };
-        let all = of_set_in(&frame.two, beside);
-        let set = elements(self.sv, &frame.two, beside, sent);
+        let Some(beside) = &frame.0.three else { return news };
+        let all = of_set_in(&frame.0.two, beside);
+        let set = elements(self.sv, &frame.0.two, beside, sent);
         // A frame is of one ephemeris, and what it says besides bears its issue.
         let issue = u32::from(set.iode);
         let beside = beside_in(beside);
         let accuracies = self.accuracies.take(issue, &accuracies_in(&beside));
-        news.extend(accuracies.map(|raws| Read::Parameters(self.rows(issue, raws))));
+        news.extend(accuracies.map(|raws| Read::parameters(self.sv, &B_CNAV1, issue, raws)));
         if let Some((coefficients, raws)) = electrons_in(&beside) {
             news.push(Read::Ionosphere(coefficients));
             let own = Some((issue, raws));
             if self.electrons != own {
-                news.extend(own.iter().map(|(issue, raws)| Read::Parameters(self.rows(*issue, raws.clone()))));
+                news.extend(own.iter().map(|(issue, raws)| Read::parameters(self.sv, &B_CNAV1, *issue, raws.clone())));
                 self.electrons = own;
             }
         }

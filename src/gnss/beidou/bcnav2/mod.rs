@@ -16,10 +16,10 @@ use crate::beidou::b1c::B1C;
 use crate::beidou::b2a::B2A;
 use crate::beidou::bcnav::blocks::{self, Of};
 use crate::beidou::bcnav::typed::{Layout, Messages, TypedReader};
-use crate::beidou::bcnav::{self, Tables, record_lines};
-use crate::beidou::bcnav1::B_CNAV1_SETS;
+use crate::beidou::bcnav::{self, OfSet, Tables, record_lines};
+use crate::beidou::bcnav1::{B_CNAV1, B_CNAV1_SETS};
 use crate::bits::Kind::{Signed, Whole};
-use crate::bits::{Field, FieldError, plain};
+use crate::bits::{Field, plain};
 use crate::broadcast::{Ephemeris, SetForm};
 use crate::fec::ldpc64::Ldpc64;
 use crate::message::{Message, Records};
@@ -28,34 +28,25 @@ use crate::message::{Message, Records};
 pub static B_CNAV2: Message = Message {
     name: "B-CNAV2",
     symbol_s: 0.005,
-    bit: |_| &[1],
     unit_s: MESSAGE_S,
-    decided_after: 0,
     set_s: MESSAGE_S * ORDER.len() as i64,
-    first_s: 0,
     sender: |common| bcnav::check(common).map(|()| Box::new(Messages { layout: &LAYOUT, common: common.clone() }) as _),
     number: |start| LAYOUT.type_at(start),
     timed: &ORDER,
-    dated: &[],
     set: &OF_SET,
-    reduced: &[],
     ionosphere: bcnav::ionosphere(|start| LAYOUT.type_at(start) == 30),
-    set_parameters: || bcnav::set_parameters(SET),
-    elements: |sv, raw, near| LAYOUT.elements(SET, sv, raw, near),
+    fields: &FIELDS,
     parameters: |symbols| LAYOUT.opened(symbols),
     reader: |sv| Box::new(TypedReader::new(&LAYOUT, sv)),
     form,
     sets: &B_CNAV2_SETS,
-    quantised,
-    adjustable: || bcnav::adjustable(SET),
-    alert: None,
-    adjust: |set, parameter, by| bcnav::adjust(SET, set, parameter, by),
     rinex: Some(Records {
         set: |_| "CNV2",
         common: "CNVX",
         fields: tables,
         lines: Some(|set, raw| record_lines(set, raw, [None, Some(set.isc_s[0]), Some(set.tgd_s), Some(set.tgd2_s)])),
     }),
+    ..B_CNAV1
 };
 
 /// Ephemerides of B-CNAV2: as those of B-CNAV1.
@@ -130,13 +121,8 @@ fn form(set: &Ephemeris) -> Ephemeris {
     bcnav::carried(set, &B_CNAV2_SETS, &[&B1C, &B2A], Some(["5D", "5P"]))
 }
 
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    bcnav::quantised(SET, form(ephemeris))
-}
+/// Tables of the ephemeris.
+static FIELDS: OfSet = bcnav::set_tables(&B_CNAV2_SETS, SET, |own, set| bcnav::rounded(own, form(set)));
 
 /// The symbols of a satellite's message of 288 bits with their check.
 pub fn encode(bits: &[bool]) -> Vec<bool> {

@@ -15,10 +15,11 @@ use std::sync::LazyLock;
 use crate::beidou::b2b::{B2B, CARRIER_HZ};
 use crate::beidou::bcnav::blocks::{self, Of};
 use crate::beidou::bcnav::typed::{Layout, Messages, TypedReader};
-use crate::beidou::bcnav::{self, Tables, record_lines_of_b2b};
+use crate::beidou::bcnav::{self, OfSet, Tables, record_lines_of_b2b};
+use crate::beidou::bcnav1::B_CNAV1;
 use crate::beidou::d1d2::issue;
 use crate::bits::Kind::{Signed, Whole};
-use crate::bits::{Field, FieldError, plain};
+use crate::bits::{Field, plain};
 use crate::broadcast::{Ephemeris, SetForm};
 use crate::fec::ldpc64::Ldpc64;
 use crate::message::{Message, Records};
@@ -27,29 +28,20 @@ use crate::message::{Message, Records};
 pub static B_CNAV3: Message = Message {
     name: "B-CNAV3",
     symbol_s: 0.001,
-    bit: |_| &[1],
     unit_s: MESSAGE_S,
-    decided_after: 0,
     set_s: MESSAGE_S * ORDER.len() as i64,
-    first_s: 0,
     sender: |common| bcnav::check(common).map(|()| Box::new(Messages { layout: &LAYOUT, common: common.clone() }) as _),
     number: |start| LAYOUT.type_at(start),
     timed: &ORDER,
-    dated: &[],
     set: &ORDER,
-    reduced: &[],
     ionosphere: bcnav::ionosphere(|start| LAYOUT.type_at(start) == 30),
-    set_parameters: || bcnav::set_parameters(SET),
-    elements: |sv, raw, near| LAYOUT.elements(SET, sv, raw, near),
+    fields: &FIELDS,
     parameters: |symbols| LAYOUT.opened(symbols),
     reader: |sv| Box::new(TypedReader::new(&LAYOUT, sv)),
     form,
     sets: &B_CNAV3_SETS,
-    quantised,
-    adjustable: || bcnav::adjustable(SET),
-    alert: None,
-    adjust: |set, parameter, by| bcnav::adjust(SET, set, parameter, by),
     rinex: Some(Records { set: |_| "CNV3", common: "CNVX", fields: tables, lines: Some(record_lines_of_b2b) }),
+    ..B_CNAV1
 };
 
 /// Ephemerides of B-CNAV3: T_GD of B2b in the field of the first group delay; health of the satellite.
@@ -121,13 +113,11 @@ fn form(set: &Ephemeris) -> Ephemeris {
     bcnav::carried(set, &B_CNAV3_SETS, &[&B2B], None)
 }
 
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    bcnav::quantised(SET, form(ephemeris))
-}
+/// Tables of the ephemeris.
+static FIELDS: OfSet = OfSet {
+    elements: |own, sv, raw, near| own.of_integers(sv, raw, near).and_then(numbered),
+    ..bcnav::set_tables(&B_CNAV3_SETS, SET, |own, set| bcnav::rounded(own, form(set)))
+};
 
 /// The symbols of a satellite's message of 486 bits with their check.
 pub fn encode(number: u8, bits: &[bool]) -> Vec<bool> {

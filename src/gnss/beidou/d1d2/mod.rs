@@ -49,16 +49,12 @@ pub static D1_D2: Message = Message {
         unit: |_| true,
         coefficients: |raw| Klobuchar::named(|name| OF_SET.value(name, raw)).and_then(given),
     },
-    set_parameters: || OF_SET.parameters(),
-    elements: |sv, raw, near| OF_SET.elements(sv, raw, near).map(numbered),
+    fields: &OF_SET,
     parameters: |symbols| parameters(symbols).map(|found| (true, found)),
     reader: |sv| Box::new(D1D2Reader::new(sv)),
     form,
     sets: &D1_SETS,
-    quantised,
-    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records {
         set: |sv| if sv.is_geostationary() { "D2" } else { "D1" },
         common: "D1D2",
@@ -147,10 +143,7 @@ struct Frames {
 
 impl Sender for Frames {
     fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
-        if start.tow_whole_s() % UNIT_S != 0 || start.fraction() != 0.0 {
-            let expected = "a multiple of 30 s of BDT";
-            return Err(FieldError::Start { message: D1_D2.name, start_s: start.tow_s(), expected });
-        }
+        D1_D2.check_start(start, "a multiple of 30 s of BDT")?;
         let on_air = Ephemeris { transmitted: start, ..ephemeris.clone() };
         let klobuchar = self.klobuchar.unwrap_or(Klobuchar::ZERO);
         let orbit = Orbit { ephemeris: on_air, klobuchar };
@@ -308,22 +301,16 @@ fn parameters(symbols: &[bool]) -> Option<Vec<(&'static str, i64)>> {
     Some(integers(&D2_SET, &D2Set::joined(parts.iter().map(|part| &part.0))))
 }
 
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays. Times are BDT's.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    OF_SET.quantised(form(ephemeris))
-}
-
 /// Parameters by which ephemerides are distinguished, what all satellites send alike, and the health, which
 /// has a fault of its own, are fixed.
 static OF_SET: SetTables<Orbit, D1Set> = SetTables {
-    parts: &[&D1_SET],
-    passing: &[],
     fixed: &[&["week", "toc_s", "toe_s", "health", "aodc", "aode"], &Klobuchar::PARAMETERS],
-    sets: &D1_SETS,
-    blank: D1Set::default,
-    content: |ephemeris| Orbit { klobuchar: Klobuchar::ZERO, ephemeris },
-    ephemeris: |orbit| orbit.ephemeris,
+    elements: |own, sv, raw, near| own.of_integers(sv, raw, near).map(numbered),
+    quantised: |own, set| own.rounded(form(set)),
+    ..SetTables::of(
+        &D1_SETS,
+        &[&D1_SET],
+        D1Set::default,
+        (|ephemeris| Orbit { klobuchar: Klobuchar::ZERO, ephemeris }, |orbit| orbit.ephemeris),
+    )
 };

@@ -9,7 +9,6 @@ use super::{
 };
 use crate::bits::Store;
 use crate::message::{Read, Reader};
-use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::{Epoch, WEEK_S};
 
@@ -173,10 +172,10 @@ impl D1D2Reader {
         if !parts.iter().all(is_later) || self.complete.as_ref() == Some(&content) {
             return;
         }
-        let rows = NavigationRow::each(self.sv, D1_D2.name, u32::from(set.iode), content.clone()).collect();
+        let rows = Read::parameters(self.sv, &D1_D2, u32::from(set.iode), content.clone());
         news.push(Read::Ephemeris(Box::new(set)));
         news.extend(given(klobuchar).map(Read::Ionosphere));
-        news.push(Read::Parameters(rows));
+        news.push(rows);
         self.complete = Some(content);
     }
 }

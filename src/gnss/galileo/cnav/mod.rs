@@ -17,13 +17,13 @@
 mod reader;
 
 use crate::bits::Kind::Whole;
-use crate::bits::{Field, FieldError, Store, bits_of, number};
+use crate::bits::{Field, FieldError, Store, bits_of, soft};
 use crate::broadcast::Ephemeris;
-use crate::crc::crc24q;
 use crate::fec::interleaver::Interleaver;
+use crate::fec::pages::Form;
 use crate::galileo::inav::{INAV, INAV_SETS, code};
 use crate::ionosphere::Model;
-use crate::message::{IonosphereForm, Message, Parameters, Sender};
+use crate::message::{IonosphereForm, Message, Parameters, Sender, SetFields};
 use crate::time::Epoch;
 pub use reader::CnavReader;
 
@@ -43,21 +43,19 @@ pub static CNAV: Message = Message {
     set: &[],
     reduced: &[],
     ionosphere: IonosphereForm { model: Model::NequickG, unit: |_| false, coefficients: |_| None },
-    set_parameters: Vec::new,
-    elements: |_, _, _| None,
-    parameters: |symbols| {
-        let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
-        decode_soft(&soft).map(|(page, _)| (false, parameters(&page)))
-    },
+    fields: &NoFields,
+    parameters: |symbols| decode_soft(&soft(symbols)).map(|(page, _)| (false, parameters(&page))),
     reader: |sv| Box::new(CnavReader::new(sv)),
     form: |set| (INAV.form)(set),
     sets: &INAV_SETS,
-    quantised: |set| Ok(set.clone()),
-    adjustable: Vec::new,
     alert: None,
-    adjust: |_, _, _| false,
     rinex: None,
 };
+
+/// Fields of ephemerides where there are none.
+struct NoFields;
+
+impl SetFields for NoFields {}
 
 /// Seconds of a page.
 const PAGE_S: i64 = 1;
@@ -65,12 +63,16 @@ const PAGE_S: i64 = 1;
 const PATTERN: u128 = 0b1011_0111_0111_0000;
 const PATTERN_SYMBOLS: usize = 16;
 const PAGE_SYMBOLS: usize = 1000;
-/// Bits of a page without its check, of the check, and with both and the tail of zeros.
+/// Bits of a page without its check and the tail of six zeros.
 const DATA_BITS: usize = 462;
-const CHECK_BITS: usize = 24;
-const PAGE_BITS: usize = 492;
 
-const INTERLEAVER: Interleaver = Interleaver { columns: 123, rows: 8 };
+const FORM: Form = Form {
+    pattern: (PATTERN, PATTERN_SYMBOLS),
+    data_bits: DATA_BITS,
+    tail_bits: 6,
+    code,
+    interleaver: Interleaver { columns: 123, rows: 8 },
+};
 
 /// Seconds from one message of the service to the next, as satellites sent them in 2025.
 const ROUND_S: i64 = 10;
@@ -143,9 +145,7 @@ struct Pages;
 
 impl Sender for Pages {
     fn unit(&self, _: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
-        if start.fraction() != 0.0 {
-            return Err(FieldError::Start { message: CNAV.name, start_s: start.tow_s(), expected: "a whole second" });
-        }
+        CNAV.check_start(start, "a whole second")?;
         Ok(encode_page(&if is_dummy_at(start) { dummy() } else { without_corrections(start) }))
     }
 }
@@ -176,29 +176,14 @@ fn without_corrections(start: Epoch) -> Vec<bool> {
 
 /// The symbols of a page of 462 bits: pattern, then the bits with check and tail, coded and interleaved.
 pub fn encode_page(page: &[bool]) -> Vec<bool> {
-    let check = crc24q(page.iter().copied());
-    let mut bits: Vec<bool> = page.iter().copied().chain(bits_of(u128::from(check), CHECK_BITS)).collect();
-    bits.resize(PAGE_BITS, false);
-    let coded = INTERLEAVER.interleave(&code().encode(&bits));
-    bits_of(planted!("gnss.galileo_cnav.pattern", PATTERN, !PATTERN), PATTERN_SYMBOLS).chain(coded).collect()
+    let pattern = planted!("gnss.galileo_cnav.pattern", PATTERN, !PATTERN);
+    bits_of(pattern, PATTERN_SYMBOLS).chain(FORM.coded(page)).collect()
 }
 
 /// The 462 bits in the 1000 soft symbols of a page, and whether they are inverted; `None` where the check
 /// is wrong.
 pub fn decode_soft(symbols: &[f32]) -> Option<(Vec<bool>, bool)> {
-    let (head, coded) = symbols.split_at_checked(PATTERN_SYMBOLS).filter(|_| symbols.len() == PAGE_SYMBOLS)?;
-    let inverted = sum_of_pattern(head) < 0.0;
-    let sense = if inverted { -1.0 } else { 1.0 };
-    let coded: Vec<f32> = coded.iter().map(|soft| soft * sense).collect();
-    let mut bits = code().decode(&INTERLEAVER.deinterleave(&coded));
-    let check = number(bits.get(DATA_BITS..DATA_BITS + CHECK_BITS)?) as u32;
-    bits.truncate(DATA_BITS);
-    (crc24q(bits.iter().copied()) == check).then_some((bits, inverted))
-}
-
-/// Symbols as the pattern's, less those that are its inverse.
-fn sum_of_pattern(symbols: &[f32]) -> f32 {
-    symbols.iter().zip(bits_of(PATTERN, PATTERN_SYMBOLS)).map(|(soft, bit)| if bit { -soft } else { *soft }).sum()
+    FORM.decode(symbols)
 }
 
 /// True if the page comes from a satellite that has no message of the service.

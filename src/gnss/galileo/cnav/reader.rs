@@ -3,7 +3,6 @@
 use super::{CNAV, PAGE_SYMBOLS, PATTERN, PATTERN_SYMBOLS, decode_soft, parameters};
 use crate::framed::{Content, Framed, Pattern};
 use crate::message::Read;
-use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::Epoch;
 
@@ -12,13 +11,6 @@ const BEGIN: Pattern = Pattern { bits: PATTERN, symbols: PATTERN_SYMBOLS, tolera
 
 /// Reader of C/NAV.
 pub type CnavReader = Framed<CnavContent>;
-
-impl CnavReader {
-    /// Creates a reader that has received no symbols.
-    pub fn new(sv: Sv) -> Self {
-        Self::of(CnavContent { sv })
-    }
-}
 
 /// Content of a satellite's pages.
 #[derive(Clone, Debug)]
@@ -31,6 +23,10 @@ impl Content for CnavContent {
     type Frame = (Vec<bool>, bool);
     const SYMBOLS: usize = PAGE_SYMBOLS;
 
+    fn new(sv: Sv) -> Self {
+        Self { sv }
+    }
+
     fn may_begin(&self, symbols: &[f32]) -> bool {
         BEGIN.begins(symbols)
     }
@@ -40,8 +36,10 @@ impl Content for CnavContent {
     }
 
     fn read(&mut self, (page, inverted): Self::Frame, _: u64, _: Epoch) -> Vec<Read> {
-        let rows = NavigationRow::each(self.sv, CNAV.name, 0, parameters(&page)).collect();
-        vec![Read::Undated { symbols: PAGE_SYMBOLS as u64, inverted }, Read::Parameters(rows)]
+        vec![
+            Read::Undated { symbols: PAGE_SYMBOLS as u64, inverted },
+            Read::parameters(self.sv, &CNAV, 0, parameters(&page)),
+        ]
     }
 
     fn missing(&self) -> Vec<u8> {

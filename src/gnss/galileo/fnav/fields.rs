@@ -2,10 +2,12 @@
 //! SIS ICD 2.1, tables 29 to 35).
 
 use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::bits::{Element, Field, element, plain};
+use crate::bits::{Element, Field, element, fields, plain};
 use crate::galileo::inav::GST_WEEK;
-use crate::galileo::inav::almanac::{Entry, Offset, TOA_STEP_S, Triple};
-use crate::galileo::inav::fields::{CLOCK, DELAY, IONOSPHERE, MINUTE_S, ORBIT, Orbit, TIME, UTC, Utc, gst_week};
+use crate::galileo::inav::almanac::{self, Entry, Offset, Triple, of};
+use crate::galileo::inav::fields::{
+    CLOCK, DELAY, IONOSPHERE, ISSUE, MINUTE_S, ORBIT, Orbit, TIME, UTC, Utc, tow, week,
+};
 use crate::galileo::status::E5A;
 use crate::time::WEEK_S;
 
@@ -15,29 +17,10 @@ const ALMANAC: &str = "5.1.10, table 71";
 const OFFSET: &str = "5.1.8, table 69";
 const STATUS: &str = "5.1.9.7";
 
-/// The issue of data, alike in pages 1 to 4.
-const fn issue(pieces: &'static [(u16, u8)]) -> Of {
-    element(
-        Field::new("iodnav", pieces, Whole, 0, "5.1.9.2"),
-        |o| f64::from(o.ephemeris.iode),
-        |o, v| (o.ephemeris.iode, o.ephemeris.iodc) = (v as u16, v as u16),
-    )
-}
-
-/// The week of sending; what sets it is the caller.
-const fn week(pieces: &'static [(u16, u8)]) -> Of {
-    element(Field::new("week", pieces, Whole, 0, TIME), |o| gst_week(o.ephemeris.transmitted), |_, _| {})
-}
-
-/// The time of week of sending.
-const fn tow(pieces: &'static [(u16, u8)]) -> Of {
-    element(Field::new("tow_s", pieces, Whole, 0, TIME), |o| o.ephemeris.transmitted.tow_s(), |_, _| {})
-}
-
 #[rustfmt::skip]
 pub(super) static PAGE_1: [Of; 15] = [
     element(Field::new("svid", &[(6, 6)], Whole, 0, "5.1.9.3"), |o| f64::from(o.ephemeris.sv.number), |_, _| {}),
-    issue(&[(12, 10)]),
+    ISSUE.at(&[(12, 10)]),
     element(Field::new("toc_min", &[(22, 14)], Whole, 0, CLOCK),
         |o| o.ephemeris.toc.tow_s() / MINUTE_S,
         |o, v| o.ephemeris.toc = o.ephemeris.toc.nearest_tow((v * MINUTE_S) as i64)),
@@ -60,7 +43,7 @@ pub(super) static PAGE_1: [Of; 15] = [
 
 #[rustfmt::skip]
 pub(super) static PAGE_2: [Of; 9] = [
-    issue(&[(6, 10)]),
+    ISSUE,
     plain!("m0_rad", [(16, 32)], Turn, -31, ORBIT, ephemeris.m0_rad),
     plain!("omega_dot_radps", [(48, 24)], Semicircles, -43, ORBIT, ephemeris.omega_dot_radps),
     plain!("eccentricity", [(72, 32)], Unsigned, -33, ORBIT, ephemeris.eccentricity),
@@ -73,7 +56,7 @@ pub(super) static PAGE_2: [Of; 9] = [
 
 #[rustfmt::skip]
 pub(super) static PAGE_3: [Of; 11] = [
-    issue(&[(6, 10)]),
+    ISSUE,
     plain!("i0_rad", [(16, 32)], Semicircles, -31, ORBIT, ephemeris.i0_rad),
     plain!("omega_rad", [(48, 32)], Turn, -31, ORBIT, ephemeris.omega_rad),
     plain!("delta_n_radps", [(80, 16)], Semicircles, -43, ORBIT, ephemeris.delta_n_radps),
@@ -91,7 +74,7 @@ pub(super) static PAGE_3: [Of; 11] = [
 /// Fields of page 4 that belong to the ephemeris.
 #[rustfmt::skip]
 pub(super) static PAGE_4: [Of; 3] = [
-    issue(&[(6, 10)]),
+    ISSUE,
     plain!("cic_rad", [(16, 16)], Signed, -29, ORBIT, ephemeris.cic_rad),
     plain!("cis_rad", [(32, 16)], Signed, -29, ORBIT, ephemeris.cis_rad),
 ];
@@ -125,12 +108,6 @@ pub(super) static PAGE_4_GPS: [Element<Offset>; 4] = [
     element(Field::new("ggto_week", &[(183, 6)], Whole, 0, OFFSET), |o| o.field(3), |_, _| {}),
 ];
 
-const ISSUE_OF_ALMANAC: Element<Triple> = element(
-    Field::new("almanac_issue", &[(6, 4)], Whole, 0, ALMANAC),
-    |t| f64::from(t.issue),
-    |t, v| t.issue = v as u8,
-);
-
 /// The longitude of the second satellite's node, of which page 5 has the first four bits of sixteen and page
 /// 6 the others.
 const SPLIT: Field = Field::new("omega0_rad", &[(0, 16)], Turn, -15, ALMANAC);
@@ -147,38 +124,11 @@ fn join(entry: &mut Entry, mask: i64, bits: i64) {
     entry.omega0_rad = SPLIT.value(if raw >= 1 << 15 { raw - (1 << 16) } else { raw });
 }
 
-/// A field of one of the three satellites, from its first bit on.
-macro_rules! of {
-    ($entry:literal, number, $at:literal) => {
-        element(
-            Field::new("svid", &[($at, 6)], Whole, 0, ALMANAC),
-            |t| f64::from(t.entries[$entry].number),
-            |t, v| t.entries[$entry].number = v as u8,
-        )
-    };
-    ($entry:literal, health, $at:literal) => {
-        element(
-            Field::new("e5a_health", &[($at, 2)], Whole, 0, STATUS),
-            |t| f64::from(t.entries[$entry].e5a_health),
-            |t, v| t.entries[$entry].e5a_health = v as u8,
-        )
-    };
-    ($entry:literal, $field:ident, $at:literal, $bits:literal, $kind:ident, $exponent:literal) => {
-        element(
-            Field::new(stringify!($field), &[($at, $bits)], $kind, $exponent, ALMANAC),
-            |t| t.entries[$entry].$field,
-            |t, v| t.entries[$entry].$field = v,
-        )
-    };
-}
-
 #[rustfmt::skip]
 pub(super) static PAGE_5: [Element<Triple>; 20] = [
-    ISSUE_OF_ALMANAC,
-    element(Field::new("almanac_week", &[(10, 2)], Whole, 0, ALMANAC),
-        |t| (t.toa.week() - GST_WEEK).rem_euclid(4) as f64, |_, _| {}),
-    element(Field::new("toa_10min", &[(12, 10)], Whole, 0, ALMANAC),
-        |t| t.toa.tow_s() / TOA_STEP_S as f64, |_, _| {}),
+    almanac::ISSUE,
+    almanac::WEEK,
+    almanac::TOA,
     of!(0, number, 22),
     of!(0, delta_sqrt_a_sqrtm, 28, 13, Signed, -9),
     of!(0, eccentricity, 41, 11, Unsigned, -16),
@@ -189,7 +139,7 @@ pub(super) static PAGE_5: [Element<Triple>; 20] = [
     of!(0, m0_rad, 106, 16, Turn, -15),
     of!(0, af0_s, 122, 16, Signed, -19),
     of!(0, af1_sps, 138, 13, Signed, -38),
-    of!(0, health, 151),
+    of!(0, e5a_health, 151, status),
     of!(1, number, 153),
     of!(1, delta_sqrt_a_sqrtm, 159, 13, Signed, -9),
     of!(1, eccentricity, 172, 11, Unsigned, -16),
@@ -202,7 +152,7 @@ pub(super) static PAGE_5: [Element<Triple>; 20] = [
 
 #[rustfmt::skip]
 pub(super) static PAGE_6: [Element<Triple>; 18] = [
-    ISSUE_OF_ALMANAC,
+    almanac::ISSUE,
     element(Field::new("omega0_low", &[(10, 12)], Whole, 0, ALMANAC),
         |t| (split(&t.entries[1]) & 0xFFF) as f64,
         |t, v| join(&mut t.entries[1], 0xFFF, v as i64)),
@@ -210,7 +160,7 @@ pub(super) static PAGE_6: [Element<Triple>; 18] = [
     of!(1, m0_rad, 33, 16, Turn, -15),
     of!(1, af0_s, 49, 16, Signed, -19),
     of!(1, af1_sps, 65, 13, Signed, -38),
-    of!(1, health, 78),
+    of!(1, e5a_health, 78, status),
     of!(2, number, 80),
     of!(2, delta_sqrt_a_sqrtm, 86, 13, Signed, -9),
     of!(2, eccentricity, 99, 11, Unsigned, -16),
@@ -221,20 +171,17 @@ pub(super) static PAGE_6: [Element<Triple>; 18] = [
     of!(2, m0_rad, 164, 16, Turn, -15),
     of!(2, af0_s, 180, 16, Signed, -19),
     of!(2, af1_sps, 196, 13, Signed, -38),
-    of!(2, health, 209),
+    of!(2, e5a_health, 209, status),
 ];
 
 /// Lists every field by the page that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
-    fn of<T>(table: &'static [Element<T>]) -> Vec<&'static Field> {
-        table.iter().map(|element| &element.field).collect()
-    }
     vec![
-        ("page 1", of(&PAGE_1)),
-        ("page 2", of(&PAGE_2)),
-        ("page 3", of(&PAGE_3)),
-        ("page 4", [of(&PAGE_4), of(&PAGE_4_UTC), of(&PAGE_4_GPS)].concat()),
-        ("page 5", of(&PAGE_5)),
-        ("page 6", of(&PAGE_6)),
+        ("page 1", fields(&[&PAGE_1])),
+        ("page 2", fields(&[&PAGE_2])),
+        ("page 3", fields(&[&PAGE_3])),
+        ("page 4", [fields(&[&PAGE_4]), fields(&[&PAGE_4_UTC]), fields(&[&PAGE_4_GPS])].concat()),
+        ("page 5", fields(&[&PAGE_5])),
+        ("page 6", fields(&[&PAGE_6])),
     ]
 }

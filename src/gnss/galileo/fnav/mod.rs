@@ -11,10 +11,10 @@
 mod fields;
 mod reader;
 
-use crate::bits::{Element, FieldError, Store, bits_of, integers, number, write_all};
+use crate::bits::{Element, FieldError, Store, integers, soft, write_all};
 use crate::broadcast::{Ephemeris, SetForm};
-use crate::crc::crc24q;
 use crate::fec::interleaver::Interleaver;
+use crate::fec::pages::Form;
 use crate::galileo::inav::almanac::{Offset, TRIPLES, Triple, offset_of};
 use crate::galileo::inav::fields::{FIXED, Orbit, Utc, coefficients};
 use crate::galileo::inav::{GST_WEEK, INAV, INAV_E5B, code};
@@ -44,11 +44,9 @@ pub static FNAV: Message = Message {
     set: &PAGES_OF_SET,
     reduced: &[],
     ionosphere: IonosphereForm { model: Model::NequickG, unit: |start| page_at(start) == 1, coefficients: ionosphere },
-    set_parameters: || OF_SET.parameters(),
-    elements: |sv, raw, near| OF_SET.elements(sv, raw, near),
+    fields: &OF_SET,
     parameters: |symbols| {
-        let soft: Vec<f32> = symbols.iter().map(|&bit| if bit { -1.0 } else { 1.0 }).collect();
-        let (page, _) = decode_soft(&soft)?;
+        let (page, _) = decode_soft(&soft(symbols))?;
         parameters(&page).map(|found| (true, found))
     },
     reader: |sv| Box::new(FnavReader::new(sv)),
@@ -57,10 +55,7 @@ pub static FNAV: Message = Message {
         Ephemeris { form: &FNAV_SETS, af0_s: set.af0_s + ahead_s, ..set.clone() }
     },
     sets: &FNAV_SETS,
-    quantised,
-    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "FNAV", common: "IFNV", fields: tables, lines: None }),
 };
 
@@ -82,16 +77,20 @@ const PAGE_S: i64 = 10;
 const SUBFRAME_S: i64 = 50;
 const PAIR_S: i64 = 2 * SUBFRAME_S;
 /// Symbols of the pattern with which a page begins (4.2.2.1), and of a page.
-const PATTERN: [bool; 12] = [true, false, true, true, false, true, true, true, false, false, false, false];
+const PATTERN: (u128, usize) = (0b1011_0111_0000, 12);
 const PAGE_SYMBOLS: usize = 500;
-/// Bits of a page without and with its check, and with the tail of zeros (4.2.2.2).
+/// Bits of a page without its check and the tail of six zeros (4.2.2.2).
 const DATA_BITS: usize = 214;
-const CHECK_BITS: usize = 24;
-const PAGE_BITS: usize = 244;
 /// The pages of an ephemeris, all of which state their time.
 const PAGES_OF_SET: [u8; 4] = [1, 2, 3, 4];
 
-const INTERLEAVER: Interleaver = Interleaver { columns: 61, rows: 8 };
+const FORM: Form = Form {
+    pattern: PATTERN,
+    data_bits: DATA_BITS,
+    tail_bits: 6,
+    code,
+    interleaver: Interleaver { columns: 61, rows: 8 },
+};
 
 /// Bits that nobody reads, as satellites sent them in 2025: ones and zeros in turn, by page with the first
 /// position and the first bit.
@@ -119,10 +118,7 @@ struct Pages {
 
 impl Sender for Pages {
     fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
-        if start.tow_whole_s() % PAGE_S != 0 || start.fraction() != 0.0 {
-            let expected = "a multiple of 10 s";
-            return Err(FieldError::Start { message: FNAV.name, start_s: start.tow_s(), expected });
-        }
+        FNAV.check_start(start, "a multiple of 10 s")?;
         Ok(encode_page(&self.page(page_at(start), ephemeris, start)?))
     }
 }
@@ -161,27 +157,13 @@ impl Pages {
 
 /// The symbols of a page of 214 bits: pattern, then the bits with check and tail, coded and interleaved.
 pub fn encode_page(page: &[bool]) -> Vec<bool> {
-    let check = crc24q(page.iter().copied());
-    let mut bits: Vec<bool> = page.iter().copied().chain(bits_of(u128::from(check), CHECK_BITS)).collect();
-    bits.resize(PAGE_BITS, false);
-    let coded = INTERLEAVER.interleave(&code().encode(&bits));
-    PATTERN.into_iter().chain(coded).collect()
+    FORM.pattern().chain(FORM.coded(page)).collect()
 }
 
 /// The 214 bits in the 500 soft symbols of a page, and whether they are inverted; `None` where the check
 /// is wrong.
 pub fn decode_soft(symbols: &[f32]) -> Option<(Vec<bool>, bool)> {
-    if symbols.len() != PAGE_SYMBOLS {
-        return None;
-    }
-    let sum: f32 = symbols.iter().zip(PATTERN).map(|(soft, bit)| if bit { -soft } else { *soft }).sum();
-    let inverted = sum < 0.0;
-    let sense = if inverted { -1.0 } else { 1.0 };
-    let coded: Vec<f32> = symbols[PATTERN.len()..].iter().map(|soft| soft * sense).collect();
-    let mut bits = code().decode(&INTERLEAVER.deinterleave(&coded));
-    let check = number(&bits[DATA_BITS..DATA_BITS + CHECK_BITS]) as u32;
-    bits.truncate(DATA_BITS);
-    (crc24q(bits.iter().copied()) == check).then_some((bits, inverted))
+    FORM.decode(symbols)
 }
 
 /// The raw integers of all parameters of a page but its time; `None` for almanacs.
@@ -199,27 +181,19 @@ pub fn parameters(page: &Vec<bool>) -> Option<Parameters> {
 
 /// Tables of the ephemeris.
 static OF_SET: SetTables<Orbit, Vec<bool>> = SetTables {
-    parts: &[&PAGE_1, &PAGE_2, &PAGE_3, &PAGE_4],
     passing: &["tow_s"],
     fixed: &[&FIXED],
-    sets: &FNAV_SETS,
-    blank: || vec![false; DATA_BITS],
-    content: Orbit::of,
-    ephemeris: |orbit| orbit.ephemeris,
+    ..SetTables::of(
+        &FNAV_SETS,
+        &[&PAGE_1, &PAGE_2, &PAGE_3, &PAGE_4],
+        || vec![false; DATA_BITS],
+        (Orbit::of, |orbit| orbit.ephemeris),
+    )
 };
 
 /// The coefficients of the ionosphere that raw integers of page 1 give.
 fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
     coefficients(|name| OF_SET.value(name, raw))
-}
-
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays, and so does what
-/// the message does not state.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    OF_SET.quantised(ephemeris.clone())
 }
 
 /// The elements in pages 1 to 4 with the time at which page 1 was sent; `None` where the issues differ or

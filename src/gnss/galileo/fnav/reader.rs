@@ -6,23 +6,18 @@ use super::{
     FNAV, PAGE_SYMBOLS, PAGES_OF_SET, PATTERN, decode_soft, elements, gps_offset, ionosphere, page_type, parameters,
     sent_at, time_of_week,
 };
-use crate::framed::{Content, Framed, Reported};
-use crate::message::{Parameters, Read};
+use crate::framed::{Content, Framed, Pattern, Reported};
+use crate::message::{Parameters, Read, raw_of};
 use crate::satellite::Sv;
 use crate::time::Epoch;
 
+/// Pattern of a page.
+const BEGIN: Pattern = Pattern { bits: PATTERN.0, symbols: PATTERN.1, tolerated: 0 };
 /// Parameters that change from page to page of the same ephemeris.
 const PASSING: [&str; 1] = ["week"];
 
 /// Reader of F/NAV.
 pub type FnavReader = Framed<FnavContent>;
-
-impl FnavReader {
-    /// Creates a reader that has received no symbols.
-    pub fn new(sv: Sv) -> Self {
-        Self::of(FnavContent { sv, pages: BTreeMap::new(), reported: Reported::without(&PASSING) })
-    }
-}
 
 /// Content of a satellite's pages.
 #[derive(Clone, Debug)]
@@ -50,10 +45,12 @@ impl Content for FnavContent {
     const SYMBOLS: usize = PAGE_SYMBOLS;
     const FAILURES: u32 = 3;
 
-    /// The pattern is there, normal or inverted.
+    fn new(sv: Sv) -> Self {
+        Self { sv, pages: BTreeMap::new(), reported: Reported::without(&PASSING) }
+    }
+
     fn may_begin(&self, symbols: &[f32]) -> bool {
-        let has = |flip: bool| symbols.iter().zip(PATTERN).all(|(soft, bit)| (*soft < 0.0) == (bit ^ flip));
-        [false, true].into_iter().any(has)
+        BEGIN.begins(symbols)
     }
 
     fn decode(&self, symbols: &[f32]) -> Option<Self::Frame> {
@@ -69,7 +66,7 @@ impl Content for FnavContent {
         let kind = page_type(&page);
         if kind == 1 {
             let all = parameters(&page).unwrap_or_default();
-            let raw = |name: &str| all.iter().find(|(other, _)| *other == name).map(|(_, raw)| *raw);
+            let raw = |name: &str| raw_of(&all, name);
             news.extend(ionosphere(&raw).map(Read::Ionosphere));
         }
         if kind == 4 {

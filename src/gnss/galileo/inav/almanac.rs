@@ -129,17 +129,17 @@ const NO_OFFSET: [f64; 4] = [-1.0 / 34_359_738_368.0, -1.0 / 2_251_799_813_685_2
 
 type Of = Element<Triple>;
 
-const ISSUE: Of = element(
+pub(in crate::galileo) const ISSUE: Of = element(
     Field::new("almanac_issue", &[(6, 4)], Whole, 0, ALMANAC),
     |t| f64::from(t.issue),
     |t, v| t.issue = v as u8,
 );
-const WEEK: Of = element(
+pub(in crate::galileo) const WEEK: Of = element(
     Field::new("almanac_week", &[(10, 2)], Whole, 0, ALMANAC),
     |t| (t.toa.week() - GST_WEEK).rem_euclid(4) as f64,
     |_, _| {},
 );
-const TOA: Of = element(
+pub(in crate::galileo) const TOA: Of = element(
     Field::new("toa_10min", &[(12, 10)], Whole, 0, ALMANAC),
     |t| t.toa.tow_s() / TOA_STEP_S as f64,
     |t, v| t.toa = Epoch::new(t.toa.week() * WEEK_S + v as i64 * TOA_STEP_S, 0.0),
@@ -169,6 +169,8 @@ macro_rules! of {
         )
     };
 }
+
+pub(in crate::galileo) use of;
 
 #[rustfmt::skip]
 pub(super) static WORD_7: [Of; 11] = [

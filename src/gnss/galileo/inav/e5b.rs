@@ -5,41 +5,20 @@
 //! what satellites sent in 2025 (`tests/witness`).
 
 use super::reader::InavReader;
-use super::{
-    INAV, INAV_SETS, On, PAGE_S, Pages, SPARE, SUBFRAME_S, alerted, form, ionosphere, of_issue, opened, quantised,
-    tables,
-};
-use crate::ionosphere::Model;
-use crate::message::{IonosphereForm, Message, Records};
+use super::{INAV, On, Pages, SPARE, SUBFRAME_S};
+use crate::message::{IonosphereForm, Message};
 use crate::time::Epoch;
 
 /// I/NAV as E5b names it. Its ephemerides are those of I/NAV on E1-B.
 pub static INAV_E5B: Message = Message {
     name: "I/NAV on E5b",
-    symbol_s: INAV.symbol_s,
-    bit: |_| &[1],
-    unit_s: PAGE_S,
-    decided_after: 0,
-    set_s: PAGE_S,
     first_s: 0,
     sender: |common| Ok(Box::new(Pages { common: common.clone(), carrier: &ON_E5B })),
     number: word_at,
-    timed: &[SPARE, 5, 6],
-    dated: &[],
-    set: &[1, 2, 3, 4, 5],
     reduced: &[],
-    ionosphere: IonosphereForm { model: Model::NequickG, unit: |start| word_at(start) == 5, coefficients: ionosphere },
-    set_parameters: of_issue,
-    elements: INAV.elements,
-    parameters: opened,
+    ionosphere: IonosphereForm { unit: |start| word_at(start) == 5, ..INAV.ionosphere },
     reader: |sv| Box::new(InavReader::on(&INAV_E5B, sv)),
-    form,
-    sets: &INAV_SETS,
-    quantised,
-    adjustable: INAV.adjustable,
-    alert: Some(alerted),
-    adjust: INAV.adjust,
-    rinex: Some(Records { set: |_| "INAV", common: "IFNV", fields: tables, lines: None }),
+    ..INAV
 };
 
 /// The last 24 of the reserved bits before the check are ones and zeros in turn.

@@ -4,7 +4,7 @@
 use super::almanac::{GPS_OFFSET, WORD_7, WORD_8, WORD_9, WORD_10};
 use super::reduced::WORD_16;
 use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::bits::{Element, Field, element, plain};
+use crate::bits::{Element, Field, element, fields, plain};
 use crate::broadcast::Ephemeris;
 use crate::galileo::status::{E1B, E5B};
 use crate::ionosphere::Coefficients;
@@ -96,19 +96,19 @@ pub(in crate::galileo) fn gst_week(at: Epoch) -> f64 {
 }
 
 /// The issue of data, alike in words 1 to 4.
-const ISSUE: Of = element(
+pub(in crate::galileo) const ISSUE: Of = element(
     Field::new("iodnav", &[(6, 10)], Whole, 0, "5.1.9.2"),
     |o| f64::from(o.ephemeris.iode),
     |o, v| (o.ephemeris.iode, o.ephemeris.iodc) = (v as u16, v as u16),
 );
 
 /// The week of sending; what sets it is the caller.
-const fn week(pieces: &'static [(u16, u8)]) -> Of {
+pub(in crate::galileo) const fn week(pieces: &'static [(u16, u8)]) -> Of {
     element(Field::new("week", pieces, Whole, 0, TIME), |o| gst_week(o.ephemeris.transmitted), |_, _| {})
 }
 
 /// The time of week of sending.
-const fn tow(pieces: &'static [(u16, u8)]) -> Of {
+pub(in crate::galileo) const fn tow(pieces: &'static [(u16, u8)]) -> Of {
     element(Field::new("tow_s", pieces, Whole, 0, TIME), |o| o.ephemeris.transmitted.tow_s(), |_, _| {})
 }
 
@@ -215,21 +215,18 @@ pub fn sisa_index(accuracy_m: Option<f64>) -> u8 {
 
 /// Lists every field by the word that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
-    fn of<T>(table: &'static [Element<T>]) -> Vec<&'static Field> {
-        table.iter().map(|element| &element.field).collect()
-    }
     vec![
-        ("word 0", of(&WORD_0)),
-        ("word 1", of(&WORD_1)),
-        ("word 2", of(&WORD_2)),
-        ("word 3", of(&WORD_3)),
-        ("word 4", of(&WORD_4)),
-        ("word 5", of(&WORD_5)),
-        ("word 6", of(&WORD_6)),
-        ("word 7", of(&WORD_7)),
-        ("word 8", of(&WORD_8)),
-        ("word 9", of(&WORD_9)),
-        ("word 10", WORD_10.iter().chain(&GPS_OFFSET).map(|element| &element.field).collect()),
-        ("word 16", of(&WORD_16)),
+        ("word 0", fields(&[&WORD_0])),
+        ("word 1", fields(&[&WORD_1])),
+        ("word 2", fields(&[&WORD_2])),
+        ("word 3", fields(&[&WORD_3])),
+        ("word 4", fields(&[&WORD_4])),
+        ("word 5", fields(&[&WORD_5])),
+        ("word 6", fields(&[&WORD_6])),
+        ("word 7", fields(&[&WORD_7])),
+        ("word 8", fields(&[&WORD_8])),
+        ("word 9", fields(&[&WORD_9])),
+        ("word 10", fields(&[&WORD_10, &GPS_OFFSET])),
+        ("word 16", fields(&[&WORD_16])),
     ]
 }

@@ -14,16 +14,16 @@ mod reader;
 mod reduced;
 mod redundancy;
 
-use crate::bits::{Element, FieldError, Store, bits_of, integers, number, read_all, write_all};
+use crate::bits::{Element, FieldError, Store, bits_of, integers, number, read_all, soft, write_all};
 use crate::broadcast::{Ephemeris, SetForm};
-use crate::crc::crc24q;
+use crate::crc::{CHECK_BITS, crc24q};
 use crate::fec::convolutional::Convolutional;
 use crate::fec::interleaver::Interleaver;
 use crate::galileo::cnav::CNAV;
 use crate::galileo::fnav::FNAV_SETS;
 use crate::galileo::status::{self, Band};
 use crate::ionosphere::{Coefficients, Model};
-use crate::message::{Common, IonosphereForm, Message, Records, Sender};
+use crate::message::{Common, IonosphereForm, Message, Records, Sender, raw_of};
 use crate::satellite::Sv;
 use crate::set_tables::SetTables;
 use crate::time::{Epoch, WEEK_S};
@@ -55,16 +55,12 @@ pub static INAV: Message = Message {
     set: &[1, 2, 3, 4, 5],
     reduced: &[REDUCED],
     ionosphere: IonosphereForm { model: Model::NequickG, unit: |start| word_at(start) == 5, coefficients: ionosphere },
-    set_parameters: of_issue,
-    elements: |sv, raw, near| OF_SET.elements(sv, raw, near),
+    fields: &OF_SET,
     parameters: opened,
     reader: |sv| Box::new(InavReader::new(sv)),
     form,
     sets: &INAV_SETS,
-    quantised,
-    adjustable: || OF_SET.adjustable(),
     alert: Some(alerted),
-    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "INAV", common: "IFNV", fields: tables, lines: None }),
 };
 
@@ -123,7 +119,6 @@ const EVEN_WORD_BITS: usize = 112;
 const WORD_BEGIN: usize = 2;
 /// First bit of the check in the odd part (5.1.9.4). The check covers everything before it.
 const CHECK_BEGIN: usize = 82;
-const CHECK_BITS: usize = 24;
 /// First bit in the odd part of the bits before the check, and of those after it (4.3.2.3).
 const RESERVED_BEGIN: usize = 18;
 const RESERVED_BITS: usize = 64;
@@ -152,12 +147,6 @@ fn opened(symbols: &[bool]) -> Option<(bool, Vec<(&'static str, i64)>)> {
     let (bits, _) = decode_page(symbols)?;
     let word = word_of(&bits);
     parameters(&word).map(|found| (WORDS_OF_SET.contains(&word_type(&word)), found))
-}
-
-/// Names of the parameters in words 1 to 4.
-fn of_issue() -> Vec<&'static str> {
-    let words = tables().into_iter().filter(|(name, _)| ["word 1", "word 2", "word 3", "word 4"].contains(name));
-    words.flat_map(|(_, fields)| fields).map(|field| field.name).collect()
 }
 
 /// Type of the word that begins at a time, by the nominal sequence of E1-B (4.3.5, table 38). Before 2023,
@@ -196,10 +185,8 @@ struct Pages {
 impl Sender for Pages {
     fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
         let On { message, word_at, rest } = self.carrier;
-        if start.tow_whole_s() % PAGE_S != message.first_s || start.fraction() != 0.0 {
-            let expected = if message.first_s == 1 { "an odd whole second" } else { "an even whole second" };
-            return Err(FieldError::Start { message: message.name, start_s: start.tow_s(), expected });
-        }
+        message
+            .check_start(start, if message.first_s == 1 { "an odd whole second" } else { "an even whole second" })?;
         let word = self.word(word_at(start), ephemeris, start)?;
         Ok(encode_page(&page_with(&word, self.signed(ephemeris.sv, start, rest(start)))))
     }
@@ -347,8 +334,7 @@ pub fn encode_page(parts: &[Vec<bool>; 2]) -> Vec<bool> {
 
 /// The parts of 120 bits in the 500 symbols of a page without errors.
 fn decode_page(symbols: &[bool]) -> Option<([Vec<bool>; 2], bool)> {
-    let soft: Vec<f32> = symbols.iter().map(|&bit| if bit { -1.0 } else { 1.0 }).collect();
-    decode_soft(&soft)
+    decode_soft(&soft(symbols))
 }
 
 /// The parts of 120 bits in the 500 soft symbols of a page, and whether they are inverted; `None` where
@@ -423,23 +409,18 @@ fn ionosphere(raw: &dyn Fn(&str) -> Option<i64>) -> Option<Coefficients> {
 
 /// Tables of the ephemeris.
 static OF_SET: SetTables<Orbit, u128> = SetTables {
-    parts: &[&WORD_1, &WORD_2, &WORD_3, &WORD_4, &WORD_5],
+    // Word 5 has no issue.
+    issued: 4,
     // The week and time of word 5 are those of its sending, which the ephemeris has already.
     passing: &["tow_s"],
     fixed: &[&FIXED],
-    sets: &INAV_SETS,
-    blank: || 0,
-    content: Orbit::of,
-    ephemeris: |orbit| orbit.ephemeris,
+    ..SetTables::of(
+        &INAV_SETS,
+        &[&WORD_1, &WORD_2, &WORD_3, &WORD_4, &WORD_5],
+        || 0,
+        (Orbit::of, |orbit| orbit.ephemeris),
+    )
 };
-
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    OF_SET.quantised(ephemeris.clone())
-}
 
 /// The elements in short in word 16, sent at `start`, with the group delays and the health of word 5 where it
 /// was read.
@@ -474,7 +455,7 @@ pub fn ephemeris_of(sv: Sv, words: &[u128; 5], near: Epoch) -> Option<Ephemeris>
 /// Coefficients of the ionosphere in a word 5.
 pub fn ionosphere_of(word: &u128) -> Option<Coefficients> {
     let all = parameters(word)?;
-    ionosphere(&|name: &str| all.iter().find(|(other, _)| *other == name).map(|(_, raw)| *raw))
+    ionosphere(&|name: &str| raw_of(&all, name))
 }
 
 /// The start of the page by its own week and time of week, the week near `near`; `None` for words without

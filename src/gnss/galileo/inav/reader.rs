@@ -9,7 +9,7 @@ use super::{
 };
 use crate::bits::number;
 use crate::framed::{Content, Framed};
-use crate::message::{Message, Read, SentPage};
+use crate::message::{Message, Read, SentPage, raw_of};
 use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::Epoch;
@@ -18,23 +18,9 @@ use crate::time::Epoch;
 pub type InavReader = Framed<InavContent>;
 
 impl InavReader {
-    /// Creates a reader of E1-B that has received no symbols.
-    pub fn new(sv: Sv) -> Self {
-        Self::on(&INAV, sv)
-    }
-
-    /// Creates a reader of either carrier.
+    /// Creates a reader of either carrier that has received no symbols.
     pub(super) fn on(message: &'static Message, sv: Sv) -> Self {
-        Self::of(InavContent {
-            sv,
-            message,
-            words: BTreeMap::new(),
-            issue: None,
-            complete: None,
-            reduced: None,
-            timed: None,
-            pages: None,
-        })
+        Self::of(InavContent { message, ..InavContent::new(sv) })
     }
 }
 
@@ -78,7 +64,7 @@ impl InavContent {
         self.words.insert(word_type(&word), word);
         if word_type(&word) == 5 {
             let all = parameters(&word).unwrap_or_default();
-            let raw = |name: &str| all.iter().find(|(other, _)| *other == name).map(|(_, raw)| *raw);
+            let raw = |name: &str| raw_of(&all, name);
             news.extend(ionosphere(&raw).map(Read::Ionosphere));
         }
         match word_type(&word) {
@@ -166,6 +152,19 @@ impl Content for InavContent {
     type Frame = ([Vec<bool>; 2], bool);
     const SYMBOLS: usize = PAGE_SYMBOLS;
     const FAILURES: u32 = 5;
+
+    fn new(sv: Sv) -> Self {
+        Self {
+            sv,
+            message: &INAV,
+            words: BTreeMap::new(),
+            issue: None,
+            complete: None,
+            reduced: None,
+            timed: None,
+            pages: None,
+        }
+    }
 
     /// Both parts begin with the pattern, both normal or both inverted.
     fn may_begin(&self, symbols: &[f32]) -> bool {

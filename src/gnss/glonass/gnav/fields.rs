@@ -2,7 +2,7 @@
 //! numbers 85 (GLONASS ICD L1, L2 5.1, 4.3.2 and table 4.5). Kilometres are those of the document.
 
 use crate::bits::Kind::{Magnitude, Whole};
-use crate::bits::{Bits, Element, Field, element, plain};
+use crate::bits::{Bits, Element, Field, element, fields, plain};
 use crate::broadcast::{Ephemeris, StateVector};
 use crate::time::Epoch;
 
@@ -146,10 +146,13 @@ pub(super) static STRING_5: [Element<SystemTime>; 3] = [
 
 /// Lists every field by its string.
 pub fn tables() -> Vec<(u8, Vec<&'static Field>)> {
-    fn of<T>(table: &'static [Element<T>]) -> Vec<&'static Field> {
-        table.iter().map(|element| &element.field).collect()
-    }
-    vec![(1, of(&STRING_1)), (2, of(&STRING_2)), (3, of(&STRING_3)), (4, of(&STRING_4)), (5, of(&STRING_5))]
+    vec![
+        (1, fields(&[&STRING_1])),
+        (2, fields(&[&STRING_2])),
+        (3, fields(&[&STRING_3])),
+        (4, fields(&[&STRING_4])),
+        (5, fields(&[&STRING_5])),
+    ]
 }
 
 #[cfg(test)]

@@ -20,7 +20,7 @@ mod reader;
 
 use std::ops::RangeInclusive;
 
-use crate::bits::{FieldError, Store, bits_of, integers, write_all};
+use crate::bits::{FieldError, Store, bits_of, integers, soft, write_all};
 use crate::broadcast::{Ephemeris, SetForm};
 use crate::ionosphere::Model;
 use crate::message::{IonosphereForm, Message, Raw, Records, Sender};
@@ -48,21 +48,16 @@ pub static GNAV: Message = Message {
     reduced: &[],
     // It says nothing of it.
     ionosphere: IonosphereForm { model: Model::Klobuchar, unit: |_| false, coefficients: |_| None },
-    set_parameters: || OF_SET.parameters(),
-    elements: of_integers,
+    fields: &OF_SET,
     parameters: |symbols| {
-        let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
-        let string = decode_soft(&soft)?;
+        let string = decode_soft(&soft(symbols))?;
         let found = parameters(&string);
         (!found.is_empty()).then(|| (id(&string) <= 4, found))
     },
     reader: |sv| Box::new(GnavReader::new(sv)),
     form: Ephemeris::clone,
     sets: &GNAV_SETS,
-    quantised,
-    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "FDMA", common: "FDMA", fields: Vec::new, lines: None }),
 };
 
@@ -139,10 +134,7 @@ struct Strings;
 
 impl Sender for Strings {
     fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
-        if start.seconds() % STRING_S != 0 || start.fraction() != 0.0 {
-            let expected = "an even second of GLONASS time";
-            return Err(FieldError::Start { message: GNAV.name, start_s: start.tow_s(), expected });
-        }
+        GNAV.check_start(start, "an even second of GLONASS time")?;
         let mut string = GlonassString::default();
         let number = string_at(start);
         let frame = Epoch::new(start.seconds() - i64::from(number - 1) * STRING_S, 0.0);
@@ -165,7 +157,7 @@ impl Sender for Strings {
                 string.set_piece(FIVE, u32::from(frame_of_five < FRAMES - 1));
             }
             4 => {
-                check(ephemeris)?;
+                ephemeris.with_one_reference()?;
                 write_all(&STRING_4, ephemeris, &mut string)?;
                 string.set_piece(DAY, date(frame).1 as u32);
                 string.set_piece(KIND, MODERNISED);
@@ -252,18 +244,20 @@ pub fn parameters(string: &GlonassString) -> Vec<(&'static str, i64)> {
 /// Parameters by which ephemerides and senders are distinguished, and the health, which has a fault of its
 /// own, are fixed.
 static OF_SET: SetTables<Ephemeris, GlonassString> = SetTables {
-    parts: &[&STRING_1, &STRING_2, &STRING_3, &STRING_4],
-    passing: &[],
     fixed: &[&["health", "tb_quarters", "unhealthy", "day", "slot"]],
-    sets: &GNAV_SETS,
-    blank: GlonassString::default,
-    content: |ephemeris| ephemeris,
-    ephemeris: |ephemeris| ephemeris,
+    elements: of_integers,
+    quantised: |own, set| own.rounded(set.with_one_reference()?.clone()),
+    ..SetTables::of(
+        &GNAV_SETS,
+        &[&STRING_1, &STRING_2, &STRING_3, &STRING_4],
+        GlonassString::default,
+        (|set| set, |set| set),
+    )
 };
 
 /// The elements that raw integers give, as if they had been sent in the frame nearest to `near`.
-fn of_integers(sv: Sv, raw: Raw<'_>, near: Epoch) -> Option<Ephemeris> {
-    let found = OF_SET.elements(sv, raw, near)?;
+fn of_integers(tables: &SetTables<Ephemeris, GlonassString>, sv: Sv, raw: Raw<'_>, near: Epoch) -> Option<Ephemeris> {
+    let found = tables.of_integers(sv, raw, near)?;
     // Sent in a frame of the ephemeris's own half hour.
     let half_s = 0.5 * found.fit_interval_s();
     let late_s = near.since(found.toe).clamp(-half_s, half_s - FRAME_S as f64);
@@ -321,24 +315,6 @@ pub fn slot(four: &GlonassString) -> u8 {
     four.piece(SLOT) as u8
 }
 
-/// One reference time is sent for orbit and clock.
-fn check(ephemeris: &Ephemeris) -> Result<(), FieldError> {
-    if ephemeris.toe == ephemeris.toc {
-        Ok(())
-    } else {
-        Err(FieldError::References { toe_s: ephemeris.toe.tow_s(), toc_s: ephemeris.toc.tow_s() })
-    }
-}
-
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    check(ephemeris)?;
-    OF_SET.quantised(ephemeris.clone())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -358,8 +334,7 @@ mod tests {
         for second in (0..60).step_by(2) {
             let mut symbols = sender.unit(&set, start.plus_s(f64::from(second))).unwrap();
             if second % 30 == 8 {
-                let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
-                let mut string = decode_soft(&soft).unwrap();
+                let mut string = decode_soft(&soft(&symbols)).unwrap();
                 write_all(&STRING_5, &SystemTime { four_years: sent as f64, ..SystemTime::default() }, &mut string)
                     .unwrap();
                 symbols = encode(&string);
@@ -400,7 +375,7 @@ mod tests {
         let sets = [-900.0, 900.0].map(|from_s| {
             let toe = change.plus_s(from_s);
             let mut set = Ephemeris { form: &GNAV_SETS, toe, toc: toe, ..Ephemeris::blank(sv, toe) };
-            assert!(["x_km", "y_km", "z_km"].into_iter().all(|name| OF_SET.adjust(&mut set, name, from_s)));
+            assert!(["x_km", "y_km", "z_km"].into_iter().all(|name| GNAV.fields.adjust(&mut set, name, from_s)));
             set
         });
         let mut reader = (GNAV.reader)(sv);
@@ -437,8 +412,7 @@ mod tests {
             };
             for number in 1..=15 {
                 let symbols = sender.unit(&set, near.plus_s(f64::from(2 * (number - 1)))).unwrap();
-                let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
-                let string = decode_soft(&soft).unwrap();
+                let string = decode_soft(&soft(&symbols)).unwrap();
                 // Numbered from the last bit on, bit 65 of string 3 and bit 9 of the others (ICD 5.1, table
                 // 4.6).
                 let bit = |number: usize| string.0[STRING_BITS - number];

@@ -10,8 +10,7 @@ use super::{
 use crate::bits::Store;
 use crate::framed::{Content, Framed, Pattern, Reported};
 use crate::glonass::fdma::channel;
-use crate::message::{Parameters, Read};
-use crate::record::NavigationRow;
+use crate::message::Read;
 use crate::satellite::Sv;
 use crate::time::Epoch;
 
@@ -26,13 +25,6 @@ type Placed = (u64, GlonassString);
 
 /// Reader of the message.
 pub type GnavReader = Framed<GnavContent>;
-
-impl GnavReader {
-    /// Creates a reader that has received no symbols.
-    pub fn new(sv: Sv) -> Self {
-        Self::of(GnavContent { sv, parts: BTreeMap::new(), dated: None, reported: Reported::default(), known: None })
-    }
-}
 
 /// Content of a satellite's strings.
 #[derive(Clone, Debug)]
@@ -57,6 +49,10 @@ impl Content for GnavContent {
     type Frame = (GlonassString, bool);
     const SYMBOLS: usize = STRING_SYMBOLS;
     const FAILURES: u32 = 3;
+
+    fn new(sv: Sv) -> Self {
+        Self { sv, parts: BTreeMap::new(), dated: None, reported: Reported::default(), known: None }
+    }
 
     fn may_begin(&self, symbols: &[f32]) -> bool {
         END.begins(mark(symbols))
@@ -98,7 +94,7 @@ impl Content for GnavContent {
         news.push(Read::Unit { symbols: STRING_SYMBOLS as u64, of_week_s: start.tow_whole_s(), inverted });
         if number == 5 {
             news.push(Read::Time(start));
-            news.push(Read::Parameters(self.rows(0, parameters(&string))));
+            news.push(Read::parameters(self.sv, &GNAV, 0, parameters(&string)));
         }
         self.look_for_set((begin, start), &mut news);
         news
@@ -151,9 +147,5 @@ impl GnavContent {
         }
         let all = [one, two, three, four].into_iter().flat_map(|(_, string)| parameters(string)).collect();
         self.reported.take(GNAV.name, all, set, news);
-    }
-
-    fn rows(&self, issue: u32, parameters: Parameters) -> Vec<NavigationRow> {
-        NavigationRow::each(self.sv, GNAV.name, issue, parameters).collect()
     }
 }

@@ -3,7 +3,7 @@
 
 use super::Content;
 use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::bits::{Element, Field, element, plain};
+use crate::bits::{Element, Field, element, fields, plain};
 use crate::earth::GPS_PI;
 use crate::satellite::{Sv, System};
 use crate::time::Epoch;
@@ -164,13 +164,10 @@ pub(super) static TIME: [Of; 9] = [
 
 /// Lists every field by the message that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
-    fn of(tables: &[&'static [Of]]) -> Vec<&'static Field> {
-        tables.iter().flat_map(|table| table.iter()).map(|element| &element.field).collect()
-    }
     vec![
-        ("message 10", of(&[&HEADER, &ORBIT_1])),
-        ("message 11", of(&[&HEADER, &ORBIT_2])),
-        ("message 30", of(&[&HEADER, &CLOCKS, &DELAY])),
-        ("message 33", of(&[&HEADER, &CLOCKS, &TIME])),
+        ("message 10", fields(&[&HEADER, &ORBIT_1])),
+        ("message 11", fields(&[&HEADER, &ORBIT_2])),
+        ("message 30", fields(&[&HEADER, &CLOCKS, &DELAY])),
+        ("message 33", fields(&[&HEADER, &CLOCKS, &TIME])),
     ]
 }

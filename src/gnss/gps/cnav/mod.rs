@@ -17,9 +17,9 @@ mod fields;
 mod on_l2c;
 mod reader;
 
-use crate::bits::{Element, FieldError, bits_of, integers, number, read_all, write_all};
+use crate::bits::{Element, FieldError, integers, number, read_all, soft};
 use crate::broadcast::{Ephemeris, GPS_CLOCK_CODE, SetForm};
-use crate::crc::crc24q;
+use crate::crc::{self, CHECK_BITS, is_checked};
 use crate::exchange::modern;
 use crate::fec::convolutional::Convolutional;
 use crate::fec::running::MARGIN;
@@ -57,16 +57,12 @@ pub static CNAV: Message = Message {
         unit: |start| type_at(&CNAV, start) == IONOSPHERE,
         coefficients: ionosphere,
     },
-    set_parameters: || OF_SET.parameters(),
-    elements: |sv, raw, near| OF_SET.elements(sv, raw, near),
+    fields: &OF_SET,
     parameters: opened,
     reader: |sv| Box::new(CnavReader::of(&CNAV, sv)),
     form,
     sets: &CNAV_SETS,
-    quantised,
-    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "CNAV", common: "CNVX", fields: tables, lines: Some(record_lines) }),
 };
 
@@ -102,7 +98,6 @@ const ORDER: [u8; 4] = [10, 11, 30, 33];
 const IONOSPHERE: u8 = 30;
 /// Bits of a message without and with its check.
 const DATA_BITS: usize = 276;
-const CHECK_BITS: usize = 24;
 const BITS: usize = DATA_BITS + CHECK_BITS;
 const PREAMBLE: f64 = 139.0;
 /// Bits of the message before that the code remembers.
@@ -131,8 +126,7 @@ struct Content {
 
 /// The parameters of a unit's symbols; every message has some of an ephemeris.
 fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
-    let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
-    let bits = checked(CODE.decode_open(&soft))?;
+    let bits = checked(CODE.decode_open(&soft(symbols)))?;
     parameters(&bits).map(|found| (true, found))
 }
 
@@ -205,12 +199,8 @@ impl Sender for Messages {
     }
 
     fn unit_after(&self, before: &Ephemeris, set: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
-        let Message { name, unit_s, .. } = *self.message;
-        if start.tow_whole_s() % unit_s != 0 || start.fraction() != 0.0 {
-            let expected = "the beginning of a message";
-            return Err(FieldError::Start { message: name, start_s: start.tow_s(), expected });
-        }
-        let past = self.message(before, start.plus_s(-unit_s as f64))?;
+        self.message.check_start(start, "the beginning of a message")?;
+        let past = self.message(before, start.plus_s(-self.message.unit_s as f64))?;
         let memory = past.get(BITS - MEMORY_BITS..).unwrap_or_default();
         Ok(encode(memory, &self.message(set, start)?))
     }
@@ -233,13 +223,7 @@ impl Messages {
             utc: UtcNumbers::of(&self.common, start, &GPST, (0, 1)),
             ..blank(set.clone())
         };
-        let mut bits = vec![false; DATA_BITS];
-        for table in of_type(kind) {
-            write_all(table, &content, &mut bits)?;
-        }
-        let check = crc24q(bits.iter().copied());
-        bits.extend(bits_of(u128::from(check), CHECK_BITS));
-        Ok(bits)
+        crc::checked(&of_type(kind), &content, BITS)
     }
 }
 
@@ -268,7 +252,7 @@ pub fn checked(bits: Vec<bool>) -> Option<Vec<bool>> {
 /// True if bits form a message: the preamble and the check over all bits are right.
 fn is_message(bits: &[bool]) -> bool {
     let begins = bits.get(..8).is_some_and(|begin| number(begin) as f64 == PREAMBLE);
-    begins && bits.len() == BITS && crc24q(bits.iter().copied()) == 0
+    begins && bits.len() == BITS && is_checked(bits)
 }
 
 /// Type of a message, as it states it.
@@ -290,8 +274,6 @@ pub fn parameters(bits: &Vec<bool>) -> Option<Parameters> {
 /// Parameters by which ephemerides are distinguished, that are no ephemeris's, or that all satellites state
 /// alike, are fixed.
 static OF_SET: SetTables<Content, Vec<bool>> = SetTables {
-    parts: &[&ORBIT_1, &ORBIT_2, &CLOCKS, &DELAY],
-    passing: &[],
     fixed: &[
         &[
             "week",
@@ -306,10 +288,13 @@ static OF_SET: SetTables<Content, Vec<bool>> = SetTables {
         ],
         &Klobuchar::PARAMETERS,
     ],
-    sets: &CNAV_SETS,
-    blank: || vec![false; DATA_BITS],
-    content: blank,
-    ephemeris: |content| content.set,
+    quantised: |own, set| own.rounded(form(set)),
+    ..SetTables::of(
+        &CNAV_SETS,
+        &[&ORBIT_1, &ORBIT_2, &CLOCKS, &DELAY],
+        || vec![false; DATA_BITS],
+        (blank, |content| content.set),
+    )
 };
 
 /// Creates content in which nothing has been decoded.
@@ -333,14 +318,6 @@ fn blank(set: Ephemeris) -> Content {
 /// The coefficients of the ionosphere that raw integers of message 30 give.
 fn ionosphere(raw: Raw<'_>) -> Option<Coefficients> {
     Klobuchar::named(|name| OF_SET.value(name, raw)).map(Coefficients::Klobuchar)
-}
-
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    OF_SET.quantised(form(ephemeris))
 }
 
 /// The ephemeris in messages 10, 11 and 30 of the same reference time, the first sent at `sent`; `None` where

@@ -7,8 +7,7 @@ use super::{BITS, IONOSPHERE, MESSAGE_S, elements, ionosphere, is_message, messa
 use crate::bits::number;
 use crate::fec::running::Running;
 use crate::framed::Reported;
-use crate::message::{Message, Parameters, Read, Reader};
-use crate::record::NavigationRow;
+use crate::message::{Message, Parameters, Read, Reader, raw_of};
 use crate::satellite::Sv;
 use crate::time::{Epoch, WEEK_S};
 
@@ -51,13 +50,12 @@ impl CnavReader {
         let kind = message_type(&bits);
         if kind == IONOSPHERE {
             let all = parameters(&bits).unwrap_or_default();
-            let raw = |name: &str| all.iter().find(|(other, _)| *other == name).map(|(_, raw)| *raw);
+            let raw = |name: &str| raw_of(&all, name);
             news.extend(ionosphere(&raw).map(Read::Ionosphere));
             // Its reference time is that of its ephemeris, by which ephemerides are numbered.
             if let Some(issue) = raw("toc_5min") {
                 let own = all.iter().filter(|(name, _)| DELAY.iter().any(|element| element.field.name == *name));
-                let rows = NavigationRow::each(self.sv, self.message.name, issue as u32, own.copied().collect());
-                news.push(Read::Parameters(rows.collect()));
+                news.push(Read::parameters(self.sv, self.message, issue as u32, own.copied().collect()));
             }
         }
         if OF_SET.contains(&kind) {

@@ -4,7 +4,7 @@
 use super::Content;
 use super::almanac::{OF_MEDIUM, OF_REDUCED};
 use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::bits::{Element, Field, element, plain};
+use crate::bits::{Element, Field, element, fields, plain};
 use crate::gps::cnav::{REFERENCE_NODE_RADPS, STEP_S, reference_axis_m};
 use crate::time::Epoch;
 
@@ -116,13 +116,10 @@ pub(super) static OF_UTC: [Of; 9] = [
 
 /// Lists every field by the subframe that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
-    fn of(tables: &[&'static [Of]]) -> Vec<&'static Field> {
-        tables.iter().flat_map(|table| table.iter()).map(|element| &element.field).collect()
-    }
     vec![
-        ("subframe 2", of(&[&SET])),
-        ("subframe 3, page 1", of(&[&HEADER, &OF_UTC, &DELAY])),
-        ("subframe 3, page 3", of(&OF_REDUCED)),
-        ("subframe 3, page 4", of(&OF_MEDIUM)),
+        ("subframe 2", fields(&[&SET])),
+        ("subframe 3, page 1", fields(&[&HEADER, &OF_UTC, &DELAY])),
+        ("subframe 3, page 3", fields(&OF_REDUCED)),
+        ("subframe 3, page 4", fields(&OF_MEDIUM)),
     ]
 }

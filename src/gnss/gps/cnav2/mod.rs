@@ -19,9 +19,9 @@ mod reader;
 
 use std::sync::LazyLock;
 
-use crate::bits::{Element, FieldError, bits_of, integers, number, read_all, write_all};
+use crate::bits::{Element, FieldError, integers, number, read_all, soft};
 use crate::broadcast::{Ephemeris, SetForm};
-use crate::crc::crc24q;
+use crate::crc::{checked, is_checked};
 use crate::exchange::modern;
 use crate::fec::interleaver::Interleaver;
 use crate::fec::ldpc::Ldpc;
@@ -57,16 +57,12 @@ pub static CNAV2: Message = Message {
     set: &[1],
     reduced: &[],
     ionosphere: IonosphereForm { model: Model::Klobuchar, unit: is_first, coefficients: ionosphere },
-    set_parameters: || OF_SET.parameters(),
-    elements: |sv, raw, near| OF_SET.elements(sv, raw, near),
+    fields: &OF_SET,
     parameters: opened,
     reader: |sv| Box::new(Cnav2Reader::new(sv)),
     form,
     sets: &CNAV2_SETS,
-    quantised,
-    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "CNV2", common: "CNVX", fields: tables, lines: Some(record_lines) }),
 };
 
@@ -93,7 +89,6 @@ const FRAMES: i64 = INTERVAL_S / FRAME_S;
 /// Bits of subframes 2 and 3 with their checks, and of a check.
 const BITS_2: usize = 600;
 const BITS_3: usize = 274;
-const CHECK_BITS: usize = 24;
 /// Symbols of subframe 1, and of a frame.
 const SYMBOLS_1: usize = 52;
 const SYMBOLS: usize = SYMBOLS_1 + 2 * BITS_2 + 2 * BITS_3;
@@ -112,7 +107,7 @@ static FRAME: Subframes = Subframes {
     three: (&CODE_3, BITS_3),
     // Rows of 46 written, columns of 38 sent (3.2.3.5).
     interleaver: Interleaver { columns: 38, rows: 46 },
-    is_right: |bits| crc24q(bits.iter().copied()) == 0,
+    is_right: is_checked,
 };
 
 /// Content of the frames.
@@ -135,40 +130,29 @@ struct Content {
 
 /// Decoded frame with correct checks.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Frame {
-    /// Time of the next frame's beginning, in units of eighteen seconds.
-    pub time: u32,
-    /// True if the symbols were inverted.
-    pub inverted: bool,
-    /// Bits of subframe 2 with their check.
-    pub two: Vec<bool>,
-    /// Bits of subframe 3 with their check; `None` if the check fails.
-    pub three: Option<Vec<bool>>,
-}
+pub struct Frame(pub Blocks);
 
 impl Frame {
     /// Seconds of the week at which it began.
     pub fn of_week_s(&self) -> i64 {
-        let interval = number(self.two.get(13..21).unwrap_or_default()) as i64;
         // The count is that of the frame after, the interval that of this one.
-        let before = i64::from(self.time) + planted!("gnss.cnav2.time", FRAMES - 1, FRAMES);
-        (interval * INTERVAL_S + before.rem_euclid(FRAMES) * FRAME_S).rem_euclid(WEEK_S)
+        let before = i64::from(self.0.time) + planted!("gnss.cnav2.time", FRAMES - 1, FRAMES);
+        (self.0.interval() * INTERVAL_S + before.rem_euclid(FRAMES) * FRAME_S).rem_euclid(WEEK_S)
     }
 
     /// Start time of the frame, with its week near `near`.
     pub fn sent_at(&self, near: Epoch) -> Epoch {
-        let week = number(self.two.get(..13).unwrap_or_default()) as i64;
-        Epoch::new(near.nearest_week(week, 8192) * WEEK_S + self.of_week_s(), 0.0)
+        Epoch::new(near.nearest_week(self.0.week(), 8192) * WEEK_S + self.of_week_s(), 0.0)
     }
 
     /// The bits of page 1, if subframe 3 has that.
     fn page_1(&self) -> Option<&Vec<bool>> {
-        self.three.as_ref().filter(|bits| page(bits) == PAGE)
+        self.0.three.as_ref().filter(|bits| page(bits) == PAGE)
     }
 
     /// The number of the satellite's codes that subframe 3 states.
     fn prn(&self) -> Option<u128> {
-        self.three.as_ref().and_then(|bits| bits.get(..8)).map(number)
+        self.0.three.as_ref().and_then(|bits| bits.get(..8)).map(number)
     }
 }
 
@@ -189,8 +173,7 @@ pub fn interleaved(coded: &[bool]) -> Vec<bool> {
 /// The frame in 1800 soft symbols, positive for a logical 0, normal or inverted; `None` where its checks
 /// fail.
 pub fn decode(soft: &[f32]) -> Option<Frame> {
-    let Blocks { time, inverted, two, three } = FRAME.decode(soft)?;
-    Some(Frame { time, inverted, two, three })
+    FRAME.decode(soft).map(Frame)
 }
 
 /// Makes the frames of satellites.
@@ -201,10 +184,7 @@ struct Frames {
 
 impl Sender for Frames {
     fn unit(&self, set: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
-        if start.tow_whole_s() % FRAME_S != 0 || start.fraction() != 0.0 {
-            let expected = "a multiple of 18 s";
-            return Err(FieldError::Start { message: CNAV2.name, start_s: start.tow_s(), expected });
-        }
+        CNAV2.check_start(start, "a multiple of 18 s")?;
         let (page, entries) = self.almanacs.page_at(set.sv.system, start);
         let content = Content {
             page,
@@ -237,17 +217,6 @@ fn of_page(page: f64) -> Vec<&'static [Element<Content>]> {
     [&[header], rest].concat()
 }
 
-/// The bits of a subframe with their check.
-fn checked(tables: &[&'static [Element<Content>]], content: &Content, count: usize) -> Result<Vec<bool>, FieldError> {
-    let mut bits = vec![false; count - CHECK_BITS];
-    for table in tables {
-        write_all(table, content, &mut bits)?;
-    }
-    let check = crc24q(bits.iter().copied());
-    bits.extend(bits_of(u128::from(check), CHECK_BITS));
-    Ok(bits)
-}
-
 /// The ephemeris as CNAV-2 has it.
 fn form(set: &Ephemeris) -> Ephemeris {
     if *set.form == CNAV2_SETS {
@@ -273,7 +242,6 @@ fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
 /// Parameters by which ephemerides are distinguished, that are no ephemeris's, or that all satellites state
 /// alike, are fixed.
 static OF_SET: SetTables<Content, Vec<bool>> = SetTables {
-    parts: &[&SET, &DELAY],
     passing: &["week", "itow_2h"],
     fixed: &[
         &[
@@ -290,10 +258,8 @@ static OF_SET: SetTables<Content, Vec<bool>> = SetTables {
         ],
         &Klobuchar::PARAMETERS,
     ],
-    sets: &CNAV2_SETS,
-    blank: || vec![false; BITS_2],
-    content: blank,
-    ephemeris: |content| content.set,
+    quantised: |own, set| own.rounded(form(set)),
+    ..SetTables::of(&CNAV2_SETS, &[&SET, &DELAY], || vec![false; BITS_2], (blank, |content| content.set))
 };
 
 /// The raw integers of the ephemeris in subframe 2.
@@ -312,9 +278,8 @@ fn of_set_in(two: &Vec<bool>, page_1: &Vec<bool>) -> Parameters {
 
 /// The parameters of a unit's symbols: of subframe 2, and of page 1 where that is there.
 fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
-    let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
-    let frame = decode(&soft)?;
-    let mut found = of_two(&frame.two);
+    let frame = decode(&soft(symbols))?;
+    let mut found = of_two(&frame.0.two);
     if let Some(page_1) = frame.page_1() {
         found.extend(integers(&DELAY, page_1));
         found.extend(integers(&OF_UTC, page_1));
@@ -355,14 +320,6 @@ fn klobuchar(page_1: &Vec<bool>) -> Klobuchar {
     let mut content = nothing();
     read_all(&DELAY, page_1, &mut content);
     content.klobuchar
-}
-
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    OF_SET.quantised(form(ephemeris))
 }
 
 #[cfg(test)]

@@ -13,13 +13,6 @@ use crate::time::Epoch;
 /// Reader of CNAV-2.
 pub type Cnav2Reader = Framed<Cnav2Content>;
 
-impl Cnav2Reader {
-    /// Creates a reader that has received no symbols.
-    pub fn new(sv: Sv) -> Self {
-        Self::of(Cnav2Content { sv, page_1: None, reported: Reported::default() })
-    }
-}
-
 /// Content of a satellite's frames.
 #[derive(Clone, Debug)]
 pub struct Cnav2Content {
@@ -32,6 +25,10 @@ pub struct Cnav2Content {
 impl Content for Cnav2Content {
     type Frame = Frame;
     const SYMBOLS: usize = SYMBOLS;
+
+    fn new(sv: Sv) -> Self {
+        Self { sv, page_1: None, reported: Reported::default() }
+    }
 
     fn may_begin(&self, symbols: &[f32]) -> bool {
         FRAME.may_begin(symbols)
@@ -46,15 +43,15 @@ impl Content for Cnav2Content {
             return vec![Read::names_another("a frame", other)];
         }
         let sent = frame.sent_at(near);
-        let unit = Read::Unit { symbols: SYMBOLS as u64, of_week_s: frame.of_week_s(), inverted: frame.inverted };
+        let unit = Read::Unit { symbols: SYMBOLS as u64, of_week_s: frame.of_week_s(), inverted: frame.0.inverted };
         let mut news = vec![unit, Read::Time(sent)];
         if let Some(page_1) = frame.page_1() {
             self.page_1 = Some(page_1.clone());
             news.push(Read::Ionosphere(Coefficients::Klobuchar(klobuchar(page_1))));
         }
         let Some(beside) = &self.page_1 else { return news };
-        let all = of_set_in(&frame.two, beside);
-        let set = OF_SET.decoded(self.sv, [&frame.two, beside], sent);
+        let all = of_set_in(&frame.0.two, beside);
+        let set = OF_SET.decoded(self.sv, [&frame.0.two, beside], sent);
         self.reported.take(CNAV2.name, all, set, &mut news);
         news
     }

@@ -6,7 +6,7 @@
 
 use super::almanac::{Almanac, Utc};
 use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::bits::{Element, Field, Store, element, plain};
+use crate::bits::{Element, Field, Store, element, fields, plain};
 use crate::broadcast::Ephemeris;
 use crate::klobuchar::Klobuchar;
 
@@ -144,15 +144,12 @@ pub(super) static UTC_PAGE: [Element<Utc>; 8] = [
 
 /// Lists every field by the subframe or page that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
-    fn of<T>(table: &'static [Element<T>]) -> Vec<&'static Field> {
-        table.iter().map(|element| &element.field).collect()
-    }
     vec![
-        ("subframe 1", of(&SUBFRAME_1)),
-        ("subframe 2", of(&SUBFRAME_2)),
-        ("subframe 3", of(&SUBFRAME_3)),
-        ("almanac", of(&ALMANAC_PAGE)),
-        ("ionosphere, subframe 4 page 18", of(&IONOSPHERE_PAGE)),
-        ("utc, subframe 4 page 18", of(&UTC_PAGE)),
+        ("subframe 1", fields(&[&SUBFRAME_1])),
+        ("subframe 2", fields(&[&SUBFRAME_2])),
+        ("subframe 3", fields(&[&SUBFRAME_3])),
+        ("almanac", fields(&[&ALMANAC_PAGE])),
+        ("ionosphere, subframe 4 page 18", fields(&[&IONOSPHERE_PAGE])),
+        ("utc, subframe 4 page 18", fields(&[&UTC_PAGE])),
     ]
 }

@@ -66,16 +66,12 @@ pub static LNAV: Message = Message {
             Some(Coefficients::Klobuchar(found))
         },
     },
-    set_parameters: || OF_SET.parameters(),
-    elements: of_integers,
+    fields: &OF_SET,
     parameters: opened,
     reader: |sv| Box::new(LnavReader::new(sv)),
     form: |set| Ephemeris { form: &LNAV_SETS, signal_delays_s: Vec::new(), ..set.clone() },
     sets: &LNAV_SETS,
-    quantised,
-    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "LNAV", common: "LNAV", fields: tables, lines: None }),
 };
 
@@ -231,22 +227,16 @@ fn check_issue(ephemeris: &Ephemeris) -> Result<(), FieldError> {
     }
 }
 
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    check_issue(ephemeris)?;
-    OF_SET.quantised(ephemeris.clone())
-}
-
 /// Parameters by which ephemerides are distinguished, and the health, which has a fault of its own, are
 /// fixed.
 static OF_SET: SetTables<Ephemeris, [u32; 10]> = SetTables {
-    parts: &[&SUBFRAME_1, &SUBFRAME_2, &SUBFRAME_3],
-    passing: &[],
     fixed: &[&["week", "iodc", "iode", "health"]],
-    sets: &LNAV_SETS,
-    blank: || [0; 10],
-    content: |ephemeris| ephemeris,
-    ephemeris: |ephemeris| ephemeris,
+    elements: |_, sv, raw, near| of_integers(sv, raw, near),
+    quantised: |own, set| {
+        check_issue(set)?;
+        own.rounded(set.clone())
+    },
+    ..SetTables::of(&LNAV_SETS, &[&SUBFRAME_1, &SUBFRAME_2, &SUBFRAME_3], || [0; 10], (|set| set, |set| set))
 };
 
 /// Reason for which words are no subframe, or subframes no ephemeris.

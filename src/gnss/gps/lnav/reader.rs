@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use super::{PREAMBLE, SUBFRAME_S, Subframe, TOW_COUNTS, check_parity, ephemeris};
 use crate::ionosphere::Coefficients;
-use crate::message::{Read, Reader};
+use crate::message::{Read, Reader, raw_of};
 use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::{Epoch, WEEK_S};
@@ -163,15 +163,13 @@ impl LnavReader {
     fn read(&mut self, subframe: Subframe, near: Epoch, news: &mut Vec<Read>) {
         if let Some(klobuchar) = subframe.klobuchar() {
             news.push(Read::Ionosphere(Coefficients::Klobuchar(klobuchar)));
-            news.push(Read::Parameters(
-                NavigationRow::each(self.sv, super::LNAV.name, 0, subframe.parameters()).collect(),
-            ));
+            news.push(Read::parameters(self.sv, &super::LNAV, 0, subframe.parameters()));
         }
         if !(1..=3).contains(&subframe.id) {
             return;
         }
         if subframe.id == 1 {
-            let week = subframe.parameters().iter().find(|(name, _)| *name == "week").map(|(_, raw)| *raw);
+            let week = raw_of(&subframe.parameters(), "week");
             if let Some(week) = week {
                 let count = (i64::from(subframe.tow_count) - 1).rem_euclid(i64::from(TOW_COUNTS));
                 let week = near.nearest_week(week, 1024);

@@ -3,7 +3,7 @@
 
 use super::Content;
 use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::bits::{Element, Field, element, plain};
+use crate::bits::{Element, Field, element, fields, plain};
 use crate::time::Epoch;
 
 const TIME: &str = "subframe 2, time and health";
@@ -100,8 +100,5 @@ pub(super) static IONOSPHERE: [Of; 13] = [
 
 /// Lists every field by the subframe that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
-    fn of(tables: &[&'static [Of]]) -> Vec<&'static Field> {
-        tables.iter().flat_map(|table| table.iter()).map(|element| &element.field).collect()
-    }
-    vec![("subframe 2", of(&[&SET])), ("subframe 3, message 10", of(&[&HEADER, &IONOSPHERE]))]
+    vec![("subframe 2", fields(&[&SET])), ("subframe 3, message 10", fields(&[&HEADER, &IONOSPHERE]))]
 }

@@ -19,9 +19,9 @@ mod reader;
 
 use std::sync::LazyLock;
 
-use crate::bits::{Element, FieldError, bits_of, integers, number, read_all, write_all};
+use crate::bits::{Element, FieldError, integers, number, read_all, soft};
 use crate::broadcast::{Ephemeris, SetForm};
-use crate::crc::crc24q;
+use crate::crc::{checked, is_checked};
 use crate::exchange::modern;
 use crate::fec::interleaver::Interleaver;
 use crate::fec::ldpc::Ldpc;
@@ -57,16 +57,12 @@ pub static L1_NAV: Message = Message {
     set: &[1],
     reduced: &[],
     ionosphere: IonosphereForm { model: Model::KlobucharNavic, unit: |_| true, coefficients: ionosphere },
-    set_parameters: || OF_SET.parameters(),
-    elements: |sv, raw, near| OF_SET.elements(sv, raw, near),
+    fields: &OF_SET,
     parameters: opened,
     reader: |sv| Box::new(L1NavReader::new(sv)),
     form,
     sets: &L1_NAV_SETS,
-    quantised,
-    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "L1NV", common: "L1NV KLOB", fields: tables, lines: Some(record_lines) }),
 };
 
@@ -88,7 +84,6 @@ const FRAMES: i64 = INTERVAL_S / FRAME_S;
 /// Bits of subframes 2 and 3 with their checks, and of a check.
 const BITS_2: usize = 600;
 const BITS_3: usize = 274;
-const CHECK_BITS: usize = 24;
 /// Symbols of subframe 1, and of a frame.
 const SYMBOLS_1: usize = 52;
 const SYMBOLS: usize = SYMBOLS_1 + 2 * BITS_2 + 2 * BITS_3;
@@ -110,7 +105,7 @@ static FRAME: Subframes = Subframes {
     two: (&CODE_2, BITS_2),
     three: (&CODE_3, BITS_3),
     interleaver: Interleaver { columns: 38, rows: 46 },
-    is_right: |bits| crc24q(bits.iter().copied()) == 0,
+    is_right: is_checked,
 };
 
 /// Content of the frames.
@@ -135,15 +130,13 @@ pub struct Frame(pub Blocks);
 impl Frame {
     /// Seconds of the week at which it began.
     pub fn of_week_s(&self) -> i64 {
-        let interval = number(self.0.two.get(13..21).unwrap_or_default()) as i64;
         let before = i64::from(self.0.time) - planted!("gnss.navic.l1_time", 1, 0);
-        (interval * INTERVAL_S + before * FRAME_S).rem_euclid(WEEK_S)
+        (self.0.interval() * INTERVAL_S + before * FRAME_S).rem_euclid(WEEK_S)
     }
 
     /// Start time of the frame, with its week near `near`.
     pub fn sent_at(&self, near: Epoch) -> Epoch {
-        let week = number(self.0.two.get(..13).unwrap_or_default()) as i64;
-        Epoch::new(near.nearest_week(week + NAVIC_WEEK, 8192) * WEEK_S + self.of_week_s(), 0.0)
+        Epoch::new(near.nearest_week(self.0.week() + NAVIC_WEEK, 8192) * WEEK_S + self.of_week_s(), 0.0)
     }
 
     /// The bits of message type 10, if subframe 3 is that.
@@ -173,10 +166,7 @@ struct Frames(Common);
 
 impl Sender for Frames {
     fn unit(&self, set: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
-        if start.tow_whole_s() % FRAME_S != 0 || start.fraction() != 0.0 {
-            let expected = "a multiple of 18 s";
-            return Err(FieldError::Start { message: L1_NAV.name, start_s: start.tow_s(), expected });
-        }
+        L1_NAV.check_start(start, "a multiple of 18 s")?;
         let known = self.0.klobuchar_navic;
         let content = Content {
             week: (start.week() - NAVIC_WEEK).rem_euclid(8192) as f64,
@@ -192,17 +182,6 @@ impl Sender for Frames {
         let time = start.tow_whole_s() / FRAME_S % FRAMES + 1;
         Ok(sent(time as u32, &two, &three))
     }
-}
-
-/// The bits of a subframe with their check.
-fn checked(tables: &[&'static [Element<Content>]], content: &Content, count: usize) -> Result<Vec<bool>, FieldError> {
-    let mut bits = vec![false; count - CHECK_BITS];
-    for table in tables {
-        write_all(table, content, &mut bits)?;
-    }
-    let check = crc24q(bits.iter().copied());
-    bits.extend(bits_of(u128::from(check), CHECK_BITS));
-    Ok(bits)
 }
 
 /// The ephemeris as this message has it.
@@ -242,13 +221,10 @@ fn group_delay_s(set: &Ephemeris, signal: &Signal) -> f64 {
 
 /// Parameters by which ephemerides are distinguished, or that have a fault of their own, are fixed.
 static OF_SET: SetTables<Content, Vec<bool>> = SetTables {
-    parts: &[&SET],
     passing: &["week", "itow_2h", "alert", "prn"],
     fixed: &[&["week", "itow_2h", "alert", "prn", "toe_5min", "iodec", "l1_health", "reference_flag"]],
-    sets: &L1_NAV_SETS,
-    blank: || vec![false; BITS_2],
-    content: blank,
-    ephemeris: |content| content.set,
+    quantised: |own, set| own.rounded(form(set)),
+    ..SetTables::of(&L1_NAV_SETS, &[&SET], || vec![false; BITS_2], (blank, |content| content.set))
 };
 
 /// The raw integers of the ephemeris in subframe 2.
@@ -265,8 +241,7 @@ fn of_electrons_in(three: &Vec<bool>) -> Parameters {
 
 /// The parameters of a unit's symbols.
 fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
-    let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
-    let frame = decode(&soft)?;
+    let frame = decode(&soft(symbols))?;
     let mut found = of_set_in(&frame.0.two);
     found.extend(frame.electrons().map(of_electrons_in).unwrap_or_default());
     Some((true, found))
@@ -302,14 +277,6 @@ fn coefficients_in(three: &Vec<bool>) -> Coefficients {
     let mut content = blank(Ephemeris::blank(Sv::gps(1), Epoch::new(0, 0.0)));
     read_all(&IONOSPHERE, three, &mut content);
     Coefficients::KlobucharNavic(content.klobuchar)
-}
-
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    OF_SET.quantised(form(ephemeris))
 }
 
 /// The lines of a record (RINEX 4.02, table A32): of the two pairs of carriers that the clock may be of, the

@@ -6,19 +6,11 @@
 use super::{FRAME, Frame, L1_NAV, OF_SET, SYMBOLS, coefficients_in, decode, of_electrons_in, of_set_in};
 use crate::framed::{Content, Framed, Reported};
 use crate::message::Read;
-use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::Epoch;
 
 /// Reader of NavIC's message on L1.
 pub type L1NavReader = Framed<L1NavContent>;
-
-impl L1NavReader {
-    /// Creates a reader that has received no symbols.
-    pub fn new(sv: Sv) -> Self {
-        Self::of(L1NavContent { sv, reported: Reported::default() })
-    }
-}
 
 /// Content of a satellite's frames.
 #[derive(Clone, Debug)]
@@ -30,6 +22,10 @@ pub struct L1NavContent {
 impl Content for L1NavContent {
     type Frame = Frame;
     const SYMBOLS: usize = SYMBOLS;
+
+    fn new(sv: Sv) -> Self {
+        Self { sv, reported: Reported::default() }
+    }
 
     fn may_begin(&self, symbols: &[f32]) -> bool {
         FRAME.may_begin(symbols)
@@ -51,8 +47,7 @@ impl Content for L1NavContent {
         let issue = u32::from(set.iode);
         if let Some(three) = frame.electrons() {
             news.push(Read::Ionosphere(coefficients_in(three)));
-            let rows = NavigationRow::each(self.sv, L1_NAV.name, issue, of_electrons_in(three));
-            news.push(Read::Parameters(rows.collect()));
+            news.push(Read::parameters(self.sv, &L1_NAV, issue, of_electrons_in(three)));
         }
         self.reported.take(L1_NAV.name, of_set_in(&frame.0.two), set, &mut news);
         news

@@ -3,7 +3,7 @@
 
 use super::NAVIC_WEEK;
 use crate::bits::Kind::{Semicircles, Signed, Turn, Unsigned, Whole};
-use crate::bits::{Bits, Element, Field, element, plain};
+use crate::bits::{Bits, Element, Field, element, fields, plain};
 use crate::broadcast::Ephemeris;
 use crate::klobuchar::Klobuchar;
 use crate::message::Common;
@@ -187,14 +187,11 @@ pub(super) static MESSAGE_11: [Element<Klobuchar>; 8] = [
 
 /// Lists every field by the subframe or message that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
-    fn of<T>(table: &'static [Element<T>]) -> Vec<&'static Field> {
-        table.iter().map(|element| &element.field).collect()
-    }
     vec![
-        ("subframe 1", of(&SUBFRAME_1)),
-        ("subframe 2", of(&SUBFRAME_2)),
-        ("message 7", of(&MESSAGE_7)),
-        ("message 11", of(&MESSAGE_11)),
-        ("message 26", of(&MESSAGE_26)),
+        ("subframe 1", fields(&[&SUBFRAME_1])),
+        ("subframe 2", fields(&[&SUBFRAME_2])),
+        ("message 7", fields(&[&MESSAGE_7])),
+        ("message 11", fields(&[&MESSAGE_11])),
+        ("message 26", fields(&[&MESSAGE_26])),
     ]
 }

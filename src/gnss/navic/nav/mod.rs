@@ -13,14 +13,14 @@
 mod fields;
 mod reader;
 
-use crate::bits::{Bits, FieldError, Store, bits_of, integers, number, read_all, write_all};
+use crate::bits::{Bits, FieldError, Store, integers, read_all, soft, write_all};
 use crate::broadcast::{Ephemeris, PLAIN};
-use crate::crc::crc24q;
 use crate::fec::convolutional::Convolutional;
 use crate::fec::interleaver::Interleaver;
+use crate::fec::pages::Form;
 use crate::ionosphere::{Coefficients, Model};
 use crate::klobuchar::Klobuchar;
-use crate::message::{Common, IonosphereForm, Message, Records, Sender};
+use crate::message::{Common, IonosphereForm, Message, Records, Sender, raw_of};
 use crate::satellite::{Sv, System};
 use crate::set_tables::SetTables;
 use crate::time::{Epoch, WEEK_S};
@@ -55,8 +55,7 @@ pub static SPS_NAV: Message = Message {
             Some(coefficients(&page))
         },
     },
-    set_parameters: || OF_SET.parameters(),
-    elements: |sv, raw, near| OF_SET.elements(sv, raw, near).filter(is_whole),
+    fields: &OF_SET,
     parameters: |symbols| {
         let subframe = decode_soft(&soft(symbols))?;
         let found = parameters(&subframe);
@@ -65,10 +64,7 @@ pub static SPS_NAV: Message = Message {
     reader: |sv| Box::new(NavReader::new(sv)),
     form: Ephemeris::clone,
     sets: &PLAIN,
-    quantised,
-    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "LNAV", common: "LNAV", fields: tables, lines: None }),
 };
 
@@ -80,12 +76,9 @@ const FRAME_S: i64 = 48;
 /// Subframes of a week: the count of the next one's beginning runs below it.
 const TOW_COUNTS: i64 = WEEK_S / SUBFRAME_S;
 /// Symbols of the pattern with which a subframe begins, EB90 in hexadecimal, and of a subframe.
-const PATTERN: u16 = 0xEB90;
+const PATTERN: u128 = 0xEB90;
 const PATTERN_SYMBOLS: usize = 16;
 const SUBFRAME_SYMBOLS: usize = 600;
-/// Bits of the check and of the tail of zeros.
-const CHECK_BITS: usize = 24;
-const TAIL_BITS: usize = 6;
 /// Content of the telemetry word as real satellites send it.
 const TELEMETRY: u32 = 0x8B;
 /// Message types of subframes 3 and 4.
@@ -100,8 +93,13 @@ const ID: (u16, u8) = (27, 2);
 const MESSAGE: (u16, u8) = (30, 6);
 const SENDER: (u16, u8) = (256, 6);
 
-const CODE: Convolutional = Convolutional { second_inverted: false };
-const INTERLEAVER: Interleaver = Interleaver { columns: 73, rows: 8 };
+const FORM: Form = Form {
+    pattern: (PATTERN, PATTERN_SYMBOLS),
+    data_bits: DATA_BITS,
+    tail_bits: 6,
+    code: || Convolutional { second_inverted: false },
+    interleaver: Interleaver { columns: 73, rows: 8 },
+};
 
 fn blank() -> Subframe {
     Subframe::default()
@@ -146,15 +144,12 @@ struct Subframes {
 
 impl Sender for Subframes {
     fn unit(&self, ephemeris: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
-        if start.tow_whole_s() % SUBFRAME_S != 0 || start.fraction() != 0.0 {
-            let expected = "a multiple of 12 s";
-            return Err(FieldError::Start { message: SPS_NAV.name, start_s: start.tow_s(), expected });
-        }
+        SPS_NAV.check_start(start, "a multiple of 12 s")?;
         let mut subframe = blank();
         let on_air = Ephemeris { transmitted: start, ..ephemeris.clone() };
         match subframe_at(start) {
             1 => {
-                check(ephemeris)?;
+                ephemeris.with_one_reference()?;
                 write_all(&SUBFRAME_1, &on_air, &mut subframe)?;
             }
             2 => write_all(&SUBFRAME_2, &on_air, &mut subframe)?,
@@ -199,24 +194,13 @@ impl Subframes {
 
 /// The symbols of a subframe, with check and tail.
 pub fn encode(subframe: &Subframe) -> Vec<bool> {
-    let check = bits_of(u128::from(crc24q(subframe.0)), CHECK_BITS);
-    let bits: Vec<bool> = subframe.0.into_iter().chain(check).chain([false; TAIL_BITS]).collect();
-    let pattern = bits_of(u128::from(PATTERN), PATTERN_SYMBOLS);
-    pattern.chain(INTERLEAVER.interleave(&CODE.encode(&bits))).collect()
+    FORM.pattern().chain(FORM.coded(&subframe.0)).collect()
 }
 
 /// The subframe in soft symbols not inverted, its pattern among them; `None` where its check fails.
 pub fn decode_soft(symbols: &[f32]) -> Option<Subframe> {
-    let coded = symbols.get(PATTERN_SYMBOLS..SUBFRAME_SYMBOLS)?;
-    let bits = CODE.decode(&INTERLEAVER.deinterleave(coded));
-    let (data, rest) = bits.split_at_checked(DATA_BITS)?;
-    let check = number(rest.get(..CHECK_BITS)?) as u32;
-    let data: [bool; DATA_BITS] = data.try_into().ok()?;
-    (crc24q(data) == check).then_some(Bits(data))
-}
-
-fn soft(symbols: &[bool]) -> Vec<f32> {
-    symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect()
+    let data = FORM.data(symbols.get(PATTERN_SYMBOLS..SUBFRAME_SYMBOLS)?)?;
+    data.try_into().ok().map(Bits)
 }
 
 /// The raw integers of all parameters of a subframe; none for messages that are not read.
@@ -241,13 +225,10 @@ fn coefficients(subframe: &Subframe) -> Coefficients {
 /// Parameters by which ephemerides are distinguished, and the health, which has a fault of its own, are
 /// fixed.
 static OF_SET: SetTables<Ephemeris, Subframe> = SetTables {
-    parts: &[&SUBFRAME_1, &SUBFRAME_2],
-    passing: &[],
     fixed: &[&["week", "iodec", "toc_s", "toe_s", "health"]],
-    sets: &PLAIN,
-    blank,
-    content: |ephemeris| ephemeris,
-    ephemeris: |ephemeris| ephemeris,
+    elements: |own, sv, raw, near| own.of_integers(sv, raw, near).filter(is_whole),
+    quantised: |own, set| own.rounded(set.with_one_reference()?.clone()),
+    ..SetTables::of(&PLAIN, &[&SUBFRAME_1, &SUBFRAME_2], blank, (|set| set, |set| set))
 };
 
 /// Equal reference times show that subframes 1 and 2 are of one ephemeris.
@@ -263,28 +244,9 @@ pub fn elements(sv: Sv, one: &Subframe, two: &Subframe, near: Epoch) -> Option<E
 
 /// Start time of subframe 1 from its own week, which is near `near`.
 pub fn sent_at(one: &Subframe, near: Epoch) -> Option<Epoch> {
-    let week = integers(&SUBFRAME_1, one).iter().find(|(name, _)| *name == "week").map(|(_, raw)| *raw)?;
+    let week = raw_of(&integers(&SUBFRAME_1, one), "week")?;
     let week = near.nearest_week(week + NAVIC_WEEK, 1024);
     Some(Epoch::new(week * WEEK_S + began_s(one)?, 0.0))
-}
-
-/// Checks that the reference times of orbit and clock are equal. Receivers have no other sign that subframes
-/// 1 and 2 belong together.
-fn check(ephemeris: &Ephemeris) -> Result<(), FieldError> {
-    if ephemeris.toe == ephemeris.toc {
-        Ok(())
-    } else {
-        Err(FieldError::References { toe_s: ephemeris.toe.tow_s(), toc_s: ephemeris.toc.tow_s() })
-    }
-}
-
-/// Returns the ephemeris as a receiver decodes it after transmission; `transmitted` stays.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    check(ephemeris)?;
-    OF_SET.quantised(ephemeris.clone())
 }
 
 #[cfg(test)]

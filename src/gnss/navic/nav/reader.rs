@@ -6,24 +6,17 @@ use super::{
     ELECTRONS, PATTERN, PATTERN_SYMBOLS, SPS_NAV, SUBFRAME_SYMBOLS, Subframe, UTC, began_s, coefficients, decode_soft,
     elements, id, message_type, parameters, sent_at,
 };
+use crate::bits::upright;
 use crate::framed::{Content, Framed, Pattern, Reported};
-use crate::message::{Parameters, Read};
-use crate::record::NavigationRow;
+use crate::message::Read;
 use crate::satellite::Sv;
 use crate::time::Epoch;
 
 /// Pattern of a subframe. With two wrong symbols one of 240 positions looks like it, and the check decides.
-const BEGIN: Pattern = Pattern { bits: PATTERN as u128, symbols: PATTERN_SYMBOLS, tolerated: 2 };
+const BEGIN: Pattern = Pattern { bits: PATTERN, symbols: PATTERN_SYMBOLS, tolerated: 2 };
 
 /// Reader of NavIC's message.
 pub type NavReader = Framed<NavContent>;
-
-impl NavReader {
-    /// Creates a reader that has received no symbols.
-    pub fn new(sv: Sv) -> Self {
-        Self::of(NavContent { sv, set: BTreeMap::new(), reported: Reported::default() })
-    }
-}
 
 /// Content of a satellite's subframes.
 #[derive(Clone, Debug)]
@@ -40,14 +33,17 @@ impl Content for NavContent {
     const SYMBOLS: usize = SUBFRAME_SYMBOLS;
     const FAILURES: u32 = 3;
 
+    fn new(sv: Sv) -> Self {
+        Self { sv, set: BTreeMap::new(), reported: Reported::default() }
+    }
+
     fn may_begin(&self, symbols: &[f32]) -> bool {
         BEGIN.begins(symbols)
     }
 
     fn decode(&self, symbols: &[f32]) -> Option<Self::Frame> {
         let inverted = BEGIN.is_inverted(symbols);
-        let upright: Vec<f32> = symbols.iter().map(|soft| if inverted { -soft } else { *soft }).collect();
-        Some((decode_soft(&upright)?, inverted))
+        Some((decode_soft(&upright(symbols, inverted))?, inverted))
     }
 
     fn read(&mut self, (subframe, inverted): Self::Frame, _: u64, near: Epoch) -> Vec<Read> {
@@ -69,9 +65,9 @@ impl Content for NavContent {
             }
             (_, ELECTRONS) => {
                 news.push(Read::Ionosphere(coefficients(&subframe)));
-                news.push(Read::Parameters(self.rows(0, parameters(&subframe))));
+                news.push(Read::parameters(self.sv, &SPS_NAV, 0, parameters(&subframe)));
             }
-            (_, UTC) => news.push(Read::Parameters(self.rows(0, parameters(&subframe)))),
+            (_, UTC) => news.push(Read::parameters(self.sv, &SPS_NAV, 0, parameters(&subframe))),
             _ => {}
         }
         news
@@ -88,9 +84,5 @@ impl NavContent {
         let all = [parameters(one), parameters(two)].concat();
         let set = || elements(self.sv, one, two, near);
         self.reported.take_whole(SPS_NAV.name, all, (set, "subframes 1 and 2"), news);
-    }
-
-    fn rows(&self, issue: u32, parameters: Parameters) -> Vec<NavigationRow> {
-        NavigationRow::each(self.sv, SPS_NAV.name, issue, parameters).collect()
     }
 }

@@ -4,7 +4,7 @@
 
 use super::NetworkTime;
 use crate::bits::Kind::{Signed, Whole};
-use crate::bits::{Element, Field, element, plain};
+use crate::bits::{Element, Field, element, fields, plain};
 use crate::broadcast::{Ephemeris, StateVector};
 use crate::time::Epoch;
 
@@ -87,9 +87,6 @@ pub(super) static TIME: [Element<NetworkTime>; 3] = [
 
 /// Lists every field by the message that carries it.
 pub fn tables() -> Vec<(&'static str, Vec<&'static Field>)> {
-    let own = vec![
-        ("type 9", GEO.iter().map(|element| &element.field).collect()),
-        ("type 12", TIME.iter().map(|element| &element.field).collect()),
-    ];
+    let own = vec![("type 9", fields(&[&GEO])), ("type 12", fields(&[&TIME]))];
     own.into_iter().chain(super::corrections::tables()).chain(super::bounds::tables()).collect()
 }

@@ -21,9 +21,9 @@ mod schedule;
 use std::sync::Arc;
 
 use crate::augmentation::{Content, Network};
-use crate::bits::{FieldError, bits_of, integers, number, write_all};
+use crate::bits::{FieldError, bits_of, integers, number, soft, write_all};
 use crate::broadcast::{Ephemeris, SetForm};
-use crate::crc::crc24q;
+use crate::crc::{CHECK_BITS, is_checked, with_check};
 use crate::fec::convolutional::Convolutional;
 use crate::fec::running::MARGIN;
 use crate::ionosphere::Model;
@@ -52,17 +52,12 @@ pub static SBAS: Message = Message {
     reduced: &[],
     // Its grid is left out.
     ionosphere: IonosphereForm { model: Model::Klobuchar, unit: |_| false, coefficients: |_| None },
-    set_parameters: || OF_SET.parameters(),
-    // Blocks begin with seconds.
-    elements: |sv, raw, near| OF_SET.elements(sv, raw, Epoch::new(near.seconds(), 0.0)),
+    fields: &OF_SET,
     parameters: opened,
     reader: |sv| Box::new(SbasReader::new(sv)),
     form: Ephemeris::clone,
     sets: &SBAS_SETS,
-    quantised,
-    adjustable: || OF_SET.adjustable(),
     alert: None,
-    adjust: |set, parameter, by| OF_SET.adjust(set, parameter, by),
     rinex: Some(Records { set: |_| "SBAS", common: "SBAS", fields: tables, lines: None }),
 };
 
@@ -87,7 +82,6 @@ const ORDER: [u8; 6] = [OF_TIME, OF_PLACE, EMPTY, EMPTY, EMPTY, EMPTY];
 const PREAMBLES: [u128; 3] = [0x53, 0x9A, 0xC6];
 /// Bits of a block without and with its check; symbols of a second.
 const DATA_BITS: usize = 226;
-const CHECK_BITS: usize = 24;
 const BITS: usize = DATA_BITS + CHECK_BITS;
 const RATE_HZ: f64 = 500.0;
 /// Bits of the block before that the code remembers.
@@ -129,10 +123,7 @@ impl Sender for Blocks {
     }
 
     fn unit_after(&self, before: &Ephemeris, set: &Ephemeris, start: Epoch) -> Result<Vec<bool>, FieldError> {
-        if start.fraction() != 0.0 {
-            let expected = "a whole second";
-            return Err(FieldError::Start { message: SBAS.name, start_s: start.tow_s(), expected });
-        }
+        SBAS.check_start(start, "a whole second")?;
         let past = self.block(before, start.plus_s(-1.0))?;
         let memory = past.get(BITS - MEMORY_BITS..).unwrap_or_default();
         let all: Vec<bool> = memory.iter().chain(&self.block(set, start)?).copied().collect();
@@ -159,16 +150,14 @@ impl Blocks {
             }
             (None, _) => {}
         }
-        let check = crc24q(bits.iter().copied());
-        bits.extend(bits_of(u128::from(check), CHECK_BITS));
-        Ok(bits)
+        Ok(with_check(bits))
     }
 }
 
 /// True if bits form a block: one of the three preambles, and a correct check.
 fn is_block(bits: &[bool]) -> bool {
     let begins = bits.get(..8).is_some_and(|begin| PREAMBLES.contains(&number(begin)));
-    begins && bits.len() == BITS && crc24q(bits.iter().copied()) == 0
+    begins && bits.len() == BITS && is_checked(bits)
 }
 
 /// Type of a block, as it states it.
@@ -178,8 +167,7 @@ fn type_of(bits: &[bool]) -> u8 {
 
 /// The parameters of a unit's symbols.
 fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
-    let soft: Vec<f32> = symbols.iter().map(|&one| if one { -1.0 } else { 1.0 }).collect();
-    let bits = CODE.decode_open(&soft);
+    let bits = CODE.decode_open(&soft(symbols));
     let kind = is_block(&bits).then(|| type_of(&bits))?;
     if kind == OF_PLACE {
         return Some((true, integers(&GEO, &bits)));
@@ -190,19 +178,8 @@ fn opened(symbols: &[bool]) -> Option<(bool, Parameters)> {
 
 /// Parameters by which ephemerides are distinguished, and the accuracy, which is the health, are fixed.
 static OF_SET: SetTables<Ephemeris, Vec<bool>> = SetTables {
-    parts: &[&GEO],
-    passing: &[],
     fixed: &[&["iodn", "t0_16s", "ura_index"]],
-    sets: &SBAS_SETS,
-    blank: || vec![false; DATA_BITS],
-    content: |ephemeris| ephemeris,
-    ephemeris: |ephemeris| ephemeris,
+    // Blocks begin with seconds.
+    elements: |own, sv, raw, near| own.of_integers(sv, raw, Epoch::new(near.seconds(), 0.0)),
+    ..SetTables::of(&SBAS_SETS, &[&GEO], || vec![false; DATA_BITS], (|set| set, |set| set))
 };
-
-/// The ephemeris that a receiver decodes when `ephemeris` is sent; `transmitted` stays.
-///
-/// # Errors
-/// A value that the message cannot carry.
-pub fn quantised(ephemeris: &Ephemeris) -> Result<Ephemeris, FieldError> {
-    OF_SET.quantised(ephemeris.clone())
-}

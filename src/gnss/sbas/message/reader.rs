@@ -6,7 +6,7 @@ use crate::augmentation::Content;
 use crate::bits::integers;
 use crate::fec::running::Running;
 use crate::framed::Reported;
-use crate::message::{Read, Reader};
+use crate::message::{Read, Reader, raw_of};
 use crate::record::NavigationRow;
 use crate::satellite::Sv;
 use crate::time::{Epoch, WEEK_S};
@@ -38,8 +38,7 @@ impl SbasReader {
     /// The time that a block of type 12 states it began at, its week near `near`.
     fn said(bits: &Vec<bool>, near: Epoch) -> Option<Epoch> {
         let all = integers(&TIME, bits);
-        let value = |name: &str| all.iter().find(|(other, _)| *other == name).map(|(_, raw)| *raw);
-        let (tow_s, week) = (value("tow_s")?, value("week")?);
+        let (tow_s, week) = (raw_of(&all, "tow_s")?, raw_of(&all, "week")?);
         let tow_s = planted!("gnss.sbas.tow", tow_s, tow_s - 1);
         (tow_s < WEEK_S).then(|| Epoch::new(near.nearest_week(week, 1024) * WEEK_S + tow_s, 0.0))
     }

@@ -1,11 +1,11 @@
-//! The receiver's model of the neutral atmosphere: a standard atmosphere, half saturated, and Niell's
+//! Model of the neutral atmosphere as receivers have it: a standard atmosphere, half saturated, and Niell's
 //! mapping.
 //!
 //! Sources: zenith delays after Saastamoinen 1972 and Davis et al. 1985, Magnus' saturation pressure, mapping
 //! functions of Niell 1996 (tables 3 and 4). The receiver knows no weather, so true delays differ from it by
 //! several centimetres at the zenith. Below 2° the mapping is constant.
 
-use gnss::earth::Geodetic;
+use crate::earth::Geodetic;
 
 /// Niell's columns: a, b, c of the average hydrostatic, of its yearly amplitude, and of the wet mapping.
 struct Column {
