@@ -176,16 +176,16 @@ fn both(
 fn modelled(
     scenes: &[Scene],
     settings: &Settings,
-    sinks: (&mut (dyn truth::Sink + Send), &mut (dyn Sink + Send)),
+    (truth, records): (&mut (dyn truth::Sink + Send), &mut (dyn Sink + Send)),
     told: &(dyn Fn(u64) + Sync),
 ) -> Result<Both, Failure> {
     let start = Instant::now();
     let is_of = |grade| scenes.iter().any(|scene| scene.fidelity.grade == grade);
     let progress = &mut |samples| told(samples);
     let done = if is_of(Grade::Observations) && !is_of(Grade::Correlations) {
-        twin::observations::run(scenes, settings, sinks, progress)
+        twin::observations::run(scenes, settings, (truth, records), progress)
     } else {
-        twin::correlations::run(scenes, settings, sinks, progress)
+        twin::correlations::run(scenes, settings, (truth, records), progress)
     };
     let twin::Done { generated, outcome } = done.map_err(failure)?;
     let whole = start.elapsed();

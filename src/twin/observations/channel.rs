@@ -208,7 +208,7 @@ impl Channel {
         report: &mut Report,
     ) {
         let now_s = instant.seconds;
-        self.join(world, sight);
+        self.join(sight);
         if let Some(sight) = sight {
             self.rest(world.law, sight, passed_s);
         }
@@ -225,12 +225,11 @@ impl Channel {
     }
 
     /// Joins the carriers of neighbouring polynomials: less the delay they change slowly.
-    fn join(&mut self, world: &World<'_>, sight: Option<&Sight>) {
+    fn join(&mut self, sight: Option<&Sight>) {
         let Some(sight) = sight else {
             self.joined = None;
             return;
         };
-        let _ = world;
         let apart = sight.carrier_cycles - self.link.carrier_hz() * sight.delay_s;
         let whole = self.joined.map_or(0.0, |(whole, before)| (before - apart - whole).round() + whole);
         self.joined = Some((whole, apart + whole));
@@ -266,8 +265,6 @@ impl Channel {
             report.events.push((if next_s <= world.first_search_s { 0 } else { start }, Event::Acquired));
             self.mean_hz = cn0_hz;
             self.inverted = !law.is_pilot && self.stream.part(1).word(self.attempts) & 1 == 1;
-            let joined = self.joined.map_or(0.0, |(whole, apart)| whole + (apart - whole).round());
-            let _ = joined;
             self.slipped_cycles = if self.inverted { 0.5 } else { 0.0 };
             let (code, carrier) = self.stream.part(2).normals(self.attempts);
             let (strength, _) = self.stream.part(3).normals(self.attempts);
@@ -331,7 +328,7 @@ impl Channel {
         let uniform = (self.stream.part(7).word(key) >> 11) as f64 / 9_007_199_254_740_992.0;
         let age = |memory: f64, value: f64, normal: f64| memory * value + (1.0 - memory * memory).sqrt() * normal;
         self.code = age(law.code_memory(passed_s), self.code, a);
-        self.carrier = age(libm::copysign(law.carrier_memory.abs(), law.carrier_memory), self.carrier, b);
+        self.carrier = age(law.carrier_memory, self.carrier, b);
         let average_s = law.tracking.cn0_average_s;
         let memory = libm::exp(-passed_s / average_s);
         self.strength = age(memory, self.strength, c);
@@ -341,7 +338,8 @@ impl Channel {
         let is_noisy = self.density.is_some();
         let (phase_rad2, _) = if is_noisy { law.carrier_variance(cn0_hz.max(1e-3)) } else { (0.0, 0.0) };
         let phase_rad2 = if sight.is_some() { phase_rad2.min(MOST_RAD * MOST_RAD) } else { MOST_RAD * MOST_RAD };
-        let cosine = libm::exp(-2.0 * phase_rad2);
+        let lag_rad = TAU * sight.map_or(0.0, |sight| sight.lag_cycles);
+        let cosine = libm::exp(-2.0 * phase_rad2) * libm::cos(2.0 * lag_rad.clamp(-0.5 * PI, 0.5 * PI));
         followed.cosine = cosine + libm::exp(-passed_s / LOCK_S) * (followed.cosine - cosine);
         let sample = instant.sample;
         if followed.lock_s <= now_s && followed.locked_since_s.is_none() {
@@ -430,7 +428,11 @@ impl Channel {
             sample: tick.sample,
             code_periods: (code.at.period - followed.base).max(0) as u64,
             code_fraction: code.share,
-            carrier_cycles: sight.carrier_cycles + whole + self.turn_cycles + phase + self.slipped_cycles,
+            carrier_cycles: sight.carrier_cycles - sight.lag_cycles
+                + whole
+                + self.turn_cycles
+                + phase
+                + self.slipped_cycles,
             half_cycle_known: law.is_pilot && followed.is_synchronised,
             doppler_hz: rate_hz2.sqrt() * rate - sight.rate_hz,
             cn0_dbhz: stated_dbhz.min(LARGEST_CN0_DBHZ),

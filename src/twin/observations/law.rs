@@ -75,7 +75,6 @@ impl Answer {
 
 /// Everything about channels on a signal that does not depend on the satellite.
 pub(super) struct Law {
-    pub signal: &'static Signal,
     /// Index of the front end.
     pub front: usize,
     /// Index of the component that is followed, and the component.
@@ -101,8 +100,8 @@ pub(super) struct Law {
     pub symbol_s: f64,
     pub tracking: TrackingSettings,
     pub pll: Answer,
-    /// Gain of the phase loop that decides its lag, and its order.
-    pub lag: (f64, u32),
+    /// Lag of the phase loop over the jerk of the carrier, or over its acceleration for a loop of order two.
+    lag: (f64, u32),
     /// Correlation of errors of carrier and code over a tick.
     pub carrier_memory: f64,
     code_root: (f64, f64),
@@ -159,7 +158,6 @@ impl Law {
         let pps = message.periods_per_symbol()?;
         let group = if is_pilot { receiver::track::pilot_group(component.period_s()) } else { pps };
         Some(Self {
-            signal,
             front,
             lead: place(component)?,
             component,
@@ -196,6 +194,12 @@ impl Law {
         let raw_rad2 = (1.0 + 1.0 / (2.0 * snr)) / (2.0 * snr);
         let turn = std::f64::consts::TAU;
         (raw_rad2 * self.pll.phase, raw_rad2 * self.pll.rate_per_s2 / (turn * turn))
+    }
+
+    /// Lag of the phase loop in cycles behind a carrier with that acceleration and jerk, in cycles.
+    pub fn lag_cycles(&self, acceleration: f64, jerk: f64) -> f64 {
+        let (factor, order) = self.lag;
+        factor * if order == 3 { jerk } else { acceleration }
     }
 
     /// Seconds from the end of a search to phase lock.

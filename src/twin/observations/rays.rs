@@ -25,6 +25,8 @@ pub(super) struct Sight {
     pub carrier_cycles: f64,
     /// Rate of the first ray's carrier, in cycles a second.
     pub rate_hz: f64,
+    /// Cycles by which the phase loop lags behind the motion.
+    pub lag_cycles: f64,
     /// Amplitude of each ray in the root of its C/N0, its carrier's phasor against the first one's, and its
     /// delay behind that in chips.
     rays: Vec<(Complex64, f64)>,
@@ -38,6 +40,7 @@ impl Sight {
         let rate_hz = scene.clock.rate.hz();
         let first = rays.at(0, own)?;
         let (delay_rate, carrier_hz) = rates(&rays, own, rate_hz)?;
+        let lag_cycles = if scene.trajectory.is_static() { 0.0 } else { lag_cycles(&rays, law, (own, rate_hz)) };
         let one = |ray: RayAt| {
             let cycles = ray.carrier_cycles - first.carrier_cycles;
             let (sin, cos) = libm::sincos(-std::f64::consts::TAU * (cycles - cycles.floor()));
@@ -48,6 +51,7 @@ impl Sight {
             delay_s: first.delay_s - delay_rate * later_s,
             carrier_cycles: first.carrier_cycles - carrier_hz * later_s,
             rate_hz: carrier_hz,
+            lag_cycles,
             rays: (0..rays.count()).filter_map(|number| rays.at(number, own)).map(one).collect(),
         })
     }
@@ -88,4 +92,15 @@ fn rates(rays: &Rays<'_>, sample: u64, rate_hz: f64) -> Option<(f64, f64)> {
     let (a, b) = (rays.at(0, before)?, rays.at(0, sample + span)?);
     let seconds = (sample + span - before) as f64 / rate_hz;
     Some(((b.delay_s - a.delay_s) / seconds, (b.carrier_cycles - a.carrier_cycles) / seconds))
+}
+
+/// Lag of the phase loop behind the motion of the last quarters of its bandwidth's inverse.
+fn lag_cycles(rays: &Rays<'_>, law: &Law, (sample, rate_hz): (u64, f64)) -> f64 {
+    let span = ((0.25 / law.tracking.pll_bandwidth_hz * rate_hz) as u64).max(1);
+    let at = |count: u64| rays.at(0, sample.saturating_sub(count * span)).map(|ray| ray.carrier_cycles);
+    let [Some(a), Some(b), Some(c), Some(d)] = [0, 1, 2, 3].map(at) else { return 0.0 };
+    let seconds = span as f64 / rate_hz;
+    let acceleration = (a - 2.0 * b + c) / (seconds * seconds);
+    let jerk = (a - 3.0 * b + 3.0 * c - d) / (seconds * seconds * seconds);
+    law.lag_cycles(acceleration, jerk)
 }
