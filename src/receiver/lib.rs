@@ -71,3 +71,4 @@ pub mod track;
 pub use navigator::Navigator;
 pub use outcome::{Conditioning, Interfered, Outcome, ReceiveError};
 pub use run::{Receiver, Reception, receive, receive_several, searched};
+pub use session::Given;

@@ -7,9 +7,8 @@
 use crate::outcome::{Outcome, ReceiveError};
 use crate::output::Sink;
 use crate::run::{diagnosis, searched, summary};
-use crate::session::Navigation;
+use crate::session::{Given, Navigation};
 use crate::settings::Settings;
-use crate::track::Report;
 use gnss::samples::IfMetadata;
 use gnss::signal::{Link, Signal};
 
@@ -52,13 +51,12 @@ impl Navigator {
         self.navigation.has_fix()
     }
 
-    /// Takes the reports of all signals for the next tick: events and symbols since the tick before, and the
-    /// measurement at the tick. A signal begins with its event `Acquired` and ends with `LossOfLock`. Gives
-    /// the links that were given up: their messages lead nowhere.
+    /// Takes all signals at the next tick. A signal begins with the search that found it and ends with its
+    /// event `LossOfLock`. Gives the links that were given up: their messages lead nowhere.
     ///
     /// # Errors
     /// Records that cannot be written.
-    pub fn take(&mut self, given: &mut [(Link, Report)], sink: &mut dyn Sink) -> Result<Vec<Link>, ReceiveError> {
+    pub fn take(&mut self, given: &mut [Given], sink: &mut dyn Sink) -> Result<Vec<Link>, ReceiveError> {
         self.navigation.take(given, sink)
     }
 

@@ -21,6 +21,7 @@ use front_end::{FrontEnd, Track, Window};
 use gnss::samples::IfMetadata;
 use gnss::signal::Signal;
 use gnss::time::Epoch;
+pub use navigation::Given;
 pub(super) use navigation::Navigation;
 use shared::Shared;
 use step::{Step, Tick};

@@ -15,20 +15,31 @@ use crate::outcome::{Outcome, ReceiveError};
 use crate::output::{Record, Sink};
 use crate::settings::Settings;
 use crate::track::{LoopMargin, Measurement, Report};
-use gnss::record::{Event, EventRow};
+use gnss::record::{AcquisitionRow, Event, EventRow};
 use gnss::samples::IfMetadata;
 use gnss::satellite::Sv;
 use gnss::signal::{Link, Signal};
 use gnss::time::Rate;
 
-/// A signal that is followed elsewhere.
-struct Given {
+/// A signal that is followed elsewhere, at one tick.
+#[derive(Clone, Debug)]
+pub struct Given {
+    /// Satellite and signal.
+    pub link: Link,
+    /// The search that found it since the tick before, if one did.
+    pub found: Option<AcquisitionRow>,
+    /// Events and symbols since the tick before, and the measurement at the tick.
+    pub report: Report,
+}
+
+/// A signal whose messages are read.
+struct Read {
     link: Link,
     /// True if symbols are inverted; `None` before the message shows it.
     inverted: Option<bool>,
 }
 
-impl Tracked for Given {
+impl Tracked for Read {
     fn link(&self) -> Link {
         self.link
     }
@@ -44,7 +55,7 @@ impl Tracked for Given {
 
 /// A given signal with its decoder.
 struct Track {
-    given: Given,
+    read: Read,
     decoder: Option<Decoder>,
     since: u64,
     symbols: u64,
@@ -55,7 +66,7 @@ struct Track {
 
 impl Track {
     fn reading(&self) -> Option<Reading> {
-        let Link { sv, signal } = self.given.link;
+        let Link { sv, signal } = self.read.link;
         Reading::new(sv, signal, self.measured.as_ref()?, self.decoder.as_ref()?)
     }
 }
@@ -102,20 +113,20 @@ impl Navigation {
 
     /// Takes what is known of each signal at the tick, and goes on to the next one. Gives the links that lead
     /// nowhere.
-    pub fn take(&mut self, given: &mut [(Link, Report)], sink: &mut dyn Sink) -> Result<Vec<Link>, ReceiveError> {
+    pub fn take(&mut self, given: &mut [Given], sink: &mut dyn Sink) -> Result<Vec<Link>, ReceiveError> {
         let tick = self.tick();
         self.number += 1;
         let lost = self.note(given, sink)?;
         let step = Step::new(0, self.rate, self.rate);
-        for (link, report) in given.iter_mut() {
-            let Some(Track { given, decoder, symbols, measured, .. }) = self.tracks.get_mut(link) else { continue };
+        for Given { link, report, .. } in given.iter_mut() {
+            let Some(Track { read, decoder, symbols, measured, .. }) = self.tracks.get_mut(link) else { continue };
             if let Some(decoder) = decoder {
-                self.shared.hear(Hearing { channel: given, decoder, report, symbols }, (tick, step), sink)?;
+                self.shared.hear(Hearing { channel: read, decoder, report, symbols }, (tick, step), sink)?;
             }
-            let half = if given.inverted == Some(true) { 0.5 } else { 0.0 };
+            let half = if read.inverted == Some(true) { 0.5 } else { 0.0 };
             *measured = report.measurements.iter().find(|one| one.sample == tick).map(|one| Measurement {
                 carrier_cycles: one.carrier_cycles + half,
-                half_cycle_known: one.half_cycle_known || given.inverted.is_some(),
+                half_cycle_known: one.half_cycle_known || read.inverted.is_some(),
                 ..*one
             });
         }
@@ -132,9 +143,13 @@ impl Navigation {
     }
 
     /// Begins the signals that were found, and hands their events on. Gives those that were lost.
-    fn note(&mut self, given: &[(Link, Report)], sink: &mut dyn Sink) -> Result<Vec<Link>, ReceiveError> {
+    fn note(&mut self, given: &[Given], sink: &mut dyn Sink) -> Result<Vec<Link>, ReceiveError> {
         let mut events: Vec<(u64, Link, Event)> = Vec::new();
-        for (link, report) in given {
+        for Given { link, found, report } in given {
+            if let Some(row) = found {
+                sink.take(Record::Acquisition(row.clone()))?;
+                events.push((row.sample, *link, Event::Acquired));
+            }
             events.extend(report.events.iter().map(|(sample, event)| (*sample, *link, *event)));
         }
         events.sort_by_key(|(sample, link, _)| (*sample, *link));
@@ -145,12 +160,12 @@ impl Navigation {
                     self.shared.acquired.insert(link.sv);
                     self.shared.progress.entry(link.sv).or_default();
                     let decoder = self.shared.decoder(link.signal, link.sv);
-                    let given = Given { link, inverted: None };
-                    let track = Track { given, decoder, since: sample, symbols: 0, wrong_time: 0, measured: None };
+                    let read = Read { link, inverted: None };
+                    let track = Track { read, decoder, since: sample, symbols: 0, wrong_time: 0, measured: None };
                     self.tracks.insert(link, track);
                 }
                 Event::CycleSlip => {
-                    self.tracks.entry(link).and_modify(|track| track.given.inverted = None);
+                    self.tracks.entry(link).and_modify(|track| track.read.inverted = None);
                 }
                 Event::LossOfLock => {
                     self.shared.losses += 1;
@@ -158,7 +173,7 @@ impl Navigation {
                 }
                 _ => {}
             }
-            let Link { sv, signal } = self.tracks.get(&link).map_or(link, |track| track.given.link);
+            let Link { sv, signal } = self.tracks.get(&link).map_or(link, |track| track.read.link);
             sink.take(Record::Event(EventRow { sample, sv, signal, event }))?;
         }
         Ok(lost)
@@ -173,7 +188,7 @@ impl Navigation {
         let readings = self.tracks.values().filter_map(Track::reading);
         let known: Vec<Reading> = readings.filter(|reading| reading.signal.is_dated()).collect();
         for track in self.tracks.values_mut() {
-            let link = track.given.link;
+            let link = track.read.link;
             let Some(decoder) = track.decoder.as_mut().filter(|decoder| decoder.is_dated_elsewhere()) else { continue };
             let Some(measurement) = track.measured.as_ref().filter(|one| one.locked) else { continue };
             if date(decoder, link, measurement, &known) {
@@ -192,7 +207,7 @@ impl Navigation {
         let Some(solved) = self.shared.solve(tick, &readings, sink)? else { return Ok(()) };
         let excluded = self.shared.settle((tick, self.rate), solved, sink)?;
         for track in self.tracks.values_mut() {
-            let wrong = is_wrong_time(&excluded, track.given.link.sv);
+            let wrong = is_wrong_time(&excluded, track.read.link.sv);
             track.wrong_time = if wrong { track.wrong_time + 1 } else { 0 };
         }
         Ok(())
@@ -207,7 +222,7 @@ impl Navigation {
             if track.wrong_time < WRONG_TIME_FIXES && (has_units || tick <= track.since + limit) {
                 continue;
             }
-            let Link { sv, signal } = track.given.link;
+            let Link { sv, signal } = track.read.link;
             let sample = tick.saturating_sub(1);
             sink.take(Record::Event(EventRow { sample, sv, signal, event: Event::LossOfLock }))?;
             self.shared.losses += 1;

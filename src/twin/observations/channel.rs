@@ -11,9 +11,10 @@ use std::f64::consts::{PI, TAU};
 use generator::random::Stream;
 use generator::scene::Scene;
 use generator::transmit::Transmitter;
-use gnss::record::Event;
+use gnss::record::{AcquisitionRow, Event};
 use gnss::satellite::System;
 use gnss::signal::Link;
+use receiver::Given;
 use receiver::settings::Settings;
 use receiver::threshold::threshold;
 use receiver::track::cn0::{LARGEST_CN0_DBHZ, relative_sigma};
@@ -159,8 +160,8 @@ impl Channel {
     }
 
     /// Follows the signal up to a tick. `at` gives the instant of a time in seconds.
-    pub fn follow(&mut self, world: &World<'_>, around: Around, tick: &Instant, at: &dyn Fn(f64) -> Instant) -> Report {
-        let mut report = Report::default();
+    pub fn follow(&mut self, world: &World<'_>, around: Around, tick: &Instant, at: &dyn Fn(f64) -> Instant) -> Given {
+        let mut given = Given { link: self.link, found: None, report: Report::default() };
         let now_s = tick.seconds;
         let from_s = self.last_s.replace(now_s).unwrap_or(now_s);
         let passed_s = now_s - from_s;
@@ -175,14 +176,14 @@ impl Channel {
             let instant = at(from_s + passed_s * step as f64 / steps as f64);
             let sight = self.see(world, &instant);
             let key = tick.number * 4096 + step;
-            self.step(world, around, (&instant, passed_s / steps as f64, key), sight.as_ref(), &mut report);
+            self.step(world, around, (&instant, passed_s / steps as f64, key), sight.as_ref(), &mut given);
         }
         let last = (tick, passed_s / steps as f64, tick.number * 4096);
-        self.step(world, around, last, sight.as_ref(), &mut report);
+        self.step(world, around, last, sight.as_ref(), &mut given);
         if let Some(sight) = &sight {
-            self.measure(world, tick, sight, &mut report);
+            self.measure(world, tick, sight, &mut given.report);
         }
-        report
+        given
     }
 
     fn see(&self, world: &World<'_>, instant: &Instant) -> Option<Sight> {
@@ -205,7 +206,7 @@ impl Channel {
         around: Around,
         (instant, passed_s, key): (&Instant, f64, u64),
         sight: Option<&Sight>,
-        report: &mut Report,
+        given: &mut Given,
     ) {
         let now_s = instant.seconds;
         self.join(sight);
@@ -217,10 +218,10 @@ impl Channel {
             State::Sought { next_s, misses } => {
                 let (next_s, misses) = (*next_s, *misses);
                 if next_s <= now_s {
-                    self.search(world, around, (cn0_hz, next_s, misses), instant, report);
+                    given.found = self.search(world, around, (cn0_hz, next_s, misses), (instant, sight));
                 }
             }
-            State::Followed(_) => self.track(world, (cn0_hz, passed_s, key), sight, instant, report),
+            State::Followed(_) => self.track(world, (cn0_hz, passed_s, key), sight, instant, &mut given.report),
         }
     }
 
@@ -254,15 +255,14 @@ impl Channel {
         world: &World<'_>,
         around: Around,
         (cn0_hz, next_s, misses): (f64, f64, u32),
-        instant: &Instant,
-        report: &mut Report,
-    ) {
+        (instant, sight): (&Instant, Option<&Sight>),
+    ) -> Option<AcquisitionRow> {
         let operation = &world.settings.operation;
         self.attempts += 1;
-        if self.is_found(world, cn0_hz) {
+        let begun_s = next_s - world.first_search_s;
+        let found = sight.and_then(|sight| self.look(world, (cn0_hz, sight), instant, instant.sample_at(begun_s)));
+        if found.is_some() {
             let law = world.law;
-            let start = instant.sample_at(next_s);
-            report.events.push((if next_s <= world.first_search_s { 0 } else { start }, Event::Acquired));
             self.mean_hz = cn0_hz;
             self.inverted = !law.is_pilot && self.stream.part(1).word(self.attempts) & 1 == 1;
             self.slipped_cycles = if self.inverted { 0.5 } else { 0.0 };
@@ -281,7 +281,7 @@ impl Channel {
                 symbol: None,
             });
             self.known = true;
-            return;
+            return found;
         }
         let is_eager = self.lost_s.is_some_and(|lost_s| instant.seconds - lost_s < EAGER_S);
         let wait_s = match (around.has_fix, is_eager) {
@@ -294,10 +294,17 @@ impl Channel {
         };
         let next_s = next_s.max(instant.seconds - wait_s) + wait_s;
         self.state = State::Sought { next_s, misses: misses + 1 };
+        None
     }
 
-    /// True if a search finds the signal.
-    fn is_found(&self, world: &World<'_>, cn0_hz: f64) -> bool {
+    /// Outcome of a search whose samples begin with one of the first front end, where it finds the signal.
+    fn look(
+        &self,
+        world: &World<'_>,
+        (cn0_hz, sight): (f64, &Sight),
+        instant: &Instant,
+        sample: u64,
+    ) -> Option<AcquisitionRow> {
         let Law { search: (coherent_s, sums), component, code, grid, .. } = world.law;
         let chips = f64::from(component.code_chips);
         let cells = 2.0 * chips * DOPPLERS_HZ * coherent_s / world.settings.acquisition.doppler_step_cycles;
@@ -310,7 +317,31 @@ impl Channel {
             let (i, q) = stream.normals(u64::from(sum));
             (amplitude + i) * (amplitude + i) + q * q
         };
-        (0..*sums).map(power).sum::<f64>() > least
+        let (count, statistic) = (f64::from(*sums), (0..*sums).map(power).sum::<f64>());
+        if statistic <= least {
+            return None;
+        }
+        // Refined in frequency and delay with all energy of the search.
+        let energy = count * coherent_s * code.share * cn0_hz;
+        let (a, b) = if self.density.is_some() { stream.normals(1 << 32) } else { (0.0, 0.0) };
+        let doppler_hz = a * (1.5 / energy).sqrt() / (PI * coherent_s) - sight.rate_hz;
+        let (own, later_s) = instant.own(world.law.front)?;
+        let at = world.transmitter.code_at(world.scene, world.law.lead, own, sight.delay_s + later_s)?;
+        let rate = component.chip_rate_hz * (1.0 + doppler_hz / self.link.carrier_hz());
+        let passed_s = (instant.sample - sample) as f64 / world.rate_hz;
+        let phase = (at.share + 0.5 * b / energy.sqrt() / chips) * chips - rate * passed_s;
+        let found_hz = ((statistic / count - 2.0) / (2.0 * coherent_s * code.share * grid)).max(1.0);
+        Some(AcquisitionRow {
+            sample,
+            sv: self.link.sv,
+            signal: self.link.signal,
+            acquired: true,
+            statistic,
+            threshold: least,
+            doppler_hz,
+            code_phase_chips: phase.rem_euclid(chips),
+            cn0_dbhz: (10.0 * libm::log10(found_hz)).min(LARGEST_CN0_DBHZ),
+        })
     }
 
     /// Follows lock and strength.

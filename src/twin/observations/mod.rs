@@ -30,8 +30,7 @@ use rayon::prelude::*;
 use receiver::acquire::samples_needed;
 use receiver::output;
 use receiver::settings::Settings;
-use receiver::track::Report;
-use receiver::{Navigator, ReceiveError};
+use receiver::{Given, Navigator, ReceiveError};
 
 use channel::{Around, Channel, World};
 use clock::Instant;
@@ -45,9 +44,6 @@ use crate::{Done, TwinError, settings_for};
 const SLAB_S: u64 = 1;
 /// Time before a slab about which channels still ask.
 const BEFORE_S: f64 = 1.5;
-
-/// Reports of all channels at one tick.
-type Given = Vec<(Link, Report)>;
 
 /// Receives a scene by its observations: no sample is made. `progress` gets the number of samples that have
 /// been passed.
@@ -72,14 +68,14 @@ pub fn run(
     let before = (BEFORE_S * rate.hz()) as u64;
     let (mut slab, mut to) = (0, 0);
     // What was made of the last slab is navigated while the next one is made.
-    let mut waiting: Vec<(Instant, Given)> = Vec::new();
+    let mut waiting: Vec<(Instant, Vec<Given>)> = Vec::new();
     while to < first.samples || !waiting.is_empty() {
         let from = to;
         slab += SLAB_S;
         to = rate.first_sample_at(slab, 1).min(first.samples);
         let known = Known { has_fix: navigator.has_fix() };
         let (made, navigated) = rayon::join(
-            || -> Result<Vec<(Instant, Given)>, TwinError> {
+            || -> Result<Vec<(Instant, Vec<Given>)>, TwinError> {
                 if from >= first.samples {
                     return Ok(Vec::new());
                 }
@@ -186,7 +182,7 @@ impl<'a> Model<'a> {
     }
 
     /// Reports of all channels at the ticks before a sample, which have been prepared.
-    fn make(&mut self, fronts: &Fronts<'_>, to: u64, known: &Known) -> Vec<(Instant, Given)> {
+    fn make(&mut self, fronts: &Fronts<'_>, to: u64, known: &Known) -> Vec<(Instant, Vec<Given>)> {
         let ticks = self.ticks(to);
         let transmitters: Vec<&[Transmitter]> = fronts.transmitters().collect();
         if let Some(first) = ticks.first() {
@@ -200,7 +196,7 @@ impl<'a> Model<'a> {
             .collect();
         let Self { scenes, settings, laws, channels, first_search_s, .. } = self;
         let rate_hz = scenes.first().map_or(1.0, |scene| scene.clock.rate.hz());
-        let one = |channel: &mut Channel| -> Option<(Link, Vec<Report>)> {
+        let one = |channel: &mut Channel| -> Option<Vec<Given>> {
             let link = channel.link;
             let law = laws.get(channel.law)?;
             let transmitter = transmitters.get(law.front)?.get(channel.transmitter)?;
@@ -216,14 +212,14 @@ impl<'a> Model<'a> {
                 };
                 channel.follow(&world, around, tick, &at)
             };
-            Some((link, ticks.iter().map(follow).collect()))
+            Some(ticks.iter().map(follow).collect())
         };
-        let of_links: Vec<(Link, Vec<Report>)> = channels.par_iter_mut().filter_map(one).collect();
-        let mut made: Vec<(Instant, Given)> = ticks.into_iter().map(|tick| (tick, Vec::new())).collect();
-        for (link, reports) in of_links {
-            for ((_, given), report) in made.iter_mut().zip(reports) {
-                if !(report.events.is_empty() && report.measurements.is_empty()) {
-                    given.push((link, report));
+        let of_links: Vec<Vec<Given>> = channels.par_iter_mut().filter_map(one).collect();
+        let mut made: Vec<(Instant, Vec<Given>)> = ticks.into_iter().map(|tick| (tick, Vec::new())).collect();
+        for of_link in of_links {
+            for ((_, given), one) in made.iter_mut().zip(of_link) {
+                if one.found.is_some() || !(one.report.events.is_empty() && one.report.measurements.is_empty()) {
+                    given.push(one);
                 }
             }
         }

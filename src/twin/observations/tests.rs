@@ -86,7 +86,7 @@ fn records_do_not_depend_on_the_number_of_threads() {
 
 #[test]
 fn errors_of_code_and_carrier_have_the_deviations_of_their_loops() {
-    let scene = scene("duration_s = 620\nnoise = {}\npower = { cn0_dbhz = 42 }\ntruth_interval_s = 1\n");
+    let scene = scene("duration_s = 620\nnoise = {}\npower = { cn0_dbhz = 42 }\ntruth = { interval_s = 1 }\n");
     let mut settings = Settings::default();
     (settings.operation.measurement_interval_ms, settings.operation.tracking_interval_ms) = (1000, 1000);
     settings.tracking.dll_bandwidth_hz = 1.0;
@@ -139,7 +139,7 @@ fn an_occluded_satellite_is_lost_and_comes_back() {
          [motion]\nkind = \"waypoints\"\nacceleration_mps2 = 2\njerk_mps3 = 2\n\
          [[motion.point]]\nlatitude_deg = 26.5123\nlongitude_deg = 80.2329\nheight_m = 130\nspeed_mps = 0\n\
          hold_s = 30\n\
-         [[motion.point]]\nlatitude_deg = 26.5150\nlongitude_deg = 80.2329\nheight_m = 130\nspeed_mps = 8\n\
+         [[motion.point]]\nlatitude_deg = 26.5165\nlongitude_deg = 80.2329\nheight_m = 130\nspeed_mps = 8\n\
          [[obstruction]]\nkind = \"building\"\neast_m = [4, 30]\nnorth_m = [40, 140]\ntop_m = 60\n",
     );
     let (records, _, done) = received(&scene, &Settings::default());
@@ -170,7 +170,7 @@ fn what_has_no_model_is_refused_by_name() {
     };
     for (rest, name) in [
         ("[[interference]]\nkind = \"cw\"\njs_db = 20\n", "[[interference]]"),
-        ("[scintillation]\ns4 = 0.5\n", "[scintillation]"),
+        ("[scintillation]\ns4 = 0.5\ndecorrelation_s = 1\n", "[scintillation]"),
     ] {
         let text = refused(rest);
         assert!(text.contains(name) && text.contains("level = \"observations\""), "{text}");
