@@ -78,7 +78,7 @@ pub fn run(
     let (mut second, mut to) = (0, 0);
     while to < first.samples {
         to = first.clock.rate.first_sample_at(second + 1, 1).min(first.samples);
-        fronts.pass(&reception.needs(), to, truth)?;
+        fronts.pass(&reception.needs(), to, &|_| true, truth)?;
         let over = |(plan, transmitters)| Plan::over(plan, transmitters, second);
         let models: Vec<Correlations<'_>> = plans.iter().zip(fronts.transmitters()).map(over).collect();
         models.iter().try_for_each(Correlations::refuse_near_and_far)?;

@@ -153,6 +153,14 @@ impl Channel {
         matches!(self.state, State::Followed(_))
     }
 
+    /// True if messages may be asked for in what begins at an instant.
+    pub fn hears(&mut self, scene: &Scene, from: &Instant) -> bool {
+        if self.is_followed() {
+            self.listening.look(scene, self.link, from);
+        }
+        !self.is_followed() || self.listening.is_open()
+    }
+
     /// Leaves a signal alone whose message leads nowhere.
     pub fn give_up(&mut self, now_s: f64) {
         self.state = State::Sought { next_s: now_s + REFUSED_S, misses: 0 };
@@ -478,8 +486,7 @@ impl Channel {
         let pps = law.periods_per_symbol;
         let next = *followed.symbol.get_or_insert_with(|| (since / pps as f64).ceil() as i64 * pps);
         let ended = code.at.period.div_euclid(pps) * pps;
-        let is_heard = self.listening.hears(world.scene, self.link, tick);
-        if is_heard && followed.locked_since_s.is_some() {
+        if self.listening.is_open() && followed.locked_since_s.is_some() {
             let amplitude = (2.0 * law.symbol_s * cn0_hz).sqrt();
             let sense = if self.inverted { -1.0 } else { 1.0 };
             for first in (next..ended).step_by(pps.max(1) as usize) {

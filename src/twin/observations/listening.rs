@@ -22,6 +22,7 @@ const LOOK_S: f64 = 10.0;
 /// Times of one channel.
 pub(super) struct Listening {
     always: bool,
+    is_open: bool,
     until_s: f64,
     look_s: f64,
     /// Time of the ephemeris that was sent last.
@@ -30,18 +31,23 @@ pub(super) struct Listening {
 
 impl Listening {
     pub fn new(always: bool) -> Self {
-        Self { always, until_s: 0.0, look_s: 0.0, sent: None }
+        Self { always, is_open: true, until_s: 0.0, look_s: 0.0, sent: None }
     }
 
     /// Begins with a signal that is found.
     pub fn begin(&mut self, now_s: f64) {
-        self.until_s = now_s + CYCLE_S;
+        (self.is_open, self.until_s) = (true, now_s + CYCLE_S);
     }
 
-    /// True if the symbols that end by a tick are heard.
-    pub fn hears(&mut self, scene: &Scene, link: Link, tick: &Instant) -> bool {
+    /// True if symbols are heard.
+    pub fn is_open(&self) -> bool {
+        self.is_open
+    }
+
+    /// Decides whether the symbols are heard that end in what begins at an instant.
+    pub fn look(&mut self, scene: &Scene, link: Link, tick: &Instant) {
         if self.always || scene.osnma.is_some() || !scene.message_faults.is_empty() {
-            return true;
+            return;
         }
         if tick.seconds >= self.look_s {
             self.look_s = tick.seconds + LOOK_S;
@@ -52,6 +58,6 @@ impl Listening {
             }
             self.sent = sent;
         }
-        tick.seconds < self.until_s
+        self.is_open = tick.seconds < self.until_s;
     }
 }

@@ -80,7 +80,8 @@ pub fn run(
                     return Ok(Vec::new());
                 }
                 let needed: Vec<u64> = scenes.iter().map(|scene| needed(scene, first, from, before)).collect();
-                fronts.pass(&needed, to, truth)?;
+                let heard = Instant::new(scenes, 0, from).map(|from| model.heard(&from)).unwrap_or_default();
+                fronts.pass(&needed, to, &|link| heard.contains(&link), truth)?;
                 Ok(model.make(&fronts, to, &known))
             },
             || -> Result<Vec<(f64, Link)>, ReceiveError> {
@@ -165,6 +166,16 @@ impl<'a> Model<'a> {
     fn give_up(&mut self, link: Link, now_s: f64) {
         let channel = self.channels.iter_mut().find(|channel| channel.link == link);
         channel.into_iter().for_each(|channel| channel.give_up(now_s));
+    }
+
+    /// Links whose messages may be asked for in what begins at an instant.
+    fn heard(&mut self, from: &Instant) -> BTreeSet<Link> {
+        let Self { scenes, laws, channels, .. } = self;
+        let is_heard = |channel: &mut &mut Channel| {
+            let scene = laws.get(channel.law).and_then(|law| scenes.get(law.front));
+            scene.is_some_and(|scene| channel.hears(scene, from))
+        };
+        channels.iter_mut().filter_map(|mut channel| is_heard(&mut channel).then_some(channel.link)).collect()
     }
 
     /// Ticks before a sample of the first front end, from the last one on.
