@@ -109,14 +109,23 @@ impl<'a> Plan<'a> {
         let made = Made::all(scene, settings);
         let rate_hz = scene.clock.rate.hz();
         let sampled: Vec<Sampled> = scene.signals.iter().map(|signal| Sampled::new(signal, scene)).collect();
-        let carriers = |signal: &'static Signal| signal.satellites().map(|sv| signal.carrier_hz(sv));
+        // Each carrier once: satellites share most of them, and asking for all makes their codes.
+        let distinct = |signal: &&'static Signal| {
+            let mut all: Vec<f64> = signal.satellites().map(|sv| signal.carrier_hz(sv)).collect();
+            all.dedup();
+            (*signal, all)
+        };
+        let known: Vec<(&'static Signal, Vec<f64>)> = scene.signals.iter().map(distinct).collect();
+        let carriers = |signal: &'static Signal| {
+            let of = known.iter().find(|(other, _)| *other == signal);
+            of.map_or(&[][..], |(_, all)| all.as_slice())
+        };
         let from_all = |made: &Made| {
             let mut all = BTreeMap::new();
             let own = (&made.own, made.component.chip_rate_hz);
             for (number, (signal, sampled)) in scene.signals.iter().zip(&sampled).enumerate() {
-                for (own_hz, other_hz) in
-                    carriers(made.signal).flat_map(|own| carriers(signal).map(move |hz| (own, hz)))
-                {
+                let pairs = |own: &f64| carriers(signal).iter().map(move |hz| (*own, *hz)).collect::<Vec<_>>();
+                for (own_hz, other_hz) in carriers(made.signal).iter().flat_map(pairs) {
                     let apart_hz = other_hz - own_hz;
                     let entry = all.entry((number, apart_hz.round() as i64));
                     entry.or_insert_with(|| sampled.separation_s(own, apart_hz, rate_hz));
