@@ -1,8 +1,8 @@
 //! The receiver from its channels on: decoding, observations, position, for signals that others follow.
 //!
 //! A [`Navigator`] asks for no samples. At each of its ticks it takes what channels would report, the
-//! measurements, symbols and events of each signal, and writes the records that a [`crate::Reception`] writes.
-//! Limits: no rows of searches, loops and spectra; the front part decides what is found and lost.
+//! measurements, symbols and events of each signal, and writes the records that a [`crate::Reception`]
+//! writes. Limits: no rows of searches, loops and spectra; the front part decides what is found and lost.
 
 use crate::outcome::{Outcome, ReceiveError};
 use crate::output::Sink;

@@ -91,6 +91,7 @@ pub const ORDER: Order<'static> = &[
             &["outcome"],
             &["session"],
             &["run"],
+            &["navigator"],
         ],
     ),
     (

@@ -11,12 +11,11 @@ use std::f64::consts::{PI, TAU};
 use generator::random::Stream;
 use generator::scene::Scene;
 use generator::transmit::Transmitter;
-use gnss::record::{AcquisitionRow, Event};
+use gnss::record::Event;
 use gnss::satellite::System;
 use gnss::signal::Link;
 use receiver::Given;
 use receiver::settings::Settings;
-use receiver::threshold::threshold;
 use receiver::track::cn0::{LARGEST_CN0_DBHZ, relative_sigma};
 use receiver::track::{Measurement, Report, Symbol};
 
@@ -32,21 +31,14 @@ const WEAK_HZ: f64 = 1000.0;
 /// Time in which the mean of phase lock follows.
 const LOCK_S: f64 = 0.12;
 /// Share of the time between searches for all in which a lost satellite is searched for.
-const LOST_SHARE: f64 = 0.25;
-/// Time for which a lost satellite is searched for eagerly.
-const EAGER_S: f64 = 30.0;
+pub(super) const LOST_SHARE: f64 = 0.25;
 /// Time for which a satellite whose message leads nowhere is left alone.
 const REFUSED_S: f64 = 120.0;
-/// Largest number of doublings of the time between searches without result.
-const MOST_DOUBLINGS: u32 = 4;
 /// Largest standard deviation of a phase error that counts, in radians: it has no lock.
 const MOST_RAD: f64 = 2.0;
-/// Cells of a search of one satellite, for the threshold: as many chips as a code has, in half chips, and
-/// Dopplers of ±5 kHz.
-const DOPPLERS_HZ: f64 = 10_000.0;
 
 /// State of a search or of tracking.
-enum State {
+pub(super) enum State {
     /// Searched for next at that time, after so many searches without result.
     Sought { next_s: f64, misses: u32 },
     /// Followed.
@@ -54,22 +46,22 @@ enum State {
 }
 
 /// Times of a channel, in seconds.
-struct Followed {
-    lock_s: f64,
+pub(super) struct Followed {
+    pub lock_s: f64,
     /// Time from which on symbols are known; infinite before phase lock.
-    symbols_s: f64,
-    is_synchronised: bool,
-    locked_since_s: Option<f64>,
-    missing_since_s: Option<f64>,
+    pub symbols_s: f64,
+    pub is_synchronised: bool,
+    pub locked_since_s: Option<f64>,
+    pub missing_since_s: Option<f64>,
     /// Mean cosine of twice the phase error.
-    cosine: f64,
+    pub cosine: f64,
     /// First code period that is counted.
-    base: i64,
+    pub base: i64,
     /// First code period of the next symbol to be handed over.
-    symbol: Option<i64>,
+    pub symbol: Option<i64>,
 }
 
-/// What a channel knows of others.
+/// Facts about the rest of the receiver.
 #[derive(Clone, Copy)]
 pub(super) struct Around {
     /// True if there was a fix.
@@ -86,28 +78,28 @@ pub(super) struct Channel {
     pub transmitter: usize,
     /// Noise density over the thermal one; none without noise.
     pub density: Option<f64>,
-    stream: Stream,
-    state: State,
-    listening: Listening,
+    pub(super) stream: Stream,
+    pub(super) state: State,
+    pub(super) listening: Listening,
     /// Time at which the satellite was lost.
-    lost_s: Option<f64>,
-    known: bool,
-    attempts: u64,
+    pub(super) lost_s: Option<f64>,
+    pub(super) known: bool,
+    pub(super) attempts: u64,
     last_s: Option<f64>,
     /// Errors of code and carrier in deviations, and of C/N0 as a share.
-    code: f64,
-    carrier: f64,
-    strength: f64,
+    pub(super) code: f64,
+    pub(super) carrier: f64,
+    pub(super) strength: f64,
     /// C/N0 of the whole signal that is estimated, in hertz.
-    mean_hz: f64,
-    /// Place of the code loop in chips behind the first ray, and the carrier's turn there, in cycles.
+    pub(super) mean_hz: f64,
+    /// Position of the code loop in chips behind the first ray, and the carrier's turn there, in cycles.
     rest_chips: f64,
     turn_cycles: f64,
     /// Whole cycles that join the carriers of polynomials, and what they join.
     joined: Option<(f64, f64)>,
     /// Cycles of slips, and the unknown whole number.
-    slipped_cycles: f64,
-    inverted: bool,
+    pub(super) slipped_cycles: f64,
+    pub(super) inverted: bool,
 }
 
 /// Scene and settings of a channel.
@@ -244,7 +236,7 @@ impl Channel {
         self.joined = Some((whole, apart + whole));
     }
 
-    /// Moves the code loop towards the place at which it rests, and the carrier to that of the sum there.
+    /// Moves the code loop towards the position at which it rests, and the carrier to that of the sum there.
     fn rest(&mut self, law: &Law, sight: &Sight, passed_s: f64) {
         if !sight.is_reflected() {
             (self.rest_chips, self.turn_cycles) = (self.rest_chips * law.code_memory(passed_s), 0.0);
@@ -255,101 +247,6 @@ impl Channel {
         self.rest_chips = rest + memory * (self.rest_chips - rest);
         let turn = -sight.sum(law, self.rest_chips).arg() / TAU;
         self.turn_cycles = turn + (self.turn_cycles - turn).round();
-    }
-
-    /// Searches at `next_s`, and begins to follow what is found.
-    fn search(
-        &mut self,
-        world: &World<'_>,
-        around: Around,
-        (cn0_hz, next_s, misses): (f64, f64, u32),
-        (instant, sight): (&Instant, Option<&Sight>),
-    ) -> Option<AcquisitionRow> {
-        let operation = &world.settings.operation;
-        self.attempts += 1;
-        let begun_s = next_s - world.first_search_s;
-        let found = sight.and_then(|sight| self.look(world, (cn0_hz, sight), instant, instant.sample_at(begun_s)));
-        if found.is_some() {
-            let law = world.law;
-            self.mean_hz = cn0_hz;
-            self.inverted = !law.is_pilot && self.stream.part(1).word(self.attempts) & 1 == 1;
-            self.slipped_cycles = if self.inverted { 0.5 } else { 0.0 };
-            let (code, carrier) = self.stream.part(2).normals(self.attempts);
-            let (strength, _) = self.stream.part(3).normals(self.attempts);
-            (self.code, self.carrier, self.strength) = (code, carrier, strength);
-            self.listening.begin(next_s + law.lock_s());
-            self.state = State::Followed(Followed {
-                lock_s: next_s + law.lock_s(),
-                symbols_s: f64::INFINITY,
-                is_synchronised: false,
-                locked_since_s: None,
-                missing_since_s: None,
-                cosine: 1.0,
-                base: 0,
-                symbol: None,
-            });
-            self.known = true;
-            return found;
-        }
-        let is_eager = self.lost_s.is_some_and(|lost_s| instant.seconds - lost_s < EAGER_S);
-        let wait_s = match (around.has_fix, is_eager) {
-            (true, true) => LOST_SHARE * operation.reacquisition_interval_s,
-            (false, true) => operation.reacquisition_interval_s,
-            _ if around.is_led || (around.has_fix && self.known) => {
-                operation.reacquisition_interval_s * f64::from(1_u32 << misses.min(MOST_DOUBLINGS))
-            }
-            _ => operation.search_interval_s,
-        };
-        let next_s = next_s.max(instant.seconds - wait_s) + wait_s;
-        self.state = State::Sought { next_s, misses: misses + 1 };
-        None
-    }
-
-    /// Outcome of a search whose samples begin with one of the first front end, where it finds the signal.
-    fn look(
-        &self,
-        world: &World<'_>,
-        (cn0_hz, sight): (f64, &Sight),
-        instant: &Instant,
-        sample: u64,
-    ) -> Option<AcquisitionRow> {
-        let Law { search: (coherent_s, sums), component, code, grid, .. } = world.law;
-        let chips = f64::from(component.code_chips);
-        let cells = 2.0 * chips * DOPPLERS_HZ * coherent_s / world.settings.acquisition.doppler_step_cycles;
-        let satellites = 32.0;
-        let probability = world.settings.acquisition.false_alarm_probability / (cells * satellites);
-        let least = threshold(probability.max(1e-300), 2 * sums);
-        let amplitude = (2.0 * coherent_s * code.share * grid * cn0_hz).sqrt();
-        let stream = self.stream.part(4).part(self.attempts);
-        let power = |sum: u32| {
-            let (i, q) = stream.normals(u64::from(sum));
-            (amplitude + i) * (amplitude + i) + q * q
-        };
-        let (count, statistic) = (f64::from(*sums), (0..*sums).map(power).sum::<f64>());
-        if statistic <= least {
-            return None;
-        }
-        // Refined in frequency and delay with all energy of the search.
-        let energy = count * coherent_s * code.share * cn0_hz;
-        let (a, b) = if self.density.is_some() { stream.normals(1 << 32) } else { (0.0, 0.0) };
-        let doppler_hz = a * (1.5 / energy).sqrt() / (PI * coherent_s) - sight.rate_hz;
-        let (own, later_s) = instant.own(world.law.front)?;
-        let at = world.transmitter.code_at(world.scene, world.law.lead, own, sight.delay_s + later_s)?;
-        let rate = component.chip_rate_hz * (1.0 + doppler_hz / self.link.carrier_hz());
-        let passed_s = (instant.sample - sample) as f64 / world.rate_hz;
-        let phase = (at.share + 0.5 * b / energy.sqrt() / chips) * chips - rate * passed_s;
-        let found_hz = ((statistic / count - 2.0) / (2.0 * coherent_s * code.share * grid)).max(1.0);
-        Some(AcquisitionRow {
-            sample,
-            sv: self.link.sv,
-            signal: self.link.signal,
-            acquired: true,
-            statistic,
-            threshold: least,
-            doppler_hz,
-            code_phase_chips: phase.rem_euclid(chips),
-            cn0_dbhz: (10.0 * libm::log10(found_hz)).min(LARGEST_CN0_DBHZ),
-        })
     }
 
     /// Follows lock and strength.
@@ -439,7 +336,8 @@ impl Channel {
         let periods = 2.0 * law.tracking.cn0_average_s / law.component.period_s();
         let group = (law.group > 1).then_some(law.group);
         let sigma = relative_sigma(hz.max(1.0), law.component.period_s(), group, [periods; 2]);
-        (hz * (1.0 + sigma * self.strength)).max(1.0)
+        // A ratio of powers, which scatters alike in decibels to either side.
+        (hz * libm::exp(sigma * self.strength)).max(1.0)
     }
 
     /// State of the replica at a tick, and the symbols that have ended by then.

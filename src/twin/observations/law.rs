@@ -36,7 +36,7 @@ const SECONDARY_PROMPTS: f64 = 20.0;
 /// Answer of a phase loop to independent errors of its discriminator, of unit variance.
 #[derive(Clone, Debug)]
 pub(super) struct Answer {
-    /// Variance of the phase at any place of an interval.
+    /// Variance of the phase at any position in an interval.
     pub phase: f64,
     /// Variance of the rate, per squared second.
     pub rate_per_s2: f64,
@@ -226,7 +226,8 @@ impl Law {
     }
 }
 
-/// Correlation of a component, as it is sent, with the replica that a receiver makes, and of that with itself.
+/// Correlation of a component, as it is sent, with the replica that a receiver makes, and of that with
+/// itself.
 fn peaks(component: &Component, scene: &Scene, tracking: &TrackingSettings) -> Option<(PeakTable, PeakTable)> {
     let sent = scene.fidelity.waveform;
     let [found, own] = match tracking.waveform {

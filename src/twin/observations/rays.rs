@@ -1,9 +1,9 @@
-//! What channels follow of a satellite's rays: where the code loop rests and the carrier of their sum.
+//! Rays of a satellite as channels follow them: where the code loop rests, and the carrier of their sum.
 //!
 //! E, P and L are the sums over the rays of amplitude, phase and correlation at the replica and half a
 //! spacing to either side. A loop of early minus late power rests where |E|² = |L|², one of the dot product
 //! where Re((E−L)·P*) = 0 (Braasch, in Global Positioning System: Theory and Applications I, 1996). Limits:
-//! the loop's answer to rays whose phases turn is that of a low pass behind the place of rest.
+//! the loop's answer to rays whose phases turn is that of a low pass behind the position of rest.
 
 use generator::scene::Scene;
 use generator::transmit::{RayAt, Rays, Transmitter};
@@ -66,7 +66,7 @@ impl Sight {
         self.rays.iter().map(|(amplitude, excess)| amplitude * law.found.value(chips - excess)).sum()
     }
 
-    /// Place in chips behind the first ray at which the code loop rests.
+    /// Position in chips behind the first ray at which the code loop rests.
     pub fn rest_chips(&self, law: &Law) -> f64 {
         let spacing = law.spacing_chips;
         let late = |at: f64| {
