@@ -267,7 +267,7 @@ fn once_ns(site: Site, fidelity: Fidelity) -> f64 {
 fn settings(rate_msps: f64) -> Vec<(String, Fidelity)> {
     let mut found: Vec<(String, Fidelity)> = Grade::NAMES
         .iter()
-        .filter(|(_, grade)| *grade != Grade::Correlations)
+        .filter(|(_, grade)| grade.is_sampled())
         .map(|(name, grade)| {
             ((*name).to_owned(), Fidelity::suited(*grade, rate_msps * 1e6, allowed_m(None), &[&L1_CA]).unwrap())
         })

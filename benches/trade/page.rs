@@ -29,7 +29,7 @@ fn ladder<'r>(rows: &'r [SignalRow], signal: &Signal, rate_msps: f64) -> Vec<Run
         let ns = [median, low, high];
         Some(Rung { name, row, ns })
     };
-    Grade::NAMES.iter().filter(|(_, grade)| *grade != Grade::Correlations).filter_map(of).collect()
+    Grade::NAMES.iter().filter(|(_, grade)| grade.is_sampled()).filter_map(of).collect()
 }
 
 /// Levels that a more accurate one beats, with intervals that do not meet.

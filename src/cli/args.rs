@@ -225,8 +225,8 @@ pub struct Run {
     /// Front end to receive in a scene with several [default: all in one reception]
     #[arg(long, value_name = "NAME")]
     pub front_end: Option<String>,
-    /// Level of fidelity, overrides the scene's: fast, balanced, reference; or correlations, where a model
-    /// answers in place of samples
+    /// Level of fidelity, overrides the scene's: fast, balanced, reference; or correlations or observations,
+    /// which models give in place of samples
     #[arg(long, value_name = "LEVEL", value_parser = grade)]
     pub level: Option<Grade>,
     /// Noise seed, overrides the scene's

@@ -37,7 +37,9 @@ impl Ladder {
         let each = scenes.iter().zip(plans).map(|(scene, plan)| Rung::of_samples(scene, plan));
         let join = |all: Vec<Rung>, more: Vec<Rung>| all.into_iter().zip(more).map(|(a, b)| a.join(b)).collect();
         let mut rungs = each.reduce(join).unwrap_or_default();
-        rungs.push(correlations(named, overrides)?);
+        for grade in [Grade::Correlations, Grade::Observations] {
+            rungs.push(modelled(grade, named, overrides)?);
+        }
         let own = scenes.first().map_or(Grade::Balanced, |scene| scene.fidelity.grade);
         let broken = twin::correlations::broken(scenes).map_err(failure)?;
         let is_kept = matches!(own, Grade::Budget(_)) && broken.is_none();
@@ -55,7 +57,9 @@ impl Ladder {
                     let mib = memory_bytes.map_or("-".to_owned(), |bytes| format!("{:.1}", bytes as f64 / 1_048_576.0));
                     writeln!(out, "{mark} {level:12} {code_m:7.1e}  {carrier_cycles:13.1e}  {cn0_db:7.2}  {mib:>10}")
                 }
-                (None, None) => writeln!(out, "{mark} {level:12} no signals"),
+                (None, None) => {
+                    writeln!(out, "{mark} {level:12} noise by theory, no loops: nothing is promised of an epoch")
+                }
             };
         }
         if let Some(broken) = &self.broken {
@@ -69,7 +73,7 @@ impl Ladder {
         let known = self.rungs.iter().filter(|rung| rung.refused.is_none());
         let each: Vec<String> = known.map(|rung| format!("{} {:.1} s", rung.level, rung.time_s)).collect();
         format!(
-            "levels on this machine, of one core: {}; correlations with the receiver, the others without",
+            "levels on this machine, of one core: {}; correlations and observations with the receiver, others without",
             each.join(", ")
         )
     }
@@ -81,21 +85,19 @@ impl Ladder {
     }
 }
 
-/// The level of modelled correlations, as `run --level correlations` has it.
-fn correlations(named: &Named, overrides: &Overrides) -> Result<Rung, CliError> {
+/// A level without samples, as `run --level` has it.
+fn modelled(grade: Grade, named: &Named, overrides: &Overrides) -> Result<Rung, CliError> {
     let mut named = named.clone();
     let ends = named.scenario.front_ends.iter_mut();
-    ends.for_each(|front_end| front_end.fidelity = front_end.fidelity.at(Grade::Correlations));
+    ends.for_each(|front_end| front_end.fidelity = front_end.fidelity.at(grade));
     let (mut scenes, _) = scenario::compose_all(&named, overrides)?;
     let settings = twin::settings_for(&scenes, &scenario::receiver_settings(&named)?);
-    let rung = |refused, time_s, errors| Rung {
-        level: Grade::Correlations.name(),
-        refused,
-        time_s,
-        memory_bytes: None,
-        errors,
+    let rung = |refused, time_s, errors| Rung { level: grade.name(), refused, time_s, memory_bytes: None, errors };
+    let promise = match grade {
+        Grade::Observations => twin::observations::refuse(&scenes).map(|()| None),
+        _ => twin::correlations::promise(&scenes),
     };
-    let promise = match twin::correlations::promise(&scenes) {
+    let promise = match promise {
         Ok(promise) => promise,
         Err(refused) => return Ok(rung(Some(format!("no model of {}", refused.effect)), 0.0, None)),
     };
@@ -119,7 +121,7 @@ fn pilot_s(scenes: &[Scene], settings: &Settings) -> Result<f64, CliError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(CliError::bug)?;
     pool.install(|| {
         let watch = Stopwatch::start();
-        let done = twin::correlations::run(scenes, settings, (&mut (), &mut Nowhere), &mut |_| ());
+        let done = twin::run(scenes, settings, &mut (), &mut Nowhere);
         done.map(|_| watch.elapsed_s()).map_err(|error| failure(error).into())
     })
 }
@@ -156,13 +158,13 @@ mod tests {
     fn a_dearer_level_errs_less_and_the_scene_s_own_is_marked() {
         let ladder = ladder(&include_str!("../../scenarios/static.toml").replace("duration_s = 60", "duration_s = 5"));
         let names: Vec<&str> = ladder.rungs.iter().map(|rung| rung.level).collect();
-        assert_eq!(names, ["fast", "balanced", "reference", "correlations"]);
+        assert_eq!(names, ["fast", "balanced", "reference", "correlations", "observations"]);
         let code_m = |at: usize| ladder.rungs[at].errors.unwrap().code_m / 5.0;
         for (at, expected_m) in [(0, 1.15), (1, 0.122), (2, 0.0108)] {
             assert!((code_m(at) / expected_m - 1.0).abs() < 0.15, "{at}: {}", code_m(at));
         }
         assert!(ladder.rungs[..3].is_sorted_by(|a, b| a.time_s < b.time_s), "{:?}", ladder.rungs);
-        assert!(ladder.rungs[3].time_s > 0.0 && ladder.rungs[3].refused.is_none());
+        assert!(ladder.rungs[3..].iter().all(|rung| rung.time_s > 0.0 && rung.refused.is_none()));
         let text = ladder.text();
         assert!(text.contains("* balanced") && !text.contains("would break"), "{text}");
         assert_eq!(ladder.object()[1]["chosen"], true);

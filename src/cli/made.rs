@@ -28,8 +28,8 @@ use gnss::signal::Signal;
 use receiver::output::{Nmea, Output, Rinex, Sink, Tracks};
 use receiver::settings::Settings;
 use receiver::{Outcome, Reception};
+use twin::Refused;
 use twin::TwinError;
-use twin::correlations::Refused;
 
 /// Bytes that are made numbers at a time: whole samples of any format.
 const SEEN_BYTES: usize = 1 << 17;
@@ -46,7 +46,7 @@ pub struct Wanted<'a> {
 
 /// End of a run that is not success.
 pub enum Failure {
-    /// The level `correlations` has no model of an effect.
+    /// A level without samples has no model of an effect.
     Refused(Refused),
     /// Anything else, with its exit code.
     Other(CliError),
@@ -111,9 +111,9 @@ pub fn make(run: &Path, scenes: &[Scene], settings: &Settings, wanted: &Wanted<'
         others = Some((files, sentences(&rx_in)?, tracks));
     }
     let (keep, changing) = (wanted.keep_if, scenes.iter().any(|scene| !scene.interference.is_empty()));
-    let is_sampled = scene.fidelity.grade != Grade::Correlations;
+    let is_sampled = scene.fidelity.grade.is_sampled();
     if keep && !is_sampled {
-        return Err(generator_error(GenerateError::NoSamples).into());
+        return Err(generator_error(GenerateError::NoSamples(scene.fidelity.grade.name())).into());
     }
     let mut moment = Moment::of(scene);
     let tap = |scene: &Scene| Tap::new(scene, run, (keep, changing), (scenes.len(), moment.samples(scene)));
@@ -122,7 +122,7 @@ pub fn make(run: &Path, scenes: &[Scene], settings: &Settings, wanted: &Wanted<'
         if is_sampled {
             Ok(both(scenes, settings, &mut (&mut truth, &mut moment), outputs, (&mut taps, wanted.told))?)
         } else {
-            by_correlations(scenes, settings, (&mut truth, outputs), wanted.told)
+            modelled(scenes, settings, (&mut truth, outputs), wanted.told)
         }
     };
     let made = match &mut others {
@@ -172,15 +172,21 @@ fn both(
     Ok(Both { generated, outcome, generator_busy, receiver_busy, whole: start.elapsed() })
 }
 
-/// Receives a scene by modelled correlations.
-fn by_correlations(
+/// Receives a scene without samples: by modelled correlations or observations.
+fn modelled(
     scenes: &[Scene],
     settings: &Settings,
-    sinks: (&mut dyn truth::Sink, &mut dyn Sink),
+    (truth, records): (&mut (dyn truth::Sink + Send), &mut (dyn Sink + Send)),
     told: &(dyn Fn(u64) + Sync),
 ) -> Result<Both, Failure> {
     let start = Instant::now();
-    let done = twin::correlations::run(scenes, settings, sinks, &mut |samples| told(samples));
+    let is_of = |grade| scenes.iter().any(|scene| scene.fidelity.grade == grade);
+    let progress = &mut |samples| told(samples);
+    let done = if is_of(Grade::Observations) && !is_of(Grade::Correlations) {
+        twin::observations::run(scenes, settings, (truth, records), progress)
+    } else {
+        twin::correlations::run(scenes, settings, (truth, records), progress)
+    };
     let twin::Done { generated, outcome } = done.map_err(failure)?;
     let whole = start.elapsed();
     Ok(Both { generated, outcome, generator_busy: whole, receiver_busy: whole, whole })

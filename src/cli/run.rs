@@ -23,7 +23,6 @@ use analysis::judge::schema::SUMMARY;
 use analysis::judge::summary::Summary;
 use analysis::judge::verdict::Verdict;
 use analysis::{self, JudgeError};
-use generator::fidelity::Grade;
 use generator::scenario::Overrides;
 use generator::scene::Scene;
 use generator::{GenerateError, truth};
@@ -105,7 +104,7 @@ impl Case {
     /// Generates, receives and judges into an empty directory.
     pub fn make(&self, run: &Path, arguments: &args::Run, gate: &Gate) -> Result<Done, CliError> {
         let Some(scene) = self.scenes.first() else { return Err(CliError::bug("a scenario without a front end")) };
-        let is_sampled = scene.fidelity.grade != Grade::Correlations;
+        let is_sampled = scene.fidelity.grade.is_sampled();
         let label = format!("run {}", scene.name);
         let progress = Progress::new(&label, Some(scene.samples), arguments.printed.in_words());
         let told = |samples| progress.set(samples);
@@ -127,7 +126,7 @@ impl Case {
 pub struct Done {
     both: Both,
     summary: Summary,
-    /// Length of a scene whose correlations a model gave, in seconds.
+    /// Length of a scene without samples, in seconds.
     modelled_s: Option<f64>,
 }
 

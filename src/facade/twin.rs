@@ -35,7 +35,7 @@ use ::gnss::record::Fix;
 use ::receiver::output::{self, Output, OutputError};
 use ::receiver::settings::{Settings, SettingsError};
 use ::receiver::{Outcome, ReceiveError};
-use ::twin::correlations::Refused;
+use ::twin::Refused;
 #[doc(inline)]
 pub use ::twin::{Done, Fed, Listen, feed};
 use ::twin::{TwinError, run};
@@ -57,7 +57,7 @@ pub enum Error {
     /// Scene that cannot be generated.
     #[error(transparent)]
     Generate(#[from] GenerateError),
-    /// Effect of a scene without a model of its correlations.
+    /// Effect of a scene of which its level has no model.
     #[error(transparent)]
     Refused(#[from] Refused),
     /// Samples that cannot be received.

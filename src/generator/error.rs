@@ -26,8 +26,8 @@ pub enum GenerateError {
     #[error(transparent)]
     Waveform(#[from] WaveformError),
     /// Samples of a scene that has none.
-    #[error("fidelity.level = \"correlations\": no samples exist at this level; `gnss-twin run` receives such a scene")]
-    NoSamples,
+    #[error("fidelity.level = \"{0}\": no samples exist at this level; `gnss-twin run` receives such a scene")]
+    NoSamples(&'static str),
     /// Front ends without a scene.
     #[error("no front end: expected one at least")]
     NoFrontEnd,

@@ -32,6 +32,8 @@ pub enum Grade {
     Budget(Budget),
     /// Correlations from a model in place of samples, whose knobs are those of `balanced` with area edges.
     Correlations,
+    /// Observations from theory in place of samples and loops, whose knobs are those of `correlations`.
+    Observations,
 }
 
 /// Model of a chip edge between samples. C/N0 is at the antenna, before the front end: samples have the share
@@ -79,12 +81,18 @@ pub struct Fidelity {
 
 impl Grade {
     /// Levels and their names in a scenario.
-    pub const NAMES: [(&'static str, Self); 4] = [
+    pub const NAMES: [(&'static str, Self); 5] = [
         ("fast", Self::Fast),
         ("balanced", Self::Balanced),
         ("reference", Self::Reference),
         ("correlations", Self::Correlations),
+        ("observations", Self::Observations),
     ];
+
+    /// True if samples are made at this level.
+    pub fn is_sampled(self) -> bool {
+        !matches!(self, Self::Correlations | Self::Observations)
+    }
 
     /// Name of the level in a scenario; of a budget, the name of its key.
     pub fn name(self) -> &'static str {
@@ -151,7 +159,7 @@ impl Fidelity {
             },
             // 1e-4 cycle is 19 µm: a carrier loop at 50 dB-Hz has forty times that. A budget sets what it
             // needs.
-            Grade::Balanced | Grade::Budget(_) | Grade::Correlations => Self {
+            Grade::Balanced | Grade::Budget(_) | Grade::Correlations | Grade::Observations => Self {
                 grade,
                 code_edge: CodeEdge::Area,
                 waveform: Layers::Whole,

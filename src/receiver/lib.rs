@@ -9,7 +9,8 @@
 //!
 //! A [`Receiver`] takes samples and returns [`output::Record`]s as values; [`receive`] reads a stream to its
 //! end and gives them to any [`output::Sink`], of which the CSV files of [`output::Output`] are one. Several
-//! front ends of one clock are one reception ([`Receiver::of_several`], [`receive_several`]).
+//! front ends of one clock are one reception ([`Receiver::of_several`], [`receive_several`]). A [`Navigator`]
+//! is the part behind the channels alone.
 //!
 //! ```
 //! use gnss::samples::{Format, IfMetadata};
@@ -35,7 +36,8 @@
 //! Rooms from the ground up; each imports only rooms before it:
 //! source, format, thresholds · [`correlate`] · [`lead`] · [`gap`], [`interference`], [`parting`] ·
 //! [`acquire`], looks · [`track`] · [`decode`] · [`observe`], [`position`] · [`settings`] (of all those) ·
-//! [`diagnosis`], [`output`] · [`array`](mod@array), [`authentic`], [`detect`] · outcome · session · run.
+//! [`diagnosis`], [`output`] · [`array`](mod@array), [`authentic`], [`detect`] · outcome · session · run ·
+//! navigator.
 //!
 //! Internal crate: programs use the facade `gnss_twin`. What it does not hand on may change with any version.
 
@@ -56,6 +58,7 @@ pub mod gap;
 pub mod interference;
 pub mod lead;
 pub mod looks;
+mod navigator;
 pub mod observe;
 mod outcome;
 pub mod output;
@@ -68,5 +71,7 @@ pub mod source;
 pub mod threshold;
 pub mod track;
 
+pub use navigator::Navigator;
 pub use outcome::{Conditioning, Interfered, Outcome, ReceiveError};
 pub use run::{Receiver, Reception, receive, receive_several, searched};
+pub use session::Given;

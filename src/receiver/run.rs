@@ -4,7 +4,7 @@
 //! messages, make observables, solve. Results do not depend on the number of threads. Memory holds one block,
 //! one search window and what the satellites said.
 
-mod summary;
+pub(crate) mod summary;
 
 use std::io::{ErrorKind, Read};
 
@@ -311,12 +311,7 @@ impl Reception {
                 let needed = acquire::least_samples(metadata, &settings.acquisition)?;
                 Stage::NothingSearched { samples: count, needed }
             };
-            let signals = settings.acquisition.signals();
-            let if_hz = signals.first().map_or(0.0, |signal| metadata.if_hz(signal.centre_hz()));
-            let format = metadata.format.to_string();
-            let (rate_hz, acquired) = (metadata.rate.hz(), outcome.acquired.len());
-            let mut diagnosis =
-                Diagnosis::new(stage, seconds, rate_hz, &format, if_hz, cut_bytes, acquired).with_messages(&signals);
+            let mut diagnosis = diagnosis(stage, metadata, settings, &outcome);
             if let Some(seen) = &outcome.interfered {
                 diagnosis.advice.insert(0, format!("the spectrum: {seen}"));
             }
@@ -328,6 +323,15 @@ impl Reception {
         sink.finish(&summary(&self.metadata, &self.session.signals(), settings, &outcome))?;
         Ok(outcome)
     }
+}
+
+/// Diagnosis of an outcome without a fix, for the stage that failed.
+pub(crate) fn diagnosis(stage: Stage, metadata: &IfMetadata, settings: &Settings, outcome: &Outcome) -> Diagnosis {
+    let signals = settings.acquisition.signals();
+    let if_hz = signals.first().map_or(0.0, |signal| metadata.if_hz(signal.centre_hz()));
+    let format = metadata.format.to_string();
+    let (rate_hz, acquired) = (metadata.rate.hz(), outcome.acquired.len());
+    Diagnosis::new(stage, outcome.seconds, rate_hz, &format, if_hz, outcome.cut_bytes, acquired).with_messages(&signals)
 }
 
 /// Takes the samples before these ends from all queues through the session.

@@ -36,12 +36,13 @@
 #![cfg(all(feature = "generator", feature = "receiver"))]
 
 pub mod correlations;
+pub mod observations;
+mod refusal;
 
 use std::time::{Duration, Instant};
 
 use thiserror::Error;
 
-use correlations::Refused;
 use generator::scene::{Grade, Scene};
 use generator::stream::{Fronts, GenerateError, Generated, Options, Stream};
 use generator::truth;
@@ -50,6 +51,7 @@ use gnss::signal::Signal;
 use receiver::output;
 use receiver::settings::Settings;
 use receiver::{Outcome, ReceiveError, Reception};
+pub use refusal::Refused;
 
 /// Error that ends a run of the twin early.
 #[derive(Debug, Error)]
@@ -57,7 +59,7 @@ pub enum TwinError {
     /// The scene cannot be generated, or its truth is not taken.
     #[error(transparent)]
     Generate(#[from] GenerateError),
-    /// The scene has an effect that modelled correlations do not have.
+    /// The scene has an effect of which a level without samples has no model.
     #[error(transparent)]
     Refused(#[from] Refused),
     /// The samples cannot be received, or the records are not taken.
@@ -86,8 +88,12 @@ pub fn run(
     truth: &mut (dyn truth::Sink + Send),
     records: &mut (dyn output::Sink + Send),
 ) -> Result<Done, TwinError> {
-    if scenes.iter().any(|scene| scene.fidelity.grade == Grade::Correlations) {
+    let grades = || scenes.iter().map(|scene| scene.fidelity.grade);
+    if grades().any(|grade| grade == Grade::Correlations) {
         return correlations::run(scenes, settings, (truth, records), &mut |_| ());
+    }
+    if grades().any(|grade| grade == Grade::Observations) {
+        return observations::run(scenes, settings, (truth, records), &mut |_| ());
     }
     let metadata: Vec<IfMetadata> = scenes.iter().map(|scene| scene.metadata.clone()).collect();
     let mut reception = Reception::of_several(&metadata, &settings_for(scenes, settings))?;

@@ -94,6 +94,7 @@ pub const ORDER: Order<'static> = &[
             &["outcome"],
             &["session"],
             &["run"],
+            &["navigator"],
         ],
     ),
     (

@@ -10,7 +10,7 @@ pub mod foreign;
 pub mod integrity;
 pub mod judgement;
 pub mod limits;
-mod rules;
+pub(crate) mod rules;
 pub mod schema;
 pub mod summary;
 pub mod verdict;

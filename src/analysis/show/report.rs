@@ -4,17 +4,24 @@ use std::collections::BTreeSet;
 use std::fmt;
 
 use crate::judge::judgement::Status;
+use crate::judge::rules::{CORRELATIONS, OBSERVATIONS};
 use crate::judge::summary::Summary;
 use crate::judge::verdict::Verdict;
 use crate::measure::consistency::Calibration;
 use crate::statistics::Spread;
 
+/// True of a level of fidelity at which no samples are made.
+pub(crate) fn is_modelled(level: &str) -> bool {
+    [CORRELATIONS, OBSERVATIONS].contains(&level)
+}
+
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let rate_msps = self.sample_rate_hz / 1e6;
         let Self { scene, duration_s, seed, .. } = self;
-        if self.fidelity == "correlations" {
-            writeln!(f, "{scene} · {duration_s} s modelled at level correlations, without samples · seed {seed}")?;
+        if is_modelled(&self.fidelity) {
+            let level = &self.fidelity;
+            writeln!(f, "{scene} · {duration_s} s modelled at level {level}, without samples · seed {seed}")?;
         } else {
             writeln!(f, "{scene} · {duration_s} s at {rate_msps} Msps · seed {seed}")?;
         }

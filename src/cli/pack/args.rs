@@ -61,6 +61,8 @@ pub enum Level {
     Samples,
     /// Modelled correlations
     Correlations,
+    /// Modelled observations
+    Observations,
 }
 
 impl Level {
@@ -69,6 +71,7 @@ impl Level {
         match self {
             Self::Samples => "samples",
             Self::Correlations => "correlations",
+            Self::Observations => "observations",
         }
     }
 }

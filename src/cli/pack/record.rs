@@ -95,10 +95,13 @@ pub fn composed(entry: &Entry, level: Level) -> Result<(Vec<Scene>, Settings), C
 
 fn at_level(scenario: &Scenario, level: Level) -> Scenario {
     let mut scenario = scenario.clone();
-    if level == Level::Correlations {
-        let ends = scenario.front_ends.iter_mut();
-        ends.for_each(|front_end| front_end.fidelity = front_end.fidelity.at(Grade::Correlations));
-    }
+    let grade = match level {
+        Level::Samples => return scenario,
+        Level::Correlations => Grade::Correlations,
+        Level::Observations => Grade::Observations,
+    };
+    let ends = scenario.front_ends.iter_mut();
+    ends.for_each(|front_end| front_end.fidelity = front_end.fidelity.at(grade));
     scenario
 }
 

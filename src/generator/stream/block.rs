@@ -5,7 +5,7 @@
 //! side. What stages look back at is rendered before it and not sent on.
 
 use crate::error::GenerateError;
-use crate::scene::{CodeEdge, Grade, Scene};
+use crate::scene::{CodeEdge, Scene};
 use crate::stage::Block;
 use crate::synth::band::Filter;
 use crate::synth::isa;
@@ -16,7 +16,8 @@ use gnss::samples::Format;
 impl Scene {
     /// Refuses a level at which no samples exist.
     pub(super) fn has_samples(&self) -> Result<(), GenerateError> {
-        if self.fidelity.grade == Grade::Correlations { Err(GenerateError::NoSamples) } else { Ok(()) }
+        let grade = self.fidelity.grade;
+        if grade.is_sampled() { Ok(()) } else { Err(GenerateError::NoSamples(grade.name())) }
     }
 }
 

@@ -17,6 +17,7 @@ use crate::synth::{Edge, Kernel, RUN_SAMPLES};
 use crate::transmit::Transmitter;
 use gnss::record::{NavigationRow, PassRow};
 use gnss::satellite::Sv;
+use gnss::signal::Link;
 
 /// Smallest length of a block, in units of the samples that its stages look back at.
 const LEADS_PER_BLOCK: u64 = 8;
@@ -132,13 +133,16 @@ impl<'a> Front<'a> {
     }
 
     /// Prepares the data for the samples from `needed` up to `to`, and drops earlier data; no samples are
-    /// made.
+    /// made. Messages are those of links that are `heard`.
     ///
     /// # Errors
     /// Errors of orbits and messages.
-    pub fn pass(&mut self, needed: u64, to: u64) -> Result<(), GenerateError> {
+    pub fn pass(&mut self, needed: u64, to: u64, heard: &(dyn Fn(Link) -> bool + Sync)) -> Result<(), GenerateError> {
         let (scene, needed) = (self.scene, needed.min(self.next));
-        self.transmitters.par_iter_mut().try_for_each(|t| t.prepare(scene, needed, to))?;
+        self.transmitters.par_iter_mut().try_for_each(|t| {
+            let is_heard = heard(t.link());
+            t.prepare_heard(scene, (needed, to), is_heard)
+        })?;
         self.next = to;
         Ok(())
     }

@@ -16,6 +16,7 @@ use crate::synth::RUN_SAMPLES;
 use crate::transmit::Transmitter;
 use crate::truth::Sink;
 use gnss::record::PassRow;
+use gnss::signal::Link;
 
 /// Streams of the front ends of a scene.
 pub struct Fronts<'a> {
@@ -89,18 +90,24 @@ impl<'a> Fronts<'a> {
 
     /// Prepares the signals of each front end from its sample of `needed` on, up to sample `to` of the first
     /// one, and passes the true values before it to `truth`. Earlier signals are dropped, and no samples are
-    /// made.
+    /// made. Messages are prepared of links that are `heard`.
     ///
     /// # Errors
     /// [`GenerateError`] of orbits, messages and truth.
-    pub fn pass(&mut self, needed: &[u64], to: u64, truth: &mut dyn Sink) -> Result<(), GenerateError> {
+    pub fn pass(
+        &mut self,
+        needed: &[u64],
+        to: u64,
+        heard: &(dyn Fn(Link) -> bool + Sync),
+        truth: &mut dyn Sink,
+    ) -> Result<(), GenerateError> {
         let Some((count, seconds)) = self.fronts.first().map(|first| first.scene.clock.rate.ratio()) else {
             return Ok(());
         };
         for (number, (front, needed)) in self.fronts.iter_mut().zip(needed).enumerate() {
             // Instants of the truth before `to` have their sample in every front end.
             let own = if number == 0 { to } else { front.scene.clock.rate.first_sample_at(to * seconds, count) + 1 };
-            front.pass(*needed, own.min(front.part.end))?;
+            front.pass(*needed, own.min(front.part.end), heard)?;
         }
         self.ticks.give(&self.fronts, to, truth)
     }

@@ -277,6 +277,19 @@ impl Transmitter {
     /// # Errors
     /// Errors of orbits and messages.
     pub fn prepare(&mut self, scene: &Scene, from: u64, to: u64) -> Result<(), GenerateError> {
+        self.prepare_heard(scene, (from, to), true)
+    }
+
+    /// [`Transmitter::prepare`], without messages where they are not heard.
+    ///
+    /// # Errors
+    /// Errors of [`Transmitter::prepare`].
+    pub fn prepare_heard(
+        &mut self,
+        scene: &Scene,
+        (from, to): (u64, u64),
+        is_heard: bool,
+    ) -> Result<(), GenerateError> {
         let first = scene.clock.rate.elapsed(from).0 as u64;
         if self.view.is_empty() && first > 0 {
             let sample = |second| scene.clock.rate.first_sample_at(second, 1);
@@ -284,7 +297,8 @@ impl Transmitter {
                 |second| arrival::presence_from(scene, &self.from, self.sv, scene.clock.epoch(sample(second)));
             self.since = rising::rising(scene, (&self.from, self.sv), first, presence)?.map(sample);
         }
-        self.prepare_alone(scene, from, to)
+        self.prepare_rays(scene, from, to)?;
+        if is_heard { self.prepare_messages(scene, from, to) } else { Ok(()) }
     }
 
     /// [`Transmitter::prepare`] for samples alone: how long the satellite has been in view is not sought.
@@ -292,6 +306,12 @@ impl Transmitter {
     /// # Errors
     /// Errors of [`Transmitter::prepare`].
     pub fn prepare_alone(&mut self, scene: &Scene, from: u64, to: u64) -> Result<(), GenerateError> {
+        self.prepare_rays(scene, from, to)?;
+        self.prepare_messages(scene, from, to)
+    }
+
+    /// Prepares view and polynomials.
+    fn prepare_rays(&mut self, scene: &Scene, from: u64, to: u64) -> Result<(), GenerateError> {
         let rate = scene.clock.rate;
         let (first, last) = (rate.elapsed(from).0 as u64, rate.elapsed(to.saturating_sub(1)).0 as u64);
         self.view = self.view.split_off(&first);
@@ -327,11 +347,12 @@ impl Transmitter {
             }
         }
         self.fast.prepare(scene.fast_phases(), self.from.fading(self.sv), self.signal.carrier_hz(self.sv), from, to);
-        self.prepare_messages(scene, from, to)
+        Ok(())
     }
 
     fn prepare_messages(&mut self, scene: &Scene, from: u64, to: u64) -> Result<(), GenerateError> {
-        if self.symbols.is_empty() {
+        let is_sent = to > self.on.start && from < self.on.end && self.view.values().any(|up| *up);
+        if self.symbols.is_empty() || !is_sent {
             return Ok(());
         }
         let delays = self

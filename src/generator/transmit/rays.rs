@@ -52,6 +52,12 @@ impl Transmitter {
         if negative { -1.0 } else { 1.0 }
     }
 
+    /// Sign of a component's code period by its message alone.
+    pub fn data_sign(&self, component: usize, period: i64) -> f64 {
+        let data = self.sent.iter().find(|sent| sent.component == component).and_then(|sent| sent.data);
+        if self.symbols.negative(data, period).0 { -1.0 } else { 1.0 }
+    }
+
     /// Signs of a component's code periods from period `first` on, as [`Self::sign`] gives them, into
     /// `signs`.
     pub fn signs(&self, component: usize, first: i64, signs: &mut [f64]) {

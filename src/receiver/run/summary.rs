@@ -9,7 +9,7 @@ use gnss::samples::IfMetadata;
 use gnss::satellite::Sv;
 
 /// Summary of a reception, written as `receiver.json`.
-pub(super) fn summary(
+pub(crate) fn summary(
     metadata: &[IfMetadata],
     signals: &[Vec<&'static str>],
     settings: &Settings,

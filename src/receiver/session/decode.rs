@@ -1,13 +1,10 @@
-//! Decoding of the channels' symbols, and the effects on the session.
+//! Decoding of the channels' symbols, tick by tick.
 
+use super::hear::Hearing;
 use super::step::Counted;
 use super::{FrontEnd, Session, Shared, Track};
-use crate::authentic::Authentic;
-use crate::decode::News;
 use crate::outcome::ReceiveError;
-use crate::output::{Record, Sink};
-use gnss::broadcast::Ephemeris;
-use gnss::record::{Event, EventRow};
+use crate::output::Sink;
 use gnss::satellite::Sv;
 
 impl Session {
@@ -60,104 +57,9 @@ impl FrontEnd {
     fn decode(&mut self, until: u64, shared: &mut Shared, sink: &mut dyn Sink) -> Result<(), ReceiveError> {
         let step = self.step;
         let sink = &mut Counted { sink, step, ticks: &[] };
-        for track in &mut self.tracks {
-            let (near, known) = (shared.near(), shared.known());
-            let (mut sv, signal) = (track.channel.sv(), track.channel.signal());
-            let Some(decoder) = &mut track.decoder else { continue };
-            // A position of verified data alone takes nothing that no tag covers.
-            let all_data = !shared.authentic.as_ref().is_some_and(Authentic::is_required);
-            known.into_iter().for_each(|known| decoder.know(known));
-            let slipped = track.report.events.iter().any(|(_, event)| *event == Event::CycleSlip);
-            let mut all = Vec::new();
-            let ended = track.report.symbols.partition_point(|symbol| symbol.end <= until);
-            for symbol in track.report.symbols.drain(..ended) {
-                track.symbols += 1;
-                all.extend(decoder.take(&symbol, near).into_iter().map(|news| (symbol.end, news)));
-            }
-            let progress = shared.progress.entry(sv).or_default();
-            progress.symbols |= track.symbols > 0;
-            progress.frame |= decoder.is_synchronised();
-            if !decoder.is_dated_elsewhere() {
-                progress.missing = decoder.missing();
-            }
-            for (sample, news) in all {
-                let event = match news {
-                    News::FrameSynchronised => Some(Event::FrameSynchronised),
-                    News::Polarity { inverted } => {
-                        if !slipped {
-                            track.channel.resolve_half_cycle(inverted);
-                        }
-                        None
-                    }
-                    News::Contradiction => {
-                        shared.refuse(sv, "the time of a unit contradicts that of those before it".to_owned());
-                        None
-                    }
-                    News::Refused(why) => {
-                        shared.refuse(sv, why);
-                        None
-                    }
-                    News::Time(time) => {
-                        shared.timebase.take_time(time);
-                        None
-                    }
-                    // Of several models the receiver takes one.
-                    News::Ionosphere(sent) if shared.ionosphere_model == Some(sent.model()) => {
-                        let before = shared.ionosphere.replace(sent);
-                        (before != Some(sent)).then_some(Event::IonosphereDecoded)
-                    }
-                    News::Ionosphere(_) => None,
-                    News::Sender(other) => {
-                        // Another of those that are alike was found: what follows is of it.
-                        shared.rename(sv, other);
-                        track.channel.rename(other);
-                        sv = other;
-                        Some(Event::Identified)
-                    }
-                    News::Page(page) => {
-                        if let Some(authentic) = &mut shared.authentic {
-                            authentic.take(sv, step.main(sample), page);
-                        }
-                        None
-                    }
-                    News::Parameters(rows) => {
-                        sink.take(Record::Navigation(rows))?;
-                        None
-                    }
-                    News::Augmentation { sent, content } => {
-                        if all_data {
-                            shared.solver.take_augmentation(sv, sent, &content);
-                        }
-                        None
-                    }
-                    News::AheadOfGps { scale, ahead } => {
-                        if all_data {
-                            shared.solver.take_ahead(scale, ahead);
-                        }
-                        None
-                    }
-                    News::Reduced { set, with_delays } => {
-                        let serves = all_data && shared.solver.take_reduced(*set, with_delays);
-                        (serves && shared.ephemerides.of(sv).is_empty()).then_some(Event::ReducedElements)
-                    }
-                    News::Ephemeris(ephemeris) => {
-                        // What was refused on the way to it has done no harm.
-                        shared.refused.remove(&sv);
-                        let is_sick = |set: &Ephemeris| set.is_healthy_on(signal) == Some(false);
-                        let sick = is_sick(&ephemeris);
-                        let before = shared.ephemerides.insert(*ephemeris).as_ref().is_some_and(is_sick);
-                        sink.take(Record::Event(EventRow { sample, sv, signal, event: Event::EphemerisComplete }))?;
-                        match (before, sick) {
-                            (false, true) => Some(Event::Unhealthy),
-                            (true, false) => Some(Event::Healthy),
-                            _ => None,
-                        }
-                    }
-                };
-                if let Some(event) = event {
-                    sink.take(Record::Event(EventRow { sample, sv, signal, event }))?;
-                }
-            }
+        for Track { channel, decoder, report, symbols, .. } in &mut self.tracks {
+            let Some(decoder) = decoder else { continue };
+            shared.hear(Hearing { channel, decoder, report, symbols }, (until, step), sink)?;
         }
         Ok(())
     }

@@ -1,14 +1,12 @@
 //! Observations and a fix at one tick.
 
+use super::hear::{date, is_wrong_time};
 use super::{FrontEnd, Session, Tick, WRONG_TIME_FIXES};
-use crate::authentic::Authentic;
 use crate::observe::Reading;
 use crate::outcome::ReceiveError;
 use crate::output::{Record, Sink};
-use gnss::record::{Event, EventRow, Observation};
+use gnss::record::{Event, EventRow};
 
-/// Residuals beyond this are no noise: the channel has the wrong time.
-const WRONG_TIME_M: f64 = 10_000.0;
 /// Number of satellites that have to show by how much a front end is out of step.
 const SHOWING: usize = 3;
 /// Difference in seconds within which they have to agree: the ionosphere separates two carriers by less than
@@ -38,9 +36,8 @@ impl FrontEnd {
             let (sv, signal) = (track.channel.sv(), track.channel.signal());
             let Some(decoder) = track.decoder.as_mut().filter(|decoder| decoder.is_dated_elsewhere()) else { continue };
             let measurement = track.report.measurements.iter().find(|one| one.sample == own && one.locked);
-            let other = known.iter().find(|other| other.sv == sv && other.signal.time == signal.time);
-            let (Some(measurement), Some(other)) = (measurement, other) else { continue };
-            if decoder.date(measurement.code_periods, other.sent_of_week) {
+            let Some(measurement) = measurement else { continue };
+            if date(decoder, signal.link(sv), measurement, known) {
                 let event = Event::FrameSynchronised;
                 sink.take(Record::Event(EventRow { sample: own, sv, signal, event }))?;
             }
@@ -55,57 +52,17 @@ impl Session {
         self.date(tick, sink)?;
         let readings = self.readings(tick, sink)?;
         let shared = &mut self.shared;
-        let observed = shared.timebase.observe(tick, &readings);
-        for one in observed.iter().filter(|one| one.half_cycle_known) {
-            sink.take(Record::Observation(one.observation.clone()))?;
+        let Some(solved) = shared.solve(tick, &readings, sink)? else { return Ok(()) };
+        let Some(first) = self.front_ends.first_mut() else { return Ok(()) };
+        if first.clock_jumped(&solved.fix, shared, sink)? {
+            self.keep_step();
+            return Ok(());
         }
-        let Some(clock) = shared.timebase.clock() else { return Ok(()) };
-        let observations: Vec<Observation> = observed.into_iter().map(|one| one.observation).collect();
-        let verified = shared.authentic.as_ref().filter(|authentic| authentic.is_required());
-        let (sets, ionosphere) = verified.map_or((&shared.ephemerides, shared.ionosphere), Authentic::data);
-        let solved = shared.solver.solve(tick, clock, &observations, sets, ionosphere);
-        if let Some(detection) = &mut shared.detection {
-            detection.take_observations(&observations);
-            detection.take_residuals(shared.solver.take_tested());
-        }
-        match solved {
-            Ok(solved) => {
-                if let Some(first) = self.front_ends.first_mut()
-                    && first.clock_jumped(&solved.fix, shared, sink)?
-                {
-                    self.keep_step();
-                    return Ok(());
-                }
-                if let Some(detection) = &mut shared.detection {
-                    detection.take_fix(&solved.fix);
-                }
-                sink.take(Record::Fix(solved.fix.clone()))?;
-                sink.take(Record::Clocks(solved.clocks))?;
-                sink.take(Record::Sights(solved.sights))?;
-                sink.take(Record::Ionosphere(solved.ionosphere))?;
-                if let Some(row) = solved.integrity {
-                    sink.take(Record::Integrity(Box::new(row)))?;
-                }
-                let condition = solved.fix.condition;
-                shared.worst_condition = Some(shared.worst_condition.map_or(condition, |worst| worst.max(condition)));
-                shared.fixes += 1;
-                if let Some(authentic) = &mut shared.authentic {
-                    authentic.fixed(tick, &solved.used, &shared.ephemerides);
-                }
-                shared.clock_drift = Some(solved.fix.clock_drift);
-                shared.latest = Some(solved.fix.clone());
-                if let Some(first) = self.front_ends.first() {
-                    shared.first_fix_s.get_or_insert(first.metadata.rate.elapsed_s(tick));
-                }
-                shared.used.extend(solved.used);
-                for track in self.front_ends.iter_mut().flat_map(|front_end| &mut front_end.tracks) {
-                    let sv = track.channel.sv();
-                    let wrong = solved.excluded.iter().any(|(out, miss_m)| *out == sv && miss_m.abs() > WRONG_TIME_M);
-                    track.wrong_time = if wrong { track.wrong_time + 1 } else { 0 };
-                    track.dropped |= track.wrong_time >= WRONG_TIME_FIXES;
-                }
-            }
-            Err(reason) => shared.reason = Some(reason),
+        let excluded = shared.settle((tick, first.metadata.rate), solved, sink)?;
+        for track in self.front_ends.iter_mut().flat_map(|front_end| &mut front_end.tracks) {
+            let wrong = is_wrong_time(&excluded, track.channel.sv());
+            track.wrong_time = if wrong { track.wrong_time + 1 } else { 0 };
+            track.dropped |= track.wrong_time >= WRONG_TIME_FIXES;
         }
         Ok(())
     }

@@ -11,15 +11,18 @@ use crate::correlate::layers_refusal;
 use crate::detect::Detection;
 use crate::diagnosis::Stage;
 use crate::lead::{lead, refusal};
-use crate::outcome::{Conditioning, Outcome, ReceiveError};
+use crate::outcome::{Outcome, ReceiveError};
 use crate::output::Sink;
 use crate::position::Noises;
-use crate::position::least_squares::LARGEST_CONDITION;
 use crate::settings::{Settings, SettingsError};
 use crate::source::Stretch;
 use crate::track::LoopMargin;
 use front_end::{FrontEnd, Track, Window};
 use gnss::samples::IfMetadata;
+use gnss::signal::Signal;
+use gnss::time::Epoch;
+pub use navigation::Given;
+pub(super) use navigation::Navigation;
 use shared::Shared;
 use step::{Step, Tick};
 pub(super) use suited::held;
@@ -28,7 +31,9 @@ mod decode;
 mod detect;
 mod front_end;
 mod gap;
+mod hear;
 mod measure;
+mod navigation;
 mod part;
 mod plan;
 mod predict;
@@ -40,8 +45,53 @@ mod suited;
 /// Number of consecutive fixes that have to show a channel's wrong time.
 const WRONG_TIME_FIXES: u32 = 10;
 
-/// Years in 1024 weeks.
-const ERA_YEARS: f64 = 19.6;
+/// Signals that each front end receives, and the noise of their code loops.
+fn assign(metadata: &[IfMetadata], settings: &Settings) -> Result<(Vec<Vec<&'static Signal>>, Noises), ReceiveError> {
+    week_reference(settings)?;
+    if metadata.is_empty() {
+        return Err(ReceiveError::NoFrontEnd);
+    }
+    let assigned = suited::assigned(metadata, &settings.acquisition.signals());
+    let all = assigned.iter().flatten();
+    if let Some((signal, reason)) = all.filter_map(|signal| Some((signal, refusal(signal)?))).next() {
+        return Err(ReceiveError::Unsupported { signal: signal.name, reason });
+    }
+    let mut noises = Noises::new();
+    for (metadata, signals) in metadata.iter().zip(&assigned) {
+        for signal in signals {
+            if let Some(reason) = layers_refusal(settings.tracking.waveform, signal, metadata.rate.hz()) {
+                return Err(ReceiveError::Unsupported { signal: signal.name, reason });
+            }
+            noises.push((*signal, front_end::noise(signal, metadata, settings)));
+        }
+    }
+    Ok((assigned, noises))
+}
+
+/// GPS time near which the settings resolve weeks.
+fn week_reference(settings: &Settings) -> Result<Epoch, ReceiveError> {
+    let stated = settings.week_reference();
+    let error = |source| SettingsError::Week { origin: "settings".to_owned(), above: String::new(), source };
+    Ok(stated.map_err(error)?)
+}
+
+/// State of what front ends share, and the margins of their loops.
+fn share(
+    metadata: &[IfMetadata],
+    settings: &Settings,
+    noises: Noises,
+) -> Result<(Shared, [LoopMargin; 5]), ReceiveError> {
+    let Some(first) = metadata.first() else { return Err(ReceiveError::NoFrontEnd) };
+    let start = metadata.iter().find_map(|metadata| metadata.start);
+    let authentic = match &settings.osnma {
+        Some(osnma) => Some(Authentic::new(osnma, &settings.acquisition.signals(), start, first.rate)?),
+        None => None,
+    };
+    let detection = Detection::new(settings, noises.clone(), first.rate, metadata.len());
+    let loops = settings.tracking.least_margins(noises.iter().filter_map(|(signal, _)| lead(signal)));
+    let times = (start, week_reference(settings)?);
+    Ok((Shared::new(settings, noises, first.rate, times, (authentic, detection)), loops))
+}
 
 /// A reception of one or several front ends that share a clock.
 pub(super) struct Session {
@@ -55,27 +105,10 @@ impl Session {
     /// A cold start. Every signal is received in the first front end whose band holds its main lobes, or else
     /// its carrier.
     pub fn new(metadata: &[IfMetadata], settings: &Settings) -> Result<Self, ReceiveError> {
-        let week_reference = settings.week_reference().map_err(|source| SettingsError::Week {
-            origin: "settings".to_owned(),
-            above: String::new(),
-            source,
-        })?;
+        let (assigned, noises) = assign(metadata, settings)?;
         let Some(first) = metadata.first() else { return Err(ReceiveError::NoFrontEnd) };
-        let assigned = suited::assigned(metadata, &settings.acquisition.signals());
-        let all = assigned.iter().flatten();
-        if let Some((signal, reason)) = all.filter_map(|signal| Some((signal, refusal(signal)?))).next() {
-            return Err(ReceiveError::Unsupported { signal: signal.name, reason });
-        }
-        for (metadata, signals) in metadata.iter().zip(&assigned) {
-            for signal in signals {
-                if let Some(reason) = layers_refusal(settings.tracking.waveform, signal, metadata.rate.hz()) {
-                    return Err(ReceiveError::Unsupported { signal: signal.name, reason });
-                }
-            }
-        }
-        let (mut noises, mut front_ends): (Noises, Vec<FrontEnd>) = (Vec::new(), Vec::new());
+        let mut front_ends: Vec<FrontEnd> = Vec::new();
         for (number, (metadata, signals)) in metadata.iter().zip(&assigned).enumerate() {
-            noises.extend(signals.iter().map(|signal| (*signal, front_end::noise(signal, metadata, settings))));
             let mut own = settings.clone();
             if assigned.len() > 1 && !signals.is_empty() {
                 own.acquisition.signals = signals.iter().map(|signal| signal.name.to_owned()).collect();
@@ -83,19 +116,8 @@ impl Session {
             let step = Step::new(number, metadata.rate, first.rate);
             front_ends.push(FrontEnd::new(step, metadata, own, signals.clone())?);
         }
-        let start = metadata.iter().find_map(|metadata| metadata.start);
-        let authentic = match &settings.osnma {
-            Some(osnma) => Some(Authentic::new(osnma, &settings.acquisition.signals(), start, first.rate)?),
-            None => None,
-        };
-        let detection = Detection::new(settings, noises.clone(), first.rate, metadata.len());
-        let loops = settings.tracking.least_margins(noises.iter().filter_map(|(signal, _)| lead(signal)));
-        Ok(Self {
-            front_ends,
-            shared: Shared::new(settings, noises, first.rate, (start, week_reference), (authentic, detection)),
-            next_tick: 0,
-            loops,
-        })
+        let (shared, loops) = share(metadata, settings, noises)?;
+        Ok(Self { front_ends, shared, next_tick: 0, loops })
     }
 
     /// Ends of a block in the samples of every front end, for a block that ends at `main` in those of the
@@ -185,32 +207,13 @@ impl Session {
 
     /// Outcome of the session; the caller adds its own knowledge of the samples.
     pub fn outcome(&self) -> Outcome {
-        let shared = &self.shared;
         let strongest = self.front_ends.iter().filter_map(|front_end| front_end.interfered.clone());
         Outcome {
-            samples: 0,
-            seconds: 0.0,
-            acquired: shared.acquired.iter().copied().collect(),
-            used: shared.used.iter().copied().collect(),
-            fixes: shared.fixes,
-            first_fix_s: shared.first_fix_s,
-            last_fix: shared.latest.clone(),
-            losses: shared.losses,
-            cut_bytes: 0,
-            format_warning: None,
-            diagnosis: None,
             interfered: strongest.max_by(|a, b| a.strongest.jn0_dbhz.total_cmp(&b.strongest.jn0_dbhz)),
-            parted: self.front_ends.iter().find_map(|front_end| front_end.parted(shared)),
-            osnma: shared.authentic.as_ref().map(Authentic::outcome),
-            detection: shared.detection.as_ref().map(Detection::outcome),
-            array: None,
+            parted: self.front_ends.iter().find_map(|front_end| front_end.parted(&self.shared)),
             jumps: self.front_ends.iter().flat_map(|front_end| front_end.gap.jumps.iter().copied()).collect(),
             warnings: self.warnings(),
-            conditioning: Conditioning {
-                geometry_worst: shared.worst_condition,
-                geometry_limit: LARGEST_CONDITION,
-                loops: self.loops.to_vec(),
-            },
+            ..self.shared.outcome(&self.loops)
         }
     }
 
@@ -241,21 +244,8 @@ impl Session {
                 ));
             }
         }
-        warnings.extend(self.assumed_era());
-        warnings.extend(self.shared.solver.other_troposphere().map(str::to_owned));
-        warnings.extend(self.shared.refusals().iter().map(ToString::to_string));
+        warnings.extend(self.shared.warnings());
         warnings
-    }
-
-    /// Note on a week number that was resolved without a start time.
-    fn assumed_era(&self) -> Option<String> {
-        let clock = self.shared.timebase.clock().filter(|_| self.shared.start.is_none())?;
-        Some(format!(
-            "the recording has no start time and the message counts weeks modulo 1024: of times {ERA_YEARS} years \
-             apart the one nearest to operation.week_reference = {:?} was taken, {}; --start TIME or that setting \
-             takes another",
-            self.shared.settings.operation.week_reference, clock.start
-        ))
     }
 
     /// The names of the signals that each front end receives.

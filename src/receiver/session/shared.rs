@@ -8,14 +8,19 @@ use crate::decode::Decoder;
 use crate::detect::Detection;
 use crate::diagnosis::{Refusal, Stage};
 use crate::observe::Timebase;
-use crate::position::least_squares::UNKNOWNS;
+use crate::outcome::{Conditioning, Outcome};
+use crate::position::least_squares::{LARGEST_CONDITION, UNKNOWNS};
 use crate::position::{CodeNoise, NoFix, Noises, Sets, Solver};
 use crate::settings::Settings;
+use crate::track::LoopMargin;
 use gnss::ionosphere::{Coefficients, Model};
 use gnss::record::Fix;
 use gnss::satellite::Sv;
 use gnss::signal::{Link, Signal};
 use gnss::time::{Epoch, Rate};
+
+/// Years in 1024 weeks.
+const ERA_YEARS: f64 = 19.6;
 
 /// Progress of a satellite, for the diagnosis.
 #[derive(Clone, Default)]
@@ -161,6 +166,54 @@ impl Shared {
             }
         }
         all.into_values().collect()
+    }
+
+    /// Outcome as far as navigation knows it, for loops with these margins.
+    pub fn outcome(&self, loops: &[LoopMargin]) -> Outcome {
+        Outcome {
+            samples: 0,
+            seconds: 0.0,
+            acquired: self.acquired.iter().copied().collect(),
+            used: self.used.iter().copied().collect(),
+            fixes: self.fixes,
+            first_fix_s: self.first_fix_s,
+            last_fix: self.latest.clone(),
+            losses: self.losses,
+            cut_bytes: 0,
+            format_warning: None,
+            diagnosis: None,
+            interfered: None,
+            parted: None,
+            osnma: self.authentic.as_ref().map(Authentic::outcome),
+            detection: self.detection.as_ref().map(Detection::outcome),
+            array: None,
+            jumps: Vec::new(),
+            warnings: Vec::new(),
+            conditioning: Conditioning {
+                geometry_worst: self.worst_condition,
+                geometry_limit: LARGEST_CONDITION,
+                loops: loops.to_vec(),
+            },
+        }
+    }
+
+    /// Conditions of clock, position and messages that make the results worse than necessary.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings: Vec<String> = self.assumed_era().into_iter().collect();
+        warnings.extend(self.solver.other_troposphere().map(str::to_owned));
+        warnings.extend(self.refusals().iter().map(ToString::to_string));
+        warnings
+    }
+
+    /// Note on a week number that was resolved without a start time.
+    fn assumed_era(&self) -> Option<String> {
+        let clock = self.timebase.clock().filter(|_| self.start.is_none())?;
+        Some(format!(
+            "the recording has no start time and the message counts weeks modulo 1024: of times {ERA_YEARS} years \
+             apart the one nearest to operation.week_reference = {:?} was taken, {}; --start TIME or that setting \
+             takes another",
+            self.settings.operation.week_reference, clock.start
+        ))
     }
 
     /// The first stage that failed, where there was no fix.

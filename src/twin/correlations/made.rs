@@ -142,6 +142,11 @@ impl Made {
             && self.made == (code.waveform, code.edge)
     }
 
+    /// True if this is how replicas are made.
+    pub fn is_made(&self, way: (Layers, Edge)) -> bool {
+        self.made == way
+    }
+
     /// Calls `with` for what depends on a satellite's code and these taps near the prompt alone.
     #[inline]
     pub fn with_taps<R>(&self, number: u8, chips: &[f64], with: impl FnOnce(&Taps) -> R) -> R {

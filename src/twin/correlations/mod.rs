@@ -41,12 +41,13 @@ use receiver::lead::lead;
 use receiver::output;
 use receiver::settings::Settings;
 
+pub use crate::refusal::Refused;
 use crowd::{Course, Crowd, LEAST_LONG_CHIPS};
 use made::Made;
 use noise::Noise;
 pub use promise::{broken, knobs, promise};
 use ray::Question;
-pub use refusal::{Refused, refuse};
+pub use refusal::refuse;
 use sent::Sent;
 use separation::Sampled;
 use taps::{MOST, is_near};
@@ -80,7 +81,7 @@ pub fn run(
     let (mut second, mut to) = (0, 0);
     while to < first.samples {
         to = first.clock.rate.first_sample_at(second + 1, 1).min(first.samples);
-        fronts.pass(&reception.needs(), to, truth)?;
+        fronts.pass(&reception.needs(), to, &|_| true, truth)?;
         let over = |(plan, transmitters)| Plan::over(plan, transmitters, second);
         let models: Vec<Correlations<'_>> = plans.iter().zip(fronts.transmitters()).map(over).collect();
         models.iter().try_for_each(Correlations::refuse_near_and_far)?;
@@ -145,8 +146,7 @@ impl<'a> Plan<'a> {
         let sent: Vec<Sent> = transmitters.iter().map(|one| Sent::new(self.scene, one, span)).collect();
         let cn0_hz: Vec<f64> =
             sent.iter().map(|one| one.leg(sample).map_or(0.0, |leg| leg.rays.cn0_hz(sample))).collect();
-        let rounding = if self.scene.metadata.format == Format::Cf32Le { 0.0 } else { ROUNDING };
-        let floor = if self.scene.noise { self.thermal() + rounding } else { 0.0 };
+        let floor = self.floor();
         let sampled_hz: f64 = sent.iter().zip(&cn0_hz).map(|(one, hz)| hz * self.kept(one.transmitter.signal)).sum();
         let power = 2.0 * floor + 2.0 * self.thermal() * sampled_hz / self.scene.clock.rate.hz();
         let places = |link: Link| {
@@ -182,6 +182,25 @@ impl<'a> Plan<'a> {
     /// Variance of the thermal noise of a sample, per component.
     fn thermal(&self) -> f64 {
         f64::from(self.scene.noise_lsb) * f64::from(self.scene.noise_lsb)
+    }
+
+    /// Replica that loops make of a component of a signal.
+    pub(crate) fn followed(&self, signal: &Signal, index: usize, settings: &Settings) -> Option<usize> {
+        let way = (settings.tracking.waveform, settings.tracking.replica);
+        self.made.iter().position(|made| made.signal == signal && made.index == index && made.is_made(way))
+    }
+
+    /// Noise density that a replica for a link meets over the thermal one, with the sums of C/N0 of what is
+    /// sent by link; those of the link itself left out. None without noise.
+    pub(crate) fn density(&self, made: usize, link: Link, sent: &[(Link, f64)]) -> Option<f64> {
+        let load: f64 = sent.iter().map(|(other, hz)| hz * self.separation_s(made, link, *other)).sum();
+        self.scene.noise.then(|| (self.floor() + self.thermal() * load) / self.thermal())
+    }
+
+    /// Variance of thermal noise and rounding in a sample, per component.
+    fn floor(&self) -> f64 {
+        let rounding = if self.scene.metadata.format == Format::Cf32Le { 0.0 } else { ROUNDING };
+        if self.scene.noise { self.thermal() + rounding } else { 0.0 }
     }
 
     /// Spectral separation of a replica for a link from another link's signal, in seconds.
@@ -290,7 +309,7 @@ impl Correlations<'_> {
             let apart_db = 10.0 * libm::log10(most / least);
             if most > 0.0 && apart_db > NEAR_FAR_DB {
                 let effect = format!("{signal} of satellites whose powers are {apart_db:.1} dB apart");
-                return Err(Refused { effect });
+                return Err(Refused { level: "correlations", effect });
             }
         }
         Ok(())

@@ -82,7 +82,7 @@ pub fn broken(scenes: &[Scene]) -> Result<Option<String>, TwinError> {
     });
     let Some(budget) = budget else { return Ok(None) };
     match promise(scenes) {
-        Err(Refused { effect }) => Ok(Some(format!("no model of {effect}"))),
+        Err(Refused { effect, .. }) => Ok(Some(format!("no model of {effect}"))),
         Ok(None) => Ok(Some("no signals".to_owned())),
         Ok(Some(promise)) => match budget.broken(&promise) {
             Some(broken) => Ok(Some(broken)),

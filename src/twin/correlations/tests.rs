@@ -45,7 +45,7 @@ fn at_rest(signal: &Signal, rate_hz: f64, duration_s: f64, rest: &str) -> Scene 
 /// First satellite that is received from the beginning on.
 fn first(scene: &Scene) -> Sv {
     let mut fronts = Fronts::new(std::slice::from_ref(scene), &mut (), &Options::default()).unwrap();
-    fronts.pass(&[0], scene.samples, &mut ()).unwrap();
+    fronts.pass(&[0], scene.samples, &|_| true, &mut ()).unwrap();
     let seen = fronts.transmitters().flatten().find(|one| one.rays(scene, scene.samples / 2).is_some());
     seen.unwrap_or_else(|| panic!("{} is not received", scene.signals[0])).link().sv
 }
@@ -145,7 +145,7 @@ impl Both<'_> {
 /// Calls `with` for a scene without noise.
 fn with_both(scene: &Scene, sv: Sv, with: &mut dyn FnMut(&Both)) {
     let mut fronts = Fronts::new(std::slice::from_ref(scene), &mut (), &Options::default()).unwrap();
-    fronts.pass(&[0], scene.samples, &mut ()).unwrap();
+    fronts.pass(&[0], scene.samples, &|_| true, &mut ()).unwrap();
     let transmitters = fronts.transmitters().next().unwrap();
     let plan = Plan::new(scene, &Settings::default());
     let transmitter = transmitters.iter().find(|one| one.sv == sv).unwrap();

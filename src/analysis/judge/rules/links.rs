@@ -3,6 +3,7 @@
 use crate::error::JudgeError;
 use crate::judge::forecast::links::{Figure, LeftOut, Links};
 use crate::judge::judgement::Bound;
+use crate::judge::rules::OBSERVATIONS;
 use crate::judge::summary::Summary;
 use crate::judge::verdict::Verdict;
 use crate::measure::errors::Errors;
@@ -55,7 +56,9 @@ impl Verdict {
             return Ok(());
         }
         let links = Links::measure(run, errors, &summary.details.stated)?;
-        for (reason, names) in &links.left_out {
+        // What a level does not have is named once.
+        let is_due = |reason: &LeftOut| !(run.scene.fidelity == OBSERVATIONS && *reason == LeftOut::Updates);
+        for (reason, names) in links.left_out.iter().filter(|(reason, _)| is_due(reason)) {
             let (what, why) = match reason {
                 LeftOut::Unheld => ("loops", "the settings make no loop that holds the signal"),
                 LeftOut::Unsettled => ("loops", "too few observations past pull-in at a steady C/N0"),

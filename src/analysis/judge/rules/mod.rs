@@ -42,6 +42,11 @@ use crate::measure::slips::Slips;
 use crate::read::Run;
 use availability::Came;
 
+/// Level of fidelity at which a model answers for correlators.
+pub(crate) const CORRELATIONS: &str = "correlations";
+/// Level of fidelity at which theory stands for searches and loops.
+pub(crate) const OBSERVATIONS: &str = "observations";
+
 impl Verdict {
     /// A run against the limits that need no user: those of theory and of the receiver's own covariance.
     ///
@@ -72,6 +77,10 @@ impl Verdict {
         verdict.spoofing(run, summary)?;
         verdict.detection(summary);
         verdict.about(Group::Tables).tables(run, errors)?;
+        if run.scene.fidelity == OBSERVATIONS {
+            let rows = "spectrum of the samples, prompts and discriminators of the loops, rows of tracking";
+            verdict.not_judged.push(format!("{rows}: the level {OBSERVATIONS} has none"));
+        }
         verdict.hint(run);
         Ok(verdict)
     }

@@ -21,6 +21,7 @@ use crate::show::document::{Cell, Forms, Item, Report, Side, Table, Tone};
 use crate::show::plot::canvas::Failure;
 use crate::show::plot::sketch::{Figure, Sketch};
 use crate::show::plot::{self, Judged};
+use crate::show::report::is_modelled;
 use crate::show::write::{retire, write_whole};
 use crate::statistics::larger;
 
@@ -181,7 +182,7 @@ fn facts(judged: &Judged<'_>) -> Result<Vec<(String, String)>, JudgeError> {
         ("tolerance", "knot_tolerance_cycles"),
         ("noise", "noise_arithmetic"),
     ];
-    let is_modelled = scene.fidelity == "correlations";
+    let is_modelled = is_modelled(&scene.fidelity);
     // Arithmetic of samples that were not made.
     let of_samples = ["carrier", "noise"];
     let knobs: Vec<String> = knobs
@@ -193,7 +194,7 @@ fn facts(judged: &Judged<'_>) -> Result<Vec<(String, String)>, JudgeError> {
         .collect();
     let satellites = &summary.satellites;
     let front_end = format!("{} Msps, {}", number(scene.sample_rate_hz / 1e6), scene.format);
-    let modelled = format!("{} s of correlations, no samples", number(summary.duration_s));
+    let modelled = format!("{} s of {}, no samples", number(summary.duration_s), scene.fidelity);
     let mut facts = vec![
         ("program", Some(concat!("gnss-twin ", env!("CARGO_PKG_VERSION")).to_owned())),
         ("modelled", is_modelled.then_some(modelled)),
