@@ -323,7 +323,7 @@ mod tests {
     fn a_gain_of_a_channel_changes_nothing_and_a_turn_of_it_neither() {
         let mut facts = pair();
         facts.towards = vec![[0.8, 0.6, 0.0]];
-        let (looks, sources) = ([(Sv::gps(1), Vector3::new(0.0, 0.6, 0.8))], [(1, 1e11)]);
+        let (looks, sources) = ([(Sv::gps(1), Vector3::new(0.0, 0.9, 0.43))], [(1, 1e11)]);
         let gain = |facts: &ArrayFacts| {
             let array = array(facts);
             let weights = array.weights(&sources).unwrap();
