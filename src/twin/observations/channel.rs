@@ -303,6 +303,7 @@ impl Channel {
             followed.missing_since_s = Some(now_s);
             followed.lock_s = now_s + LOCK_S;
             report.events.push((sample, Event::CycleSlip));
+            self.listening.resume(now_s);
             let cycles = if law.is_pilot { 1.0 } else { 0.5 };
             self.slipped_cycles += libm::copysign(cycles, d);
             if !law.is_pilot {

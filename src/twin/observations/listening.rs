@@ -39,6 +39,11 @@ impl Listening {
         (self.is_open, self.until_s) = (true, now_s + CYCLE_S);
     }
 
+    /// Hears what comes next: the message has to show the polarity again.
+    pub fn resume(&mut self, now_s: f64) {
+        self.until_s = self.until_s.max(now_s + RENEWED_S);
+    }
+
     /// True if symbols are heard.
     pub fn is_open(&self) -> bool {
         self.is_open
