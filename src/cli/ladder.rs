@@ -152,7 +152,7 @@ mod tests {
         Ladder::new(&named, &scenes, &plans, &overrides).unwrap()
     }
 
-    /// Of C/A at 2.6 Msps the errors of codes fall from the nearest chip to the band-limited one (1.15, 0.12
+    /// C/A at 2.6 Msps: errors of codes fall from the nearest chip to the band-limited one (1.15, 0.12
     /// and 0.011 m rms, as another language has them), and samples take more time the less they err.
     #[test]
     fn a_dearer_level_errs_less_and_the_scene_s_own_is_marked() {

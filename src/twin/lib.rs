@@ -78,7 +78,8 @@ pub struct Done {
 
 /// Generates a scene and receives its samples with `settings`, from the first to the last. `scenes` are its
 /// front ends, one or several ([`settings_for`]); a reference to one [`Scene`] is made such a slice by
-/// [`std::slice::from_ref`]. Scenes with a budget make samples, unless [`settle`] has found that they need none.
+/// [`std::slice::from_ref`]. Scenes with a budget make samples, unless [`settle`] has found that they need
+/// none.
 ///
 /// # Errors
 /// The first error of either side; what the sinks took before stays.

@@ -18,6 +18,9 @@ use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::facts::ArrayFacts;
 use gnss::satellite::Sv;
 
+/// Sources of interference by number, and their powers over the noise density, in hertz.
+type Powers = Vec<(usize, f64)>;
+
 /// Expected work of a spatial filter at each instant of the truth.
 #[derive(Debug, Default)]
 pub struct Filtered {
@@ -51,7 +54,7 @@ impl Filtered {
     /// Rows of the truth that cannot be read again.
     pub fn of(run: &Run) -> Result<Self, JudgeError> {
         let Some(array) = Array::of(run) else { return Ok(Self::default()) };
-        let mut heard: BTreeMap<u64, Vec<(usize, f64)>> = BTreeMap::new();
+        let mut heard: BTreeMap<u64, Powers> = BTreeMap::new();
         for row in &run.interference {
             heard.entry(row.sample).or_default().push((row.source, libm::pow(10.0, row.jn0_dbhz / 10.0)));
         }
@@ -65,7 +68,7 @@ impl Filtered {
             })?;
         }
         // Powers change with the sources that are on, and with their distances.
-        let mut known: Option<(Vec<(usize, f64)>, DVector<Complex64>)> = None;
+        let mut known: Option<(Powers, DVector<Complex64>)> = None;
         let mut ticks = BTreeMap::new();
         for (sample, looks) in looks {
             let sources = heard.remove(&sample).unwrap_or_default();
@@ -119,7 +122,7 @@ pub struct Pattern {
 /// none without a filter whose weights can be expected.
 pub fn patterns(run: &Run, elevation_deg: f64) -> Vec<Pattern> {
     let Some(array) = Array::of(run) else { return Vec::new() };
-    let mut sets: BTreeMap<u64, Vec<(usize, f64)>> = BTreeMap::new();
+    let mut sets: BTreeMap<u64, Powers> = BTreeMap::new();
     for row in &run.interference {
         sets.entry(row.sample).or_default().push((row.source, libm::pow(10.0, row.jn0_dbhz / 10.0)));
     }
@@ -152,7 +155,7 @@ impl<'a> Array<'a> {
         };
         let loading = libm::pow(10.0, number("loading_db")? / 10.0);
         let is_whole = kept.len() == count && facts.mixing.len() == count * count && facts.gains.len() == count;
-        is_whole.then(|| Self { facts, kept, loading, wave_per_m, rate_hz: run.scene.sample_rate_hz })
+        is_whole.then_some(Self { facts, kept, loading, wave_per_m, rate_hz: run.scene.sample_rate_hz })
     }
 
     /// Answer of the elements to a unit wave from a direction in east, north and up.

@@ -35,7 +35,8 @@ pub struct Machinery {
     pub truth_s: f64,
 }
 
-/// Computes the synthesiser's figures: knots along the scene, memory of a batch, and the time of knots and truth.
+/// Computes the synthesiser's figures: knots along the scene, memory of a batch, and the time of knots and
+/// truth.
 ///
 /// # Errors
 /// Errors of orbits.

@@ -1,8 +1,8 @@
 //! Levels of fidelity for a scene, each with its time, memory and largest errors.
 //!
-//! Errors of samples are those that a budget is held against ([`Promise`]). The time of a level is the plan's,
-//! with the kernels' costs of this level in place of the chosen one's ([`kernel_ns`]). Limits: the ratio of
-//! two costs is that of the processor that measured them.
+//! Errors of samples are those that a budget is held against ([`Promise`]). The time of a level is the
+//! plan's, with the kernels' costs of this level in place of the chosen one's ([`kernel_ns`]). Limits: the
+//! ratio of two costs is that of the processor that measured them.
 
 use serde::Serialize;
 
@@ -75,7 +75,7 @@ impl Rung {
         }
     }
 
-    /// The same level of several front ends: the sum of times and memories, and the worst errors.
+    /// Level of several front ends: the sum of times and memories, and the worst errors.
     pub fn join(self, other: Self) -> Self {
         let worst = |a: Errors, b: Errors| Errors {
             code_m: a.code_m.max(b.code_m),

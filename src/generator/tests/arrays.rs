@@ -119,8 +119,8 @@ fn carriers_of_satellites_differ_between_elements_by_the_geometry() {
                 later * satellite_m(set, start.since(set.toe) + t_s - travel_s)
             };
             let away = |k: usize| away_cycles(sent_m, &element_m(ARMS_M[k], spin_hz, t_s), L1_HZ);
-            for k in 1..4 {
-                let off = found[k][&(*sample, *sv)] - first + (away(k) - away(0));
+            for (k, element) in found.iter().enumerate().skip(1) {
+                let off = element[&(*sample, *sv)] - first + (away(k) - away(0));
                 assert!((off - off.round()).abs() < 1e-4, "{spin_hz} Hz, {sample} {sv} {k}: {off}");
                 checked += 1;
             }

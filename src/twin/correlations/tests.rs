@@ -166,7 +166,8 @@ fn code_and_carrier_are_those_of_samples(is_in: fn(&Signal) -> bool, most: (f64,
             (true, false) => 43.7e6,
             (false, _) => 61.3e6,
         };
-        // A symbol that changes at the first sample of a period, as each of L2C may, weighs up to half a sample.
+        // A symbol that changes at the first sample of a period, as each of L2C may, weighs up to half a
+        // sample.
         let is_long = signal.components.iter().any(|one| one.code_chips > lead(signal).unwrap().code_chips);
         let most = if is_long { bounds(signal) } else { most };
         // A budget is held against nothing smaller.

@@ -188,9 +188,9 @@ const FIDELITY: &[Key] = &[
     table(
         "budget",
         BUDGET,
-        "Largest errors, in place of a level and knobs; at least one of the three. Samples have the cheapest knobs whose \
-         errors stay below them. `run` makes no samples where the level correlations has all effects of the scene and \
-         stays below them too. `gnss-twin plan` prints the choice, and what cheaper ones would break.",
+        "Largest errors, in place of a level and knobs; at least one of the three. Samples have the cheapest knobs \
+         whose errors stay below them. `run` makes no samples where the level correlations has all effects of the \
+         scene and stays below them too. `gnss-twin plan` prints the choice, and what cheaper ones would break.",
     ),
 ];
 
