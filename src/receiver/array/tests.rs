@@ -197,7 +197,7 @@ fn errors_of_channels_leave_the_null_and_take_from_the_beam_by_their_variance() 
             Complex64::from_polar(1.0, sigma_rad * std::f64::consts::SQRT_2 * random.complex().re)
         });
         let jammer = answers[0].component_mul(&errors);
-        let own = weights(&exact(&[jammer.clone()], elements, power), &a, 0.0).unwrap();
+        let own = weights(&exact(std::slice::from_ref(&jammer), elements, power), &a, 0.0).unwrap();
         // Weights from the samples do not know the errors, and null what comes.
         deepest = f64::min(deepest, -10.0 * libm::log10(own.dotc(&jammer).norm_sqr()));
         fixed += ideal.dotc(&jammer).norm_sqr() / TRIALS as f64;
@@ -257,7 +257,10 @@ fn samples_that_are_not_those_of_one_array_are_refused_by_name() {
     let refused =
         |metadata: &[IfMetadata], settings: &ArraySettings| Former::new(metadata, settings).unwrap_err().to_string();
     let (usual, one) = (ArraySettings::default(), metadata(Format::Ci8));
-    assert!(refused(&[one.clone()], &usual).contains("1 streams of samples: expected those of 2 to 16 elements"));
+    assert!(
+        refused(std::slice::from_ref(&one), &usual)
+            .contains("1 streams of samples: expected those of 2 to 16 elements")
+    );
     assert!(refused(&vec![one.clone(); 17], &usual).contains("17 streams"));
     let four = beam(&places(4), 1.0, 0.0);
     let text = refused(&vec![one.clone(); 5], &four);
