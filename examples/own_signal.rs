@@ -12,8 +12,7 @@ use std::sync::Arc;
 
 use gnss_twin::judge::Status;
 use gnss_twin::message::{
-    Common, FieldError, IonosphereForm, IonosphereModel, Message, Parameters, Raw, Read, Reader, Sender, SetFields,
-    SetForm,
+    Common, FieldError, IonosphereForm, IonosphereModel, Message, Parameters, Read, Reader, Sender, SetFields, SetForm,
 };
 use gnss_twin::orbit::embedded_navigation;
 use gnss_twin::prelude::*;
@@ -189,7 +188,7 @@ impl SetFields for Fields {
         vec!["issue"]
     }
 
-    fn elements(&self, sv: Sv, raw: Raw<'_>, _: Epoch) -> Option<Ephemeris> {
+    fn elements(&self, sv: Sv, raw: &dyn Fn(&str) -> Option<i64>, _: Epoch) -> Option<Ephemeris> {
         let time = |name| raw(name).map(|seconds| Epoch::new(seconds, 0.0));
         let mut set = Ephemeris { form: &SETS, toc: time("toc_s")?, ..Ephemeris::blank(sv, time("toe_s")?) };
         set.iode = raw("issue")? as u16;

@@ -44,4 +44,4 @@ pub use ::gnss::gps::lnav::LNAV;
 #[doc(inline)]
 pub use ::gnss::ionosphere::Model as IonosphereModel;
 #[doc(inline)]
-pub use ::gnss::message::{Common, IonosphereForm, Message, Parameters, Raw, Read, Reader, Sender, SetFields};
+pub use ::gnss::message::{Common, IonosphereForm, Message, Parameters, Read, Reader, Sender, SetFields};

@@ -1,9 +1,9 @@
 //! Observations in place of samples and loops: the receiver's navigation part on measurements by theory.
 //!
 //! A channel's code and carrier are those of the satellite's rays at a tick, with errors of the loops' noise
-//! in the noise density that the replica meets ([`law`]), and rest where reflections put them ([`rays`]).
-//! Searches ([`search`]), lock, slips and losses ([`channel`]) are drawn from C/N0. Symbols are those that
-//! satellites send, in noise, and the receiver's own decoders read them ([`listening`] says when). Limits:
+//! in the noise density that the replica meets (`law`), and rest where reflections put them (`rays`).
+//! Searches (`search`), lock, slips and losses (`channel`) are drawn from C/N0. Symbols are those that
+//! satellites send, in noise, and the receiver's own decoders read them (`listening` says when). Limits:
 //! front ends without stages ([`refuse`]); loops are linear and in step with the motion; short codes of other
 //! satellites are noise.
 
