@@ -1,7 +1,7 @@
 //! Position, velocity and time from observations and decoded ephemerides.
 //!
 //! A [`Solver`] smooths code with carrier ([`smooth`]), finds where satellites were, corrects the atmosphere
-//! by the decoded ionosphere (until then by a nominal one, [`ionosphere`]) and its own [`troposphere`],
+//! by the decoded ionosphere (until then by a nominal one, [`ionosphere`]) and its own [`gnss::troposphere`],
 //! solves ([`least_squares`]), with a clock for each time scale, and tests the residuals, leaving out the
 //! fewest satellites that contradict the others ([`exclusion`]). Two carriers of a satellite are used in the
 //! [`combination`] without ionosphere. What augmentation systems say of satellites and the ionosphere is
