@@ -16,6 +16,7 @@ use generator::scene::{Grade, Scene};
 use generator::stopwatch::Stopwatch;
 use receiver::output::{OutputError, Record, Sink};
 use receiver::settings::Settings;
+use twin::{Refused, TwinError};
 
 /// Lengths of the two pilots in seconds. What a scene costs a second is their difference.
 const PILOTS_S: [f64; 2] = [1.0, 4.0];
@@ -90,40 +91,56 @@ fn modelled(grade: Grade, named: &Named, overrides: &Overrides) -> Result<Rung, 
     let mut named = named.clone();
     let ends = named.scenario.front_ends.iter_mut();
     ends.for_each(|front_end| front_end.fidelity = front_end.fidelity.at(grade));
-    let (mut scenes, _) = scenario::compose_all(&named, overrides)?;
-    let settings = twin::settings_for(&scenes, &scenario::receiver_settings(&named)?);
     let rung = |refused, time_s, errors| Rung { level: grade.name(), refused, time_s, memory_bytes: None, errors };
+    let refused = |reason| Ok(rung(Some(reason), 0.0, None));
+    // The scene itself was composed before: what is wrong now is the level.
+    let (mut scenes, _) = match named.scenario.compose_all(&named.directory, overrides) {
+        Ok(composed) => composed,
+        Err(error) => return refused(error.to_string()),
+    };
+    let settings = twin::settings_for(&scenes, &scenario::receiver_settings(&named)?);
     let promise = match grade {
         Grade::Observations => twin::observations::refuse(&scenes).map(|()| None),
         _ => twin::correlations::promise(&scenes),
     };
+    let lacks = |lacking: Refused| format!("no model of {}", lacking.effect);
     let promise = match promise {
         Ok(promise) => promise,
-        Err(refused) => return Ok(rung(Some(format!("no model of {}", refused.effect)), 0.0, None)),
+        Err(lacking) => return refused(lacks(lacking)),
     };
-    let duration_s = scenes.first().map_or(0.0, |scene| scene.clock.rate.elapsed_s(scene.samples));
-    let [short, long] = PILOTS_S.map(|s| s.min(duration_s));
-    let ends: Vec<u64> = scenes.iter().map(|scene| scene.samples).collect();
-    let mut pilot_s = |duration_s: f64| {
-        for (scene, end) in scenes.iter_mut().zip(&ends) {
-            scene.samples = ((duration_s * scene.clock.rate.hz()) as u64).min(*end);
-        }
-        pilot_s(&scenes, &settings)
-    };
-    let [first_s, both_s] = [pilot_s(short)?, pilot_s(long)?];
-    let second_s = if long > short { (both_s - first_s) / (long - short) } else { 0.0 };
-    let time_s = both_s + second_s.max(0.0) * (duration_s - long);
-    Ok(rung(None, time_s, promise.map(Errors::from)))
+    match pilots_s(&mut scenes, &settings) {
+        Ok(time_s) => Ok(rung(None, time_s, promise.map(Errors::from))),
+        Err(TwinError::Refused(lacking)) => refused(lacks(lacking)),
+        Err(error) => Err(failure(error).into()),
+    }
 }
 
-/// Time of one core for scenes at this level.
-fn pilot_s(scenes: &[Scene], settings: &Settings) -> Result<f64, CliError> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().map_err(CliError::bug)?;
-    pool.install(|| {
+/// Time of one core for scenes at a level without samples, from two pilots. The scenes are shorter then.
+fn pilots_s(scenes: &mut [Scene], settings: &Settings) -> Result<f64, TwinError> {
+    let ends: Vec<u64> = scenes.iter().map(|scene| scene.samples).collect();
+    let duration_s = scenes.first().map_or(0.0, |scene| scene.clock.rate.elapsed_s(scene.samples));
+    let mut pilot_s = |length_s: f64| {
+        for (scene, end) in scenes.iter_mut().zip(&ends) {
+            scene.samples = ((length_s * scene.clock.rate.hz()) as u64).min(*end);
+        }
+        on_one_core_s(|| twin::run(scenes, settings, &mut (), &mut Nowhere))
+    };
+    let [short_s, long_s] = PILOTS_S.map(|length_s| length_s.min(duration_s));
+    let (first_s, both_s) = (pilot_s(short_s)?, pilot_s(long_s)?);
+    let second_s = if long_s > short_s { (both_s - first_s) / (long_s - short_s) } else { 0.0 };
+    Ok(both_s + second_s.max(0.0) * (duration_s - long_s))
+}
+
+/// Processor time of work that may share itself among threads, on one.
+fn on_one_core_s<T>(work: impl FnOnce() -> Result<T, TwinError> + Send) -> Result<f64, TwinError> {
+    let timed = || {
         let watch = Stopwatch::start();
-        let done = twin::run(scenes, settings, &mut (), &mut Nowhere);
-        done.map(|_| watch.elapsed_s()).map_err(|error| failure(error).into())
-    })
+        work().map(|_| watch.elapsed_s())
+    };
+    match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
+        Ok(pool) => pool.install(timed),
+        Err(_) => timed(),
+    }
 }
 
 /// Sink that keeps nothing.
