@@ -223,14 +223,14 @@ fn scenes(text: &mut String, rows: &[SceneRow]) {
         "\n## Whole scenes\n\n\
          ![Scenes](trade_scenes.png)\n\n\
          Costs are processor seconds of all threads for one simulated second, tables included: first the generator \
-         alone, then a run of both less that. With several runs they are medians, and the CSV file has both ends; the \
-         seed is the same in all, so that positions of two settings are paired. The position is that of every fix \
-         against the truth. C/N0 loss is what the scene makes, other satellites counted as noise, less what the \
+         alone, then a run of both less that. They are medians of the runs, and the CSV file has both ends. Runs differ \
+         by their seed, and every setting has the same seeds, so that positions of two settings are paired. The \
+         position is that of every fix of all runs against the truth, with the least and the greatest of the runs. C/N0 loss is what the scene makes, other satellites counted as noise, less what the \
          receiver measures. \"Between signals\" is the largest difference of the mean code errors of two signals; a \
          user who combines two bands without ionosphere sees about 2.6 times as much. `full_sky` is too short for a \
          position.\n\n",
     );
-    let head = "| setting | generator (s/s) | receiver (s/s) | fixes | position rms / 95 % (m) | \
+    let head = "| setting | generator (s/s) | receiver (s/s) | fixes | position rms (runs) / 95 % (m) | \
                 pseudoranges (m, rms) | \
                 C/N0 loss (dB) | between signals (m) | ionosphere-free (m) |\n\
                 | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
@@ -242,12 +242,13 @@ fn scenes(text: &mut String, rows: &[SceneRow]) {
         }
         let _ = writeln!(
             text,
-            "| `{}` | {:.3} | {:.3} | {} | {} / {} | {} | {} | {} | {} |",
+            "| `{}` | {:.3} | {:.3} | {:.0} | {}{} / {} | {} | {} | {} | {} |",
             row.setting,
             row.generator_s,
             row.receiver_s,
             row.fixes,
             maybe(row.position_rms_m, 3),
+            row.position_low_m.zip(row.position_high_m).map_or_else(String::new, |(a, b)| format!(" ({a:.3}–{b:.3})")),
             maybe(row.position_p95_m, 3),
             maybe(row.pseudorange_rms_m, 3),
             maybe(row.cn0_loss_db, 2),
@@ -384,11 +385,9 @@ pub fn write(
     text.push_str(knobs);
     text.push_str(
         "\n## What this page does not hold\n\n\
-         - There is no curve over the taps of a front end's filter or of a channel.\n\
+         - There is no curve of errors over the taps of a channel. [performance.md](performance.md) has their cost.\n\
          - Components whose code lasts longer than 20 ms (L2 CL) are timed and not judged.\n\
-         - Positions come from one seed each: differences between settings are paired, and their size is not a mean \
-         over seeds.\n\
-         - Scenes other than `static` are timed once, so their costs have no interval.\n\
+         - Two or three seeds show how much positions differ from run to run. They are too few for an interval.\n\
          - Costs belong to this processor and its instruction set.\n\
          - The receiver's cost is a difference: where the generator takes ten times as much, it is known to a tenth of \
          the generator's at best.\n\

@@ -3,7 +3,8 @@
 
 use std::path::Path;
 
-use analysis::statistics::Spread;
+use analysis::judge::Summary;
+use analysis::statistics::{self, Spread};
 use generator::scenario::{Overrides, Scenario};
 use generator::scene::Scene;
 use generator::stream::GenerateError;
@@ -13,7 +14,7 @@ use receiver::settings::Settings;
 use serde::Serialize;
 use toml::{Table, Value};
 
-/// A scene, how long it runs here, and how often it is timed.
+/// A scene, how long it runs here, and how often, each time with another seed.
 struct Site {
     name: &'static str,
     seconds: f64,
@@ -22,13 +23,15 @@ struct Site {
 
 const SITES: [Site; 6] = [
     Site { name: "static", seconds: 50.0, runs: 3 },
-    Site { name: "two_systems", seconds: 45.0, runs: 1 },
-    Site { name: "dual_band", seconds: 45.0, runs: 1 },
-    Site { name: "full_sky", seconds: 4.0, runs: 1 },
-    Site { name: "urban", seconds: 60.0, runs: 1 },
-    Site { name: "high_dynamics", seconds: 60.0, runs: 1 },
+    Site { name: "two_systems", seconds: 45.0, runs: 3 },
+    Site { name: "dual_band", seconds: 45.0, runs: 2 },
+    Site { name: "full_sky", seconds: 4.0, runs: 2 },
+    Site { name: "urban", seconds: 60.0, runs: 3 },
+    Site { name: "high_dynamics", seconds: 60.0, runs: 3 },
 ];
 
+/// Seed of the first run of every setting; the next runs have the next seeds.
+const SEED: i64 = 1;
 /// Knobs of both sides that are changed one at a time, as keys of a scenario and their values.
 const KNOBS: [&str; 25] = [
     "fidelity.code_edge = \"nearest\"",
@@ -74,8 +77,12 @@ pub struct SceneRow {
     pub receiver_s: f64,
     pub receiver_low_s: f64,
     pub receiver_high_s: f64,
-    pub fixes: usize,
+    /// Mean number of fixes of a run.
+    pub fixes: f64,
+    /// Errors over all runs, and both ends of the position's by runs.
     pub position_rms_m: Option<f64>,
+    pub position_low_m: Option<f64>,
+    pub position_high_m: Option<f64>,
     pub position_p95_m: Option<f64>,
     pub pseudorange_rms_m: Option<f64>,
     pub carrier_rms_cycles: Option<f64>,
@@ -111,11 +118,12 @@ fn merge(into: &mut Table, from: Table) {
     }
 }
 
-/// The scene's text with other values of some keys.
-fn changed(site: &Site, changes: &[&str]) -> String {
+/// The scene's text for a run, with other values of some keys.
+fn changed(site: &Site, run: usize, changes: &[&str]) -> String {
     let text = std::fs::read_to_string(format!("scenarios/{}.toml", site.name)).unwrap();
     let mut table: Table = text.parse().unwrap();
     table.insert("duration_s".to_owned(), Value::Float(site.seconds));
+    table.insert("seed".to_owned(), Value::Integer(SEED + run as i64));
     for change in changes {
         merge(&mut table, change.parse().unwrap());
     }
@@ -133,45 +141,67 @@ fn ends(mut values: Vec<f64>) -> [f64; 3] {
     [values[values.len() / 2], values[0], values[values.len() - 1]]
 }
 
-fn row(site: &Site, setting: &str, changes: &[&str]) -> SceneRow {
-    let text = changed(site, changes);
+/// Processor time of one run in seconds, of the generator and of the receiver, and what the judge found.
+struct Run {
+    generator_s: f64,
+    receiver_s: f64,
+    summary: Option<Summary>,
+}
+
+fn run(site: &Site, number: usize, setting: &str, changes: &[&str]) -> Run {
+    let text = changed(site, number, changes);
     let scenes = scenes(&text, site.name);
     let settings = Settings::of_scenario(&text, site.name).unwrap();
-    let (mut generator, mut receiver) = (Vec::new(), Vec::new());
-    let mut summary = None;
-    for _ in 0..site.runs {
-        let alone = tempfile::tempdir().unwrap();
-        let begin = processor_s();
-        let mut writer = truth::Writer::create(alone.path()).unwrap();
-        twin::feed::<GenerateError>(&scenes, &mut writer, &mut |_, _| Ok(())).unwrap();
-        drop(writer);
-        let generated = processor_s();
-        let run = tempfile::tempdir().unwrap();
-        for name in ["truth", "rx"] {
-            std::fs::create_dir(run.path().join(name)).unwrap();
-        }
-        let mut writer = truth::Writer::create(&run.path().join("truth")).unwrap();
-        let mut output = Output::create(&run.path().join("rx")).unwrap();
-        twin::run(&scenes, &settings, &mut writer, &mut output).unwrap();
-        drop((writer, output));
-        let received = processor_s();
-        generator.push((generated - begin) / site.seconds);
-        receiver.push((received - generated - (generated - begin)) / site.seconds);
-        summary = analysis::assess(run.path(), None).map_err(|error| println!("{setting}: {error}")).ok();
+    let alone = tempfile::tempdir().unwrap();
+    let begin = processor_s();
+    let mut writer = truth::Writer::create(alone.path()).unwrap();
+    twin::feed::<GenerateError>(&scenes, &mut writer, &mut |_, _| Ok(())).unwrap();
+    drop(writer);
+    let generated = processor_s();
+    let run = tempfile::tempdir().unwrap();
+    for name in ["truth", "rx"] {
+        std::fs::create_dir(run.path().join(name)).unwrap();
     }
-    let found = summary.as_ref();
+    let mut writer = truth::Writer::create(&run.path().join("truth")).unwrap();
+    let mut output = Output::create(&run.path().join("rx")).unwrap();
+    twin::run(&scenes, &settings, &mut writer, &mut output).unwrap();
+    drop((writer, output));
+    Run {
+        generator_s: generated - begin,
+        receiver_s: processor_s() - generated - (generated - begin),
+        summary: analysis::assess(run.path(), None).map_err(|error| println!("{setting}: {error}")).ok(),
+    }
+}
+
+/// Root of the mean square of the errors of all fixes of a run.
+fn position_m(summary: &Summary) -> Option<f64> {
+    let details = &summary.details;
     let square = |spread: &Option<Spread>| spread.as_ref().map(|s| s.mean * s.mean + s.sigma * s.sigma);
-    let position = found.and_then(|s| {
-        let details = &s.details;
-        Some((square(&details.east_m)? + square(&details.north_m)? + square(&details.up_m)?).sqrt())
-    });
-    let biases: Vec<f64> =
-        found.iter().flat_map(|s| s.signals.values()).filter_map(|own| own.observables.pseudorange_bias_m).collect();
-    let least = biases.iter().copied().fold(f64::INFINITY, f64::min);
-    let most = biases.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let between = (biases.len() > 1).then_some(most - least);
-    let ([generator_s, generator_low_s, generator_high_s], [receiver_s, receiver_low_s, receiver_high_s]) =
-        (ends(generator), ends(receiver));
+    Some((square(&details.east_m)? + square(&details.north_m)? + square(&details.up_m)?).sqrt())
+}
+
+/// Largest difference of the mean code errors of two signals.
+fn between_m(summary: &Summary) -> Option<f64> {
+    let biases = || summary.signals.values().filter_map(|own| own.observables.pseudorange_bias_m);
+    let most = biases().fold(f64::NEG_INFINITY, f64::max);
+    (biases().count() > 1).then(|| most - biases().fold(f64::INFINITY, f64::min))
+}
+
+fn row(site: &Site, setting: &str, changes: &[&str]) -> SceneRow {
+    let runs: Vec<Run> = (0..site.runs).map(|number| run(site, number, setting, changes)).collect();
+    let cost = |of: fn(&Run) -> f64| ends(runs.iter().map(|run| of(run) / site.seconds).collect());
+    let [generator_s, generator_low_s, generator_high_s] = cost(|run| run.generator_s);
+    let [receiver_s, receiver_low_s, receiver_high_s] = cost(|run| run.receiver_s);
+    let found = |of: &dyn Fn(&Summary) -> Option<f64>| -> Vec<f64> {
+        runs.iter().filter_map(|run| of(run.summary.as_ref()?)).collect()
+    };
+    let mean = |of: &dyn Fn(&Summary) -> Option<f64>| statistics::mean(&found(of));
+    let rms = |of: &dyn Fn(&Summary) -> Option<f64>| {
+        statistics::mean(&found(of).into_iter().map(|x| x * x).collect::<Vec<_>>()).map(f64::sqrt)
+    };
+    let positions = found(&position_m);
+    let between = mean(&between_m);
+    let bands = scenes(&changed(site, 0, changes), site.name).len();
     let row = SceneRow {
         scene: site.name.to_owned(),
         simulated_s: site.seconds,
@@ -183,14 +213,16 @@ fn row(site: &Site, setting: &str, changes: &[&str]) -> SceneRow {
         receiver_s,
         receiver_low_s,
         receiver_high_s,
-        fixes: found.map_or(0, |s| s.position.fixes),
-        position_rms_m: position,
-        position_p95_m: found.and_then(|s| s.position.error_3d_p95_m),
-        pseudorange_rms_m: found.and_then(|s| s.observables.pseudorange_rms_m),
-        carrier_rms_cycles: found.and_then(|s| s.observables.carrier_rms_cycles),
-        cn0_loss_db: found.and_then(|s| Some(s.details.cn0_effective_dbhz? - s.details.cn0_measured_dbhz?)),
+        fixes: mean(&|s| Some(s.position.fixes as f64)).unwrap_or(0.0),
+        position_rms_m: rms(&position_m),
+        position_low_m: positions.iter().copied().reduce(f64::min),
+        position_high_m: positions.iter().copied().reduce(f64::max),
+        position_p95_m: mean(&|s| s.position.error_3d_p95_m),
+        pseudorange_rms_m: rms(&|s| s.observables.pseudorange_rms_m),
+        carrier_rms_cycles: rms(&|s| s.observables.carrier_rms_cycles),
+        cn0_loss_db: mean(&|s| Some(s.details.cn0_effective_dbhz? - s.details.cn0_measured_dbhz?)),
         between_signals_m: between,
-        ionosphere_free_m: between.filter(|_| scenes.len() > 1).map(|m| 2.6 * m),
+        ionosphere_free_m: between.filter(|_| bands > 1).map(|m| 2.6 * m),
     };
     println!("{row:?}");
     row

@@ -183,7 +183,8 @@ impl Fidelity {
 
     /// Returns the knobs of a level for `signals` at `rate_hz`. `balanced` takes area edges if the code error
     /// of every signal is below `allowed_m` (see [`allowed_m`]), because they cost less than band-limited
-    /// ones at every rate. It never takes nearest edges, whose spurs are those of `fast`.
+    /// ones at every rate. Otherwise it takes band-limited edges in `f64`: single precision saves nothing
+    /// there, because the edges take the time. It never takes nearest edges, whose spurs are those of `fast`.
     ///
     /// # Errors
     /// A budget that no knobs keep.
@@ -194,7 +195,7 @@ impl Fidelity {
         let level = Self { allowed_m, ..Self::of(grade) };
         let too_much = |signal: &&Signal| code_bias_m(level.code_edge, signal, rate_hz) >= allowed_m;
         if grade == Grade::Balanced && signals.iter().any(too_much) {
-            return Ok(Self { code_edge: CodeEdge::BandLimited, ..level });
+            return Ok(Self { code_edge: CodeEdge::BandLimited, carrier: Arithmetic::F64, ..level });
         }
         Ok(level)
     }

@@ -83,13 +83,18 @@ pub fn machinery(scene: &Scene) -> Result<Machinery, GenerateError> {
 /// Time of all rows of the truth on one core, from a few rows of each signal.
 fn truth_s(scene: &Scene, transmitters: &[Transmitter]) -> Result<f64, GenerateError> {
     let rows = (scene.clock.rate.elapsed_s(scene.samples) / scene.truth_interval_s).ceil();
-    let (watch, each) = (Stopwatch::start(), scene.samples.div_ceil(PLANNED_ROWS).max(1));
-    let mut made = 0;
+    let each = scene.samples.div_ceil(PLANNED_ROWS).max(1);
+    let row = |sample: u64| {
+        // What is not in view takes no time here, nor in the scene.
+        transmitters.iter().try_for_each(|one| {
+            observe_by(scene, &one.from, (one.sv, one.signal), (sample, 0.0), one.geometry.as_deref()).map(drop)
+        })
+    };
+    // The first rows of a scene fill its stores and the processor's; they are few among all.
+    (0..scene.samples).step_by(each as usize).try_for_each(row)?;
+    let (watch, mut made) = (Stopwatch::start(), 0);
     for sample in (0..scene.samples).step_by(each as usize) {
-        for one in transmitters {
-            // What is not in view takes no time here, nor in the scene.
-            observe_by(scene, &one.from, (one.sv, one.signal), (sample, 0.0), one.geometry.as_deref())?;
-        }
+        row(sample)?;
         made += 1;
     }
     Ok(watch.elapsed_s() * rows / f64::from(made.max(1)))

@@ -21,7 +21,7 @@ pub(super) fn means<T>(run: &Run<'_>, position: u64, out: &mut [T], number: impl
     if run.step * BLOCK as u64 <= STEPS * CODE_ONE {
         blocks(run, position, out, |position| means_of::<BLOCK>(run, position), number);
     } else {
-        blocks(run, position, out, |position| means_of::<1>(run, position), number);
+        blocks(run, position, out, |position| means_of::<SHORT_BLOCK>(run, position), number);
     }
 }
 

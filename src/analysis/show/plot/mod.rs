@@ -5,7 +5,7 @@
 //! drawn. A picture with nothing to show is drawn with empty axes, so that a script finds the files it
 //! expects; only `psd.png` and `peaks.png` depend on `psd.csv` and `peaks.csv` being there, `spoofing.png` on
 //! a spoofer, `multipath.png` on `truth/rays.csv`, `stanford.png` on `rx/integrity.csv`, `array.png` on a
-//! spatial filter and interference, and `detection.png` on `rx/detection.csv`.
+//! spatial filter and interference, `detection.png` on `rx/detection.csv`, and `discriminators.png` on loops.
 
 mod array;
 pub mod canvas;

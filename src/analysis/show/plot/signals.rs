@@ -1,6 +1,7 @@
 //! Loops and observations over time, satellite by satellite.
 
 use crate::error::JudgeError;
+use crate::judge::rules::OBSERVATIONS;
 use crate::measure::errors::{Link, SignalError};
 use crate::show::plot::canvas::{Axis, Chart, Mark, Series, WIDTH_PX};
 use crate::show::plot::chart::{Ends, Shown};
@@ -108,9 +109,12 @@ pub(super) fn legend(judged: &Judged<'_>, links: &[Link]) -> Vec<Series> {
     links.iter().enumerate().map(one).collect()
 }
 
-/// Raw discriminators of the three loops.
+/// Raw discriminators of the three loops; `None` of a receiver without loops.
 pub fn discriminators(judged: &Judged<'_>) -> Result<Option<Sketch>, JudgeError> {
     let run = judged.run;
+    if run.scene.fidelity == OBSERVATIONS {
+        return Ok(None);
+    }
     let links: Vec<Link> = run.tracking.keys().collect();
     let chart = |title, y_label, least, of: fn(&TrackingRow) -> f64| {
         over_time(judged, &links, &Frame { title, y_label, least }, |link, see| {
