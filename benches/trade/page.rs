@@ -32,10 +32,13 @@ fn ladder<'r>(rows: &'r [SignalRow], signal: &Signal, rate_msps: f64) -> Vec<Run
     Grade::NAMES.iter().filter(|(_, grade)| grade.is_sampled()).filter_map(of).collect()
 }
 
-/// Levels that a more accurate one beats, with intervals that do not meet.
+/// Levels that another one beats: it errs less and costs less, with intervals of cost that do not meet.
 fn dominated(ladder: &[Rung<'_>]) -> Vec<&'static str> {
-    let beaten = |&(at, rung): &(usize, &Rung<'_>)| ladder.iter().skip(at + 1).any(|better| better.ns[2] < rung.ns[1]);
-    ladder.iter().enumerate().filter(beaten).map(|(_, rung)| rung.name).collect()
+    let beats = |better: &Rung<'_>, rung: &Rung<'_>| {
+        better.ns[2] < rung.ns[1] && better.row.code_rms_m < rung.row.code_rms_m
+    };
+    let beaten = |rung: &&Rung<'_>| ladder.iter().any(|better| beats(better, rung));
+    ladder.iter().filter(beaten).map(|rung| rung.name).collect()
 }
 
 /// The lowest measured rate that holds both main lobes, or the highest one.
@@ -125,7 +128,7 @@ fn signals(text: &mut String, rows: &[SignalRow], dopplers: &[DopplerRow]) {
     );
     let _ = writeln!(
         text,
-        "A level is dominated where a more accurate one costs less and the two intervals do not meet. Of {ladders} \
+        "A level is dominated where another one errs less and costs less, and the two intervals of cost do not meet. Of {ladders} \
          ladders (signal and rate), {} have a dominated level{}{}.",
         beaten.len(),
         if beaten.is_empty() { "" } else { ": " },
@@ -158,25 +161,27 @@ fn models(text: &mut String, rows: &[SignalRow]) {
     text.push_str(
         "\n### What `plan` states against what is measured\n\n\
          `balanced` and `plan` read one error model (`code_bias_m`). The ratio is stated over measured; below 0.9 the \
-         model is optimistic by more than 10 %.\n\n\
-         | edge | rows | median ratio | lowest | highest | within 25 % | optimistic by more than 10 % |\n\
-         | --- | --- | --- | --- | --- | --- | --- |\n",
+         model is optimistic by more than 10 %. A root mean square of n draws scatters by 1/√(2n) itself, and twice \
+         that is \"beyond the draws\".\n\n\
+         | edge | rows | median ratio | lowest | highest | within 25 % | optimistic by more than 10 % | that, beyond the \
+         draws |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     for edge in ["nearest", "area", "band_limited"] {
         let mut own: Vec<&SignalRow> = rows.iter().filter(|row| row.code_edge == edge).collect();
         own.sort_by(|a, b| a.ratio().total_cmp(&b.ratio()));
         let (Some(first), Some(last)) = (own.first(), own.last()) else { continue };
-        let count = |test: &dyn Fn(f64) -> bool| own.iter().filter(|row| test(row.ratio())).count();
+        let count = |test: &dyn Fn(&SignalRow) -> bool| own.iter().filter(|row| test(row)).count();
         let named = |row: &SignalRow| format!("{:.2} ({} at {} Msps)", row.ratio(), row.signal, row.sample_rate_msps);
         let _ = writeln!(
             text,
-            "| {edge} | {} | {:.2} | {} | {} | {} | {} |",
+            "| {edge} | {} | {:.2} | {} | {} | {} | {} | {} |",
             own.len(),
             own[own.len() / 2].ratio(),
             named(first),
             named(last),
-            count(&|x| (0.75..=1.25).contains(&x)),
-            count(&|x| x < 0.9)
+            count(&|row| (0.75..=1.25).contains(&row.ratio())),
+            count(&|row| row.ratio() < 0.9),
+            count(&|row| row.ratio() * (1.0 + 2.0 / (2.0 * row.draws as f64).sqrt()) < 0.9)
         );
     }
     text.push_str(

@@ -85,9 +85,11 @@ fn truth_s(scene: &Scene, transmitters: &[Transmitter]) -> Result<f64, GenerateE
     let rows = (scene.clock.rate.elapsed_s(scene.samples) / scene.truth_interval_s).ceil();
     let each = scene.samples.div_ceil(PLANNED_ROWS).max(1);
     let row = |sample: u64| {
-        // What is not in view takes no time here, nor in the scene.
         transmitters.iter().try_for_each(|one| {
-            observe_by(scene, &one.from, (one.sv, one.signal), (sample, 0.0), one.geometry.as_deref()).map(drop)
+            if arrival::in_view_from(scene, &one.from, one.sv, scene.clock.epoch(sample))? {
+                observe_by(scene, &one.from, (one.sv, one.signal), (sample, 0.0), one.geometry.as_deref())?;
+            }
+            Ok::<_, GenerateError>(())
         })
     };
     // The first rows of a scene fill its stores and the processor's; they are few among all.
