@@ -34,9 +34,8 @@ fn ladder<'r>(rows: &'r [SignalRow], signal: &Signal, rate_msps: f64) -> Vec<Run
 
 /// Levels that another one beats: it errs less and costs less, with intervals of cost that do not meet.
 fn dominated(ladder: &[Rung<'_>]) -> Vec<&'static str> {
-    let beats = |better: &Rung<'_>, rung: &Rung<'_>| {
-        better.ns[2] < rung.ns[1] && better.row.code_rms_m < rung.row.code_rms_m
-    };
+    let beats =
+        |better: &Rung<'_>, rung: &Rung<'_>| better.ns[2] < rung.ns[1] && better.row.code_rms_m < rung.row.code_rms_m;
     let beaten = |rung: &&Rung<'_>| ladder.iter().any(|better| beats(better, rung));
     ladder.iter().filter(beaten).map(|rung| rung.name).collect()
 }

@@ -17,7 +17,6 @@ use analysis::expect::welch::{self, Looks};
 use analysis::measure::psd::Psd;
 use analysis::read::{PeakRow, psd_name};
 use analysis::show::tables;
-use generator::fidelity::Grade;
 use generator::scene::Scene;
 use generator::stream::Generated;
 use generator::{GenerateError, truth};
@@ -119,10 +118,14 @@ pub fn make(run: &Path, scenes: &[Scene], settings: &Settings, wanted: &Wanted<'
     let tap = |scene: &Scene| Tap::new(scene, run, (keep, changing), (scenes.len(), moment.samples(scene)));
     let mut taps: Vec<Tap> = scenes.iter().filter(|_| is_sampled).map(tap).collect::<Result<_, _>>()?;
     let mut go = |outputs: &mut (dyn Sink + Send)| {
-        if is_sampled {
-            Ok(both(scenes, settings, &mut (&mut truth, &mut moment), outputs, (&mut taps, wanted.told))?)
-        } else {
-            modelled(scenes, settings, (&mut truth, outputs), wanted.told)
+        let start = Instant::now();
+        let progress = &mut |samples| (wanted.told)(samples);
+        match twin::modelled(scenes, settings, (&mut truth, outputs), progress).map_err(failure)? {
+            Some(twin::Done { generated, outcome }) => {
+                let whole = start.elapsed();
+                Ok(Both { generated, outcome, generator_busy: whole, receiver_busy: whole, whole })
+            }
+            None => Ok(both(scenes, settings, &mut (&mut truth, &mut moment), outputs, (&mut taps, wanted.told))?),
         }
     };
     let made = match &mut others {
@@ -170,26 +173,6 @@ fn both(
     let outcome = reception.finish(output).map_err(receiver_error)?;
     let twin::Fed { generated, busy: generator_busy } = fed;
     Ok(Both { generated, outcome, generator_busy, receiver_busy, whole: start.elapsed() })
-}
-
-/// Receives a scene without samples: by modelled correlations or observations.
-fn modelled(
-    scenes: &[Scene],
-    settings: &Settings,
-    (truth, records): (&mut (dyn truth::Sink + Send), &mut (dyn Sink + Send)),
-    told: &(dyn Fn(u64) + Sync),
-) -> Result<Both, Failure> {
-    let start = Instant::now();
-    let is_of = |grade| scenes.iter().any(|scene| scene.fidelity.grade == grade);
-    let progress = &mut |samples| told(samples);
-    let done = if is_of(Grade::Observations) && !is_of(Grade::Correlations) {
-        twin::observations::run(scenes, settings, (truth, records), progress)
-    } else {
-        twin::correlations::run(scenes, settings, (truth, records), progress)
-    };
-    let twin::Done { generated, outcome } = done.map_err(failure)?;
-    let whole = start.elapsed();
-    Ok(Both { generated, outcome, generator_busy: whole, receiver_busy: whole, whole })
 }
 
 /// Does `work` and adds the time that it took to `busy`.

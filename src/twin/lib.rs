@@ -89,18 +89,35 @@ pub fn run(
     truth: &mut (dyn truth::Sink + Send),
     records: &mut (dyn output::Sink + Send),
 ) -> Result<Done, TwinError> {
-    let grades = || scenes.iter().map(|scene| scene.fidelity.grade);
-    if grades().any(|grade| grade == Grade::Correlations) {
-        return correlations::run(scenes, settings, (truth, records), &mut |_| ());
-    }
-    if grades().any(|grade| grade == Grade::Observations) {
-        return observations::run(scenes, settings, (truth, records), &mut |_| ());
+    if let Some(done) = modelled(scenes, settings, (truth, records), &mut |_| ())? {
+        return Ok(done);
     }
     let metadata: Vec<IfMetadata> = scenes.iter().map(|scene| scene.metadata.clone()).collect();
     let mut reception = Reception::of_several(&metadata, &settings_for(scenes, settings))?;
     let fed =
         feed(scenes, truth, &mut |number, samples| Ok::<_, TwinError>(reception.take_of(number, samples, records)?))?;
     Ok(Done { generated: fed.generated, outcome: reception.finish(records)? })
+}
+
+/// Receives a scene at a level without samples; `None` where samples are made. `progress` gets the number of
+/// samples of the first front end that have been passed.
+///
+/// # Errors
+/// Those of [`run`].
+pub fn modelled(
+    scenes: &[Scene],
+    settings: &Settings,
+    sinks: (&mut (dyn truth::Sink + Send), &mut (dyn output::Sink + Send)),
+    progress: &mut dyn FnMut(u64),
+) -> Result<Option<Done>, TwinError> {
+    let is_any = |grade| scenes.iter().any(|scene| scene.fidelity.grade == grade);
+    if is_any(Grade::Correlations) {
+        return correlations::run(scenes, settings, (sinks.0, sinks.1), progress).map(Some);
+    }
+    if is_any(Grade::Observations) {
+        return observations::run(scenes, settings, sinks, progress).map(Some);
+    }
+    Ok(None)
 }
 
 /// Takes the level of correlations for front ends with a budget, if it keeps that; true if it does.

@@ -35,3 +35,29 @@ fn a_drag_off_is_followed_while_the_truth_says_otherwise() {
     }
     assert!(page.contains("whose errors may have any size"));
 }
+
+#[test]
+fn a_time_pushed_off_is_captured_at_a_place_that_nobody_pushed() {
+    // The spoofer's clock meets the true one where it comes on, and gains 1.41e-6 s until the end.
+    let pushed = include_str!("../../scenarios/spoofed.toml");
+    let (before, _) = pushed.split_once("[spoofer.drag]").unwrap();
+    let push = "clock_bias_s = -8.4e-7\nclock_drift_sps = 3e-8\n";
+    let text = format!("{before}{push}").replace("position_within_m = 200", "position_within_m = 30");
+    let directory = tempfile::tempdir().unwrap();
+    let scene = directory.path().join("pushed.toml");
+    std::fs::write(&scene, text).unwrap();
+    let ran = super::ran(&scene);
+    let run = ran.path().join("reports/spoofed");
+    let summary: Value = serde_json::from_slice(&std::fs::read(run.join("summary.json")).unwrap()).unwrap();
+    let number = |pointer: &str| summary.pointer(pointer).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    // 47 s at 3e-8 s/s, 9 m/s.
+    let claimed_m = number("/spoofing/claimed_clock_max_m");
+    assert!((claimed_m - 422.7).abs() < 1.0, "{claimed_m}");
+    assert_eq!(number("/spoofing/claimed_displacement_max_m"), 0.0, "{summary}");
+    assert!(number("/spoofing/displacement_max_m") < 30.0, "{summary}");
+    assert!(number("/spoofing/captured_share") > 0.9, "{summary}");
+    // Codes are off by as much, and no more than the claim explains.
+    let verdict = std::fs::read_to_string(run.join("verdict.csv")).unwrap();
+    let row = verdict.lines().find(|line| line.contains("code error where any is expected")).unwrap();
+    assert!(row.contains(",pass,"), "{row}");
+}

@@ -96,10 +96,12 @@ impl Summary {
         }
         if let Some(spoofing) = &self.spoofing {
             let metres = |value: Option<f64>| number(value, 1);
+            let clock_m = spoofing.claimed_clock_max_m;
+            let clock = if clock_m > 0.05 { format!(" and {clock_m:.1} m of clock") } else { String::new() };
             writeln!(
                 f,
-                "spoofing      fixes up to {} m from the truth, claims up to {:.1} m; {} % of the fixes captured, 95 \
-                 % within {} m of the claim",
+                "spoofing      fixes up to {} m from the truth, claims up to {:.1} m{clock}; {} % of the fixes captured, \
+                 95 % within {} m of the claim",
                 metres(spoofing.displacement_max_m),
                 spoofing.claimed_displacement_max_m,
                 number(spoofing.captured_share.map(|share| 100.0 * share), 0),

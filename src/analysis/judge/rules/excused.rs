@@ -1,14 +1,15 @@
 //! Rules that remain where a scene expects errors of any size.
 //!
 //! Reflections shift a code by their excess and half a chip at the most, and a carrier by the user's motion
-//! towards their mirrors. A spoofer moves both to the position that it claims. Nothing turns a Doppler's
-//! sign. The 95th percentile of each satellite's errors stays below that. Limits: satellites with a fault of
+//! towards their mirrors. A spoofer moves both to the position and the time that it claims. Nothing turns a
+//! Doppler's sign. The 95th percentile of each satellite's errors stays below that. Limits: satellites with a fault of
 //! their own are left out, as their ranges may have any error.
 
 use crate::error::JudgeError;
 use crate::judge::judgement::Bound;
 use crate::judge::verdict::Verdict;
 use crate::measure::errors::Errors;
+use crate::measure::spoofing::Claims;
 use crate::read::{Numbers, Run};
 use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::signal::Link;
@@ -18,30 +19,11 @@ pub(super) const LOOP_HZ: f64 = 50.0;
 /// Velocity error in metres per second by the same causes: a fifth of a metre a second for each hertz.
 pub(super) const LOOP_MPS: f64 = 10.0;
 
-/// Largest shift of a receiver's signals from the true ones that the scene allows.
-#[derive(Default)]
-struct Reach {
-    /// Largest change of a range's rate by a mirror or a spoofer, m/s.
-    rate_mps: f64,
-    /// Largest distance of a spoofer's position, metres.
-    place_m: f64,
-}
-
-impl Reach {
-    fn of(run: &Run) -> Result<Self, JudgeError> {
-        let mut reach = Self::default();
-        let mut truth = run.trajectory.finder()?;
-        run.trajectory.each(|row| reach.rate_mps = reach.rate_mps.max(2.0 * row.velocity_mps().norm()))?;
-        let mut beside_mps = 0.0_f64;
-        run.claimed.each(|row| {
-            if let Some(own) = truth.get(row.sample) {
-                reach.place_m = reach.place_m.max((row.position_m() - own.position_m()).norm());
-                beside_mps = beside_mps.max((row.velocity_mps() - own.velocity_mps()).norm());
-            }
-        })?;
-        reach.rate_mps += beside_mps;
-        Ok(reach)
-    }
+/// Largest change of a range's rate by a mirror, m/s.
+fn mirrors_mps(run: &Run) -> Result<f64, JudgeError> {
+    let mut speed_mps = 0.0_f64;
+    run.trajectory.each(|row| speed_mps = speed_mps.max(row.velocity_mps().norm()))?;
+    Ok(2.0 * speed_mps)
 }
 
 /// A satellite's value beside its limit.
@@ -66,7 +48,7 @@ impl Verdict {
         if run.scene.expect.always_bounded() {
             return Ok(());
         }
-        let reach = Reach::of(run)?;
+        let (claims, mirrors_mps) = (Claims::of(run)?, mirrors_mps(run)?);
         let at_fault = |link: &Link| {
             let own = |satellites: &Option<Vec<_>>| satellites.as_ref().is_none_or(|list| list.contains(&link.sv));
             run.scene.faults.iter().any(|fault| own(&fault.satellites))
@@ -87,24 +69,25 @@ impl Verdict {
             run.rays.each(link, |ray| excess_m = excess_m.max(ray.excess_m))?;
             let rates_hz = link.signal.components.iter().map(|component| component.chip_rate_hz);
             let chip_m = SPEED_OF_LIGHT_MPS / rates_hz.fold(f64::INFINITY, f64::min);
-            let limit = 0.5 * chip_m + excess_m + reach.place_m;
+            let limit = 0.5 * chip_m + excess_m + claims.place_m + claims.clock_m;
             code = Worst::nearer(code, Worst { name: run.name(link), value: code_m, limit });
-            let limit = LOOP_HZ + reach.rate_mps / link.wavelength_m();
+            let rate_mps = mirrors_mps + claims.speed_mps + claims.drift_mps;
+            let limit = LOOP_HZ + rate_mps / link.wavelength_m();
             doppler = Worst::nearer(doppler, Worst { name: run.name(link), value: doppler_hz, limit });
         }
-        self.excused_velocity(run, errors, &reach)?;
+        self.excused_velocity(run, errors, mirrors_mps + claims.speed_mps)?;
         for (figure, unit, worst, source) in [
             (
                 "code error where any is expected, 95 %",
                 "m",
                 code,
-                "half a chip, reflections and the spoofer's position",
+                "half a chip, reflections, the spoofer's position and clock",
             ),
             (
                 "Doppler error where any is expected, 95 %",
                 "Hz",
                 doppler,
-                "a loop's pull-in, mirrors and the spoofer's motion",
+                "a loop's pull-in, mirrors, the spoofer's motion and clock",
             ),
         ] {
             let Some(worst) = worst else { continue };
@@ -114,7 +97,7 @@ impl Verdict {
         Ok(())
     }
 
-    fn excused_velocity(&mut self, run: &Run, errors: &Errors, reach: &Reach) -> Result<(), JudgeError> {
+    fn excused_velocity(&mut self, run: &Run, errors: &Errors, rate_mps: f64) -> Result<(), JudgeError> {
         let mut velocities = Numbers::new(errors.positions.directory());
         for row in errors.positions.cursor() {
             let row = row?;
@@ -123,7 +106,7 @@ impl Verdict {
             }
         }
         if let Some(velocity_mps) = velocities.percentile(0.95)? {
-            let bound = Bound::Max(LOOP_MPS + reach.rate_mps);
+            let bound = Bound::Max(LOOP_MPS + rate_mps);
             let source = "a loop's pull-in, mirrors and the spoofer's motion";
             self.judge("velocity error where any is expected, 95 %", "", velocity_mps, "m/s", bound, source);
         }

@@ -31,19 +31,19 @@ impl Verdict {
             };
             let name = scene.run.name(*link);
             let chip_m = leading(link.signal).map_or(0.0, |own| SPEED_OF_LIGHT_MPS / own.chip_rate_hz);
-            let limit = 0.5 * chip_m + scene.reach(link).code_m + scene.place_m;
+            let limit = 0.5 * chip_m + scene.reach(link).code_m + scene.claims.place_m + scene.claims.clock_m;
             codes.extend(high(|row| row.code_m).map(|value| Found { name: name.clone(), value, limit }));
-            let limit = LOOP_HZ + scene.rate_mps / link.wavelength_m();
+            let limit = LOOP_HZ + (scene.rate_mps() + scene.claims.drift_mps) / link.wavelength_m();
             dopplers.extend(high(|row| row.doppler_hz).map(|value| Found { name, value, limit }));
         }
-        let source = "half a chip, reflections and the spoofer's position";
+        let source = "half a chip, reflections, the spoofer's position and clock";
         self.nearest("code error where any is expected, 95 %", "", "m", codes, source);
-        let source = "a loop's pull-in, mirrors and the spoofer's motion";
+        let source = "a loop's pull-in, mirrors, the spoofer's motion and clock";
         self.nearest("Doppler error where any is expected, 95 %", "", "Hz", dopplers, source);
         let excused = places.iter().flat_map(|places| &places.rows).filter(|row| !scene.is_bounded(row.label_s));
         let speeds: Vec<f64> =
             excused.filter_map(|row| Some(libm::hypot(row.velocity_east_mps?, row.velocity_north_mps?))).collect();
-        let limit = LOOP_MPS + scene.rate_mps;
+        let limit = LOOP_MPS + scene.rate_mps();
         let found = percentile(&speeds, 0.95).map(|value| Found { name: "velocity".to_owned(), value, limit });
         self.nearest("velocity error where any is expected, 95 %", "", "m/s", found.into_iter().collect(), source);
     }

@@ -10,6 +10,7 @@ use crate::error::JudgeError;
 use crate::expect::theory::dll::{self, Discriminator};
 use crate::expect::theory::edges;
 use crate::judge::foreign::measured::ObservationError;
+use crate::measure::spoofing::Claims;
 use crate::read::Run;
 use crate::statistics::{mean, rms, std};
 use crate::waveform::leading;
@@ -113,12 +114,10 @@ pub(super) struct Scene<'r> {
     edges_m: BTreeMap<&'static str, f64>,
     /// Seconds from sample 0 to where labels count from.
     offset_s: f64,
-    /// Interval in which a spoofer claims a position, seconds.
-    spoofed_s: Option<(f64, f64)>,
-    /// Largest change of a range's rate by a mirror or a spoofer, m/s.
-    pub rate_mps: f64,
-    /// Largest distance of a spoofer's position, metres.
-    pub place_m: f64,
+    /// Largest shifts that spoofers claim.
+    pub claims: Claims,
+    /// Largest change of a range's rate by a mirror, m/s.
+    mirrors_mps: f64,
 }
 
 impl<'r> Scene<'r> {
@@ -137,23 +136,16 @@ impl<'r> Scene<'r> {
             (signal.name, averaged_m.max(EDGES_M))
         };
         let edges_m = run.signals.iter().map(edges).collect();
-        let mut scene = Self { run, reach, edges_m, offset_s, spoofed_s: None, rate_mps: 0.0, place_m: 0.0 };
-        if !scene.reach.is_empty() {
-            run.trajectory.each(|row| scene.rate_mps = scene.rate_mps.max(2.0 * row.velocity_mps().norm()))?;
+        let mut mirrors_mps = 0.0_f64;
+        if !reach.is_empty() {
+            run.trajectory.each(|row| mirrors_mps = mirrors_mps.max(2.0 * row.velocity_mps().norm()))?;
         }
-        let mut truth = run.trajectory.finder()?;
-        let mut beside_mps = 0.0_f64;
-        run.claimed.each(|row| {
-            if let Some(own) = truth.get(row.sample) {
-                let time_s = run.time_s(row.sample);
-                let (from_s, _) = scene.spoofed_s.unwrap_or((time_s, time_s));
-                scene.spoofed_s = Some((from_s, time_s));
-                scene.place_m = scene.place_m.max((row.position_m() - own.position_m()).norm());
-                beside_mps = beside_mps.max((row.velocity_mps() - own.velocity_mps()).norm());
-            }
-        })?;
-        scene.rate_mps += beside_mps;
-        Ok(scene)
+        Ok(Self { run, reach, edges_m, offset_s, claims: Claims::of(run)?, mirrors_mps })
+    }
+
+    /// Largest change of a range's rate by a mirror or the motion that a spoofer claims, m/s.
+    pub fn rate_mps(&self) -> f64 {
+        self.mirrors_mps + self.claims.speed_mps
     }
 
     /// Seconds from sample 0 by the sampler's clock of a label.
@@ -174,7 +166,7 @@ impl<'r> Scene<'r> {
 
     /// Change of a range's rate by mirrors, as a standard deviation, m/s.
     pub fn mirrors_mps(&self) -> f64 {
-        self.rate_mps / BOUND_SIGMAS
+        self.rate_mps() / BOUND_SIGMAS
     }
 
     /// Code error of a signal by edges between samples, rms in metres. For averaged edges it is that of the
@@ -192,7 +184,7 @@ impl<'r> Scene<'r> {
     /// also false where the scene expects errors and has no reflections that would explain them.
     pub fn is_bounded(&self, label_s: f64) -> bool {
         let time_s = self.time_s(label_s);
-        let spoofed = self.spoofed_s.is_some_and(|(from_s, to_s)| (from_s..to_s + RETURN_S).contains(&time_s));
+        let spoofed = self.claims.while_s.is_some_and(|(from_s, to_s)| (from_s..to_s + RETURN_S).contains(&time_s));
         let expected = self.run.scene.expect.bounded_since(time_s, RETURN_S) || !self.reach.is_empty();
         expected && !spoofed
     }
@@ -201,7 +193,7 @@ impl<'r> Scene<'r> {
     /// figures of the whole file.
     pub fn is_always_bounded(&self) -> bool {
         let expected = self.run.scene.expect.always_bounded() || !self.reach.is_empty();
-        expected && self.spoofed_s.is_none() && self.run.scene.faults.is_empty()
+        expected && self.claims.while_s.is_none() && self.run.scene.faults.is_empty()
     }
 
     /// True if a satellite sends right ranges at a label.
