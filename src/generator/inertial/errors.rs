@@ -4,8 +4,8 @@
 //! its noise ([`TriadErrors`]). Noise is the mean over the interval of processes that are stepped without
 //! error ([`crate::random::markov`]): white, random walk, and 1/f as a sum of first-order Gauss-Markov
 //! processes. Source of the terms: IEEE Std 952-1997, annex C. Limits: 1/f noise lies between the slowest and
-//! the fastest of these processes, which is flat in the Allan deviation from 0.25 s to 500 s; quantisation,
-//! temperature, vibration and the sensors' bandwidth are left out.
+//! the fastest of these processes; its Allan deviation is that of unending 1/f noise, less 1.4 % at most,
+//! from 1 s to 500 s. Quantisation, temperature, vibration and the sensors' bandwidth are left out.
 
 use std::f64::consts::PI;
 

@@ -4,7 +4,7 @@
 //! minute, and compared with the truth at its end: only noise may part them. Where the body rests, the Allan
 //! deviation of the output is compared with that of the noise. The integration ([`strapdown`], [`window`])
 //! shares no code with the generator but the Earth's rotation and its gravitation. Limits: Allan deviations
-//! of the first 2^18 rows and up to 500 s; 1/f noise from 0.25 s on.
+//! of the first 2^18 rows and up to 500 s; 1/f noise from 1 s on.
 
 pub mod strapdown;
 pub mod window;
@@ -23,7 +23,7 @@ use crate::read::Run;
 use gnss::facts::{InertialFacts, TriadErrors};
 use gnss::record::{BodyRow, InertialRow};
 use strapdown::{Motion, Strapdown, exponential};
-use window::{LENGTH, Window};
+use window::{EASY_TURN_RAD, LENGTH, Window};
 
 /// Time after which the integration begins again.
 pub const SPAN_S: f64 = 60.0;
@@ -36,7 +36,7 @@ pub const ATTITUDE_RAD: f64 = 1e-7;
 const MOST_ROWS: usize = 1 << 18;
 /// Longest averaging time, and the shortest at which 1/f noise counts, seconds.
 const LONGEST_S: f64 = 500.0;
-const SHORTEST_FLICKER_S: f64 = 0.25;
+const SHORTEST_FLICKER_S: f64 = 1.0;
 
 /// A figure against its limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -204,7 +204,8 @@ impl<'a> Spans<'a> {
         let factor = largest(3, self.count);
         let position = Limited {
             value: (found.position_m - truth.position_m).norm(),
-            limit: POSITION_M + factor * position_sigma_m(self.facts, time_s, age_s, self.force_mps2),
+            limit: POSITION_M * (self.figures.turn_rad / EASY_TURN_RAD).max(1.0).powi(2)
+                + factor * position_sigma_m(self.facts, time_s, age_s, self.force_mps2),
         };
         let attitude = Limited {
             value: angle_rad(&(found.attitude.inverse() * truth.attitude)),

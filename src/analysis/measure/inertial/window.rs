@@ -10,6 +10,9 @@ use nalgebra::Vector3;
 
 /// Intervals of a window.
 pub const LENGTH: usize = 15;
+/// Turn in an interval up to which a step of the specific force within it, as that of sensors off the centre
+/// where the nose begins to turn, leaves less than 1 mm in a minute. What it leaves grows with the square.
+pub const EASY_TURN_RAD: f64 = 0.2;
 /// Largest turn in an interval at which the integration is judged.
 pub const LARGEST_TURN_RAD: f64 = 0.4;
 
