@@ -49,7 +49,7 @@ impl Verdict {
         ];
         for (name, key, both) in sensors {
             let Some([most, least]) = both else { continue };
-            let figure = |end: &str| format!("Allan deviation of the {name} over the one asked for, {end}");
+            let figure = |end: &str| format!("Allan deviation of the {name} beyond the one asked for, {end}");
             let source = "degrees of freedom of the estimate at its averaging time";
             self.judge(
                 &figure("largest"),

@@ -55,7 +55,7 @@ impl Serialize for Limited {
 }
 
 impl Limited {
-    /// The one that is nearer to its limit from below.
+    /// The one that is nearer to its limit, or farther beyond.
     fn worse(old: Option<Self>, new: Self) -> Option<Self> {
         Some(old.filter(|old| old.value / old.limit >= new.value / new.limit).unwrap_or(new))
     }
@@ -72,9 +72,9 @@ pub struct Figures {
     pub position_error_m: Option<Limited>,
     /// Error of the attitude integrated over a minute, radians, and its limit.
     pub attitude_error_rad: Option<Limited>,
-    /// Allan deviation of the gyroscopes over the one that was asked for, largest and smallest.
+    /// Allan deviation of the gyroscopes beyond the one that was asked for, as shares: largest and smallest.
     pub gyro_allan: Option<[Limited; 2]>,
-    /// Allan deviation of the accelerometers over the one that was asked for, largest and smallest.
+    /// Allan deviation of the accelerometers beyond the one that was asked for, in the same measure.
     pub accelerometer_allan: Option<[Limited; 2]>,
 }
 
@@ -129,7 +129,7 @@ impl Figures {
                 spans.compare(&true_body, due.is_none());
             }
         }
-        let [gyro_allan, accelerometer_allan] = noises.map(|phases| phases.ratios(facts));
+        let [gyro_allan, accelerometer_allan] = noises.map(|phases| phases.excesses(facts));
         Ok(Some(Self { gyro_allan, accelerometer_allan, ..spans.figures }))
     }
 }
@@ -239,16 +239,16 @@ impl Phases {
         }
     }
 
-    /// Allan deviations over those of the noise, largest and smallest against their limits; `None` without
-    /// noise, or where the body moves.
-    fn ratios(&self, facts: &InertialFacts) -> Option<[Limited; 2]> {
+    /// Allan deviations beyond those of the noise as shares, largest and smallest against their limits; `None`
+    /// without noise, or where the body moves.
+    fn excesses(&self, facts: &InertialFacts) -> Option<[Limited; 2]> {
         let (tau0_s, count) = (1.0 / facts.rate_hz, self.axes[0].len());
         let steps: Vec<usize> = (0..usize::BITS)
             .map(|power| 1 << power)
             .take_while(|m| 8 * m < count && *m as f64 * tau0_s <= LONGEST_S)
             .filter(|m| self.is_asked(*m as f64 * tau0_s))
             .collect();
-        let mut worst: Option<[Limited; 2]> = None;
+        let mut worst: [Option<Limited>; 2] = [None, None];
         for &m in &steps {
             let tau_s = m as f64 * tau0_s;
             let squares: Option<f64> = self
@@ -257,19 +257,14 @@ impl Phases {
                 .map(|axis| Deviation::Oadev.estimate(axis, tau0_s, m).map(|found| found.deviation * found.deviation))
                 .sum();
             let (Some(squares), Some(freedom)) = (squares, self.freedom(m, count)) else { continue };
-            let ratio = (squares / 3.0 / allan_variance(&self.errors, tau_s)).sqrt();
+            let excess = (squares / 3.0 / allan_variance(&self.errors, tau_s)).sqrt() - 1.0;
             let (low, high) = mean_squares(3.0 * freedom, steps.len());
-            let [above, below] =
-                [Limited { value: ratio, limit: high.sqrt() }, Limited { value: ratio, limit: low.sqrt() }];
-            worst = Some(match worst {
-                None => [above, below],
-                Some([most, least]) => [
-                    Limited::worse(Some(most), above).unwrap_or(above),
-                    if least.value / least.limit <= below.value / below.limit { least } else { below },
-                ],
-            });
+            for (worst, limit) in worst.iter_mut().zip([high, low]) {
+                *worst = Limited::worse(*worst, Limited { value: excess, limit: limit.sqrt() - 1.0 });
+            }
         }
-        worst
+        let [most, least] = worst;
+        Some([most?, least?])
     }
 
     /// True unless 1/f noise shows at an averaging time too short for it.
