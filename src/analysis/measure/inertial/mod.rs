@@ -239,8 +239,8 @@ impl Phases {
         }
     }
 
-    /// Allan deviations beyond those of the noise as shares, largest and smallest against their limits; `None`
-    /// without noise, or where the body moves.
+    /// Allan deviations beyond those of the noise as shares, largest and smallest against their limits;
+    /// `None` without noise, or where the body moves.
     fn excesses(&self, facts: &InertialFacts) -> Option<[Limited; 2]> {
         let (tau0_s, count) = (1.0 / facts.rate_hz, self.axes[0].len());
         let steps: Vec<usize> = (0..usize::BITS)
