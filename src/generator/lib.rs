@@ -30,8 +30,8 @@
 //!
 //! Rooms from the ground up; each imports only rooms before it, tests apart:
 //!
-//! 1. [`random`], [`fidelity`]; the world: [`vehicle`], [`clock`], [`orbit_error`], [`precise`],
-//!    [`catalogue`], [`message`];
+//! 1. [`random`], [`fidelity`]; the world: [`vehicle`], [`inertial`], [`clock`], [`orbit_error`],
+//!    [`precise`], [`catalogue`], [`message`];
 //! 2. the channel: [`ray`], [`sky`], [`effect`], [`array`](mod@array), [`fast_phase`], [`spoof`];
 //! 3. the kernels and the front end: [`synth`], [`knots`], [`switches`], [`mod@stage`];
 //! 4. [`scene`], which holds all of these, and what follows from it: [`event`], [`presence`], [`geometry`],
@@ -56,6 +56,7 @@ pub mod event;
 pub mod fast_phase;
 pub mod fidelity;
 pub mod geometry;
+pub mod inertial;
 pub mod knots;
 pub mod levels;
 mod low_pass;

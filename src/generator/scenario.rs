@@ -17,6 +17,7 @@ mod fidelity;
 mod files;
 mod front_end;
 mod hardware;
+mod inertial;
 pub mod interference;
 pub mod keys;
 mod link;
@@ -72,7 +73,7 @@ use crate::effect::obstruction::Obstacle;
 use crate::fast_phase::scintillation::Strength;
 use crate::fidelity::allowed_m;
 use crate::vehicle::attitude::Attitude;
-use gnss::facts::Expect;
+use gnss::facts::{Expect, InertialFacts};
 use gnss::place::hint;
 use gnss::satellite::Sv;
 use gnss::signal::Signal;
@@ -257,6 +258,8 @@ pub struct Scenario {
     pub attitude: Option<Attitude>,
     /// Elements of an array on that body; absent means one antenna.
     pub array: Option<Vec<ElementSpec>>,
+    /// Inertial sensors on that body; absent means none.
+    pub imu: Option<InertialFacts>,
     /// One at least; one for each element of an array.
     pub front_ends: Vec<FrontEnd>,
     /// Power of the signals.
@@ -402,6 +405,8 @@ impl Scenario {
         let allowed_m = allowed_m(power.as_ref().filter(|_| noise).map(Power::strongest_dbhz));
         let front_ends = front_end::front_ends(root, allowed_m, refusals);
         let (array, front_ends) = array::array(root, front_ends, refusals);
+        let imu = refusals.take(root.table("imu")).flatten();
+        let imu = refusals.take(imu.map(|t| inertial::imu(root, &t)).transpose());
         let playback = refusals.take(playback.map(|t| stages::playback(&t)).transpose()).flatten();
         let Choice { mask_rad, only, excluded, include_unhealthy } = chosen?;
         Some(Self {
@@ -429,6 +434,7 @@ impl Scenario {
             motion: motion?,
             attitude: attitude?,
             array,
+            imu: imu?,
             city: city?,
             front_ends: front_ends?,
             power: power?,

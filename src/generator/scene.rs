@@ -14,6 +14,7 @@ use crate::fast_phase;
 use crate::fast_phase::satellite::SatelliteClocks;
 use crate::fast_phase::scintillation::Scintillation;
 pub use crate::fidelity::{Arithmetic, CodeEdge, Fidelity, Grade};
+use crate::inertial::Imu;
 use crate::low_pass::CUTOFF_CPS;
 use crate::message::{MessageFault, Senders};
 use crate::random::{Stream, seed_of};
@@ -57,6 +58,8 @@ pub struct Scene {
     pub trajectory: Trajectory,
     /// Element of an array that receives it, where the scenario has one.
     pub element: Option<Arc<Element>>,
+    /// Inertial sensors on the body, where the scenario has them.
+    pub imu: Option<Imu>,
     /// Broadcast ephemerides, and true orbits and clocks.
     pub catalogue: Arc<Catalogue>,
     /// Messages that the satellites send besides their own ephemerides.

@@ -43,6 +43,7 @@ pub mod galileo;
 pub mod geoid;
 pub mod glonass;
 pub mod gps;
+pub mod gravity;
 pub mod inflate;
 pub mod ion;
 pub mod ionex;

@@ -3,6 +3,8 @@
 //! A row states *when* by sample number: the only clock that truth and estimate share without
 //! agreeing on anything. Columns end with their unit; angles are in degrees in files, in radians nowhere.
 
+mod inertial;
+
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -10,6 +12,7 @@ use crate::earth::Geodetic;
 use crate::satellite::Sv;
 use crate::signal::{Link, Signal, by_name};
 use crate::time::{Epoch, GPST};
+pub use inertial::{BodyRow, InertialRow};
 
 /// Rows that belong to one signal of one satellite.
 macro_rules! linked {

@@ -13,6 +13,7 @@ pub const ORDER: Order<'static> = &[
         &[
             &["plant", "renamed"],
             &["time", "earth", "geoid", "satellite", "inflate", "place", "weil"],
+            &["gravity"],
             &["bits", "bdgim", "cityjson", "klobuchar", "nequick", "ionex", "projection", "samples", "vienna"],
             &["crc", "troposphere"],
             &["fec"],
@@ -37,6 +38,7 @@ pub const ORDER: Order<'static> = &[
             &["low_pass"],
             &["fidelity"],
             &["vehicle"],
+            &["inertial"],
             &["clock"],
             &["orbit_error"],
             &["precise"],
@@ -127,7 +129,7 @@ pub const ORDER: Order<'static> = &[
             &["rinex_obs", "nmea", "delay", "detection", "emission", "levels", "protection", "rows", "table"],
             &["common", "fixes"],
             &["run"],
-            &["attacks", "sky"],
+            &["attacks", "inertial", "sky"],
         ],
     ),
     (
@@ -156,12 +158,15 @@ pub const ORDER: Order<'static> = &[
             &["beats", "due", "multipath"],
         ],
     ),
-    ("analysis/expect/theory", &[&["clock", "detection", "dll", "edges", "linear", "pll"], &["fll", "oscillator"]]),
+    (
+        "analysis/expect/theory",
+        &[&["clock", "detection", "dll", "edges", "inertial", "linear", "pll"], &["fll", "oscillator"]],
+    ),
     (
         "analysis/measure",
         &[
             &["allan", "errors", "independent", "ionosphere", "lines", "osnma", "peaks", "psd", "spectrum", "spoofing"],
-            &["clock", "consistency", "elevation", "jitter", "protection"],
+            &["clock", "consistency", "elevation", "inertial", "jitter", "protection"],
             &["detection", "slips"],
             &["labelled"],
         ],

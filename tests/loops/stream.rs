@@ -47,6 +47,7 @@ fn scene(rate_hz: f64, duration_s: f64, format: Format, center_hz: f64, inverted
         nodes: Nodes::of(rate),
         metadata: IfMetadata { format, rate, center_hz, inverted, start: Some(start) },
         element: None,
+        imu: None,
         trajectory: Trajectory::fixed(Geodetic::from_degrees(26.5, 80.2, 120.0).to_ecef()),
         catalogue: Arc::new(catalogue),
         messages: Arc::new(Senders::new(&common, &[&L1_CA]).unwrap()),

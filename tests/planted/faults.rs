@@ -106,6 +106,8 @@ const TIMES: &str = "witness::printed::weeks_begin_on_sunday_and_leap_seconds_ar
 const PACKED: &str = "witness::packed::codes_and_their_positions_are_those_that_makers_print";
 const BANDS: &str = "witness::packed::bands_of_one_oscillator_have_its_frequency_at_zero";
 const PLACES: &str = "witness::printed::positions_and_directions_are_the_published_ones";
+const GRAVITY: &str = "witness::printed::gravity_is_that_of_the_ellipsoid_once_the_term_of_degree_four_is_added";
+const INERTIAL: &str = "inertial::measurements_without_errors_come_back_within_a_millimetre_in_a_minute";
 const ORBITS: &str = "witness::orbit::broadcast_orbits_of_2010_meet_the_igs_final_ones";
 const STATIONS: &str = "witness::pseudorange::two_japanese_stations_fit_the_model";
 const KLOB: &str = "witness::atmosphere::klobuchar_gives_the_worked_value_of_rtklib";
@@ -211,6 +213,7 @@ pub const FAULTS: &[Fault] = &[
     fault("gnss.klobuchar.obliquity", "a constant of the slant factor is 0.50, on both sides", KLOB),
     fault("gnss.klobuchar.pole", "the geomagnetic pole at another longitude, on both sides", KLOB),
     fault("gnss.klobuchar.noon", "the bulge is highest at noon in place of 14 h, on both sides", KLOB),
+    fault("gnss.gravity.oblateness", "the oblateness pulls the other way, on both sides", GRAVITY),
     fault("gnss.earth.rotation", "the Earth turns the other way during flight, on both sides", PLACES),
     fault("gnss.earth.height", "height is left out of z", PLACES),
     fault("gnss.earth.azimuth", "azimuth is counted from east over north", PLACES),
@@ -250,6 +253,7 @@ pub const FAULTS: &[Fault] = &[
     fault("generator.clock.drift", "the clock drifts by a twentieth more", CLOCK),
     fault("generator.truth.doppler", "the truth has Doppler with the wrong sign", LOOP),
     fault("generator.truth.clock_in_carrier", "the carrier does not show the clock", LOOP),
+    fault("generator.inertial.earth", "inertial sensors do not feel the Earth's rotation", INERTIAL),
     fault("receiver.acquire.code_phase", "the search hands over a code phase two chips off", LOOP),
     fault("receiver.loops.pll_bandwidth", "the phase loop is half as wide again", LOOP),
     fault("receiver.loops.dll_bandwidth", "the code loop is six times as wide", LOOP),

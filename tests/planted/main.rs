@@ -8,6 +8,7 @@ mod arrays;
 mod bands;
 mod channels;
 mod faults;
+mod inertial;
 mod judge;
 mod laws;
 #[path = "../common/long.rs"]

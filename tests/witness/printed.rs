@@ -7,7 +7,7 @@ use gnss::beidou::in_phase::{B1I, B2I, B3I};
 use gnss::bits::Store;
 use gnss::broadcast::{Ephemeris, StateVector};
 use gnss::crc::crc24q;
-use gnss::earth::{Geodetic, Look, look, rotate_earth};
+use gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, Look, SEMI_MAJOR_AXIS_M, look, rotate_earth};
 use gnss::galileo::altboc::E5;
 use gnss::galileo::e1::E1;
 use gnss::galileo::e6::E6;
@@ -22,6 +22,7 @@ use gnss::gps::l1ca::L1_CA;
 use gnss::gps::l2c::L2C;
 use gnss::gps::l5::L5;
 use gnss::gps::lnav::{self, Field, Kind};
+use gnss::gravity::{central_mps2, gravitation_mps2};
 use gnss::navic::sps;
 use gnss::satellite::{Sv, System};
 use gnss::time::Epoch;
@@ -369,6 +370,25 @@ fn positions_and_directions_are_the_published_ones() {
     // axes turn east.
     let later = rotate_earth(&Vector3::new(1.0, 0.0, 0.0), 3600.0);
     assert!(later.y < 0.0 && (libm::atan2(-later.y, later.x) - 7.292_115_146_7e-5 * 3600.0).abs() < 1e-12);
+}
+
+/// Normal gravity of WGS 84 at the equator and at the poles (NGA.STND.0036, table 3.5), and its form
+/// factor of degree four: −3 times the C̄40 = 7.903 037 335 11e-7 of the normal field.
+#[test]
+fn gravity_is_that_of_the_ellipsoid_once_the_term_of_degree_four_is_added() {
+    const J4: f64 = -2.370_911_2e-6;
+    for (latitude_deg, published_mps2, factor) in
+        [(0.0, 9.780_325_335_9, -1.875), (90.0, 9.832_184_937_8, -5.0), (-90.0, 9.832_184_937_8, -5.0)]
+    {
+        let at_m = Geodetic::from_degrees(latitude_deg, 33.0, 0.0).to_ecef();
+        let turning = Vector3::new(at_m.x, at_m.y, 0.0) * (EARTH_ROTATION_RADPS * EARTH_ROTATION_RADPS);
+        let gravity_mps2 = (gravitation_mps2(&at_m) + turning).norm();
+        // −(n + 1) Jn (a/r)^n Pn of the central term: P4 is 3/8 at the equator and 1 at the poles.
+        let ratio = SEMI_MAJOR_AXIS_M / at_m.norm();
+        let fourth_mps2 = factor * J4 * ratio.powi(4) * central_mps2(&at_m).norm();
+        // Degree six, J6 = 6.1e-9, is below 7·6.1e-9·1.02·9.9 = 4.3e-7; digits of J2 are 5e-11·3·9.9.
+        assert!((gravity_mps2 + fourth_mps2 - published_mps2).abs() < 5e-7, "{latitude_deg} {gravity_mps2}");
+    }
 }
 
 #[test]

@@ -31,9 +31,15 @@ fn beyond(axes: u32, p: f64) -> f64 {
 /// Band of the mean square of so many independent normal values of unit variance, half of the false alarm on
 /// each side.
 pub fn mean_square(independent: f64) -> (f64, f64) {
+    mean_squares(independent, 1)
+}
+
+/// [`mean_square`] for each of `count` means.
+pub fn mean_squares(independent: f64, count: usize) -> (f64, f64) {
     let freedom = independent.max(1.0);
     let Ok(law) = ChiSquared::new(freedom) else { return (0.0, f64::INFINITY) };
-    (law.inverse_cdf(0.5 * FALSE_ALARM) / freedom, law.inverse_cdf(1.0 - 0.5 * FALSE_ALARM) / freedom)
+    let beyond = 0.5 * FALSE_ALARM / count.max(1) as f64;
+    (law.inverse_cdf(beyond) / freedom, law.inverse_cdf(1.0 - beyond) / freedom)
 }
 
 #[cfg(test)]

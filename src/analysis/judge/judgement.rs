@@ -74,6 +74,8 @@ pub enum Group {
     Samples,
     /// Interference and spoofing.
     Interference,
+    /// Inertial measurements.
+    Inertial,
     /// Completeness and agreement of the tables.
     Tables,
 }
@@ -92,6 +94,7 @@ impl Group {
             Self::Protection => "protection levels",
             Self::Samples => "samples",
             Self::Interference => "interference and spoofing",
+            Self::Inertial => "inertial measurements",
             Self::Tables => "consistency of the tables",
         }
     }

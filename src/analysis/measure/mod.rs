@@ -18,6 +18,7 @@ pub mod detection;
 pub mod elevation;
 pub mod errors;
 pub mod independent;
+pub mod inertial;
 pub mod ionosphere;
 pub mod jitter;
 pub mod labelled;

@@ -13,6 +13,7 @@ mod emission;
 mod fault;
 mod files;
 pub mod fixes;
+mod inertial;
 pub mod levels;
 pub mod nmea;
 pub mod numbers;

@@ -1,7 +1,9 @@
 //! Rows of a run's long tables in a [`super::spill_store::SpillStore`].
 
 use crate::read::spill_store::{SpillRow, Words};
-use gnss::record::{ClockRow, IonosphereRow, Observation, RayRow, SkyRow, TrackingRow, TrajectoryRow};
+use gnss::record::{
+    BodyRow, ClockRow, InertialRow, IonosphereRow, Observation, RayRow, SkyRow, TrackingRow, TrajectoryRow,
+};
 use gnss::satellite::Sv;
 use gnss::signal::Link;
 
@@ -110,6 +112,56 @@ impl SpillRow<()> for TrajectoryRow {
             vz_mps: words.number(),
             clock_bias_s: words.number(),
             clock_drift: words.number(),
+        }
+    }
+}
+
+impl SpillRow<()> for InertialRow {
+    const WORDS: usize = 8;
+
+    fn put(&self, words: &mut Vec<u64>) {
+        words.extend([self.gps_s.cast_unsigned(), self.gps_fraction_s.to_bits()]);
+        words.extend([self.rate_x_radps, self.rate_y_radps, self.rate_z_radps].map(f64::to_bits));
+        words.extend([self.force_x_mps2, self.force_y_mps2, self.force_z_mps2].map(f64::to_bits));
+    }
+
+    fn take((): (), words: &mut Words<'_>) -> Self {
+        Self {
+            gps_s: words.word().cast_signed(),
+            gps_fraction_s: words.number(),
+            rate_x_radps: words.number(),
+            rate_y_radps: words.number(),
+            rate_z_radps: words.number(),
+            force_x_mps2: words.number(),
+            force_y_mps2: words.number(),
+            force_z_mps2: words.number(),
+        }
+    }
+}
+
+impl SpillRow<()> for BodyRow {
+    const WORDS: usize = 12;
+
+    fn put(&self, words: &mut Vec<u64>) {
+        words.extend([self.gps_s.cast_unsigned(), self.gps_fraction_s.to_bits()]);
+        words.extend([self.x_m, self.y_m, self.z_m, self.vx_mps, self.vy_mps, self.vz_mps].map(f64::to_bits));
+        words.extend([self.qw, self.qx, self.qy, self.qz].map(f64::to_bits));
+    }
+
+    fn take((): (), words: &mut Words<'_>) -> Self {
+        Self {
+            gps_s: words.word().cast_signed(),
+            gps_fraction_s: words.number(),
+            x_m: words.number(),
+            y_m: words.number(),
+            z_m: words.number(),
+            vx_mps: words.number(),
+            vy_mps: words.number(),
+            vz_mps: words.number(),
+            qw: words.number(),
+            qx: words.number(),
+            qy: words.number(),
+            qz: words.number(),
         }
     }
 }

@@ -183,7 +183,8 @@ fn named(alike: &BTreeMap<Link, Sv>, link: Link) -> Sv {
     alike.get(&link).copied().unwrap_or(link.sv)
 }
 
-const TRUTH: &str = "the generator writes it: make the run again with `gnss-twin run`, or `gnss-twin generate`";
+pub(super) const TRUTH: &str =
+    "the generator writes it: make the run again with `gnss-twin run`, or `gnss-twin generate`";
 pub(super) const RECEIVER: &str =
     "the receiver writes it: `gnss-twin receive FILE --out RUN/rx`, or make the run again";
 

@@ -8,6 +8,7 @@ use crate::judge::rules::{CORRELATIONS, OBSERVATIONS};
 use crate::judge::summary::Summary;
 use crate::judge::verdict::Verdict;
 use crate::measure::consistency::Calibration;
+use crate::measure::inertial::Limited;
 use crate::statistics::Spread;
 
 /// True of a level of fidelity at which no samples are made.
@@ -123,6 +124,17 @@ impl Summary {
                 osnma.tags_open,
                 after(osnma.first_authentic_s),
                 after(osnma.first_authentic_fix_s)
+            )?;
+        }
+        if let Some(inertial) = &self.inertial {
+            let back =
+                |figure: Option<Limited>| figure.map_or("-".to_owned(), |figure| format!("{:.1e}", figure.value));
+            writeln!(
+                f,
+                "inertial      {} measurements; integrated back: position within {} m, attitude within {} rad",
+                inertial.rows,
+                back(inertial.position_error_m),
+                back(inertial.attitude_error_rad)
             )?;
         }
         if let Some(measured) = &self.ionosphere {

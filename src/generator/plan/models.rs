@@ -47,6 +47,9 @@ pub(super) fn models(scene: &Scene, kept: &Kept) -> Vec<Model> {
     if scene.trajectory.attitude().is_none() {
         add("attitude", false, "the scenario has no [attitude]: the antenna looks up, no wind-up".to_owned());
     }
+    if let Some(imu) = &scene.imu {
+        add("inertial sensors", true, imu.describe());
+    }
     if !scene.effects.iter().any(|effect| effect.name() == "multipath") {
         add("multipath", false, "the scenario has no [[multipath]]".to_owned());
     }

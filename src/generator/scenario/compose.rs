@@ -18,6 +18,7 @@ use crate::clock::ReceiverClock;
 use crate::clock::nodes::Nodes;
 use crate::fast_phase::satellite::SatelliteClocks;
 use crate::fast_phase::scintillation::Scintillation;
+use crate::inertial::Imu;
 use crate::message::{MessageFault, Senders};
 use crate::presence;
 use crate::random::{Stream, seed_of};
@@ -61,6 +62,7 @@ struct World {
     /// array's first element.
     body: Trajectory,
     trajectory: Trajectory,
+    imu: Option<Imu>,
     switches: Option<Arc<Switches>>,
     receiver_clock: ReceiverClock,
     /// True time since the start at which the scene ends.
@@ -255,6 +257,7 @@ impl Scenario {
             own_seed,
             nodes,
             switches: trajectory.tick_samples().map(|samples| Arc::new(Switches::new(samples))),
+            imu: self.imu_on(&body, own_seed)?,
             body,
             trajectory,
             receiver_clock,
@@ -290,6 +293,7 @@ impl Scenario {
             nodes: world.nodes,
             trajectory: world.trajectory.clone(),
             element: None,
+            imu: world.imu.clone(),
             catalogue: Arc::clone(&world.catalogue),
             messages: Arc::clone(&world.messages),
             osnma: world.osnma.clone(),

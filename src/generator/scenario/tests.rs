@@ -236,6 +236,30 @@ fn what_contradicts_itself_is_refused_with_the_computed_number() {
 }
 
 #[test]
+fn a_grade_of_inertial_sensors_sets_three_errors_and_a_key_of_its_own_replaces_one() {
+    let turned = "[attitude]\nkind = \"fixed\"\n";
+    let imu =
+        |keys: &str| parse(&format!("{MINIMAL}{STATIC}{turned}[imu]\nrate_hz = 200\n{keys}")).unwrap().imu.unwrap();
+    let plain = imu("");
+    assert!(!plain.is_noisy() && plain.rate_hz == 200.0 && plain.lever_arm_m == [0.0; 3]);
+    let degph = 1_f64.to_radians() / 3600.0;
+    let low = imu("grade = \"low\"\nvelocity_random_walk_mps_per_sqrt_h = 0.6\ngyro_bias_deg_per_h = [0, 2, 0]\n");
+    // 0.75 deg/√h is 0.0125 deg/√s; 0.6 m/s/√h is 0.01 m/s/√s. Products of a few roundings.
+    assert!((low.gyro.random_walk / 0.0125_f64.to_radians() - 1.0).abs() < 1e-15);
+    assert!((low.accelerometer.random_walk - 0.01).abs() < 1e-17);
+    assert_eq!((low.gyro.bias_instability, low.gyro.bias), (10.0 * degph, [0.0, 2.0 * degph, 0.0]));
+    let refused = |text: &str| parse(text).unwrap_err().to_string();
+    let error = refused(&format!("{MINIMAL}{STATIC}[imu]\nrate_hz = 100\n"));
+    assert!(error.contains("[attitude] beside [imu]"), "{error}");
+    let error = refused(&format!("{MINIMAL}{STATIC}{turned}[imu]\nrate_hz = 20\n"));
+    assert!(error.contains("imu.rate_hz = 20") && error.contains("50"), "{error}");
+    let error = refused(&format!("{MINIMAL}{STATIC}{turned}[imu]\nrate_hz = 100\ngrade = \"tactica\"\n"));
+    assert!(error.contains("did you mean tactical?"), "{error}");
+    let error = warnings(&format!("{MINIMAL}{PUSHED}{turned}[imu]\nrate_hz = 100\n")).unwrap_err();
+    assert!(error.contains("is pushed beside [imu]"), "{error}");
+}
+
+#[test]
 fn what_cannot_be_turned_or_reflected_is_refused_with_the_remedy() {
     let parsed = |tables: &str| parse(&format!("{MINIMAL}{STATIC}{tables}")).unwrap_err().to_string();
     assert!(parsed("[attitude]\nkind = \"velocity\"\nroll_deg = 3").contains("level"));

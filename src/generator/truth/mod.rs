@@ -6,6 +6,7 @@
 //! and carrier delays.
 
 mod array;
+mod inertial;
 mod place;
 mod record;
 mod rinex;

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
+use super::inertial::Inertial;
 use super::record::{Record, Sink, TruthError};
 use super::skyline::skyline_deg;
 use crate::scene::{CodeEdge, Scene, sources};
@@ -17,7 +18,7 @@ use gnss::record::{Geographic, TrajectoryRow};
 use gnss::signal::described::texts_of;
 use gnss::time::Rate;
 
-struct Table {
+pub(super) struct Table {
     path: PathBuf,
     rows: csv::Writer<BufWriter<File>>,
     is_empty: bool,
@@ -25,7 +26,7 @@ struct Table {
 
 impl Table {
     /// The header is that of the first row.
-    fn create(directory: &Path, name: &str) -> Result<Self, TruthError> {
+    pub(super) fn create(directory: &Path, name: &str) -> Result<Self, TruthError> {
         Self::open(directory, name, true)
     }
 
@@ -53,11 +54,11 @@ impl Table {
         self.write((row, place))
     }
 
-    fn write(&mut self, row: impl Serialize) -> Result<(), TruthError> {
+    pub(super) fn write(&mut self, row: impl Serialize) -> Result<(), TruthError> {
         self.rows.serialize(row).map_err(|source| TruthError::Row { path: self.path.clone(), source })
     }
 
-    fn flush(&mut self) -> Result<(), TruthError> {
+    pub(super) fn flush(&mut self) -> Result<(), TruthError> {
         self.rows.flush().map_err(|source| TruthError::File { path: self.path.clone(), source })
     }
 }
@@ -78,8 +79,9 @@ struct Claims {
 
 /// Writes `observations.csv`, `sky.csv`, `trajectory.csv`, `navigation.csv`, `passes.csv` and `scene.json`;
 /// `rays.csv` where a satellite has more than one ray, with interference `interference.csv`, with spoofers
-/// `spoofed.csv` and `claimed.csv` (`spoofed_2.csv`, … from the second one on), and with authenticated
-/// messages `osnma_test_merkle_tree.xml`, `osnma_test_public_key.xml` and `osnma_test_kroot.hex`.
+/// `spoofed.csv` and `claimed.csv` (`spoofed_2.csv`, … from the second one on), with inertial sensors
+/// `imu.csv` and `body.csv`, and with authenticated messages `osnma_test_merkle_tree.xml`,
+/// `osnma_test_public_key.xml` and `osnma_test_kroot.hex`.
 pub struct Writer {
     directory: PathBuf,
     observations: Table,
@@ -88,6 +90,7 @@ pub struct Writer {
     trajectory: Table,
     interference: Option<Table>,
     claims: Vec<Claims>,
+    inertial: Option<Inertial>,
     navigation: Option<Table>,
     passes: Option<Table>,
     /// Switches, rate and facts of a scene whose satellites may drift while it is sent. The facts are
@@ -192,6 +195,7 @@ impl Writer {
             trajectory: Table::of_places(directory, "trajectory.csv")?,
             interference: None,
             claims: Vec::new(),
+            inertial: None,
             navigation: None,
             passes: None,
             driven: None,
@@ -211,6 +215,7 @@ impl Writer {
                 trajectory: Table::of_places(&self.directory, &format!("claimed{suffix}.csv"))?,
             });
         }
+        self.inertial = Inertial::create(&self.directory, scene, part)?;
         self.write_keys(scene, part)?;
         let (orbits, departures) = scene.catalogue.describe();
         let file = SceneFacts {
@@ -244,6 +249,7 @@ impl Writer {
                 .map(|oscillator| OscillatorFacts { h: oscillator.law.levels() }),
             front_ends: if scenes.len() > 1 { scenes.iter().map(front_end).collect() } else { Vec::new() },
             array: super::array::facts(scenes, &received),
+            imu: scene.imu.as_ref().map(|imu| imu.facts.clone()),
             interference: received.iter().map(|(_, source)| source.fact()).collect(),
             spoofers: scene.spoofers.iter().map(|spoofer| spoofer.describe()).collect(),
             orbits,
@@ -296,7 +302,10 @@ impl Sink for Writer {
 
     fn take(&mut self, record: Record) -> Result<(), TruthError> {
         match record {
-            Record::Trajectory(row) => self.trajectory.write_place(row),
+            Record::Trajectory(row) => {
+                self.inertial.as_mut().map_or(Ok(()), |inertial| inertial.until(row.time()))?;
+                self.trajectory.write_place(row)
+            }
             Record::Observation(row) => self.observations.write(row),
             Record::Sky(row) => self.sky.write(row),
             Record::Ray(row) => opened(&mut self.rays, &self.directory, "rays.csv")?.write(row),
@@ -323,6 +332,7 @@ impl Sink for Writer {
         }
         opened(&mut self.navigation, &self.directory, "navigation.csv")?.flush()?;
         opened(&mut self.passes, &self.directory, "passes.csv")?.flush()?;
+        self.inertial.as_mut().map_or(Ok(()), Inertial::finish)?;
         self.observations.flush()?;
         self.sky.flush()?;
         self.rays.iter_mut().chain(&mut self.interference).try_for_each(Table::flush)?;

@@ -8,10 +8,10 @@
 use nalgebra::Vector3;
 use thiserror::Error;
 
-use super::rocket::MU_M3PS2;
 use super::{Knot, Motion, Trajectory};
 use gnss::broadcast::solve_kepler;
 use gnss::earth::{EARTH_ROTATION_RADPS, SEMI_MAJOR_AXIS_M, rotate_earth};
+use gnss::gravity::MU_M3PS2;
 
 /// True anomaly between knots at perigee. A quintic over h misses by h⁶/46080 of the sixth derivative, which
 /// is r·ω⁶ on a circle and below 60 times that at the perigee of an ellipse (found numerically up to e =

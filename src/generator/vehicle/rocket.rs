@@ -1,7 +1,7 @@
 //! A rocket or projectile: rests on its pad, burns, and coasts under gravity and drag.
 //!
 //! Equations of motion in ECEF with centrifugal and Coriolis acceleration, integrated by the classical
-//! Runge-Kutta method of order four. Gravity: WGS 84 (NGA.STND.0036, table 3.1) central, and J2 on request.
+//! Runge-Kutta method of order four. Gravity: WGS 84 ([`gnss::gravity`]) central, and J2 on request.
 //! Drag: Cd·A/m with an exponential atmosphere that rotates with the Earth. Limits: thrust keeps its
 //! direction (no guidance, no gravity turn), no wind, no lift. The pad hands the weight over in proportion to
 //! the first ramp of the thrust, so that acceleration is continuous at lift-off.
@@ -11,12 +11,9 @@ use thiserror::Error;
 
 use super::ramp::Ramp;
 use super::{Knot, Motion, Trajectory};
-use gnss::earth::{EARTH_ROTATION_RADPS, Geodetic, SEMI_MAJOR_AXIS_M};
+use gnss::earth::{EARTH_ROTATION_RADPS, Geodetic};
+use gnss::gravity::{central_mps2, oblateness_mps2};
 
-/// Earth's gravitational parameter with its atmosphere (NGA.STND.0036, table 3.1).
-pub(super) const MU_M3PS2: f64 = 3.986_004_418e14;
-/// Dynamic form factor: −√5 times the EGM's C̄20 = −4.841 653 717 36e-4 (NGA.STND.0036, table 5.1).
-const J2: f64 = 1.082_629_8e-3;
 /// Density at sea level (U.S. Standard Atmosphere 1976) and the scale height that fits it within a fifth to
 /// 30 km.
 const SEA_LEVEL_DENSITY_KGPM3: f64 = 1.225;
@@ -140,13 +137,9 @@ impl Rocket {
 
     /// Gravity, the rotating frame and drag.
     fn field(&self, (r, v): &Pair) -> Vector3<f64> {
-        let r2 = r.norm_squared();
-        let central = MU_M3PS2 / (r2 * r2.sqrt());
-        let mut acceleration = r * -central;
+        let mut acceleration = central_mps2(r);
         if self.oblate {
-            let scale = 1.5 * J2 * central * SEMI_MAJOR_AXIS_M * SEMI_MAJOR_AXIS_M / r2;
-            let z2 = 5.0 * r.z * r.z / r2;
-            acceleration += Vector3::new(r.x * (z2 - 1.0), r.y * (z2 - 1.0), r.z * (z2 - 3.0)) * scale;
+            acceleration += oblateness_mps2(r);
         }
         let w = EARTH_ROTATION_RADPS;
         acceleration += Vector3::new(w * w * r.x + 2.0 * w * v.y, w * w * r.y - 2.0 * w * v.x, 0.0);
@@ -181,6 +174,7 @@ impl Rocket {
 mod tests {
     use super::*;
     use gnss::earth::rotate_earth;
+    use gnss::gravity::MU_M3PS2;
 
     const G_MPS2: f64 = 9.806_65;
 

@@ -167,7 +167,8 @@ fn unit(quaternion: [f64; 4]) -> [f64; 4] {
     quaternion.map(|x| x / norm)
 }
 
-fn exponential(vector: &Vector3<f64>) -> [f64; 4] {
+/// Unit quaternion of the rotation by a vector in radians.
+pub(crate) fn exponential(vector: &Vector3<f64>) -> [f64; 4] {
     let angle = vector.norm();
     let (sin, cos) = libm::sincos(0.5 * angle);
     let share = if angle < SMALL_RAD { 0.5 - angle * angle / 48.0 } else { sin / angle };

@@ -7,6 +7,7 @@
 
 mod array;
 mod front_end;
+mod inertial;
 mod interference;
 mod osnma;
 mod scene;
@@ -18,6 +19,7 @@ pub use array::ArrayFacts;
 pub use front_end::{
     BalanceSpec, ConverterSpec, Edge, FilterShape, FilterSpec, StageSpec, converter, filters, oscillator_offset_hz,
 };
+pub use inertial::{InertialFacts, TriadErrors};
 pub use interference::Interference;
 pub use osnma::{OsnmaFacts, SpoofedBits, SpoofedMessages};
 pub use scene::{FrontEndFacts, OscillatorFacts, Renewal, SceneFacts};

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{ArrayFacts, Edge, Expect, Fault, Interference, OsnmaFacts, StageSpec, TimeOffset};
+use super::{ArrayFacts, Edge, Expect, Fault, InertialFacts, Interference, OsnmaFacts, StageSpec, TimeOffset};
 use crate::satellite::Sv;
 use crate::signal::Layers;
 
@@ -93,6 +93,9 @@ pub struct SceneFacts {
     /// The array whose elements the front ends are, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub array: Option<ArrayFacts>,
+    /// Inertial sensors on the body, if there are any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub imu: Option<InertialFacts>,
     /// Waveforms of the sources of interference, in the order of their numbers.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub interference: Vec<Interference>,

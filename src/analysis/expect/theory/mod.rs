@@ -11,6 +11,7 @@ pub mod detection;
 pub mod dll;
 pub mod edges;
 pub mod fll;
+pub mod inertial;
 pub mod linear;
 pub mod oscillator;
 pub mod pll;

@@ -12,6 +12,7 @@ mod dispersion;
 mod excused;
 mod foreign;
 mod hints;
+mod inertial;
 mod interference;
 mod kind;
 mod links;
@@ -76,6 +77,7 @@ impl Verdict {
         verdict.about(Group::Interference).interference(summary);
         verdict.spoofing(run, summary)?;
         verdict.detection(summary);
+        verdict.about(Group::Inertial).inertial(run, summary);
         verdict.about(Group::Tables).tables(run, errors)?;
         if run.scene.fidelity == OBSERVATIONS {
             let rows = "spectrum of the samples, prompts and discriminators of the loops, rows of tracking";

@@ -19,6 +19,7 @@ use crate::measure::clock::{Of, Series};
 use crate::measure::consistency::{Calibration, Consistency};
 use crate::measure::detection;
 use crate::measure::errors::{Errors, Link, SignalError};
+use crate::measure::inertial;
 use crate::measure::ionosphere::Ionosphere;
 use crate::measure::jitter::{Jitter as LoopJitter, Loop, Pooled};
 use crate::measure::lines::Lines;
@@ -76,6 +77,9 @@ pub struct Summary {
     /// Verification of Galileo's authentication; absent of a receiver that does not verify.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub osnma: Option<Osnma>,
+    /// Inertial measurements integrated back, and their noise; absent of a scene without inertial sensors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub inertial: Option<inertial::Figures>,
     /// The ionosphere that two bands showed; absent without a satellite that has them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ionosphere: Option<Ionosphere>,
@@ -290,6 +294,7 @@ impl Summary {
             interference: Lines::of(run)?,
             spoofing: Spoofing::of(run)?,
             osnma: Osnma::of(run)?,
+            inertial: inertial::Figures::of(run)?,
             ionosphere: Ionosphere::of(run)?,
             protection: None,
             detection: None,

@@ -2,6 +2,7 @@
 
 pub(crate) mod array;
 pub(crate) mod hardware;
+pub(crate) mod inertial;
 pub(crate) mod motion;
 pub(crate) mod osnma;
 pub(crate) mod satellites;
@@ -79,6 +80,12 @@ pub const SCENARIO: &[Key] = &[
         array::ARRAY,
         "Antennas on the body of `[attitude]`, each with a front end like the scene's one and a file of its own. \
          Absent: one antenna.",
+    ),
+    table(
+        "imu",
+        inertial::IMU,
+        "Inertial sensors on the body of `[attitude]`: specific force and angular rate in `truth/imu.csv`. Absent: \
+         none.",
     ),
     table("power", satellites::POWER, "Received power of the satellites. Absent: a link budget with its defaults."),
     table("city", way::CITY, "Walls and roofs around the antenna, which obstruct and reflect. Absent: none."),

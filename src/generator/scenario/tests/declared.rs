@@ -183,8 +183,14 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
                     let own = "file = \"a.json\"\npermittivity = 4\nconductivity_spm = 0.1";
                     cases.push((with("city", own), table, key));
                 }
-                ("", "array" | "station") => cases.push((with("", &format!("{key} = 1")), table, key)),
+                ("", "array" | "imu" | "station") => cases.push((with("", &format!("{key} = 1")), table, key)),
                 ("array" | "array.element", _) => cases.push((with(table, &format!("{key} = 1")), table, key)),
+                ("imu", key) => {
+                    let rate = if key == "rate_hz" { "" } else { "rate_hz = 100\n" };
+                    let turned = "[attitude]\nkind = \"fixed\"";
+                    let text = format!("{MINIMAL}{STATIC}{turned}\n[imu]\n{rate}{key} = 1\n");
+                    cases.push((text, table, key));
+                }
                 ("station", "name") => cases.push((with("station", "name = 1"), table, key)),
                 ("station", _) => cases.push((with("station", &format!("name = \"a\"\n{key} = 1")), table, key)),
                 ("station.power", _) => cases.push((with("station.power", &format!("{key} = 1")), table, key)),
