@@ -22,7 +22,7 @@ use std::ops::Range;
 
 pub(crate) use front::transmitters;
 use front::{Front, share_geometry};
-pub use fronts::Fronts;
+pub use fronts::{Due, Fronts};
 pub use generator::{Batch, Generator};
 pub(crate) use measure::{Kept, Stretch, measured};
 use ticks::Ticks;

@@ -347,6 +347,9 @@ pub fn tone_turns(hz: f64, rate: Rate, n: u64) -> u64 {
     let milli = (hz * 1000.0).round() as i128;
     // Phase in turns = n * milli / 1000 * seconds / samples; keep the remainder only.
     let modulus = 1000 * i128::from(rate.samples);
+    if milli == 0 {
+        return 0;
+    }
     let step = (milli * i128::from(rate.seconds)).rem_euclid(modulus);
     let phase = (step as u128 * u128::from(n)) % modulus as u128;
     // modulus < 2^60, so the shifted value fits in 128 bits after one split.

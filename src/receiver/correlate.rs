@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::signal::{Component, Layers, Shape, Tone};
 
+pub mod ahead;
 mod carrier;
 pub mod correlator;
 pub mod fixed;

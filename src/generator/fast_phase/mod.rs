@@ -144,6 +144,11 @@ impl FastPhases {
         }
     }
 
+    /// True if there is any.
+    pub fn is_there(&self) -> bool {
+        self.grid.is_some()
+    }
+
     /// Longest run of samples that ends at nodes, if there are any and they are samples.
     pub fn run_samples(&self) -> Option<u64> {
         self.grid.and_then(|(nodes, rate)| nodes.run_samples(rate))

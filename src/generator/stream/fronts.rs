@@ -26,6 +26,23 @@ pub struct Fronts<'a> {
     slice: u64,
 }
 
+/// Truth of signals that were prepared, which waits for its sink.
+pub struct Due<'f, 'a> {
+    fronts: &'f [Front<'a>],
+    ticks: &'f mut Ticks,
+    to: u64,
+}
+
+impl Due<'_, '_> {
+    /// Passes the true values to `truth`.
+    ///
+    /// # Errors
+    /// [`GenerateError`] of orbits, and of a sink that does not take the truth.
+    pub fn give(self, truth: &mut dyn Sink) -> Result<(), GenerateError> {
+        self.ticks.give(self.fronts, self.to, truth)
+    }
+}
+
 /// Samples of one front end at which a slice ends.
 struct Ends {
     prepared: u64,
@@ -101,6 +118,20 @@ impl<'a> Fronts<'a> {
         heard: &(dyn Fn(Link) -> bool + Sync),
         truth: &mut dyn Sink,
     ) -> Result<(), GenerateError> {
+        self.prepare(needed, to, heard)?;
+        self.prepared(to).1.give(truth)
+    }
+
+    /// [`Self::pass`] without the truth, which [`Self::prepared`] gives.
+    ///
+    /// # Errors
+    /// [`GenerateError`] of orbits and messages.
+    pub fn prepare(
+        &mut self,
+        needed: &[u64],
+        to: u64,
+        heard: &(dyn Fn(Link) -> bool + Sync),
+    ) -> Result<(), GenerateError> {
         let Some((count, seconds)) = self.fronts.first().map(|first| first.scene.clock.rate.ratio()) else {
             return Ok(());
         };
@@ -109,7 +140,15 @@ impl<'a> Fronts<'a> {
             let own = if number == 0 { to } else { front.scene.clock.rate.first_sample_at(to * seconds, count) + 1 };
             front.pass(*needed, own.min(front.part.end), heard)?;
         }
-        self.ticks.give(&self.fronts, to, truth)
+        Ok(())
+    }
+
+    /// Signals of each front end that were prepared, and the truth that is due before sample `to` of the first
+    /// one.
+    pub fn prepared(&mut self, to: u64) -> (Vec<&[Transmitter]>, Due<'_, 'a>) {
+        let Self { fronts, ticks, .. } = self;
+        let transmitters = fronts.iter().map(|front| front.transmitters.as_slice()).collect();
+        (transmitters, Due { fronts, ticks, to })
     }
 
     /// Signals of each front end that were prepared.

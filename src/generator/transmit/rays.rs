@@ -74,6 +74,11 @@ impl Transmitter {
         }
     }
 
+    /// True if phases or strength have parts that change within milliseconds, beside the polynomials.
+    pub fn is_quick(&self) -> bool {
+        self.fast.is_there()
+    }
+
     /// First samples of the polynomials of the prepared segment, and the samples after their last ones.
     pub fn spans(&self) -> impl Iterator<Item = (u64, u64)> {
         self.parts.iter().map(|part| (part.start, part.end))

@@ -2,7 +2,8 @@
 //!
 //! A channel knows the phases and rates of its oscillators, and asks for the sums of a replica's taps over an
 //! interval. Whoever answers is a [`Correlator`]. [`Shown`] answers by multiplication of samples, [`Span`]
-//! asks a [`Model`], which computes what such a multiplication gives.
+//! asks a [`Model`], which computes what such a multiplication gives. A model answers several code periods at
+//! once for less: the oscillators keep their steps until the next update of the loops ([`super::ahead`]).
 
 use num_complex::Complex64;
 
@@ -62,6 +63,9 @@ pub trait Correlator {
     fn end(&self) -> u64;
     /// Number of the first sample at which a new channel can begin.
     fn fresh(&self) -> u64;
+    /// Number of the sample up to which code periods are better asked about together; zero where one by one
+    /// costs the same.
+    fn together(&self) -> u64;
     /// Σ x·conj(replica) over an interval with the replica at each of `taps`, in code phase units ahead of
     /// the prompt.
     fn sums<const T: usize>(
@@ -70,7 +74,21 @@ pub trait Correlator {
         coded: &Coded,
         arithmetic: Arithmetic,
         taps: &[i64; T],
-    ) -> [Complex64; T];
+    ) -> [Complex64; T] {
+        let mut sums = [[Complex64::ZERO; T]];
+        self.sums_of(std::slice::from_ref(interval), coded, arithmetic, taps, &mut sums);
+        sums[0]
+    }
+    /// [`Self::sums`] of each of several intervals that follow one another with the same steps of the
+    /// oscillators, as many as `sums` are.
+    fn sums_of<const T: usize>(
+        &self,
+        intervals: &[Interval],
+        coded: &Coded,
+        arithmetic: Arithmetic,
+        taps: &[i64; T],
+        sums: &mut [[Complex64; T]],
+    );
     /// Mean power of the samples in an interval.
     fn power(&self, from: u64, to: u64) -> f64;
 }
@@ -110,15 +128,22 @@ impl Correlator for Shown<'_> {
         self.from
     }
 
+    fn together(&self) -> u64 {
+        0
+    }
+
     #[inline]
-    fn sums<const T: usize>(
+    fn sums_of<const T: usize>(
         &self,
-        Interval { nco, from, to, .. }: &Interval,
+        intervals: &[Interval],
         coded: &Coded,
         arithmetic: Arithmetic,
         taps: &[i64; T],
-    ) -> [Complex64; T] {
-        coded.replica.correlate_in(arithmetic, self.part(*from, *to), nco, taps)
+        sums: &mut [[Complex64; T]],
+    ) {
+        for (Interval { nco, from, to, .. }, sums) in intervals.iter().zip(sums) {
+            *sums = coded.replica.correlate_in(arithmetic, self.part(*from, *to), nco, taps);
+        }
     }
 
     fn power(&self, from: u64, to: u64) -> f64 {
@@ -129,8 +154,11 @@ impl Correlator for Shown<'_> {
 
 /// Model of correlations, in place of samples. Its answers depend on the question alone.
 pub trait Model: Sync {
-    /// Sums of a replica over an interval, as [`Correlator::sums`] gives them: one for each tap.
-    fn sums(&self, interval: &Interval, code: &Code, taps: &[i64], sums: &mut [Complex64]);
+    /// Number of the sample after the last one for which the model is made.
+    fn end(&self) -> u64;
+    /// Adds the sums of a replica over intervals, as [`Correlator::sums_of`] gives them: for each interval
+    /// one for each tap.
+    fn sums(&self, intervals: &[Interval], code: &Code, taps: &[i64], sums: &mut [Complex64]);
     /// Mean power of the samples in an interval.
     fn power(&self, from: u64, to: u64) -> f64;
     /// Largest cell of a search.
@@ -199,16 +227,20 @@ impl Correlator for Span<'_> {
         self.first
     }
 
-    fn sums<const T: usize>(
+    fn together(&self) -> u64 {
+        self.model.end()
+    }
+
+    fn sums_of<const T: usize>(
         &self,
-        interval: &Interval,
+        intervals: &[Interval],
         coded: &Coded,
         _: Arithmetic,
         taps: &[i64; T],
-    ) -> [Complex64; T] {
-        let mut sums = [Complex64::ZERO; T];
-        self.model.sums(interval, &coded.code, taps, &mut sums);
-        sums
+        sums: &mut [[Complex64; T]],
+    ) {
+        sums.fill([Complex64::ZERO; T]);
+        self.model.sums(intervals, &coded.code, taps, sums.as_flattened_mut());
     }
 
     fn power(&self, from: u64, to: u64) -> f64 {

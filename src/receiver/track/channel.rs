@@ -283,7 +283,8 @@ impl Channel {
             }
             let (arithmetic, number) = (self.accumulator.arithmetic, self.nco.period);
             let interval = Interval { nco: self.nco.nco(), from, to, end: to };
-            self.correlate(&Period { correlator, arithmetic, number, interval }, report);
+            let (length, periods) = (self.nco.length, self.periods_to_come());
+            self.correlate(&Period { correlator, arithmetic, number, interval, length, periods }, report);
         }
     }
 
@@ -302,6 +303,12 @@ impl Channel {
 
     fn periods_per_update(&self) -> u32 {
         self.stage.mode().periods_per_update(&self.settings, self.signs.group)
+    }
+
+    /// Code periods from the running one on with one replica, up to the next update of the loops.
+    fn periods_to_come(&self) -> u32 {
+        let running = self.periods_per_update().saturating_sub(self.accumulator.periods);
+        if self.companions.keep_replica() { running } else { 1 }
     }
 
     /// Duration of what is summed like a symbol.

@@ -40,9 +40,12 @@ impl SymbolSync {
         }
         // The last `length` prompts are the symbol of the edge that comes next.
         let begin = (number + planted!("receiver.symbol_sync", 1, 2)) % length;
-        let sum: Complex64 = self.last.iter().sum();
+        // Lanes do not wait for each other's sums.
+        let (lanes, rest) = self.last.as_chunks::<4>();
+        let lanes = lanes.iter().fold([0.0; 4], |sum: [f64; 4], some| std::array::from_fn(|k| sum[k] + some[k].re));
+        let sum = lanes.into_iter().chain(rest.iter().map(|prompt| prompt.re)).sum::<f64>();
         if let Some(energy) = self.energy.get_mut(begin as usize) {
-            *energy += sum.re * sum.re;
+            *energy += sum * sum;
         }
         // Every position has had as many symbols now: one more would win where no symbol turns.
         if !(self.taken + 1).is_multiple_of(length) {

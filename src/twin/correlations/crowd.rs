@@ -4,8 +4,9 @@
 //! the difference of the carriers. So it is no white noise: loops and estimates of C/N0 meet a tone. Its
 //! amplitude and phase are the correlation of both codes at their delay and difference of Dopplers, summed
 //! over the chips of a period, before and after the other code's own period ends (Kaplan and Hegarty,
-//! Understanding GPS 2nd ed., 4.3.2). Limits: delays and phases are parabolas within a second, the difference
-//! of Dopplers and the strength are constant there; carriers are equal.
+//! Understanding GPS 2nd ed., 4.3.2). Limits: delays and phases are parabolas within a second, the strength is
+//! constant there; carriers are equal. Within a code period the difference of Dopplers counts to 2 Hz, so that
+//! sums serve for seconds ([`chips`]): 0.002 cycle from one end to the other, 0.4 % of the sum.
 
 use std::sync::Arc;
 
@@ -16,6 +17,7 @@ use receiver::correlate::correlator::Interval;
 use receiver::correlate::units_to_chips;
 use receiver::lead::lead;
 
+use super::chips::{Kept, Means, Pair};
 use super::sent::{Leg, Sent, centred, split, turns};
 use super::taps::{LANES, POSITIONS, Taps};
 
@@ -23,10 +25,8 @@ use super::taps::{LANES, POSITIONS, Taps};
 pub(super) const LEAST_LONG_CHIPS: u32 = 4000;
 /// Lags beyond the difference of the codes for which sums are made.
 const MARGIN: i64 = 3;
-/// Satellites whose phases are turned at once.
+/// Code periods for which sums are made at once.
 const TOGETHER: usize = 4;
-/// Lanes of the sums over a code.
-const SUMS: usize = 8;
 /// 2^64 as a float.
 const TURN: f64 = 18_446_744_073_709_551_616.0;
 
@@ -40,6 +40,15 @@ fn through([first, half, last]: [f64; 3]) -> Parabola {
 
 fn at([constant, linear, square]: Parabola, x: f64) -> f64 {
     constant + x * (linear + x * square)
+}
+
+fn slope([_, linear, square]: Parabola, x: f64) -> f64 {
+    linear + 2.0 * x * square
+}
+
+/// Cycles a sample in 2^-64 turn.
+fn step(cycles: f64) -> u64 {
+    (cycles * TURN) as i64 as u64
 }
 
 /// One ray of a satellite over a second.
@@ -114,6 +123,14 @@ impl Course {
         self.signs.get((period - self.signed) as usize).copied().unwrap_or(1.0)
     }
 
+    /// True if the code periods from a number on, as many as any lag meets in so many of them, have one sign.
+    #[inline]
+    fn is_same(&self, period: i64, count: usize) -> bool {
+        let first = (period - self.signed) as usize;
+        let signs = self.signs.get(first..first.saturating_add(count + 2));
+        signs.is_some_and(|signs| signs.windows(2).all(|pair| pair[0] == pair[1]))
+    }
+
     /// Share of the second that has passed at a sample.
     fn share(&self, sample: u64) -> f64 {
         (sample as f64 - self.span.0 as f64) / self.span.1
@@ -132,12 +149,12 @@ struct Other {
     period: i64,
     /// Chips by which its code is ahead of the own one.
     ahead: Parabola,
-    first_lag: i64,
+    /// Means over the own code's chips.
+    means: Means,
     /// Number of lags at which that period runs on.
     same: usize,
-    /// Sums over the own code's chips for each lag, in a sample's amplitude, where the period after has the
-    /// same sign and where it has the other one.
-    means: [Vec<[f32; 2]>; 2],
+    /// Amplitude in a sample.
+    amplitude: f32,
 }
 
 /// The other satellites in the correlations of one satellite's short code, over a second.
@@ -147,13 +164,13 @@ pub(super) struct Crowd {
 }
 
 impl Crowd {
-    /// The satellites beside number `own` of `sent`, with the courses of all and their codes. `None` for long
-    /// codes.
+    /// The satellites beside number `own` of `sent`, with the courses of all and their codes; `kept` has what
+    /// earlier seconds have summed. `None` for long codes.
     pub fn new<'c>(
         sent: &[Sent],
         own: usize,
         courses: &[Vec<Arc<Course>>],
-        code: impl Fn(&Sent, usize) -> Option<&'c [i8]>,
+        (code, kept): (impl Fn(&Sent, usize) -> Option<&'c [i8]>, &Kept),
     ) -> Option<Self> {
         let (this, course) = (sent.get(own)?, courses.get(own)?.first()?);
         let of = |sent: &Sent, course: &Course| code(sent, index_of(course.component, sent.transmitter.signal)?);
@@ -161,43 +178,72 @@ impl Crowd {
         let link = this.transmitter.link();
         let alike = sent.iter().zip(courses).filter(|(sent, _)| is_alike(link, sent.transmitter.link()));
         let rays = alike.flat_map(|(sent, rays)| rays.iter().map(move |ray| (sent, ray)));
-        let one = |(sent, ray)| Some(Other::new((course, chips), (ray, of(sent, ray)?)));
-        let others = rays.filter_map(one).collect();
+        let mut pairs = kept.of(link);
+        let one = |(number, (sent, ray)): (usize, (&Sent, &Arc<Course>))| {
+            let pair = pairs.of((sent.transmitter.link(), number), (chips, of(sent, ray)?));
+            Some(Other::new(course, ray, chips.len(), pair))
+        };
+        let others = rays.enumerate().filter_map(one).collect();
+        kept.put(link, pairs);
         Some(Self { own: Arc::clone(course), others })
     }
 
-    /// Adds the other satellites' sums over an interval that begins with a code period.
-    pub fn add(&self, interval: &Interval, taps: &Taps, sums: &mut [Complex64]) {
-        let Interval { nco, from, to, .. } = *interval;
+    /// Adds the other satellites' sums over intervals that begin with code periods and follow one another
+    /// with the same steps: for each interval one for each tap.
+    pub fn add(&self, intervals: &[Interval], taps: &Taps, sums: &mut [Complex64]) {
+        let count = taps.order.len().max(1);
+        for (intervals, sums) in intervals.chunks(TOGETHER).zip(sums.chunks_mut(TOGETHER * count)) {
+            self.add_few(intervals, taps, sums.chunks_mut(count));
+        }
+    }
+
+    /// Adds the sums over a few intervals. Both codes keep their difference for so long: it moves by three
+    /// chips a second at most, less than two positions of a tap, and the sums by less than 1e-3 of the other
+    /// satellite's amplitude.
+    fn add_few<'s>(&self, intervals: &[Interval], taps: &Taps, sums: impl Iterator<Item = &'s mut [Complex64]>) {
+        let (Some(Interval { nco, from, .. }), Some(last)) = (intervals.first(), intervals.last()) else { return };
         let length = f64::from(self.own.component.code_chips);
-        let x = self.own.share(from);
+        let x = self.own.share(*from);
+        let halfway = x + 0.5 * (last.from - from) as f64 / self.own.span.1;
         let local = centred(units_to_chips(nco.code), length);
         let own = length * at(self.own.periods, x);
         let apart = centred(own - local, length);
         // Whole periods from the other's first one to the replica's first chip.
         let whole = split((own - apart - local) / length + 0.5).0;
-        let mut all = [[0.0; LANES]; 2];
-        for together in self.others.chunks(TOGETHER) {
-            let mut words = [0; TOGETHER];
-            let turned = |other: &Other| (turns(at(other.course.cycles, x)).wrapping_sub(nco.carrier) >> 32) as u32;
-            words.iter_mut().zip(together).for_each(|(word, other)| *word = turned(other));
-            let (cos, sin) = cos_sin(&words);
-            for (other, (cos, sin)) in together.iter().zip(cos.into_iter().zip(sin)) {
-                let [re, im] = other.at(at(other.ahead, x) + apart, taps, other.period + whole);
+        let mut passed = [0; TOGETHER];
+        passed.iter_mut().zip(intervals).for_each(|(passed, interval)| *passed = interval.from - from);
+        let mut all = [[[0.0; LANES]; 2]; TOGETHER];
+        for other in &self.others {
+            let Course { cycles, span, .. } = &*other.course;
+            let begin = turns(at(*cycles, x)).wrapping_sub(nco.carrier);
+            let step = step(slope(*cycles, x) / span.1).wrapping_sub(nco.carrier_step);
+            let word = |passed: u64| (begin.wrapping_add(step.wrapping_mul(passed)) >> 32) as u32;
+            let (cos, sin) = cos_sin(&passed.map(word));
+            let (lag, period) = (at(other.ahead, halfway) + apart, other.period + whole);
+            let is_same = other.course.is_same(period, intervals.len());
+            let mut value = other.at(lag, taps, period);
+            for (number, (all, _)) in (0..).zip(all.iter_mut().zip(intervals)) {
+                if number > 0 && !is_same {
+                    value = other.at(lag, taps, period + number);
+                }
+                let [cos, sin] = [cos, sin].map(|part| part[number as usize] * other.amplitude);
+                let [re, im] = &value;
                 for lane in 0..LANES {
                     all[0][lane] += cos * re[lane] - sin * im[lane];
                     all[1][lane] += cos * im[lane] + sin * re[lane];
                 }
             }
         }
-        let [re, im] = all.map(|part| part.map(|value| f64::from(value) * (to - from) as f64));
-        sums.iter_mut().zip(re.into_iter().zip(im)).for_each(|(sum, (re, im))| *sum += Complex64::new(re, im));
+        for ((sums, all), Interval { from, to, .. }) in sums.zip(all).zip(intervals) {
+            let [re, im] = all.map(|part| part.map(|value| f64::from(value) * (to - from) as f64));
+            sums.iter_mut().zip(re.into_iter().zip(im)).for_each(|(sum, (re, im))| *sum += Complex64::new(re, im));
+        }
     }
 }
 
 impl Other {
-    fn new((own, code): (&Course, &[i8]), (course, sent): (&Arc<Course>, &[i8])) -> Self {
-        let length = code.len() as i64;
+    fn new(own: &Course, course: &Arc<Course>, length: usize, pair: &mut Pair) -> Self {
+        let length = length as i64;
         let ahead: Parabola = std::array::from_fn(|k| length as f64 * (course.periods[k] - own.periods[k]));
         let [begin, end] = [at(ahead, 0.0), at(ahead, 1.0)];
         let first_lag = split(begin.min(end)).0 - MARGIN;
@@ -205,23 +251,11 @@ impl Other {
         // Turn of the carriers' difference in a chip.
         let cycles_hz = (course.cycles[1] + course.cycles[2]) - (own.cycles[1] + own.cycles[2]);
         let periods = own.periods[1] + own.periods[2];
-        let turned = turned(code, cycles_hz / (periods * length as f64), course.amplitude / length as f64);
-        // Twice, so that any lag is one piece of it.
-        let sent: Vec<f32> = sent.iter().chain(sent).map(|chip| f32::from(*chip)).collect();
-        let mut means: [Vec<[f32; 2]>; 2] = Default::default();
-        for lag in first_lag..=last_lag {
-            let ahead = lag.rem_euclid(length) as usize;
-            let rest = code.len() - ahead;
-            let sum = |from: usize, to: usize| {
-                turned.each_ref().map(|own| product(&own[from..to], &sent[from + ahead..to + ahead]))
-            };
-            let (before, after) = (sum(0, rest), sum(rest, code.len()));
-            means[0].push(std::array::from_fn(|part| before[part] + after[part]));
-            means[1].push(std::array::from_fn(|part| before[part] - after[part]));
-        }
+        let means = pair.means(cycles_hz / (periods * length as f64), (first_lag, last_lag));
         let wraps = first_lag.div_euclid(length);
         let same = ((wraps + 1) * length - first_lag) as usize;
-        Self { course: Arc::clone(course), period: course.period + wraps, ahead, first_lag, same, means }
+        let (course, period, amplitude) = (Arc::clone(course), course.period + wraps, course.amplitude as f32);
+        Self { course, period, ahead, means, same, amplitude }
     }
 
     /// Sums at taps, real and imaginary parts, where the other code is `lag` chips ahead, and its code period
@@ -230,7 +264,7 @@ impl Other {
     fn at(&self, lag: f64, taps: &Taps, period: i64) -> [[f32; LANES]; 2] {
         let (chip, share) = split(lag);
         let weights = taps.weights((share * POSITIONS as f64 + 0.5) as usize);
-        let first = (chip + taps.first - self.first_lag) as usize;
+        let first = (chip + taps.first - self.means.first_lag) as usize;
         // Beyond `same` the next period runs.
         let here = self.same.saturating_sub(first).min(weights.len());
         let (weights, later) = weights.split_at(here);
@@ -244,53 +278,33 @@ impl Other {
 
     /// Adds the sums at lags from number `first` on, where code period `period` runs.
     #[inline]
-    fn add(&self, first: usize, weights: &[[f32; LANES]], period: i64, [re, im]: &mut [[f32; LANES]; 2]) {
+    fn add(&self, first: usize, weights: &[[f32; LANES]], period: i64, all: &mut [[f32; LANES]; 2]) {
         let [sign, next] = [self.course.sign(period), self.course.sign(period + 1)];
-        let [same, other] = &self.means;
+        let [same, other] = &self.means.means;
         let means = if sign == next { same } else { other };
-        for (mean, weights) in means.get(first..).unwrap_or_default().iter().zip(weights) {
-            let [a, b] = mean.map(|part| sign * part);
+        let [mut re, mut im] = [[0.0; LANES]; 2];
+        for ([a, b], weights) in means.get(first..).unwrap_or_default().iter().zip(weights) {
             for lane in 0..LANES {
-                re[lane] += weights[lane] * a;
-                im[lane] += weights[lane] * b;
+                re[lane] += weights[lane] * a[lane];
+                im[lane] += weights[lane] * b[lane];
             }
         }
-    }
-}
-
-/// Chips of a code that turn by so many cycles each, from the middle of the first one on: real and imaginary
-/// parts.
-fn turned(code: &[i8], cycles: f64, amplitude: f64) -> [Vec<f32>; 2] {
-    let step = turns(cycles);
-    let mut parts: [Vec<f32>; 2] = Default::default();
-    for (chips, number) in code.chunks(SUMS).zip((0..).step_by(SUMS)) {
-        let word = |lane: u64| (step.wrapping_mul(number + lane).wrapping_add((step as i64 / 2) as u64) >> 32) as u32;
-        let (cos, sin) = cos_sin::<SUMS>(&std::array::from_fn(|lane| word(lane as u64)));
-        for (part, value) in parts.iter_mut().zip([cos, sin]) {
-            part.extend(chips.iter().zip(value).map(|(chip, value)| f32::from(*chip) * value * amplitude as f32));
+        for lane in 0..LANES {
+            all[0][lane] += sign * re[lane];
+            all[1][lane] += sign * im[lane];
         }
     }
-    parts
-}
-
-/// Sum of products, the same on every processor.
-fn product(a: &[f32], b: &[f32]) -> f32 {
-    let mut sums = [0.0; SUMS];
-    let (a, b) = (a.chunks_exact(SUMS), b.chunks_exact(SUMS));
-    let rest: f32 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in a.zip(b) {
-        for lane in 0..SUMS {
-            sums[lane] += a[lane] * b[lane];
-        }
-    }
-    sums.iter().sum::<f32>() + rest
 }
 
 /// True if another satellite's short code has the carrier and the chips of this one.
 pub(super) fn is_alike(this: Link, other: Link) -> bool {
+    is_beside(this, other) && !this.is_alike(other)
+}
+
+/// True if codes of another signal are short, and have the carrier and the chips of this one.
+pub(super) fn is_beside(this: Link, other: Link) -> bool {
     let of = |link: Link| lead(link.signal).map(|lead| (lead.code_chips, lead.chip_rate_hz, lead.steps_per_chip()));
     of(this).is_some_and(|(chips, _, steps)| chips < LEAST_LONG_CHIPS && steps == 1)
         && of(this) == of(other)
-        && !this.is_alike(other)
         && this.carrier_hz() == other.carrier_hz()
 }

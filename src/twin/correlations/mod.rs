@@ -5,10 +5,12 @@
 //! difference of the carriers. τ is linear over the interval, φ a parabola; the mean is taken by Gauss and
 //! Legendre's nodes, of each piece between the edges of the ray's own symbols. Noise has the variance of the
 //! thermal noise, of rounding, and of the other signals by their spectra (source: Kaplan and Hegarty,
-//! Understanding GPS 2nd ed., 5.3 and 6.2). Components of one satellite's signal correlate as their codes do.
+//! Understanding GPS 2nd ed., 5.3 and 6.2). Code periods between two updates of a channel's loops are answered
+//! together ([`train`]). Components of one satellite's signal correlate as their codes do.
 //! Short codes of other satellites are found as they correlate, long ones are white noise. Limits: front ends
 //! without stages ([`refuse`]); samples count as infinitely many.
 
+mod chips;
 mod crowd;
 mod made;
 mod noise;
@@ -22,6 +24,7 @@ mod sequence;
 mod taps;
 #[cfg(test)]
 mod tests;
+mod train;
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
@@ -42,6 +45,7 @@ use receiver::output;
 use receiver::settings::Settings;
 
 pub use crate::refusal::Refused;
+use chips::Kept;
 use crowd::{Course, Crowd, LEAST_LONG_CHIPS};
 use made::Made;
 use noise::Noise;
@@ -51,6 +55,7 @@ pub use refusal::refuse;
 use sent::Sent;
 use separation::Sampled;
 use taps::{MOST, is_near};
+use train::Train;
 
 use crate::{Done, TwinError, settings_for};
 
@@ -68,7 +73,7 @@ const NEAR_FAR_DB: f64 = 15.0;
 pub fn run(
     scenes: &[Scene],
     settings: &Settings,
-    (truth, records): (&mut dyn truth::Sink, &mut dyn output::Sink),
+    (truth, records): (&mut (dyn truth::Sink + Send), &mut (dyn output::Sink + Send)),
     progress: &mut dyn FnMut(u64),
 ) -> Result<Done, TwinError> {
     refuse(scenes)?;
@@ -81,11 +86,19 @@ pub fn run(
     let (mut second, mut to) = (0, 0);
     while to < first.samples {
         to = first.clock.rate.first_sample_at(second + 1, 1).min(first.samples);
-        fronts.pass(&reception.needs(), to, &|_| true, truth)?;
-        let over = |(plan, transmitters)| Plan::over(plan, transmitters, second);
-        let models: Vec<Correlations<'_>> = plans.iter().zip(fronts.transmitters()).map(over).collect();
-        models.iter().try_for_each(Correlations::refuse_near_and_far)?;
-        reception.take_models(&models, (to, to == first.samples), records)?;
+        fronts.prepare(&reception.needs(), to, &|_| true)?;
+        let (transmitters, due) = fronts.prepared(to);
+        let (given, taken) = rayon::join(
+            || due.give(truth),
+            || {
+                let pairs = plans.iter().zip(transmitters);
+                let models: Vec<Correlations<'_>> = pairs.map(|(plan, sent)| plan.over(sent, second)).collect();
+                models.iter().try_for_each(Correlations::refuse_near_and_far)?;
+                Ok::<_, TwinError>(reception.take_models(&models, (to, to == first.samples), records)?)
+            },
+        );
+        given?;
+        taken?;
         progress(to);
         second += 1;
     }
@@ -104,6 +117,8 @@ pub struct Plan<'a> {
     /// Shares of the signals' powers that the samples have, which edges of chips reduce.
     kept: Vec<f64>,
     noise: Stream,
+    /// Sums of pairs of short codes.
+    pairs: Kept,
 }
 
 impl<'a> Plan<'a> {
@@ -135,7 +150,8 @@ impl<'a> Plan<'a> {
         };
         let separations_s = made.iter().map(from_all).collect();
         let kept = sampled.iter().map(Sampled::power).collect();
-        Self { scene, made, separations_s, kept, noise: Stream::new(scene.noise_seed(), "correlations") }
+        let noise = Stream::new(scene.noise_seed(), "correlations");
+        Self { scene, made, separations_s, kept, noise, pairs: Kept::default() }
     }
 
     /// Model over the segment for which signals are prepared; powers are those at the beginning of a
@@ -156,6 +172,7 @@ impl<'a> Plan<'a> {
         let mut model = Correlations {
             plan: self,
             span,
+            sums: Sum::all(&sent, &cn0_hz),
             cn0_hz,
             power,
             floor,
@@ -228,10 +245,41 @@ impl Known {
     }
 }
 
+/// Signals of one kind on one carrier.
+struct Sum {
+    /// One of them.
+    one: Link,
+    /// Indices of the signals, with the C/N0 of each in hertz.
+    members: Vec<(usize, f64)>,
+    /// Sum of these, in hertz.
+    hz: f64,
+}
+
+impl Sum {
+    /// Sums of what is sent.
+    fn all(sent: &[Sent], cn0_hz: &[f64]) -> Vec<Self> {
+        let mut all: Vec<Self> = Vec::new();
+        for (number, (sent, hz)) in sent.iter().zip(cn0_hz).enumerate() {
+            let link = sent.transmitter.link();
+            let is_of = |sum: &&mut Self| sum.one.signal == link.signal && sum.one.carrier_hz() == link.carrier_hz();
+            match all.iter_mut().find(is_of) {
+                Some(sum) => {
+                    sum.members.push((number, *hz));
+                    sum.hz += hz;
+                }
+                None => all.push(Self { one: link, members: vec![(number, *hz)], hz: *hz }),
+            }
+        }
+        all
+    }
+}
+
 /// Model of the correlations over a segment of time.
 pub struct Correlations<'a> {
     plan: &'a Plan<'a>,
     sent: Vec<Sent<'a>>,
+    /// Sums of C/N0 over [`Self::sent`].
+    sums: Vec<Sum>,
     /// First sample of the second, and the one after its last.
     span: (u64, u64),
     /// C/N0 of each of [`Self::sent`].
@@ -281,12 +329,20 @@ impl Correlations<'_> {
         if self.floor <= 0.0 {
             return [0.0; 2];
         }
-        let all = self.sent.iter().map(|one| one.transmitter).zip(&self.cn0_hz);
-        let others = || all.clone().filter(|(one, _)| !is_of(one, link));
-        let load = |one: &Transmitter, hz: &f64| hz * self.plan.separation_s(made, link, one.link());
-        let all = others().map(|(one, hz)| load(one, hz)).sum::<f64>();
-        let white = others().filter(|(one, _)| !crowd::is_alike(link, one.link())).map(|(one, hz)| load(one, hz));
-        [all, white.sum::<f64>()].map(|load| self.floor + self.plan.thermal() * load)
+        let (mut all, mut white) = (0.0, 0.0);
+        for Sum { one, members, hz } in &self.sums {
+            let hz = if one.signal == link.signal {
+                let is_other = |sent: usize| self.sent.get(sent).is_some_and(|sent| !is_of(sent.transmitter, link));
+                let others = members.iter().filter(|(sent, _)| is_other(*sent));
+                others.map(|(_, hz)| hz).sum()
+            } else {
+                *hz
+            };
+            let load = hz * self.plan.separation_s(made, link, *one);
+            all += load;
+            white += if crowd::is_beside(link, *one) { 0.0 } else { load };
+        }
+        [all, white].map(|load| self.floor + self.plan.thermal() * load)
     }
 
     /// Other satellites in the correlations of a signal's short code, by its index.
@@ -297,7 +353,8 @@ impl Correlations<'_> {
             let made = self.plan.made.iter().find(|made| made.signal == sent.transmitter.signal)?;
             made.code(sent.transmitter.sv.number, component)
         };
-        self.crowds.get(place)?.get_or_init(|| Crowd::new(&self.sent, place, courses(), code)).as_ref()
+        let made = || Crowd::new(&self.sent, place, courses(), (code, &self.plan.pairs));
+        self.crowds.get(place)?.get_or_init(made).as_ref()
     }
 
     /// Refuses satellites whose short codes a receiver finds in each other's correlations.
@@ -328,19 +385,67 @@ impl Correlations<'_> {
         }
     }
 
-    /// Adds sums at taps near the prompt, in chips, with noise of this deviation in a code period.
-    fn add_near(&self, question: &Question, taps: &[f64], (noise, deviation): (Noise, f64), sums: &mut [Complex64]) {
-        self.expect(question, taps, sums);
-        let crowd = question.place.and_then(|place| self.crowd(place));
-        question.made.with_taps(question.code.link.sv.number, taps, |taps| {
+    /// Adds sums of consecutive intervals at taps near the prompt, in chips, with noise of this deviation in a
+    /// sample: for each interval one for each tap.
+    fn add_near(&self, train: &Train, taps: &[f64], (stream, deviation): (Stream, f64), sums: &mut [Complex64]) {
+        let Question { code, made, place, .. } = train.whole;
+        for sent in self.alike(place) {
+            train.add(sent, taps, sums);
+        }
+        let crowd = place.and_then(|place| self.crowd(place));
+        made.with_taps(code.link.sv.number, taps, |taps| {
             if let Some(crowd) = crowd {
-                crowd.add(&question.interval, taps, sums);
+                crowd.add(train.intervals, taps, sums);
             }
-            if deviation > 0.0 {
-                noise.add(taps, deviation, sums);
+            if deviation <= 0.0 {
+                return;
+            }
+            let noise = |interval: &Interval| of_interval(stream, deviation, interval);
+            match train.intervals {
+                [part] if part.to < part.end => {
+                    let (stream, deviation) = noise(part);
+                    Noise { stream, share: share(part) }.add(taps, deviation, sums);
+                }
+                intervals => noise::add_to_each(intervals.iter().map(noise), taps, sums),
             }
         });
     }
+
+    /// Adds the sums of one interval, with taps that may be far from the prompt.
+    fn add_any(
+        &self,
+        (question, interval): (Question, &Interval),
+        (stream, [all, white]): (Stream, [f64; 2]),
+        taps: &[f64],
+        sums: &mut [Complex64],
+    ) {
+        let (mut near, mut chips, mut count) = ([Complex64::ZERO; MOST], [0.0; MOST], 0);
+        let (own, deviation) = of_interval(stream, all, interval);
+        let noise = Noise { stream: own, share: share(interval) };
+        for (tap, sum) in taps.iter().zip(sums.iter_mut()) {
+            if is_near(*tap) {
+                chips[count] = *tap;
+                count += 1;
+            } else {
+                *sum += deviation * noise.far(*tap);
+            }
+        }
+        let Some(train) = Train::new(question, std::slice::from_ref(interval)) else { return };
+        self.add_near(&train, &chips[..count], (stream, white), &mut near[..count]);
+        let of_near = taps.iter().zip(sums).filter(|(tap, _)| is_near(**tap));
+        of_near.zip(near).for_each(|((_, sum), near)| *sum += near);
+    }
+}
+
+/// Stream of the noise of an interval, of one of a code, and the deviation in its code period for one in a
+/// sample.
+fn of_interval(stream: Stream, deviation: f64, Interval { from, end, .. }: &Interval) -> (Stream, f64) {
+    (stream.part(*from).part(*end), deviation * (end.saturating_sub(*from) as f64).sqrt())
+}
+
+/// Share of its code period that an interval has.
+fn share(Interval { from, to, end, .. }: &Interval) -> f64 {
+    to.saturating_sub(*from) as f64 / end.saturating_sub(*from) as f64
 }
 
 /// True of a signal whose short code a receiver finds in other satellites' correlations.
@@ -356,26 +461,22 @@ fn is_of(transmitter: &Transmitter, link: Link) -> bool {
 }
 
 impl Model for Correlations<'_> {
-    fn sums(&self, interval: &Interval, code: &Code, taps: &[i64], sums: &mut [Complex64]) {
-        let Some((made, known, place)) = self.made(code) else { return };
-        let whole = interval.end.saturating_sub(interval.from) as f64;
-        let share = interval.to.saturating_sub(interval.from) as f64 / whole;
-        let [all, white] = known.deviations.map(|deviation| deviation * whole.sqrt());
-        let noise = Noise { stream: known.stream(code).part(interval.from).part(interval.end), share };
-        let (mut near, mut chips, mut count) = ([Complex64::ZERO; MOST], [0.0; MOST], 0);
-        let each = || taps.iter().take(MOST).map(|units| units_to_chips(*units));
-        for (tap, sum) in each().zip(sums.iter_mut()) {
-            if is_near(tap) {
-                chips[count] = tap;
-                count += 1;
-            } else {
-                *sum += all * noise.far(tap);
-            }
+    fn end(&self) -> u64 {
+        self.span.1
+    }
+
+    fn sums(&self, intervals: &[Interval], code: &Code, taps: &[i64], sums: &mut [Complex64]) {
+        let (Some((made, known, place)), Some(first)) = (self.made(code), intervals.first()) else { return };
+        let (mut chips, count) = ([0.0; MOST], taps.len().min(MOST));
+        chips.iter_mut().zip(taps).for_each(|(chips, units)| *chips = units_to_chips(*units));
+        let (chips, stream) = (&chips[..count], known.stream(code));
+        let question = Question { interval: *first, code, made, place };
+        if let Some(train) = Train::new(question, intervals).filter(|_| chips.iter().all(|tap| is_near(*tap))) {
+            return self.add_near(&train, chips, (stream, known.deviations[1]), sums);
         }
-        let question = Question { interval: *interval, code, made, place };
-        self.add_near(&question, &chips[..count], (noise, white), &mut near[..count]);
-        let of_near = each().zip(sums).filter(|(tap, _)| is_near(*tap));
-        of_near.zip(near).for_each(|((_, sum), near)| *sum += near);
+        for (interval, sums) in intervals.iter().zip(sums.chunks_mut(taps.len().max(1))) {
+            self.add_any((question, interval), (stream, known.deviations), chips, sums);
+        }
     }
 
     fn power(&self, _: u64, _: u64) -> f64 {

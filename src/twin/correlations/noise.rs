@@ -15,6 +15,33 @@ const SPLIT: u64 = 1 << 40;
 /// Number of the first draw for taps near the prompt.
 const NEAR: u64 = 1 << 32;
 
+/// Code periods whose noise is drawn at once.
+const TOGETHER: usize = 4;
+
+/// Adds the noise of whole code periods to sums at taps near the prompt: of each its stream, and the deviation
+/// of a component. `sums` has one sum for each tap, period after period.
+pub(super) fn add_to_each(mut periods: impl Iterator<Item = (Stream, f64)>, taps: &Taps, sums: &mut [Complex64]) {
+    let count = taps.order.len().max(1);
+    if count > LANES {
+        for ((stream, scale), sums) in periods.zip(sums.chunks_mut(count)) {
+            Noise { stream, share: 1.0 }.add(taps, scale, sums);
+        }
+        return;
+    }
+    for sums in sums.chunks_mut(TOGETHER * count) {
+        let (mut words, mut scales) = ([0; TOGETHER * LANES], [0.0; TOGETHER]);
+        for ((words, scale), (stream, own)) in words.chunks_exact_mut(LANES).zip(&mut scales).zip(periods.by_ref()) {
+            (NEAR..).zip(words).for_each(|(number, word)| *word = stream.word(number));
+            *scale = own;
+        }
+        let draws = normals(&words);
+        let [re, im] = draws.each_ref().map(|part| part.as_chunks::<LANES>().0);
+        for ((sums, scale), (re, im)) in sums.chunks_mut(count).zip(scales).zip(re.iter().zip(im)) {
+            add(taps, scale, &[*re, *im], sums);
+        }
+    }
+}
+
 /// Standard normal noise of one code period's correlations.
 pub(super) struct Noise {
     /// Stream of the code and the interval.

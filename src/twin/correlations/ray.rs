@@ -7,7 +7,7 @@ use receiver::correlate::correlator::{Code, Interval};
 use receiver::correlate::{phasor, units_to_chips};
 
 use super::made::{Made, Peak};
-use super::sent::{Anchor, Sent, centred, turns};
+use super::sent::{Anchor, Leg, Sent, centred, split, turns};
 
 /// 2^64 as a float.
 const TURN: f64 = 18_446_744_073_709_551_616.0;
@@ -25,7 +25,8 @@ const EIGHT: [(f64, f64); 4] = [
     (0.960_289_856_497_536_2, 0.101_228_536_290_376_26),
 ];
 
-/// The sums that a receiver asks for.
+/// The sums that a receiver asks for over one interval.
+#[derive(Clone, Copy)]
 pub(super) struct Question<'a> {
     pub interval: Interval,
     pub code: &'a Code,
@@ -36,24 +37,24 @@ pub(super) struct Question<'a> {
 
 /// Differences of a ray's component and a replica, as polynomials in the share of the interval that has
 /// passed.
-struct Course<'a> {
+pub(super) struct Course<'a> {
     /// Number of the component in the signal.
     sent: usize,
     /// Correlation of the component with the replica.
-    peak: &'a Peak,
+    pub peak: &'a Peak,
     /// Code in chips: at the beginning, and what it gains.
-    chips: [f64; 2],
+    pub chips: [f64; 2],
     /// Carrier in cycles: at the beginning, and the coefficients of share and square.
-    cycles: [f64; 3],
+    pub cycles: [f64; 3],
     /// Code periods of the ray: share of the running one at the beginning, and what passes.
     periods: [f64; 2],
     /// Number of the running one.
     period: i64,
-    amplitude: f64,
+    pub amplitude: f64,
 }
 
 /// One ray at the first sample of an interval, in the middle, and at the end.
-type Ends = [RayAt; 3];
+pub(super) type Ends = [RayAt; 3];
 
 impl Question<'_> {
     /// Adds the sums of a satellite's rays.
@@ -62,25 +63,41 @@ impl Question<'_> {
         if to <= from {
             return;
         }
-        let middle = from + (to - from) / 2;
-        let Some(leg) = sent.leg(middle) else { return };
-        for (ray, anchor) in leg.anchors.iter().enumerate() {
-            let [Some(first), Some(half), Some(last)] = [from, middle, to].map(|sample| leg.rays.at(ray, sample))
-            else {
-                continue;
-            };
-            let ends = [first, half, last];
-            let cycles = self.cycles(anchor, &ends);
+        let Some(leg) = sent.leg(from + (to - from) / 2) else { return };
+        for ray in 0..leg.anchors.len() {
             for component in 0..self.made.signal.components.len() {
-                if let Some(course) = self.course((sent.scene, anchor), (&ends, cycles), component) {
-                    self.integrate(sent, &course, taps, sums);
-                }
+                self.add_component(sent, leg, (ray, component), taps, sums);
             }
         }
     }
 
+    /// Adds the sums of a component by one ray of a satellite.
+    pub fn add_component(
+        &self,
+        sent: &Sent,
+        leg: &Leg,
+        (ray, component): (usize, usize),
+        taps: &[f64],
+        sums: &mut [Complex64],
+    ) {
+        let Some((anchor, ends)) = self.ends(leg, ray) else { return };
+        let cycles = self.cycles(anchor, &ends);
+        if let Some(course) = self.course((sent.scene, anchor), (&ends, cycles), component) {
+            self.integrate(sent, &course, taps, sums);
+        }
+    }
+
+    /// A ray at the ends of the interval and in its middle.
+    #[inline]
+    pub fn ends<'l>(&self, leg: &'l Leg, ray: usize) -> Option<(&'l Anchor, Ends)> {
+        let Interval { from, to, .. } = self.interval;
+        let [first, half, last] = [from, from + (to - from) / 2, to].map(|sample| leg.rays.at(ray, sample));
+        Some((leg.anchors.get(ray)?, [first?, half?, last?]))
+    }
+
     /// Difference of the carriers in cycles: at the beginning, and the coefficients of share and square.
-    fn cycles(&self, anchor: &Anchor, [first, half, last]: &Ends) -> [f64; 3] {
+    #[inline]
+    pub fn cycles(&self, anchor: &Anchor, [first, half, last]: &Ends) -> [f64; 3] {
         let Interval { nco, from, to, .. } = self.interval;
         let samples = (to - from) as f64;
         let (turns, step) = anchor.turns_at(from, first);
@@ -92,7 +109,9 @@ impl Question<'_> {
         [begin_cycles, local_cycles - (to_end - bend), -bend]
     }
 
-    fn course(
+    /// Course of a component over the interval; `None` where it does not correlate with the replica.
+    #[inline]
+    pub fn course(
         &self,
         (scene, anchor): (&Scene, &Anchor),
         ([first, half, last], cycles): (&Ends, [f64; 3]),
@@ -140,27 +159,49 @@ impl Question<'_> {
         }
         // The sum of samples is the integral from half a sample before the first one.
         let ahead = 0.5 / (self.interval.to - self.interval.from) as f64;
-        let [share, passed] = course.periods;
-        let (mut from, end) = (-ahead, 1.0 - ahead);
-        let mut period = course.period;
-        let mut sign = sent.sign(course.sent, period);
+        course.pieces(sent, (-ahead, 1.0 - ahead), course.period, |ends, sign| {
+            piece(course, ends, sign, taps, sums);
+        });
+    }
+}
+
+impl Course<'_> {
+    /// Number of the code period that runs at a share of the interval.
+    #[inline]
+    pub fn period_at(&self, share: f64) -> i64 {
+        let [begin, passed] = self.periods;
+        self.period + split(begin + passed * share).0
+    }
+
+    /// Calls `each` for what lies between changes of sign from one share of the interval to another, with the
+    /// sign; `period` is the code period that runs there.
+    #[inline]
+    pub fn pieces(
+        &self,
+        sent: &Sent,
+        (mut from, end): (f64, f64),
+        mut period: i64,
+        mut each: impl FnMut((f64, f64), f64),
+    ) {
+        let [share, passed] = self.periods;
+        let mut sign = sent.sign(self.sent, period);
         while from < end {
             let (mut to, mut next) = (end, sign);
             // The next change of sign.
             loop {
-                let edge = ((period - course.period + 1) as f64 - share) / passed;
+                let edge = ((period - self.period + 1) as f64 - share) / passed;
                 if edge >= end {
                     break;
                 }
                 period += 1;
-                next = sent.sign(course.sent, period);
+                next = sent.sign(self.sent, period);
                 if next != sign && edge > from {
                     to = edge;
                     break;
                 }
                 sign = next;
             }
-            piece(course, (from, to), sign, taps, sums);
+            each((from, to), sign);
             (from, sign) = (to, next);
         }
     }

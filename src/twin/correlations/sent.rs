@@ -86,6 +86,13 @@ pub(super) struct Leg<'a> {
     pub anchors: Vec<Anchor>,
 }
 
+impl Leg<'_> {
+    /// True if the polynomial holds from one sample to another.
+    pub fn holds(&self, from: u64, to: u64) -> bool {
+        self.from <= from && to <= self.end
+    }
+}
+
 /// Signs of a component's code periods from number `first` on.
 struct Signs {
     first: i64,
@@ -140,6 +147,12 @@ impl<'a> Sent<'a> {
         let in_view = if sample < self.first { self.transmitter.in_view(self.scene, sample) } else { self.in_view };
         let number = self.legs.partition_point(|leg| leg.end <= sample);
         self.legs.get(number).filter(|leg| in_view && leg.from <= sample)
+    }
+
+    /// True if phases or strength change within milliseconds.
+    #[inline]
+    pub fn is_quick(&self) -> bool {
+        self.transmitter.is_quick()
     }
 
     /// Signs of a component's code periods, and the number of the first one.

@@ -123,7 +123,7 @@ fn the_first_fix_comes_within_a_second_of_that_by_correlations() {
     let settings = Settings::default();
     let (_, _, own) = received(&scene, &settings);
     let mut records: Vec<Record> = Vec::new();
-    let sinks: (&mut dyn truth::Sink, &mut dyn output::Sink) = (&mut (), &mut records);
+    let sinks: (&mut (dyn truth::Sink + Send), &mut (dyn output::Sink + Send)) = (&mut (), &mut records);
     let other = correlations::run(std::slice::from_ref(&scene), &settings, sinks, &mut |_| ()).unwrap();
     let (own, other) = (own.outcome, other.outcome);
     let [own_s, other_s] = [&own, &other].map(|outcome| outcome.first_fix_s.unwrap());

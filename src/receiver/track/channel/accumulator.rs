@@ -3,6 +3,7 @@
 
 use num_complex::Complex64;
 
+use crate::correlate::ahead::Ahead;
 use crate::correlate::correlator::{Code, Coded, Correlator, Interval};
 use crate::correlate::{Arithmetic, Nco, Replica, chips_to_units};
 use crate::track::TrackingSettings;
@@ -24,6 +25,10 @@ pub(super) struct Period<'a, C> {
     pub number: u64,
     /// Samples of the period, and the oscillators at the first of them.
     pub interval: Interval,
+    /// Length of a code period in code phase units.
+    pub length: i64,
+    /// Code periods from this one on for which the oscillators are expected to keep their steps.
+    pub periods: u32,
 }
 
 impl<C: Correlator> Period<'_, C> {
@@ -32,9 +37,21 @@ impl<C: Correlator> Period<'_, C> {
         self.correlator.sums(&self.interval, coded, self.arithmetic, taps)
     }
 
+    /// Sums of a replica that is the same in the periods to come, at these taps.
+    fn sums_ahead<const T: usize>(&self, ahead: &mut Ahead, coded: &Coded, taps: &[i64; T]) -> [Complex64; T] {
+        let asked = (&self.interval, self.length, self.periods);
+        ahead.sums(self.correlator, asked, (coded, self.arithmetic), taps)
+    }
+
     /// Sum of a replica without delay.
     pub fn prompt(&self, coded: &Coded) -> Complex64 {
         let [sum] = self.sums(coded, &[0]);
+        sum
+    }
+
+    /// Sum without delay of a replica that is the same in the periods to come.
+    pub fn prompt_ahead(&self, ahead: &mut Ahead, coded: &Coded) -> Complex64 {
+        let [sum] = self.sums_ahead(ahead, coded, &[0]);
         sum
     }
 
@@ -69,6 +86,8 @@ pub(super) struct Accumulator {
     pub arithmetic: Arithmetic,
     /// Replica with its code. `None` where the documents assign no code.
     pub coded: Option<Coded>,
+    /// Sums of the code periods to come.
+    ahead: Ahead,
     /// Mean power of the replica's samples.
     replica_power: f64,
     /// Code phases of early, prompt and late.
@@ -121,6 +140,7 @@ impl Accumulator {
             arithmetic,
             replica_power: model_power * coded.as_ref().map_or(1.0, |coded| coded.replica.share()),
             coded,
+            ahead: Ahead::default(),
             taps: [half, 0, -half],
             noise_taps: Vec::new(),
             power: None,
@@ -165,7 +185,7 @@ impl Accumulator {
 
     /// All taps of a code period in one pass: early, prompt and late, and those that are asked for.
     pub fn correlate<C: Correlator>(
-        &self,
+        &mut self,
         period: &Period<C>,
         quiet: Option<i64>,
         sides: Option<[i64; 2]>,
@@ -173,13 +193,15 @@ impl Accumulator {
         let Some(coded) = &self.coded else { return Correlations::default() };
         let [e, p, l] = self.taps;
         match (quiet, sides) {
-            (None, None) => Correlations { sums: period.sums(coded, &self.taps), ..Correlations::default() },
+            (None, None) => {
+                Correlations { sums: period.sums_ahead(&mut self.ahead, coded, &self.taps), ..Correlations::default() }
+            }
             (Some(quiet), None) => {
                 let [e, p, l, noise] = period.sums(coded, &[e, p, l, quiet]);
                 Correlations { sums: [e, p, l], noise: Some(noise), sides: None }
             }
             (None, Some([a, b])) => {
-                let [e, p, l, a, b] = period.sums(coded, &[e, p, l, a, b]);
+                let [e, p, l, a, b] = period.sums_ahead(&mut self.ahead, coded, &[e, p, l, a, b]);
                 Correlations { sums: [e, p, l], noise: None, sides: Some([a, b]) }
             }
             (Some(quiet), Some([a, b])) => {

@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use super::accumulator::Period;
+use crate::correlate::ahead::Ahead;
 use crate::correlate::correlator::{Code, Coded, Correlator};
 use crate::correlate::{Replica, Wave};
 use crate::lead::beside;
@@ -75,6 +76,11 @@ impl Companions {
         }
     }
 
+    /// True if what is followed has the same replica in every code period.
+    pub fn keep_replica(&self) -> bool {
+        self.segment.is_none() && self.sides.is_none()
+    }
+
     /// The replica of a code that is the same in every code period; `None` where it is the one that is
     /// followed.
     pub fn constant_replica(&self) -> Option<&Replica> {
@@ -89,6 +95,8 @@ impl Companions {
 #[derive(Clone, Debug)]
 pub(super) struct Data {
     coded: Coded,
+    /// Sums of the code periods to come.
+    ahead: Ahead,
     /// Turns its prompts to the phase of the pilot's.
     turn: Complex64,
     /// Deviation of the noise in its correlations over that in the pilot's.
@@ -115,6 +123,7 @@ impl Data {
         let (sin, cos) = libm::sincos(TAU * sense * (pilot.phase_cycles - component.phase_cycles));
         Some(Self {
             coded: Coded { replica, code: Code::new(link, component, made) },
+            ahead: Ahead::default(),
             turn: Complex64::new(cos, sin),
             deviation: (share / own).sqrt(),
             periods_per_symbol: u64::from(component.periods_per_symbol()?),
@@ -126,7 +135,7 @@ impl Data {
     /// Correlates the data of a code period, and gives the symbol that ends with it; `scale` brings the
     /// pilot's noise to unit variance a component.
     pub fn read<C: Correlator>(&mut self, period: &Period<C>, phase: SecondaryCodePhase, scale: f64) -> Option<Symbol> {
-        let sum = period.prompt(&self.coded);
+        let sum = period.prompt_ahead(&mut self.ahead, &self.coded);
         let (number, end) = (period.number, period.interval.to);
         let chip = self.secondary_code.chip(phase, number);
         let at = (number + phase.shift) % self.periods_per_symbol;

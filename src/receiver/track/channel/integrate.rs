@@ -53,7 +53,7 @@ impl Channel {
     }
 
     /// All taps of the running period.
-    fn correlations<C: Correlator>(&self, period: &Period<C>) -> Correlations {
+    fn correlations<C: Correlator>(&mut self, period: &Period<C>) -> Correlations {
         let wants_noise = self.whole && self.detectors.cn0.needs_reference();
         let quiet = self.accumulator.quiet_tap(period.number).filter(|_| wants_noise);
         let sides = self.detectors.side_peaks.as_ref().filter(|_| self.whole && !self.held).map(SidePeaks::taps);

@@ -35,6 +35,8 @@ pub(super) struct Oscillators {
     /// Carrier without the nominal IF, in 2⁻⁶⁴ turns, never wrapped.
     pub carrier: i128,
     pub carrier_step: i128,
+    /// Rates, time to the next update and offset for which the steps are set.
+    set_for: Option<([Rates; 2], f64, f64)>,
 }
 
 impl Oscillators {
@@ -58,6 +60,7 @@ impl Oscillators {
             code_step: 0,
             carrier: 0,
             carrier_step: 0,
+            set_for: None,
         }
     }
 
@@ -120,6 +123,11 @@ impl Oscillators {
 
     /// Sets the steps to the rates of the loops, whose next update is `update_s` away.
     pub fn set_steps(&mut self, carrier: &Rates, code: &Rates, update_s: f64) {
+        let rates = Some(([*carrier, *code], update_s, self.offset_hz));
+        if self.set_for == rates {
+            return;
+        }
+        self.set_for = rates;
         let offset_hz = carrier.mean(update_s);
         self.carrier_step = self.turns(offset_hz);
         let aid_hz = (self.sense * offset_hz - self.offset_hz) * self.chip_rate_hz / self.aid_hz;
