@@ -117,7 +117,7 @@ pub fn make(run: &Path, scenes: &[Scene], settings: &Settings, wanted: &Wanted<'
     let mut moment = Moment::of(scene);
     let tap = |scene: &Scene| Tap::new(scene, run, (keep, changing), (scenes.len(), moment.samples(scene)));
     let mut taps: Vec<Tap> = scenes.iter().filter(|_| is_sampled).map(tap).collect::<Result<_, _>>()?;
-    let mut go = |outputs: &mut (dyn Sink + Send)| {
+    let mut go = |outputs: &mut (dyn Sink + Send)| -> Result<Both, Failure> {
         let start = Instant::now();
         let progress = &mut |samples| (wanted.told)(samples);
         match twin::modelled(scenes, settings, (&mut truth, outputs), progress).map_err(failure)? {
