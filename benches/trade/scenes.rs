@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use analysis::judge::Summary;
+use analysis::judge::summary::Summary;
 use analysis::statistics::{self, Spread};
 use generator::scenario::{Overrides, Scenario};
 use generator::scene::Scene;
