@@ -10,10 +10,11 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
+use gnss::facts::{InertialFacts, TriadErrors};
 use gnss::gps::l1ca::L1_CA;
 use gnss::record::{
-    AcquisitionRow, DetectionRow, Detector, Event, EventRow, Fix, IntegrityRow, IonosphereModel, IonosphereRow,
-    LineRow, NavigationRow, Observation, SkyRow, TrackingRow, TrajectoryRow,
+    AcquisitionRow, BodyRow, DetectionRow, Detector, Event, EventRow, Fix, InertialRow, IntegrityRow, IonosphereModel,
+    IonosphereRow, LineRow, NavigationRow, Observation, SkyRow, TrackingRow, TrajectoryRow,
 };
 use gnss::satellite::Sv;
 use gnss::time::Epoch;
@@ -324,6 +325,51 @@ pub(crate) fn protected(run: &Path) {
         reason: String::new(),
     };
     write(&run.join("rx/integrity.csv"), &fixes.iter().map(row).collect::<Vec<_>>());
+}
+
+/// Adds two seconds of an inertial unit at rest to a run, whose sensors have white noise alone.
+pub(crate) fn measured_at_rest(run: &Path) {
+    const IMU_HZ: u64 = 50;
+    let path = run.join("truth/scene.json");
+    let mut scene: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    let noisy = TriadErrors { random_walk: 1e-3, ..TriadErrors::default() };
+    let facts = InertialFacts {
+        rate_hz: IMU_HZ as f64,
+        is_still: true,
+        gyro: noisy,
+        accelerometer: noisy,
+        ..InertialFacts::default()
+    };
+    scene["imu"] = serde_json::to_value(&facts).unwrap();
+    fs::write(&path, scene.to_string()).unwrap();
+    let mut draw = Draw(5);
+    let mut noise = || 1e-3 * facts.rate_hz.sqrt() * draw.normal();
+    let row = |number: u64| InertialRow {
+        gps_s: (number / IMU_HZ) as i64,
+        gps_fraction_s: (number % IMU_HZ) as f64 / IMU_HZ as f64,
+        rate_x_radps: noise(),
+        rate_y_radps: noise(),
+        rate_z_radps: noise(),
+        force_x_mps2: noise(),
+        force_y_mps2: noise(),
+        force_z_mps2: noise(),
+    };
+    write(&run.join("truth/imu.csv"), &(1..=2 * IMU_HZ).map(row).collect::<Vec<_>>());
+    let place = |gps_s: i64| BodyRow {
+        gps_s,
+        gps_fraction_s: 0.0,
+        x_m: 6.378e6,
+        y_m: 0.0,
+        z_m: 0.0,
+        vx_mps: 0.0,
+        vy_mps: 0.0,
+        vz_mps: 0.0,
+        qw: 1.0,
+        qx: 0.0,
+        qy: 0.0,
+        qz: 0.0,
+    };
+    write(&run.join("truth/body.csv"), &[place(0), place(2)]);
 }
 
 /// Adds tests of two detectors to a run, one a second; every tenth of the second one raises an alarm.

@@ -139,7 +139,7 @@ pub fn find<'a>(summary: &'a Value, path: &str) -> Option<&'a Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_made::{detected, planted, protected, reported, two_bands, verified, write};
+    use crate::hand_made::{detected, measured_at_rest, planted, protected, reported, two_bands, verified, write};
     use crate::judge;
     use std::fs;
 
@@ -162,6 +162,7 @@ mod tests {
         verified(run.path(), 0.0, false);
         protected(run.path());
         detected(run.path());
+        measured_at_rest(run.path());
         let summary = judge(run.path()).unwrap();
         let mut written = Vec::new();
         paths("", &serde_json::to_value(&summary).unwrap(), &mut written);

@@ -195,6 +195,7 @@ fn about_nose(angle_rad: f64) -> Rotation3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::UnitQuaternion;
 
     fn attitude(nose: Nose, spin_hz: f64) -> Attitude {
         Attitude { nose, spin_hz, lever_arm_m: Vector3::new(0.1, 0.2, -0.3), boresight: -Vector3::z_axis() }
@@ -253,7 +254,9 @@ mod tests {
             let axes = |t_s: f64| body.at(t_s, &at(t_s), None).axes();
             let step_s = 1e-4;
             for t_s in [0.0, 0.37, 4.2] {
-                let turn = (axes(t_s - step_s).inverse() * axes(t_s + step_s)).scaled_axis() / (2.0 * step_s);
+                // By a quaternion: the angle of a matrix is lost below 1e-8.
+                let turned = UnitQuaternion::from_rotation_matrix(&(axes(t_s - step_s).inverse() * axes(t_s + step_s)));
+                let turn = turned.scaled_axis() / (2.0 * step_s);
                 let rate = body.rate_radps(&at(t_s), &axes(t_s), None);
                 // Axes are rounded to 1e-16 over 2e-4 s. Third derivatives of the angles are below 30 rad/s³
                 // (spin² times the nose's rate, 0.15 rad/s and less): times step²/6 5e-8.

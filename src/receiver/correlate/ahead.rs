@@ -190,7 +190,7 @@ mod tests {
             (|nco| nco.code += 1) as fn(&mut Nco),
             |nco| nco.code_step += 1,
             |nco| nco.carrier_step += 1,
-            |nco| nco.carrier += SAME,
+            |nco| nco.carrier = nco.carrier.wrapping_add(SAME),
         ] {
             let (intervals, answers, asked) = followed(|period, nco| {
                 if period == 6 {
