@@ -127,7 +127,8 @@ fn signals(text: &mut String, rows: &[SignalRow], dopplers: &[DopplerRow]) {
     );
     let _ = writeln!(
         text,
-        "A level is dominated where another one errs less and costs less, and the two intervals of cost do not meet. Of {ladders} \
+        "A level is dominated where another one errs less and costs less, and the two intervals of cost do not \
+         meet. Of {ladders} \
          ladders (signal and rate), {} have a dominated level{}{}.",
         beaten.len(),
         if beaten.is_empty() { "" } else { ": " },
@@ -162,8 +163,8 @@ fn models(text: &mut String, rows: &[SignalRow]) {
          `balanced` and `plan` read one error model (`code_bias_m`). The ratio is stated over measured; below 0.9 the \
          model is optimistic by more than 10 %. A root mean square of n draws scatters by 1/√(2n) itself, and twice \
          that is \"beyond the draws\".\n\n\
-         | edge | rows | median ratio | lowest | highest | within 25 % | optimistic by more than 10 % | that, beyond the \
-         draws |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n",
+         | edge | rows | median ratio | lowest | highest | within 25 % | optimistic by more than 10 % | that, beyond \
+         the draws |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     for edge in ["nearest", "area", "band_limited"] {
         let mut own: Vec<&SignalRow> = rows.iter().filter(|row| row.code_edge == edge).collect();
@@ -227,9 +228,10 @@ fn scenes(text: &mut String, rows: &[SceneRow]) {
         "\n## Whole scenes\n\n\
          ![Scenes](trade_scenes.png)\n\n\
          Costs are processor seconds of all threads for one simulated second, tables included: first the generator \
-         alone, then a run of both less that. They are medians of the runs, and the CSV file has both ends. Runs differ \
-         by their seed, and every setting has the same seeds, so that positions of two settings are paired. The \
-         position is that of every fix of all runs against the truth, with the least and the greatest of the runs. C/N0 loss is what the scene makes, other satellites counted as noise, less what the \
+         alone, then a run of both less that. They are medians of the runs, and the CSV file has both ends. Runs \
+         differ by their seed, and every setting has the same seeds, so that positions of two settings are paired. The \
+         position is that of every fix of all runs against the truth, with the least and the greatest of the \
+         runs. C/N0 loss is what the scene makes, other satellites counted as noise, less what the \
          receiver measures. \"Between signals\" is the largest difference of the mean code errors of two signals; a \
          user who combines two bands without ionosphere sees about 2.6 times as much. `full_sky` is too short for a \
          position.\n\n",

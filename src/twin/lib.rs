@@ -103,7 +103,7 @@ pub fn run(
 /// samples of the first front end that have been passed.
 ///
 /// # Errors
-/// Those of [`run`].
+/// Errors of [`run`].
 pub fn modelled(
     scenes: &[Scene],
     settings: &Settings,

@@ -1,8 +1,9 @@
 //! Effect of a spoofer on the fixes: their distance from the truth, and from the spoofer's claim.
 //!
-//! A spoofer claims a position and a time. A fix counts as captured under two conditions. In position and clock
-//! together it is nearer to what the first spoofer claims than to the truth. The two are further apart than the
-//! fixes' own scatter. Limits: one spoofer; of a claimed time whole seconds are left out, because codes repeat.
+//! A spoofer claims a position and a time. A fix counts as captured under two conditions. In position and
+//! clock together it is nearer to what the first spoofer claims than to the truth. The two are further apart
+//! than the fixes' own scatter. Limits: one spoofer; of a claimed time whole seconds are left out, because
+//! codes repeat.
 
 use serde::Serialize;
 
@@ -24,8 +25,8 @@ pub struct Spoofing {
     pub claimed_displacement_max_m: f64,
     /// Largest offset of the claimed time from the true one without whole seconds, metres.
     pub claimed_clock_max_m: f64,
-    /// Share of the fixes at claims at least [`APART_M`] from the truth, in position and clock, that lie nearer
-    /// to the claim.
+    /// Share of the fixes at claims at least [`APART_M`] from the truth, in position and clock, that lie
+    /// nearer to the claim.
     pub captured_share: Option<f64>,
     /// Distance of the captured fixes from the claim.
     pub from_claim_p95_m: Option<f64>,
@@ -47,7 +48,7 @@ pub struct Claims {
 }
 
 impl Claims {
-    /// Those of a run; zero without a spoofer.
+    /// Claims of a run; zero without a spoofer.
     ///
     /// # Errors
     /// [`JudgeError::Read`] where spilled rows cannot be read.
@@ -85,7 +86,7 @@ pub struct Moved {
     pub from_claim_m: f64,
     /// Distance of the claim from the truth, metres.
     pub claim_from_truth_m: f64,
-    /// Whether the fix is nearer to the claim than to the truth, in position and clock; `None` where the two
+    /// True if the fix is nearer to the claim than to the truth, in position and clock; `None` where the two
     /// are less than [`APART_M`] apart.
     pub is_captured: Option<bool>,
 }

@@ -101,8 +101,8 @@ impl Summary {
             let clock = if clock_m > 0.05 { format!(" and {clock_m:.1} m of clock") } else { String::new() };
             writeln!(
                 f,
-                "spoofing      fixes up to {} m from the truth, claims up to {:.1} m{clock}; {} % of the fixes captured, \
-                 95 % within {} m of the claim",
+                "spoofing      fixes up to {} m from the truth, claims up to {:.1} m{clock}; {} % of the fixes \
+                 captured, 95 % within {} m of the claim",
                 metres(spoofing.displacement_max_m),
                 spoofing.claimed_displacement_max_m,
                 number(spoofing.captured_share.map(|share| 100.0 * share), 0),

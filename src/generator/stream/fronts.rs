@@ -143,8 +143,8 @@ impl<'a> Fronts<'a> {
         Ok(())
     }
 
-    /// Signals of each front end that were prepared, and the truth that is due before sample `to` of the first
-    /// one.
+    /// Signals of each front end that were prepared, and the truth that is due before sample `to` of the
+    /// first one.
     pub fn prepared(&mut self, to: u64) -> (Vec<&[Transmitter]>, Due<'_, 'a>) {
         let Self { fronts, ticks, .. } = self;
         let transmitters = fronts.iter().map(|front| front.transmitters.as_slice()).collect();

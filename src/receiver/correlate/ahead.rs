@@ -106,7 +106,8 @@ mod tests {
     use crate::correlate::correlator::Code;
     use crate::correlate::{Edge, Replica};
 
-    /// Answers with the number of the first sample, and keeps the numbers of intervals that it was asked about.
+    /// Answers with the number of the first sample, and keeps the numbers of intervals that it was asked
+    /// about.
     struct Numbers(RefCell<Vec<usize>>);
 
     impl Correlator for Numbers {
@@ -152,8 +153,8 @@ mod tests {
         Coded { replica, code: Code::new(link, component, made) }
     }
 
-    /// Twelve code periods whose oscillators `moved` changes before each of them; the answers, and of how many
-    /// periods each question was.
+    /// Twelve code periods whose oscillators `moved` changes before each of them; the answers, and of how
+    /// many periods each question was.
     fn followed(moved: impl Fn(u32, &mut Nco)) -> (Vec<Interval>, Vec<Complex64>, Vec<usize>) {
         const LENGTH: i64 = 1_000_000;
         let (numbers, coded, mut ahead) = (Numbers(RefCell::default()), coded(), Ahead::default());

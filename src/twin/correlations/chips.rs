@@ -1,8 +1,8 @@
 //! Sums over the chips of two codes, kept from one second to the next.
 //!
-//! Two codes differ by a few chips more or less a second later, and their Dopplers by less than a hertz. So the
-//! difference of the Dopplers is rounded to steps, and of most lags the sums are known. A sum depends on the
-//! codes, the step and the lag alone: who asked before changes nothing.
+//! Two codes differ by a few chips more or less a second later, and their Dopplers by less than a hertz. So
+//! the difference of the Dopplers is rounded to steps, and of most lags the sums are known. A sum depends on
+//! the codes, the step and the lag alone: who asked before changes nothing.
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};

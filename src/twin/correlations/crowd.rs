@@ -4,9 +4,9 @@
 //! the difference of the carriers. So it is no white noise: loops and estimates of C/N0 meet a tone. Its
 //! amplitude and phase are the correlation of both codes at their delay and difference of Dopplers, summed
 //! over the chips of a period, before and after the other code's own period ends (Kaplan and Hegarty,
-//! Understanding GPS 2nd ed., 4.3.2). Limits: delays and phases are parabolas within a second, the strength is
-//! constant there; carriers are equal. Within a code period the difference of Dopplers counts to 2 Hz, so that
-//! sums serve for seconds ([`chips`]): 0.002 cycle from one end to the other, 0.4 % of the sum.
+//! Understanding GPS 2nd ed., 4.3.2). Limits: delays and phases are parabolas within a second, the strength
+//! is constant there; carriers are equal. Within a code period the difference of Dopplers counts to 2 Hz, so
+//! that sums serve for seconds ([`chips`]): 0.002 cycle from one end to the other, 0.4 % of the sum.
 
 use std::sync::Arc;
 

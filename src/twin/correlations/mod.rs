@@ -1,13 +1,13 @@
 //! Correlations in place of samples: a model of the sums that a correlator gives.
 //!
-//! Over an interval, each ray of a satellite contributes its amplitude times the mean of R(τ − δ)·e^{j2πφ}:
-//! R the correlation of what is sent with the replica, τ the difference of the codes, δ the tap, φ the
+//! Over an interval, each ray of a satellite contributes its amplitude times the mean of R(τ − δ)·e^{j2πφ}: R
+//! the correlation of what is sent with the replica, τ the difference of the codes, δ the tap, φ the
 //! difference of the carriers. τ is linear over the interval, φ a parabola; the mean is taken by Gauss and
 //! Legendre's nodes, of each piece between the edges of the ray's own symbols. Noise has the variance of the
 //! thermal noise, of rounding, and of the other signals by their spectra (source: Kaplan and Hegarty,
-//! Understanding GPS 2nd ed., 5.3 and 6.2). Code periods between two updates of a channel's loops are answered
-//! together ([`train`]). Components of one satellite's signal correlate as their codes do.
-//! Short codes of other satellites are found as they correlate, long ones are white noise. Limits: front ends
+//! Understanding GPS 2nd ed., 5.3 and 6.2). Code periods between two updates of a channel's loops are
+//! answered together ([`train`]). Components of one satellite's signal correlate as their codes do. Short
+//! codes of other satellites are found as they correlate, long ones are white noise. Limits: front ends
 //! without stages ([`refuse`]); samples count as infinitely many.
 
 mod chips;
@@ -385,8 +385,8 @@ impl Correlations<'_> {
         }
     }
 
-    /// Adds sums of consecutive intervals at taps near the prompt, in chips, with noise of this deviation in a
-    /// sample: for each interval one for each tap.
+    /// Adds sums of consecutive intervals at taps near the prompt, in chips, with noise of this deviation in
+    /// a sample: for each interval one for each tap.
     fn add_near(&self, train: &Train, taps: &[f64], (stream, deviation): (Stream, f64), sums: &mut [Complex64]) {
         let Question { code, made, place, .. } = train.whole;
         for sent in self.alike(place) {

@@ -18,8 +18,8 @@ const NEAR: u64 = 1 << 32;
 /// Code periods whose noise is drawn at once.
 const TOGETHER: usize = 4;
 
-/// Adds the noise of whole code periods to sums at taps near the prompt: of each its stream, and the deviation
-/// of a component. `sums` has one sum for each tap, period after period.
+/// Adds the noise of whole code periods to sums at taps near the prompt: of each its stream, and the
+/// deviation of a component. `sums` has one sum for each tap, period after period.
 pub(super) fn add_to_each(mut periods: impl Iterator<Item = (Stream, f64)>, taps: &Taps, sums: &mut [Complex64]) {
     let count = taps.order.len().max(1);
     if count > LANES {

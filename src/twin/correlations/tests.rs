@@ -272,8 +272,8 @@ fn following(scene: &Scene, transmitter: &Transmitter, first: u64, (off_chips, o
 
 /// Noise is the same to the bit. A line misses the corner of the prompt by 1.3e-4 of the height. Other
 /// satellites are looked up at positions of 1/128 chip. The code of C/A moves by half of one in four periods,
-/// that of B1I by one and a third, and rounding adds one. From one lag to the next a sum of n chips changes by
-/// √(2/n) of the other's amplitude rms: 4.4 % and 3.1 %. Ten satellites of like amplitude move the sum by
+/// that of B1I by one and a third, and rounding adds one. From one lag to the next a sum of n chips changes
+/// by √(2/n) of the other's amplitude rms: 4.4 % and 3.1 %. Ten satellites of like amplitude move the sum by
 /// √10·0.044/128 = 1.1e-3 rms where one position is met at all, and by 1.5e-3 where two are; three of those
 /// are the bound of B1I. Ten code periods have edges of symbols in them, whichever ten.
 #[test]

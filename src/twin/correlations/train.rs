@@ -1,12 +1,12 @@
 //! Consecutive code periods in a correlator, with one pass over what moves slowly.
 //!
 //! Between two updates of a channel's loops its oscillators keep their steps. The difference of the codes is
-//! then linear over all periods of an integration, that of the carriers a parabola. Both are computed once; the
-//! correlation follows a line through both ends, and the mean of the carrier over a piece of the parabola is
-//! its value in the middle times sin(x)/x, x the half of what it turns. With the limits below the line misses a
-//! corner of the correlation by 1.3e-4 at most, and the mean of the carrier errs by 3e-6 and 6e-6 cycle: the
-//! square of the parabola's deviation, and its product with the square of the turn. Periods beyond them, and
-//! rays that fade quickly or meet a knot, are computed one by one.
+//! then linear over all periods of an integration, that of the carriers a parabola. Both are computed once;
+//! the correlation follows a line through both ends, and the mean of the carrier over a piece of the parabola
+//! is its value in the middle times sin(x)/x, x the half of what it turns. With the limits below the line
+//! misses a corner of the correlation by 1.3e-4 at most, and the mean of the carrier errs by 3e-6 and 6e-6
+//! cycle: the square of the parabola's deviation, and its product with the square of the turn. Periods beyond
+//! them, and rays that fade quickly or meet a knot, are computed one by one.
 
 use std::f64::consts::PI;
 
@@ -18,11 +18,11 @@ use super::ray::{Course, Question};
 use super::sent::{Leg, Sent, turns};
 use super::taps::MOST;
 
-/// What the code may gain over all periods, in chips.
+/// Largest gain of the code over all periods, in chips.
 const GAINED_CHIPS: f64 = 2.5e-4;
-/// What the carrier may turn in a period, in cycles.
+/// Largest turn of the carrier in a period, in cycles.
 const TURNED_CYCLES: f64 = 0.1;
-/// What the quadratic part of the carrier may be at the end of a period, in cycles.
+/// Largest quadratic part of the carrier at the end of a period, in cycles.
 const BENT_CYCLES: f64 = 5e-3;
 
 /// The sums that a receiver asks for over consecutive intervals.

@@ -2,8 +2,8 @@
 //!
 //! Reflections shift a code by their excess and half a chip at the most, and a carrier by the user's motion
 //! towards their mirrors. A spoofer moves both to the position and the time that it claims. Nothing turns a
-//! Doppler's sign. The 95th percentile of each satellite's errors stays below that. Limits: satellites with a fault of
-//! their own are left out, as their ranges may have any error.
+//! Doppler's sign. The 95th percentile of each satellite's errors stays below that. Limits: satellites with a
+//! fault of their own are left out, as their ranges may have any error.
 
 use crate::error::JudgeError;
 use crate::judge::judgement::Bound;
