@@ -6,7 +6,7 @@
 //! over the chips of a period, before and after the other code's own period ends (Kaplan and Hegarty,
 //! Understanding GPS 2nd ed., 4.3.2). Limits: delays and phases are parabolas within a second, the strength
 //! is constant there; carriers are equal. Within a code period the difference of Dopplers counts to 2 Hz, so
-//! that sums serve for seconds ([`chips`]): 0.002 cycle from one end to the other, 0.4 % of the sum.
+//! that sums serve for seconds (`chips`): 0.002 cycle from one end to the other, 0.4 % of the sum.
 
 use std::sync::Arc;
 

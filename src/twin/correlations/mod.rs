@@ -6,7 +6,7 @@
 //! Legendre's nodes, of each piece between the edges of the ray's own symbols. Noise has the variance of the
 //! thermal noise, of rounding, and of the other signals by their spectra (source: Kaplan and Hegarty,
 //! Understanding GPS 2nd ed., 5.3 and 6.2). Code periods between two updates of a channel's loops are
-//! answered together ([`train`]). Components of one satellite's signal correlate as their codes do. Short
+//! answered together (`train`). Components of one satellite's signal correlate as their codes do. Short
 //! codes of other satellites are found as they correlate, long ones are white noise. Limits: front ends
 //! without stages ([`refuse`]); samples count as infinitely many.
 
