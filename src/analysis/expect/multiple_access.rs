@@ -13,6 +13,7 @@
 
 use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap};
+use std::sync::Arc;
 
 use crate::expect::array::Filtered;
 use crate::expect::jamming;
@@ -25,11 +26,16 @@ use gnss::signal::{Link, Signal};
 /// C/N0 that a receiver can measure, per true observation.
 pub struct MultipleAccess<'r> {
     run: &'r Run,
+    tables: Arc<Tables>,
+    sums_hz: RefCell<LevelFinder<'r, Emission>>,
+}
+
+/// What holds of a whole run.
+struct Tables {
     /// κ of the emissions that a signal meets, its own among them.
     kappa_s: HashMap<Emission, Vec<(Emission, f64)>>,
     /// Share of each signal's power at the antenna that samples have.
     kept: HashMap<&'static Signal, f64>,
-    sums_hz: RefCell<LevelFinder<'r, Emission>>,
     jammed: Jammed,
     filtered: Filtered,
 }
@@ -49,9 +55,8 @@ impl Jammed {
     }
 }
 
-impl<'r> MultipleAccess<'r> {
-    /// Multiple access from the truth of a run.
-    pub fn new(run: &'r Run) -> Self {
+impl Tables {
+    fn of(run: &Run) -> Self {
         let emissions = Emission::all(run.truth.keys());
         let signals: BTreeSet<&'static Signal> = emissions.iter().map(|one| one.signal).collect();
         let (layers, sampler) = (run.scene.waveform, run.sampler(0));
@@ -61,13 +66,24 @@ impl<'r> MultipleAccess<'r> {
         // Rows that cannot be read again are an error of the measurement, which reads them all.
         let filtered = Filtered::of(run).unwrap_or_default();
         Self {
-            run,
             kappa_s: separations(run, &emissions, &waveforms, &kept),
             kept,
-            sums_hz: RefCell::new(run.cn0_sums_hz.finder()),
             jammed: jammed(run, &emissions, &waveforms, &filtered),
             filtered,
         }
+    }
+
+    /// Other emissions that a signal meets, its own among them, with their κ in seconds.
+    fn met(&self, own: Emission) -> &[(Emission, f64)] {
+        self.kappa_s.get(&own).map_or(&[], Vec::as_slice)
+    }
+}
+
+impl<'r> MultipleAccess<'r> {
+    /// Multiple access from the truth of a run.
+    pub fn new(run: &'r Run) -> Self {
+        let tables = run.derived.get(|| Tables::of(run));
+        Self { run, tables, sums_hz: RefCell::new(run.cn0_sums_hz.finder()) }
     }
 
     /// C/N0 of a true observation with the other satellites and interference counted as noise; infinite
@@ -84,10 +100,10 @@ impl<'r> MultipleAccess<'r> {
             };
             kappa_s * others_hz
         };
-        let shared: f64 = self.kappa_s.get(&own).map_or(&[][..], Vec::as_slice).iter().map(others).sum();
+        let shared: f64 = self.tables.met(own).iter().map(others).sum();
         let thermal = if self.run.scene.noise { 1.0 } else { 0.0 };
-        let jammed = self.jammed.get(row.sample, own);
-        let (gain, mean) = (self.filtered.satellite(row.sample, row.sv), self.filtered.mean(row.sample));
+        let jammed = self.tables.jammed.get(row.sample, own);
+        let (gain, mean) = (self.tables.filtered.satellite(row.sample, row.sv), self.tables.filtered.mean(row.sample));
         10.0 * libm::log10(gain * own_hz / (thermal + mean * shared + jammed))
     }
 
@@ -95,15 +111,15 @@ impl<'r> MultipleAccess<'r> {
     /// own too: in such units a receiver has its prompts. Hertz.
     pub fn white_hz(&self, sample: u64, link: Link, own_hz: f64) -> f64 {
         let own = Emission::of(link);
-        let met = self.kappa_s.get(&own).map_or(&[][..], Vec::as_slice).iter().map(|(emission, _)| *emission);
+        let met = self.tables.met(own).iter().map(|(emission, _)| *emission);
         let in_samples = |emission: Emission| {
-            let kept = self.kept.get(emission.signal).copied().unwrap_or(1.0);
+            let kept = self.tables.kept.get(emission.signal).copied().unwrap_or(1.0);
             Some(kept * self.sums_hz.borrow_mut().get(sample, emission)?)
         };
         let all_hz: f64 = met.filter_map(in_samples).sum();
         let thermal = if self.run.scene.noise { 1.0 } else { 0.0 };
-        let jammed = self.jammed.get(sample, own);
-        let (gain, mean) = (self.filtered.satellite(sample, link.sv), self.filtered.mean(sample));
+        let jammed = self.tables.jammed.get(sample, own);
+        let (gain, mean) = (self.tables.filtered.satellite(sample, link.sv), self.tables.filtered.mean(sample));
         gain * own_hz / (thermal + mean * all_hz / self.run.rate_hz(link.signal) + jammed)
     }
 }

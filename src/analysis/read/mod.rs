@@ -8,6 +8,7 @@
 pub mod attacks;
 mod common;
 mod delay;
+pub mod derived;
 pub mod detection;
 mod emission;
 mod fault;

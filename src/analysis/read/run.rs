@@ -14,6 +14,7 @@ use super::common::Common;
 use super::emission::{self, Emission, MeanSignal};
 use super::files::{believable, each, each_of_any, json, missing, optional, rows, text};
 use crate::error::JudgeError;
+use crate::read::derived::Derived;
 use crate::read::detection::Test;
 use crate::read::fixes::Fixes;
 use crate::read::levels::{LevelFinder, Levels};
@@ -166,6 +167,8 @@ pub struct Run {
     pub peaks: Vec<PeakRow>,
     /// Speed of the stages.
     pub speed: Speed,
+    /// What measures share.
+    pub derived: Derived,
 }
 
 /// [`Run::alike`] of the truth's signals: of those that are not among them.
@@ -371,6 +374,7 @@ impl Run {
             other_psds: BTreeMap::new(),
             peaks: Vec::new(),
             speed: Speed::default(),
+            derived: Derived::default(),
         })
     }
 
