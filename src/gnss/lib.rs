@@ -34,6 +34,7 @@ pub mod bits;
 pub mod broadcast;
 pub mod cityjson;
 pub mod crc;
+pub mod discriminator;
 pub mod earth;
 pub mod exchange;
 pub mod facts;

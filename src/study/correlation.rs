@@ -8,6 +8,7 @@ use analysis::expect::theory::dll::{BandIntegrals, Discriminator, Taps, raw_on_c
 use analysis::waveform::Waveform;
 use gnss::signal::{Component, Layers, PeakTable, sinc_squared};
 use receiver::lead::shapes;
+use receiver::track::TrackingSettings;
 use receiver::track::loops::CodeShape;
 
 /// R and R' over positive offsets in chips.
@@ -106,34 +107,37 @@ impl Correlation {
         peak * peak / self.noise_power()
     }
 
-    /// Shape of the peak that a receiver with exact knowledge of it assumes for a spacing of `d` chips.
-    pub fn code_shape(&self, d: f64) -> CodeShape {
+    /// Shape of the peak that a receiver with exact knowledge of it assumes.
+    pub fn code_shape(&self, settings: &TrackingSettings) -> CodeShape {
+        let (discriminator, d) = (settings.dll_discriminator, settings.spacing_chips);
         match self {
-            Self::Triangle => CodeShape::triangle(d),
-            Self::Pulses(_) | Self::Replica { .. } | Self::BandLimited { .. } => {
-                let Taps { height, slope, common } = self.taps(d);
-                CodeShape { value: height, slope, common }
-            }
+            Self::Triangle if discriminator.pairs().len() == 1 => CodeShape::triangle(d),
+            _ => CodeShape::of(discriminator, d, |x| (self.value(x), -self.fall(x)), |x| self.noise(x)),
         }
     }
 
     /// Standard deviation of one discriminator value in chips, for a C/N0 before the front end; `None` for
-    /// the dot product behind one.
+    /// the dot products behind one.
     pub fn raw_chips(&self, discriminator: Discriminator, d: f64, t_s: f64, cn0_hz: f64) -> Option<f64> {
         match self {
             Self::Triangle => Some(analysis::expect::theory::dll::raw_chips(discriminator, d, t_s, cn0_hz)),
             Self::Pulses(_) | Self::Replica { .. } => {
-                Some(raw_on_chips(discriminator, self.taps(d), t_s * cn0_hz * self.efficiency()))
+                Some(raw_on_chips(discriminator, self.taps(discriminator, d), t_s * cn0_hz * self.efficiency()))
             }
             Self::BandLimited { band, code, .. } => BandIntegrals::of(|f| density(code.as_ref(), f), d, *band)
                 .jitter_chips(discriminator, 0.5 / t_s, t_s, cn0_hz),
         }
     }
 
-    fn taps(&self, d: f64) -> Taps {
-        let (peak, half, h) = (self.value(0.0), 0.5 * d, 0.5 / STEPS_PER_CHIP);
-        let slope = (self.value(half - h) - self.value(half + h)) / (2.0 * h);
-        Taps { height: self.value(half) / peak, slope: slope / peak, common: self.noise(d) }
+    fn taps(&self, discriminator: Discriminator, d: f64) -> Taps {
+        let peak = self.value(0.0);
+        Taps::of(discriminator, d, |x| [self.value(x), self.fall(x)].map(|value| value / peak), |x| self.noise(x))
+    }
+
+    /// Minus the slope at an offset in chips.
+    fn fall(&self, chips: f64) -> f64 {
+        let h = 0.5 / STEPS_PER_CHIP;
+        (self.value(chips - h) - self.value(chips + h)) / (2.0 * h)
     }
 }
 

@@ -213,7 +213,8 @@ pub fn simulate(case: &Case, mut each: impl FnMut(&Epoch)) -> (u64, Option<(f64,
     (channel.watch.interruptions, None)
 }
 
-/// Early, prompt and late, and behind them the taps on either side peak where those are watched.
+/// Early, prompt and late; the taps on either side peak where those are watched; very early and very late where
+/// the discriminator takes them.
 #[derive(Clone, Copy, Debug)]
 struct Taps {
     count: usize,
@@ -223,13 +224,15 @@ struct Taps {
     rows: [[f64; MOST_TAPS]; MOST_TAPS],
 }
 
-const MOST_TAPS: usize = 5;
+const MOST_TAPS: usize = 7;
 
 impl Taps {
-    fn new(correlation: &Correlation, spacing_chips: f64, side: Option<&SidePeaks>) -> Self {
-        let half = 0.5 * spacing_chips;
+    fn new(correlation: &Correlation, settings: &TrackingSettings, side: Option<&SidePeaks>) -> Self {
+        let half = 0.5 * settings.spacing_chips;
         let [above, below] = side.map_or([0.0; 2], |side| side.taps().map(units_to_chips));
-        let ahead_chips = [half, 0.0, -half, above, below];
+        let outer = settings.dll_discriminator.widest() * half;
+        let ahead_chips = [half, 0.0, -half, above, below, outer, -outer];
+        let count = if outer > half { MOST_TAPS } else { 3 + if side.is_some() { 2 } else { 0 } };
         let mut rows = [[0.0; MOST_TAPS]; MOST_TAPS];
         for (i, tap) in ahead_chips.iter().enumerate() {
             let (before, rest) = rows.split_at_mut(i);
@@ -244,7 +247,7 @@ impl Taps {
             let own = row.iter().take(i).fold(1.0, |left, x| left - x * x).max(0.0).sqrt();
             row.iter_mut().skip(i).take(1).for_each(|factor| *factor = own);
         }
-        Self { count: if side.is_some() { MOST_TAPS } else { 3 }, ahead_chips, rows }
+        Self { count, ahead_chips, rows }
     }
 }
 
@@ -283,7 +286,7 @@ impl<'a> Channel<'a> {
     fn new(case: &'a Case) -> Self {
         let chip_rate_hz = case.component.chip_rate_hz;
         let (period_s, update_s, group) = (case.period_s(), case.update_s(), case.group());
-        let shape = case.correlation.code_shape(case.settings.spacing_chips);
+        let shape = case.correlation.code_shape(&case.settings);
         let mut loops = Loops::new(&case.settings, shape, case.has_symbols(), case.motion.doppler_hz);
         loops.design(&case.settings, case.mode, false, update_s);
         loops.carrier = Rates { acceleration: case.motion.rate_hz_s, ..loops.carrier };
@@ -299,7 +302,7 @@ impl<'a> Channel<'a> {
         }
         let cn0_hz = case.component_hz();
         let side = SidePeaks::new(case.component, case.settings.waveform).filter(|_| case.watched);
-        let taps = Taps::new(&case.correlation, case.settings.spacing_chips, side.as_ref());
+        let taps = Taps::new(&case.correlation, &case.settings, side.as_ref());
         let amplitude = (2.0 * period_s * cn0_hz.unwrap_or(1.0) / case.correlation.noise_power()).sqrt();
         let found = amplitude * case.correlation.value(case.start_chips);
         Self {
@@ -335,7 +338,7 @@ impl<'a> Channel<'a> {
     fn integrate(&mut self) -> Epoch {
         let carrier_hz = self.loops.carrier.mean(self.update_s);
         let code_hz = self.loops.code.mean(self.update_s);
-        let mut sums = [Complex64::ZERO; 3];
+        let mut sums = [Complex64::ZERO; 4];
         let (mut phase, mut code, mut frequency) = (0.0, 0.0, 0.0);
         for _ in 0..self.periods {
             let truth = self.truth.advance();
@@ -345,10 +348,10 @@ impl<'a> Channel<'a> {
             // The code's truth follows the carrier's, and so does the aid of its oscillator.
             let code_gained = gained * self.chips_per_cycle - code_hz * self.period_s;
             let mean_chips = self.code_chips + 0.5 * code_gained;
-            let [early, prompt, late, ahead, behind] = self.correlate(mean_cycles, gained, mean_chips);
+            let [early, prompt, late, ahead, behind, x, y] = self.correlate(mean_cycles, gained, mean_chips);
             // The model's noise has unit variance a component.
             self.cn0.add(prompt, Some(if self.noisy { 2.0 } else { 0.0 }));
-            sums.iter_mut().zip([early, prompt, late]).for_each(|(sum, tap)| *sum += tap);
+            sums.iter_mut().zip([early, prompt, late, x - y]).for_each(|(sum, tap)| *sum += tap);
             phase += mean_cycles;
             code += mean_chips;
             frequency += gained;
@@ -398,7 +401,7 @@ impl<'a> Channel<'a> {
         self.watch.interruptions += 1;
     }
 
-    /// Early, prompt, late and both neighbours of one period, of mean phase error `cycles`, which turns by
+    /// The taps of one period ([`Taps`]), of mean phase error `cycles`, which turns by
     /// `turned` cycles in it, and mean code error `chips`.
     fn correlate(&mut self, cycles: f64, turned: f64, chips: f64) -> [Complex64; MOST_TAPS] {
         if self.has_symbols && self.number.is_multiple_of(u64::from(self.group)) {

@@ -7,12 +7,11 @@
 use std::f64::consts::TAU;
 
 use super::correlator::Case;
-use analysis::expect::theory::dll::Discriminator;
 use analysis::expect::theory::linear::{AssistedLoop, Feedback, FrequencyLoop, Linear, Pairs, PhaseLoop};
 use analysis::expect::theory::{fll, pll};
+use receiver::track::TrackingSettings;
 use receiver::track::closed::Mode;
 use receiver::track::loops::Gains;
-use receiver::track::{CodeDiscriminator, TrackingSettings};
 
 /// A jitter and how much of a run counts as one value of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,13 +101,10 @@ pub fn frequency_hz(case: &Case) -> Option<Jitter> {
     Some(jitter)
 }
 
-/// Jitter of the code in chips; `None` without noise, and for the dot product behind a front end.
+/// Jitter of the code in chips; `None` without noise, and for the dot products behind a front end.
 pub fn code_chips(case: &Case) -> Option<Jitter> {
     let (update_s, settings) = (case.update_s(), &case.settings);
-    let discriminator = match settings.dll_discriminator {
-        CodeDiscriminator::EarlyMinusLate => Discriminator::EarlyMinusLate,
-        CodeDiscriminator::DotProduct => Discriminator::DotProduct,
-    };
+    let discriminator = settings.dll_discriminator.into();
     let raw = case.correlation.raw_chips(discriminator, settings.spacing_chips, update_s, case.component_hz()?)?;
     Jitter::of(&code_loop(settings, update_s).linear(), raw, update_s)
 }

@@ -266,6 +266,7 @@ fn row(cell: &Cell, jitter: &Jitter, outcome: &Outcome) -> ProofRow {
         (Quantity::Frequency, _) => (settings.fll_order, "atan of overlapping pairs"),
         (Quantity::Code, CodeDiscriminator::EarlyMinusLate) => (settings.dll_order, "early minus late"),
         (Quantity::Code, CodeDiscriminator::DotProduct) => (settings.dll_order, "dot product"),
+        (Quantity::Code, CodeDiscriminator::DoubleDelta) => (settings.dll_order, "double delta"),
     };
     let (snr, bandwidth_time) = cell.place(jitter);
     let (theory, measured) = (jitter.sigma * unit, moments.sigma().unwrap_or(f64::NAN) * unit);

@@ -5,7 +5,7 @@ use gnss::record::{RayRow, SkyRow};
 use gnss::satellite::Sv;
 use nalgebra::Vector3;
 use receiver::correlate::Edge;
-use receiver::track::TrackingSettings;
+use receiver::track::{CodeDiscriminator, TrackingSettings};
 
 use super::single::{code_error_m, rows, samples, scene, track};
 
@@ -29,10 +29,32 @@ fn envelope_chips(a: f64, delay: f64, d: f64) -> f64 {
     }
 }
 
+/// Error of a double delta loop with one echo: the zero of the sum of two pairs on the sides of two triangles. Of
+/// the inner pair early less late is 2x, d and 1 − x + d/2, of the outer one 2x, 2d and 1 − x + d (McGraw and
+/// Braasch 1999).
+fn double_delta_chips(a: f64, delay: f64, d: f64) -> f64 {
+    if delay <= 0.5 * (1.0 + a) * d {
+        a * delay / (1.0 + a)
+    } else if delay <= d {
+        a * (d - delay) / (1.0 - a)
+    } else if delay <= 1.0 - d {
+        0.0
+    } else if delay <= 1.0 - 0.5 * d + 0.25 * a * d {
+        a * (delay - 1.0 + d) / (2.0 + a)
+    } else if delay <= 1.0 + 0.5 * d - 0.25 * a * d {
+        a * (1.0 - delay) / (2.0 - a)
+    } else if delay <= 1.0 + d {
+        -a * (1.0 + d - delay) / (2.0 + a)
+    } else {
+        0.0
+    }
+}
+
 #[test]
 fn the_code_loop_s_error_keeps_to_the_envelope_of_theory() {
     let mut worst = 0.0_f64;
-    for spacing_chips in [1.0, 0.5, 0.1] {
+    let early_late = [1.0, 0.5, 0.1].map(|spacing_chips| (CodeDiscriminator::EarlyMinusLate, spacing_chips));
+    for (dll_discriminator, spacing_chips) in early_late.into_iter().chain([(CodeDiscriminator::DoubleDelta, 0.4)]) {
         for (phase_deg, a) in [(0.0, 0.5), (180.0, -0.5)] {
             for delay in [0.02, 0.3, 0.7, 1.0] {
                 // Whole cycles of excess, so that the phase at the antenna is that of the reflection.
@@ -43,6 +65,7 @@ fn the_code_loop_s_error_keeps_to_the_envelope_of_theory() {
                      [[multipath]]\nkind = \"given\"\nexcess_m = {excess_m}\namplitude = 0.5\nphase_deg = {phase_deg}\n"
                 );
                 let settings = TrackingSettings {
+                    dll_discriminator,
                     spacing_chips,
                     replica: Edge::Nearest,
                     dll_bandwidth_hz: 5.0,
@@ -54,7 +77,12 @@ fn the_code_loop_s_error_keeps_to_the_envelope_of_theory() {
                 let late: Vec<f64> = pairs.iter().rev().take(4).map(|(truth, m)| code_error_m(truth, m)).collect();
                 assert_eq!(late.len(), 4, "not locked");
                 let mean_m = late.iter().sum::<f64>() / 4.0;
-                let expected_m = envelope_chips(a, excess_m / CHIP_M, spacing_chips) * CHIP_M;
+                let envelope = if dll_discriminator == CodeDiscriminator::DoubleDelta {
+                    double_delta_chips
+                } else {
+                    envelope_chips
+                };
+                let expected_m = envelope(a, excess_m / CHIP_M, spacing_chips) * CHIP_M;
                 // Chips sampled at 11.44 a chip put an edge within 1.1 m by a sample, of which the 512 edges
                 // of a period leave 1.1/√512 = 0.05 m; the loop has had at least ten of its time constants
                 // (0.05 s).

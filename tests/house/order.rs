@@ -11,7 +11,7 @@ pub const ORDER: Order<'static> = &[
     (
         "gnss",
         &[
-            &["plant", "renamed"],
+            &["discriminator", "plant", "renamed"],
             &["time", "earth", "geoid", "satellite", "inflate", "place", "weil"],
             &["gravity"],
             &["bits", "bdgim", "cityjson", "klobuchar", "nequick", "ionex", "projection", "samples", "vienna"],

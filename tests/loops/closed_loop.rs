@@ -576,12 +576,12 @@ fn independent(run: &Path, which: &str) -> f64 {
 /// and 90 s.
 #[test]
 fn a_code_loop_has_the_jitter_of_the_discriminator_that_is_set() {
-    for discriminator in ["early_minus_late", "dot_product"] {
+    for (discriminator, spacing_chips) in [("early_minus_late", 1.5), ("dot_product", 1.5), ("double_delta", 0.6)] {
         let scene = include_str!("../../scenarios/static.toml")
             .replace("duration_s = 60", "duration_s = 90")
             .replace("kind = \"link_budget\"", "cn0_dbhz = 38");
         let settings = format!(
-            "[receiver.tracking]\ndll_discriminator = \"{discriminator}\"\nspacing_chips = 1.5\n\
+            "[receiver.tracking]\ndll_discriminator = \"{discriminator}\"\nspacing_chips = {spacing_chips}\n\
              dll_bandwidth_hz = 10\nintegration = 4\n"
         );
         let place = tempfile::tempdir().unwrap();

@@ -91,6 +91,7 @@ const E5_CODES: &str = "witness::codes::all_chips_of_all_codes_and_secondary_cod
 const TWO_BANDS: &str =
     "laws::two_bands_show_the_ionosphere_without_the_group_delays_of_the_message_and_give_a_position_without_it";
 const CLOCKS: &str = "laws::two_systems_whose_times_differ_give_one_position_and_a_clock_of_each";
+const OUTER: &str = "laws::a_loop_of_two_pairs_reads_a_small_error_as_it_is";
 const SUMS: &str = "laws::running_sums_give_what_every_sample_by_itself_does";
 const LAYERS: &str = "bands::composite_chips_have_a_tenth_as_much_power_in_the_quick_layer_as_in_the_slow_one";
 const NO_L1: &str = "bands::two_bands_neither_of_which_is_l1_show_the_ionosphere_on_l1_and_how_well";
@@ -259,6 +260,7 @@ pub const FAULTS: &[Fault] = &[
     fault("receiver.loops.dll_bandwidth", "the code loop is six times as wide", LOOP),
     fault("receiver.loops.costas_gain", "the phase discriminator is 1.4 times too steep", LOOP),
     fault("receiver.loops.code_gain", "the code discriminator is 1.5 times too steep", LOOP),
+    fault("receiver.loops.outer", "the outer pair of a double delta is left out", OUTER),
     fault("receiver.loops.frequency_sign", "the frequency discriminator has the wrong sign", LOOP),
     fault("receiver.loops.step", "a loop update takes too little of what the half intervals bring", LOOP),
     fault("receiver.nco.carrier_aid", "the carrier aids the code with the wrong sign", LOOP),

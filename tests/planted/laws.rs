@@ -28,8 +28,9 @@ use receiver::correlate::sums::{RunningSums, Samples};
 use receiver::correlate::{Arithmetic, Edge, Nco, Replica, chips_to_units};
 use receiver::position::smooth::Smoother;
 use receiver::position::{CodeNoise, NoFix, Noises, PositionSettings, Sets, Solved, Solver, SystemClocks};
-use receiver::track::CodeDiscriminator;
+use receiver::track::closed::{Loops, Mode};
 use receiver::track::loops::CodeShape;
+use receiver::track::{CodeDiscriminator, TrackingSettings};
 
 const BIAS_S: f64 = 1.3e-4;
 const DRIFT: f64 = 5e-8;
@@ -525,6 +526,26 @@ fn a_two_bit_converter_has_its_levels_a_step_apart() {
     let mut q = [0.1; 6];
     converter.act(&mut Block::whole(0, &mut i, &mut q));
     assert_eq!(i, [-3.0, -3.0, -1.0, 1.0, 3.0, 3.0]);
+}
+
+#[test]
+fn a_loop_of_two_pairs_reads_a_small_error_as_it_is() {
+    let settings = TrackingSettings {
+        dll_discriminator: CodeDiscriminator::DoubleDelta,
+        spacing_chips: 0.4,
+        ..TrackingSettings::default()
+    };
+    let triangle = |x: f64| (1.0 - x.abs()).max(0.0);
+    let slope = |x: f64| (triangle(x), -1_f64.copysign(x));
+    let shape = CodeShape::of(settings.dll_discriminator, settings.spacing_chips, slope, triangle);
+    let mut loops = Loops::new(&settings, shape, true, 0.0);
+    loops.design(&settings, Mode::Phase, false, 4e-3);
+    let ahead = 0.01;
+    let [early, prompt, late, very_early, very_late] =
+        [0.2, 0.0, -0.2, 0.4, -0.4].map(|tap| Complex64::from(triangle(ahead - tap)));
+    let update = loops.close(Mode::Phase, [early, prompt, late, very_early - very_late], None, 4, 4e-3, None);
+    // The prompt, off its peak by as much, scales by 1/0.99.
+    assert!((update.dll_chips - ahead / 0.99).abs() < 1e-12, "{update:?}");
 }
 
 #[test]

@@ -214,7 +214,8 @@ impl Theory {
         let settings = settings.fitted(&followed);
         let chip_rate_hz = followed.found.chip_rate_hz();
         let code = Code::found(&followed);
-        if 0.5 * settings.spacing_chips >= code.reach_chips {
+        let outermost = if settings.dll_discriminator == dll::Discriminator::DoubleDelta { 1.0 } else { 0.5 };
+        if outermost * settings.spacing_chips >= code.reach_chips {
             return None;
         }
         let pll = exact_loop(settings.pll_order, settings.pll_bandwidth_hz * update_s)?;
@@ -252,7 +253,8 @@ impl Theory {
             dll: (dll, Response::of(&dll)),
             dll_gain,
             peaks: (found, own),
-            beat_chips2: code.stray_chips2(settings.spacing_chips) / f64::from(followed.component.code_chips),
+            beat_chips2: code.stray_chips2(settings.dll_discriminator, settings.spacing_chips)
+                / f64::from(followed.component.code_chips),
             code,
             component: followed.component,
             oscillator: run.scene.oscillator.map(|noise| PowerLaw { h: noise.h }),

@@ -2,7 +2,7 @@
 //!
 //! E, P and L are the sums over the rays of amplitude, phase and correlation, at the loop's estimate and half
 //! a spacing to either side. A loop of early minus late power rests where |E|² = |L|², one of the dot product
-//! where Re((E−L)·P*) = 0. Limits: the front end's rounding of the correlation is left out, and rays are
+//! where Re((E−L)·P*) = 0, one of the double delta where that of both pairs is. Limits: the front end's rounding of the correlation is left out, and rays are
 //! taken as steady over the loop's time constant, so that what moves fast is overrated.
 
 use std::collections::HashMap;
@@ -42,12 +42,14 @@ fn error_chips(code: &Code, rays: &[Ray], discriminator: Discriminator, spacing_
     // Falls through zero where the loop rests, between half a spacing before the direct ray and one behind
     // it, before early leaves the main peak.
     let discriminator = |at: f64| {
-        let [early, late] = [0.5, -0.5].map(|side| sum(at + side * spacing_chips));
+        let half = 0.5 * spacing_chips;
         match discriminator {
-            Discriminator::EarlyMinusLate => early.norm_sqr() - late.norm_sqr(),
+            Discriminator::EarlyMinusLate => sum(at + half).norm_sqr() - sum(at - half).norm_sqr(),
             // The carrier's loop turns the prompt onto the real axis, which is all that the coherent one
             // assumes.
-            Discriminator::DotProduct | Discriminator::Coherent => ((early - late) * sum(at).conj()).re,
+            Discriminator::DotProduct | Discriminator::DoubleDelta | Discriminator::Coherent => {
+                (discriminator.sum(half, |side| sum(at + side) - sum(at - side)) * sum(at).conj()).re
+            }
         }
     };
     let (mut low, mut high) = (-0.5 * spacing_chips, spacing_chips.min(code.reach_chips - 0.5 * spacing_chips));
@@ -139,7 +141,7 @@ impl<'r> Rays<'r> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::expect::theory::dll::Discriminator::{DotProduct, EarlyMinusLate};
+    use crate::expect::theory::dll::Discriminator::{DotProduct, DoubleDelta, EarlyMinusLate};
     use crate::waveform::Waveform;
     use gnss::gps::l1ca::L1_CA;
     use gnss::signal::synthetic::LONG_BOC;
@@ -175,6 +177,21 @@ mod tests {
         let (a, b, c) = (1.0 - square, 1.0 + square * (1.0 - 2.0 * delay), square * delay * (1.0 - delay));
         let (found, expected) = (error(DotProduct, 0.25), (b - (b * b - 4.0 * a * c).sqrt()) / (2.0 * a));
         assert!((found - expected).abs() < 1e-9, "{found}, {expected}");
+    }
+
+    #[test]
+    fn the_double_delta_does_not_see_a_ray_on_whose_flank_all_its_taps_lie() {
+        let code = Code::of(&Waveform::of(&L1_CA).unwrap());
+        let error = |which, excess: f64, phase: f64| error_chips(&code, &[(excess, 0.25, phase)], which, 0.2);
+        for phase in [0.0, 0.5] {
+            assert!(error(DoubleDelta, 0.5, phase).abs() < 1e-9 && error(DotProduct, 0.5, phase).abs() > 0.02);
+            // Nearer than half a spacing both loops rest on the peak of the sum.
+            let [one, other] = [DoubleDelta, DotProduct].map(|which| error(which, 0.05, phase));
+            assert!((one - other).abs() < 1e-9 && one.abs() > 0.009, "{one}, {other}");
+        }
+        // At the end of its flank one tap of two leaves it: a·(δ − 1 + d)/(2 + a).
+        let end = error(DoubleDelta, 0.88, 0.0);
+        assert!((end - 0.25 * 0.08 / 2.25).abs() < 1e-9, "{end}");
     }
 
     #[test]

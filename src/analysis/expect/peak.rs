@@ -64,9 +64,9 @@ impl Peak {
         let half = 0.5 * spacing_chips;
         let height = match discriminator {
             Discriminator::EarlyMinusLate => self.value(half),
-            Discriminator::DotProduct | Discriminator::Coherent => self.value(0.0),
+            Discriminator::DotProduct | Discriminator::DoubleDelta | Discriminator::Coherent => self.value(0.0),
         };
-        self.slope(half) / height
+        discriminator.sum(half, |x| self.slope(x)) / height
     }
 
     /// Minus its slope at a delay, by a difference that errs by 1e-9.
@@ -109,28 +109,27 @@ impl Code {
         self.peak.value(chips)
     }
 
-    /// Mean square of the error of early minus late at a distance of `d` chips that another code of N chips
+    /// Mean square of the error of a discriminator at a distance of `d` chips that another code of N chips
     /// makes, of equal power and phases at random, times N ([`super::beats`]).
-    pub(super) fn stray_chips2(&self, d: f64) -> f64 {
+    pub(super) fn stray_chips2(&self, discriminator: Discriminator, d: f64) -> f64 {
         let (half, step) = (0.5 * d, 1.0 / 256.0);
-        // A chip's correlation ends a chip from its middle.
-        let count = ((1.0 + half) / step).ceil() as i32;
+        // A chip's correlation ends a chip from its middle; no tap is further than `d`.
+        let count = ((1.0 + d) / step).ceil() as i32;
         let apart = |k: i32| {
             let at = step * f64::from(k);
-            self.value(at + half) - self.value(at - half)
+            discriminator.sum(half, |side| self.value(at + side) - self.value(at - side))
         };
         let square: f64 = (-count..=count).map(|k| apart(k) * apart(k) * step).sum();
-        let slope = self.peak.slope(half);
+        let slope = discriminator.sum(half, |side| self.peak.slope(side));
         square / (8.0 * slope * slope)
     }
 }
 
 /// Standard deviation of one discriminator value, in chips, for the shapes of signal and noise.
 pub(super) fn raw_chips(discriminator: Discriminator, (signal, noise): &(Peak, Peak), d: f64, snr: f64) -> f64 {
-    let height = signal.value(0.5 * d) / signal.value(0.0);
-    let slope = signal.slope(0.5 * d) / signal.value(0.0);
-    let rho = noise.value(d) / noise.value(0.0);
-    dll::raw_on_chips(discriminator, Taps { height, slope, common: rho }, snr)
+    let (peak, power) = (signal.value(0.0), noise.value(0.0));
+    let found = |x: f64| [signal.value(x) / peak, signal.slope(x) / peak];
+    dll::raw_on_chips(discriminator, Taps::of(discriminator, d, found, |x| noise.value(x) / power), snr)
 }
 
 #[cfg(test)]
@@ -144,7 +143,7 @@ mod tests {
     fn peaks_are_the_triangle_without_averages_and_rounded_with_them() {
         let chips = Waveform::of(&L1_CA).unwrap();
         let plain = (Peak::new(&chips, 0.4, 0), Peak::new(&chips, 0.4, 0));
-        for discriminator in [Discriminator::EarlyMinusLate, Discriminator::DotProduct] {
+        for discriminator in [Discriminator::EarlyMinusLate, Discriminator::DotProduct, Discriminator::DoubleDelta] {
             for cn0_hz in [1e3, 1e4, 1e5] {
                 let known = dll::raw_chips(discriminator, 0.5, 4e-3, cn0_hz);
                 let found = raw_chips(discriminator, &plain, 0.5, 4e-3 * cn0_hz);
@@ -189,9 +188,17 @@ mod tests {
         let found = 1023.0 * 0.5 * (differences / count) / 4.0;
         let code = Code::of(&Waveform::of(&L1_CA).unwrap());
         // Neighbouring values of these codes differ by a fortieth less than those of a random walk.
-        assert!((code.stray_chips2(0.5) / found - 1.0).abs() < 0.06, "{} {found}", code.stray_chips2(0.5));
+        assert!(
+            (code.stray_chips2(Discriminator::EarlyMinusLate, 0.5) / found - 1.0).abs() < 0.06,
+            "{} {found}",
+            code.stray_chips2(Discriminator::EarlyMinusLate, 0.5)
+        );
         // At small distances d²/4 and in the rms d/2.
-        assert!((code.stray_chips2(0.02) / (0.25 * 4e-4) - 1.0).abs() < 0.02, "{}", code.stray_chips2(0.02));
+        assert!(
+            (code.stray_chips2(Discriminator::EarlyMinusLate, 0.02) / (0.25 * 4e-4) - 1.0).abs() < 0.02,
+            "{}",
+            code.stray_chips2(Discriminator::EarlyMinusLate, 0.02)
+        );
     }
 
     #[test]

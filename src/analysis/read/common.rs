@@ -11,6 +11,7 @@ use serde_json::Value;
 
 use super::delay;
 use crate::waveform::{Edge, Sampler, Waveform};
+use gnss::discriminator::CodeDiscriminator;
 use gnss::facts::{FilterSpec, SceneFacts, filters, oscillator_offset_hz};
 use gnss::record::Observation;
 use gnss::signal::{Link, Signal};
@@ -38,6 +39,14 @@ fn spacing_chips(receiver: &Value, signal: &Signal) -> f64 {
     let own = followed.and_then(|all| all.iter().find(is_own)?.get("spacing_chips"));
     let settings = receiver.get("settings").unwrap_or(receiver);
     own.or_else(|| settings.pointer("/tracking/spacing_chips")).and_then(Value::as_f64).unwrap_or(USUAL_SPACING_CHIPS)
+}
+
+/// Discriminator of the code loops; the usual one where a receiver names none that is known.
+fn discriminator(receiver: &Value) -> CodeDiscriminator {
+    let settings = receiver.get("settings").unwrap_or(receiver);
+    let named = settings.pointer("/tracking/dll_discriminator").and_then(Value::as_str);
+    let known = CodeDiscriminator::ALL.into_iter().find(|one| Some(one.name()) == named);
+    known.unwrap_or(CodeDiscriminator::EarlyMinusLate)
 }
 
 /// The common part.
@@ -75,8 +84,8 @@ impl Common {
             let (stages, rate_hz) = scene.stages(received(signal));
             let samples = Sampler::of(scene, received(signal));
             let replica = Sampler::new(replica_edge(receiver, samples.edge()), rate_hz);
-            let spacing_chips = spacing_chips(receiver, signal);
-            let of = |filter: &FilterSpec| delay::code_delay_s(filter, &code, [&samples, &replica], spacing_chips);
+            let taps = (discriminator(receiver), spacing_chips(receiver, signal));
+            let of = |filter: &FilterSpec| delay::code_delay_s(filter, &code, [&samples, &replica], taps);
             Some((*signal, filters(stages).map(of).sum()))
         };
         self.code_delays_s = self.satellites.keys().filter_map(delay_s).collect();

@@ -12,6 +12,7 @@ use num_complex::Complex64;
 
 use crate::response::Response;
 use crate::waveform::{Sampler, Waveform};
+use gnss::discriminator::CodeDiscriminator;
 use gnss::facts::{FilterShape, FilterSpec};
 use gnss::signal::phasor;
 
@@ -68,15 +69,23 @@ impl Lines {
     }
 }
 
-/// Delay of a filter's code at a loop of that spacing, for what makes the samples and the replica's; the one
-/// that the filter states where its shape does not bend.
-pub fn code_delay_s(filter: &FilterSpec, code: &Waveform, samplers: [&Sampler; 2], spacing_chips: f64) -> f64 {
+/// Delay of a filter's code at a loop of that discriminator and spacing, for what makes the samples and the
+/// replica's; the one that the filter states where its shape does not bend.
+pub fn code_delay_s(
+    filter: &FilterSpec,
+    code: &Waveform,
+    samplers: [&Sampler; 2],
+    (discriminator, spacing_chips): (CodeDiscriminator, f64),
+) -> f64 {
     let middle_s = filter.group_delay_s;
     let FilterShape::Butterworth { .. } = filter.shape else { return middle_s };
     let lines = Lines::new(filter, code, samplers);
     let half_s = 0.5 * spacing_chips / code.chip_rate_hz();
-    let late_wins =
-        |at_s: f64| libm::fabs(lines.correlation(at_s + half_s)) > libm::fabs(lines.correlation(at_s - half_s));
+    let late_wins = |at_s: f64| {
+        let less_early =
+            |side_s: f64| libm::fabs(lines.correlation(at_s + side_s)) - libm::fabs(lines.correlation(at_s - side_s));
+        discriminator.pairs().iter().map(|(apart, weight)| weight * less_early(apart * half_s)).sum::<f64>() > 0.0
+    };
     let about_s = code.reach_s().min(1.0 / code.chip_rate_hz());
     let (mut low_s, mut high_s) = (middle_s - about_s, middle_s + about_s);
     // To 1e-16 s of a microsecond.
@@ -103,7 +112,13 @@ mod tests {
             middle_hz: None,
         };
         let [samples, replica] = [edge, Edge::Area].map(|edge| Sampler::new(edge, rate_hz));
-        299_792_458.0 * code_delay_s(&filter, &Waveform::of(&L1_CA).unwrap(), [&samples, &replica], 0.5)
+        299_792_458.0
+            * code_delay_s(
+                &filter,
+                &Waveform::of(&L1_CA).unwrap(),
+                [&samples, &replica],
+                (CodeDiscriminator::EarlyMinusLate, 0.5),
+            )
     }
 
     #[test]

@@ -216,14 +216,14 @@ impl CodeNoise {
     /// With C the power that the loop follows: B·(1−ρ)/(2·C/N0·a′²)·(1 + s) with slope a′ and noise
     /// correlation ρ of early and late. The squaring loss s is (1+ρ)/(2·T·C/N0·a²) of early minus late power,
     /// with height a; on a triangle that is Kaplan and Hegarty's equation 5.23 (2nd ed.), first branch. It is
-    /// 1/(T·C/N0) of the dot product, whose prompt has the whole height.
+    /// 1/(T·C/N0) of the dot products, whose prompt has the whole height.
     pub fn sigma_m(&self, cn0_hz: f64) -> f64 {
         let CodeShape { value, slope, common } = self.shape;
         let cn0_hz = planted!("receiver.position.share", self.share, 1.0) * cn0_hz;
         let snr = self.integration_s * cn0_hz;
         let squaring = match self.discriminator {
             CodeDiscriminator::EarlyMinusLate => (1.0 + common) / (2.0 * snr * value * value),
-            CodeDiscriminator::DotProduct => 1.0 / snr,
+            CodeDiscriminator::DotProduct | CodeDiscriminator::DoubleDelta => 1.0 / snr,
         };
         let spread = (1.0 - common) / (slope * slope);
         self.chip_m * (self.bandwidth_hz * spread / (2.0 * cn0_hz) * (1.0 + squaring)).sqrt()

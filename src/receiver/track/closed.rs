@@ -119,12 +119,12 @@ impl Loops {
         chips_per_s * update_s / self.dll.phase
     }
 
-    /// Closes the loops with the sums of early, prompt and late over the `periods` code periods of an
-    /// integration of `t_s`. `before` is the prompt `t_s` earlier, `cn0_hz` the best estimate of C/N0.
+    /// Closes the loops with the sums of early, prompt, late, and very early less very late where the
+    /// discriminator takes them, over the `periods` code periods of an integration of `t_s`. `before` is the prompt `t_s` earlier, `cn0_hz` the best estimate of C/N0.
     pub fn close(
         &mut self,
         mode: Mode,
-        [early, prompt, late]: [Complex64; 3],
+        [early, prompt, late, outer]: [Complex64; 4],
         before: Option<Complex64>,
         periods: u32,
         t_s: f64,
@@ -155,6 +155,10 @@ impl Loops {
         update.dll_chips = match self.discriminator {
             CodeDiscriminator::EarlyMinusLate => loops::early_minus_late(early, late, &self.shape, gain),
             CodeDiscriminator::DotProduct => loops::dot_product(early, prompt, late, &self.shape, gain),
+            CodeDiscriminator::DoubleDelta => {
+                let inner = early - planted!("receiver.loops.outer", 0.5, 0.0) * outer;
+                loops::dot_product(inner, prompt, late, &self.shape, gain)
+            }
         };
         (self.code, update.code_jump_chips) = loops::step(&self.dll, &self.code, update.dll_chips, t_s);
         update
@@ -165,6 +169,8 @@ impl Loops {
 fn gain(settings: &TrackingSettings, shape: CodeShape) -> CodeGain {
     match settings.dll_discriminator {
         CodeDiscriminator::EarlyMinusLate => CodeGain::new(shape, |shape, snr| shape.early_minus_late_gain(snr)),
-        CodeDiscriminator::DotProduct => CodeGain::new(shape, |_, snr| loops::dot_product_gain(snr)),
+        CodeDiscriminator::DotProduct | CodeDiscriminator::DoubleDelta => {
+            CodeGain::new(shape, |_, snr| loops::dot_product_gain(snr))
+        }
     }
 }

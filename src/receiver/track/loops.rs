@@ -7,6 +7,7 @@
 //! interval; then the one-sided noise bandwidth is exact and the loop is stable for every p in (0, 1). Steady
 //! error of order 3 under constant jerk: jerk·T³/K3.
 
+use gnss::discriminator::CodeDiscriminator;
 use num_complex::Complex64;
 
 /// Gains of a loop; those beyond its order are zero.
@@ -141,6 +142,27 @@ impl CodeShape {
     /// The triangle of unlimited bandwidth at a spacing `d` chips.
     pub fn triangle(d: f64) -> Self {
         Self { value: 1.0 - 0.5 * d, slope: 1.0, common: (1.0 - d).max(0.0) }
+    }
+
+    /// Shape for a discriminator with `spacing_chips` from early to late, on a correlation whose value and
+    /// slope a chip are `found` and which the noise of two taps has as `own`, both over offsets in chips.
+    ///
+    /// Several pairs count as one of the slope of their weighted sum, with as much noise in common as leaves
+    /// the sum its variance: 2·(1 − common) of a tap's.
+    pub fn of(
+        discriminator: CodeDiscriminator,
+        spacing_chips: f64,
+        found: impl Fn(f64) -> (f64, f64),
+        own: impl Fn(f64) -> f64,
+    ) -> Self {
+        let (half, (peak, _), power) = (0.5 * spacing_chips, found(0.0), own(0.0));
+        let pairs = discriminator.pairs();
+        let slope: f64 = pairs.iter().map(|(apart, weight)| weight * found(apart * half).1).sum();
+        let crossed = |(a, v): &(f64, f64), (b, w): &(f64, f64)| v * w * (own((a - b) * half) - own((a + b) * half));
+        let outer = pairs.iter().skip(1);
+        let more: f64 =
+            outer.map(|pair| crossed(pair, pair) + pairs.first().map_or(0.0, |first| 2.0 * crossed(first, pair))).sum();
+        Self { value: found(half).0 / peak, slope: -slope / peak, common: own(spacing_chips) / power - more / power }
     }
 
     /// Mean gain of [`early_minus_late`] at a T·C/N0 of the prompts.

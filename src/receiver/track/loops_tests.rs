@@ -218,6 +218,24 @@ fn the_gain_given_back_is_the_mean_slope_of_the_discriminator() {
 }
 
 #[test]
+fn two_pairs_count_as_one_of_half_the_slope_and_half_the_noise() {
+    let triangle = |x: f64| (1.0 - x.abs()).max(0.0);
+    let found = |x: f64| (triangle(x), -1_f64.copysign(x));
+    for d in [0.1, 0.3, 0.6] {
+        for discriminator in [CodeDiscriminator::EarlyMinusLate, CodeDiscriminator::DotProduct] {
+            assert_eq!(CodeShape::of(discriminator, d, found, triangle), CodeShape::triangle(d));
+        }
+        let both = CodeShape::of(CodeDiscriminator::DoubleDelta, d, found, triangle);
+        // Chips of white noise under the weights: ±1 over d at either end for the inner pair, ∓½ over 2d for the
+        // outer one about the same middle. Half is left everywhere, over 2d at each end: a variance of d, which
+        // is 2·(1 − common).
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{both:?}");
+        near(both.slope, 0.5);
+        near(both.common, 1.0 - 0.5 * d);
+    }
+}
+
+#[test]
 fn the_tabled_gain_is_the_gain() {
     let shape = CodeShape::triangle(0.5);
     let mut table = CodeGain::new(shape, |shape, snr| shape.early_minus_late_gain(snr));

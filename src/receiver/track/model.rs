@@ -40,10 +40,9 @@ impl ReplicaModel {
                 (value * both, slope * both + value * tone.slope_of_both(chips))
             })
         };
-        let (half, (peak, _)) = (0.5 * settings.spacing_chips, at(&signal, 0.0));
-        let ((side, slope), (power, _)) = (at(&signal, half), at(&own, 0.0));
-        let (common, _) = at(&own, settings.spacing_chips);
-        let shape = CodeShape { value: side / peak, slope: -slope / peak, common: common / power };
+        let (power, _) = at(&own, 0.0);
+        let of = |chips: f64| at(&own, chips).0;
+        let shape = CodeShape::of(settings.dll_discriminator, settings.spacing_chips, |chips| at(&signal, chips), of);
         Some(Self { shape, power, efficiency: efficiency(&signal, &own) })
     }
 }

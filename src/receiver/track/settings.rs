@@ -5,17 +5,8 @@ use thiserror::Error;
 
 use crate::correlate::{Arithmetic, Edge};
 use crate::described::described;
+pub use gnss::discriminator::CodeDiscriminator;
 use gnss::signal::{Component, Layers};
-
-/// Discriminator of the code loop.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CodeDiscriminator {
-    /// Non-coherent early minus late power over early plus late power.
-    EarlyMinusLate,
-    /// (early − late)·prompt over prompt power.
-    DotProduct,
-}
 
 described! {
 /// Settings of every tracking channel. Bandwidths are one-sided noise bandwidths of the discrete loop, exact.
@@ -44,7 +35,8 @@ pub struct TrackingSettings {
     pub dll_pull_in_s: f64,
     /// Discriminator of the code loop.
     pub dll_discriminator: CodeDiscriminator,
-    /// Spacing from early to late correlator; for BOC divided by the steps of its pulse.
+    /// Spacing from early to late correlator; for BOC divided by the steps of its pulse. The outer pair of
+    /// double_delta is twice as far apart.
     pub spacing_chips: f64,
     /// Code periods of 1 ms per loop update once symbols are known: a divisor of 20. Longer codes use as many
     /// periods as fit.
@@ -261,6 +253,9 @@ impl TrackingSettings {
              positive(self.dll_pull_in_bandwidth_hz), "above 0"),
             ("dll_pull_in_s", self.dll_pull_in_s, within(self.dll_pull_in_s, 0.0, 60.0), "0 to 60"),
             ("spacing_chips", self.spacing_chips, within(self.spacing_chips, 0.02, 1.5), "0.02 to 1.5"),
+            ("spacing_chips", self.spacing_chips,
+             within(self.spacing_chips * self.dll_discriminator.widest(), 0.0, 2.0),
+             "1 at most, with dll_discriminator = \"double_delta\""),
             ("integration", f64::from(self.integration),
              INTEGRATIONS.contains(&self.integration), "1, 2, 4, 5, 10 or 20"),
             ("phase_lock_threshold", self.phase_lock_threshold,

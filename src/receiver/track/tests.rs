@@ -309,7 +309,7 @@ fn cn0_of_a_channel_in_its_pull_in_is_within_a_decibel_after_three_tenths_of_a_s
 #[test]
 fn without_noise_code_and_carrier_are_unbiased() {
     let sky = Sky { cn0_dbhz: None, duration_s: 6.0, doppler_hz: -2345.6, ..Default::default() };
-    for dll_discriminator in [CodeDiscriminator::EarlyMinusLate, CodeDiscriminator::DotProduct] {
+    for dll_discriminator in CodeDiscriminator::ALL {
         let settings = TrackingSettings { dll_discriminator, ..Default::default() };
         let (_, report) = sky.follow(&settings, 65_536, &sky.hit(20.0, 0.1));
         let late = report.measurements.iter().filter(|m| m.sample > 7_800_000);

@@ -54,7 +54,7 @@ use ray::Question;
 pub use refusal::refuse;
 use sent::Sent;
 use separation::Sampled;
-use taps::{MOST, is_near};
+use taps::{LANES, MOST, is_near};
 use train::Train;
 
 use crate::{Done, TwinError, settings_for};
@@ -392,11 +392,15 @@ impl Correlations<'_> {
         for sent in self.alike(place) {
             train.add(sent, taps, sums);
         }
-        let crowd = place.and_then(|place| self.crowd(place));
-        made.with_taps(code.link.sv.number, taps, |taps| {
-            if let Some(crowd) = crowd {
-                crowd.add(train.intervals, taps, sums);
+        if let Some(crowd) = place.and_then(|place| self.crowd(place)) {
+            // As many taps at once as it looks up.
+            for (first, part) in (0..).step_by(LANES).zip(taps.chunks(LANES)) {
+                made.with_taps(code.link.sv.number, part, |part| {
+                    crowd.add(train.intervals, part, (first, taps.len()), sums);
+                });
             }
+        }
+        made.with_taps(code.link.sv.number, taps, |taps| {
             if deviation <= 0.0 {
                 return;
             }

@@ -9,7 +9,7 @@ use gnss::signal::PeakTable;
 
 /// Taps of one question, at most.
 pub(super) const MOST: usize = 8;
-/// Taps that other satellites' chips are looked up for at once. A signal with more has no crowd.
+/// Taps that other satellites' chips are looked up for at once.
 pub(super) const LANES: usize = 4;
 /// Taps that correlate with each other lie within this of the prompt, in chips.
 const NEAR_CHIPS: f64 = 4.0;

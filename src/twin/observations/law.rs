@@ -131,7 +131,7 @@ impl Law {
         let rate_hz = scene.clock.rate.hz();
         let peaks = |one: &Component| peaks(one, scene, &settings.tracking);
         let (found, own) = peaks(component)?;
-        let shape = shape(&found, &own, tracking.spacing_chips);
+        let shape = shape(&found, &own, &tracking);
         let assumed = ReplicaModel::new(&tracking, component, rate_hz)?.shape;
         let steepness = |shape: &CodeShape| shape.slope / shape.value;
         let gain = steepness(&shape) / steepness(&assumed);
@@ -248,13 +248,10 @@ fn reach_chips(found: &PeakTable) -> f64 {
     f64::from(falls.last().unwrap_or(1)) / STEPS_PER_CHIP
 }
 
-/// Shape of a correlation at early and late.
-fn shape(found: &PeakTable, own: &PeakTable, spacing_chips: f64) -> CodeShape {
-    let (half, peak) = (0.5 * spacing_chips, found.value(0.0));
-    let rise = found.value(half - SLOPE_CHIPS) - found.value(half + SLOPE_CHIPS);
-    CodeShape {
-        value: found.value(half) / peak,
-        slope: rise / (2.0 * SLOPE_CHIPS) / peak,
-        common: own.value(spacing_chips) / own.value(0.0),
-    }
+/// Shape of a correlation at the taps of the discriminator.
+fn shape(found: &PeakTable, own: &PeakTable, tracking: &TrackingSettings) -> CodeShape {
+    let slope =
+        |chips: f64| (found.value(chips + SLOPE_CHIPS) - found.value(chips - SLOPE_CHIPS)) / (2.0 * SLOPE_CHIPS);
+    let at = |chips: f64| (found.value(chips), slope(chips));
+    CodeShape::of(tracking.dll_discriminator, tracking.spacing_chips, at, |chips| own.value(chips))
 }

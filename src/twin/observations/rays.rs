@@ -69,11 +69,19 @@ impl Sight {
     /// Position in chips behind the first ray at which the code loop rests.
     pub fn rest_chips(&self, law: &Law) -> f64 {
         let spacing = law.spacing_chips;
-        let late = |at: f64| {
-            let [early, late] = [-0.5, 0.5].map(|side| self.sum(law, at + side * spacing));
-            match law.code.discriminator {
-                CodeDiscriminator::EarlyMinusLate => early.norm_sqr() > late.norm_sqr(),
-                CodeDiscriminator::DotProduct => ((early - late) * self.sum(law, at).conj()).re > 0.0,
+        let pair = |at: f64, apart: f64| [-0.5, 0.5].map(|side| self.sum(law, at + side * apart * spacing));
+        let late = |at: f64| match law.code.discriminator {
+            CodeDiscriminator::EarlyMinusLate => {
+                let [early, late] = pair(at, 1.0);
+                early.norm_sqr() > late.norm_sqr()
+            }
+            product @ (CodeDiscriminator::DotProduct | CodeDiscriminator::DoubleDelta) => {
+                let difference = |(apart, weight): &(f64, f64)| {
+                    let [early, late] = pair(at, *apart);
+                    (early - late) * weight
+                };
+                let all: Complex64 = product.pairs().iter().map(difference).sum();
+                (all * self.sum(law, at).conj()).re > 0.0
             }
         };
         let (mut low, mut high) = (-0.5 * spacing, spacing.min(law.reach_chips - 0.5 * spacing));

@@ -5,6 +5,10 @@
 //! one-sided noise bandwidth of the discrete loop, so the factor (1−½·B·T) of continuous updates is left out.
 //! White noise, no multipath.
 
+use std::iter::Sum;
+use std::ops::Mul;
+
+use gnss::discriminator::CodeDiscriminator;
 use gnss::signal::sinc_squared;
 
 /// A code discriminator, by its noise.
@@ -14,18 +18,36 @@ pub enum Discriminator {
     EarlyMinusLate,
     /// (early − late)·prompt.
     DotProduct,
+    /// Dot product of two pairs, the outer one twice as far apart and half as heavy.
+    DoubleDelta,
     /// Coherent early minus late.
     Coherent,
+}
+
+impl From<CodeDiscriminator> for Discriminator {
+    fn from(of_receiver: CodeDiscriminator) -> Self {
+        match of_receiver {
+            CodeDiscriminator::EarlyMinusLate => Self::EarlyMinusLate,
+            CodeDiscriminator::DotProduct => Self::DotProduct,
+            CodeDiscriminator::DoubleDelta => Self::DoubleDelta,
+        }
+    }
 }
 
 impl Discriminator {
     /// Discriminator by the name that a receiver's settings have for it; `None` of another name.
     pub fn named(name: &str) -> Option<Self> {
-        match name {
-            "early_minus_late" => Some(Self::EarlyMinusLate),
-            "dot_product" => Some(Self::DotProduct),
-            _ => None,
-        }
+        CodeDiscriminator::ALL.into_iter().find(|one| one.name() == name).map(Self::from)
+    }
+
+    /// Weighted sum of what `difference` gives for each pair of taps, which are so many chips from the prompt;
+    /// `half` is half the distance of early and late.
+    pub fn sum<T: Sum<T> + Mul<f64, Output = T>>(self, half: f64, difference: impl Fn(f64) -> T) -> T {
+        let pairs: &[(f64, f64)] = match self {
+            Self::DoubleDelta => &[(1.0, 1.0), (2.0, -0.5)],
+            Self::EarlyMinusLate | Self::DotProduct | Self::Coherent => &[(1.0, 1.0)],
+        };
+        pairs.iter().map(|(apart, weight)| difference(apart * half) * *weight).sum()
     }
 }
 
@@ -33,16 +55,17 @@ impl Discriminator {
 fn squaring(discriminator: Discriminator, d: f64, snr: f64) -> f64 {
     match discriminator {
         Discriminator::EarlyMinusLate => 2.0 / ((2.0 - d) * snr),
-        Discriminator::DotProduct => 1.0 / snr,
+        Discriminator::DotProduct | Discriminator::DoubleDelta => 1.0 / snr,
         Discriminator::Coherent => 0.0,
     }
 }
 
 /// Standard deviation of one discriminator value, in chips, unlimited bandwidth (eq. 5.23 first branch,
-/// without the loop).
+/// without the loop). Of the double delta, for `d` up to 2/3: half the slope, and half the variance.
 pub fn raw_chips(discriminator: Discriminator, d: f64, t_s: f64, cn0_hz: f64) -> f64 {
     let snr = t_s * cn0_hz;
-    (d / (planted!("analysis.theory.dll", 4.0, 2.0) * snr) * (1.0 + squaring(discriminator, d, snr))).sqrt()
+    let d_squared = if discriminator == Discriminator::DoubleDelta { 2.0 * d } else { d };
+    (d_squared / (planted!("analysis.theory.dll", 4.0, 2.0) * snr) * (1.0 + squaring(discriminator, d, snr))).sqrt()
 }
 
 /// Correlation of a code at early and late, relative to 1 at the prompt.
@@ -56,16 +79,35 @@ pub struct Taps {
     pub common: f64,
 }
 
+impl Taps {
+    /// Taps of a discriminator `d` chips apart. `found` gives height and slope, positive where it falls, of the
+    /// signal's correlation at an offset over the height of its peak, and `own` the correlation of noise.
+    ///
+    /// Of two pairs with weights 1 and w: slopes add as the weights say, and the variance of the sum is
+    /// 1 − ρ(d) + w²·(1 − ρ(2d)) + 2w·(ρ(d/2) − ρ(3d/2)) where that of one pair is 1 − ρ(d).
+    pub fn of(discriminator: Discriminator, d: f64, found: impl Fn(f64) -> [f64; 2], own: impl Fn(f64) -> f64) -> Self {
+        let half = 0.5 * d;
+        let [height, slope] = found(half);
+        let rho = own(d);
+        if discriminator != Discriminator::DoubleDelta {
+            return Self { height, slope, common: rho };
+        }
+        let [_, outer] = found(d);
+        let variance = 1.0 - rho + 0.25 * (1.0 - own(2.0 * d)) - (own(half) - own(3.0 * half));
+        Self { height, slope: slope - 0.5 * outer, common: 1.0 - variance }
+    }
+}
+
 /// Standard deviation of one discriminator value, in chips, on a correlation of any shape.
 ///
 /// With a and a′ height and slope and ρ the noise in common, (1−ρ)/(4·snr·a′²) times 1 plus the squaring
-/// loss: (1+ρ)/(2·snr·a²) of early minus late power, 1/snr of the dot product. Betz and Kolodziejski 2009,
+/// loss: (1+ρ)/(2·snr·a²) of early minus late power, 1/snr of the dot products. Betz and Kolodziejski 2009,
 /// their integrals written as the correlations that they are.
 pub fn raw_on_chips(discriminator: Discriminator, taps: Taps, snr: f64) -> f64 {
     let Taps { height, slope, common } = taps;
     let squaring = match discriminator {
         Discriminator::EarlyMinusLate => (1.0 + common) / (2.0 * snr * height * height),
-        Discriminator::DotProduct => 1.0 / snr,
+        Discriminator::DotProduct | Discriminator::DoubleDelta => 1.0 / snr,
         Discriminator::Coherent => 0.0,
     };
     ((1.0 - common) / (4.0 * snr * slope * slope) * (1.0 + squaring)).sqrt()
@@ -137,12 +179,12 @@ impl BandIntegrals {
 
     /// Closed-loop jitter in chips, eq. 5.22: coherent, or non-coherent early minus late.
     ///
-    /// `None` for the dot product, which that equation does not cover.
+    /// `None` for the dot products, which that equation does not cover.
     pub fn jitter_chips(&self, discriminator: Discriminator, bandwidth_hz: f64, t_s: f64, cn0_hz: f64) -> Option<f64> {
         let squaring = match discriminator {
             Discriminator::Coherent => 0.0,
             Discriminator::EarlyMinusLate => self.cos2 / (t_s * cn0_hz * self.cos * self.cos),
-            Discriminator::DotProduct => return None,
+            Discriminator::DotProduct | Discriminator::DoubleDelta => return None,
         };
         let turn = std::f64::consts::TAU * self.slope;
         Some((bandwidth_hz * self.sin2 / (turn * turn * cn0_hz) * (1.0 + squaring)).sqrt())
@@ -165,7 +207,7 @@ pub fn normalised_gain(discriminator: Discriminator, d: f64, t_s: f64, cn0_hz: f
     let snr = t_s * cn0_hz;
     match discriminator {
         Discriminator::Coherent => 1.0,
-        Discriminator::DotProduct => -libm::expm1(-snr),
+        Discriminator::DotProduct | Discriminator::DoubleDelta => -libm::expm1(-snr),
         Discriminator::EarlyMinusLate => {
             let (x, r) = (snr * (1.0 - 0.5 * d), d / (2.0 - d));
             // Midpoints of equal steps of e^(−xu): the weight is then uniform.

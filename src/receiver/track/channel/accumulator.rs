@@ -72,8 +72,8 @@ impl<C: Correlator> Period<'_, C> {
 /// Correlations of a code period.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Correlations {
-    /// Early, prompt and late.
-    pub sums: [Complex64; 3],
+    /// Early, prompt, late, and very early less very late where the discriminator takes them.
+    pub sums: [Complex64; 4],
     /// Correlation at a delay where the code does not correlate with itself, if it was requested.
     pub noise: Option<Complex64>,
     /// Correlations on the neighbouring peaks, ahead and behind, of a signal that has them.
@@ -92,12 +92,14 @@ pub(super) struct Accumulator {
     replica_power: f64,
     /// Code phases of early, prompt and late.
     pub taps: [i64; 3],
+    /// True if the discriminator takes taps twice as far from the prompt as early and late too.
+    takes_outer: bool,
     /// Delays at which the code does not correlate with itself.
     noise_taps: Vec<i64>,
     /// Mean power of the samples.
     power: Option<f64>,
-    /// Early, prompt and late of the running integration.
-    pub sums: [Complex64; 3],
+    /// Sums of the running integration, as of a code period.
+    pub sums: [Complex64; 4],
     /// Code periods of the running integration.
     pub periods: u32,
     /// Sample at which the running integration began.
@@ -142,9 +144,10 @@ impl Accumulator {
             coded,
             ahead: Ahead::default(),
             taps: [half, 0, -half],
+            takes_outer: settings.dll_discriminator.widest() > 1.0,
             noise_taps: Vec::new(),
             power: None,
-            sums: [Complex64::ZERO; 3],
+            sums: [Complex64::ZERO; 4],
             periods: 0,
             since: 0,
             previous: None,
@@ -192,21 +195,44 @@ impl Accumulator {
     ) -> Correlations {
         let Some(coded) = &self.coded else { return Correlations::default() };
         let [e, p, l] = self.taps;
+        if self.takes_outer {
+            let [x, y] = [2 * e, 2 * l];
+            return match (quiet, sides) {
+                (None, None) => {
+                    let [e, p, l, x, y] = period.sums_ahead(&mut self.ahead, coded, &[e, p, l, x, y]);
+                    Correlations { sums: [e, p, l, x - y], ..Correlations::default() }
+                }
+                (Some(quiet), None) => {
+                    let [e, p, l, noise, x, y] = period.sums(coded, &[e, p, l, quiet, x, y]);
+                    Correlations { sums: [e, p, l, x - y], noise: Some(noise), sides: None }
+                }
+                (None, Some([a, b])) => {
+                    let [e, p, l, x, y, a, b] = period.sums_ahead(&mut self.ahead, coded, &[e, p, l, x, y, a, b]);
+                    Correlations { sums: [e, p, l, x - y], noise: None, sides: Some([a, b]) }
+                }
+                (Some(quiet), Some([a, b])) => {
+                    let [e, p, l, noise, x, y, a, b] = period.sums(coded, &[e, p, l, quiet, x, y, a, b]);
+                    Correlations { sums: [e, p, l, x - y], noise: Some(noise), sides: Some([a, b]) }
+                }
+            };
+        }
+        let none = Complex64::ZERO;
         match (quiet, sides) {
             (None, None) => {
-                Correlations { sums: period.sums_ahead(&mut self.ahead, coded, &self.taps), ..Correlations::default() }
+                let [e, p, l] = period.sums_ahead(&mut self.ahead, coded, &self.taps);
+                Correlations { sums: [e, p, l, none], ..Correlations::default() }
             }
             (Some(quiet), None) => {
                 let [e, p, l, noise] = period.sums(coded, &[e, p, l, quiet]);
-                Correlations { sums: [e, p, l], noise: Some(noise), sides: None }
+                Correlations { sums: [e, p, l, none], noise: Some(noise), sides: None }
             }
             (None, Some([a, b])) => {
                 let [e, p, l, a, b] = period.sums_ahead(&mut self.ahead, coded, &[e, p, l, a, b]);
-                Correlations { sums: [e, p, l], noise: None, sides: Some([a, b]) }
+                Correlations { sums: [e, p, l, none], noise: None, sides: Some([a, b]) }
             }
             (Some(quiet), Some([a, b])) => {
                 let [e, p, l, noise, a, b] = period.sums(coded, &[e, p, l, quiet, a, b]);
-                Correlations { sums: [e, p, l], noise: Some(noise), sides: Some([a, b]) }
+                Correlations { sums: [e, p, l, none], noise: Some(noise), sides: Some([a, b]) }
             }
         }
     }
@@ -227,15 +253,15 @@ impl Accumulator {
         if deviation > 0.0 { 1.0 / deviation } else { 0.0 }
     }
 
-    /// Adds the early, prompt and late correlations of a code period.
-    pub fn add(&mut self, taps: [Complex64; 3]) {
+    /// Adds the correlations of a code period.
+    pub fn add(&mut self, taps: [Complex64; 4]) {
         self.sums.iter_mut().zip(taps).for_each(|(sum, tap)| *sum += tap);
         self.periods += 1;
     }
 
     /// Begins an integration at sample `since`.
     pub fn clear(&mut self, since: u64) {
-        (self.sums, self.periods, self.since) = ([Complex64::ZERO; 3], 0, since);
+        (self.sums, self.periods, self.since) = ([Complex64::ZERO; 4], 0, since);
     }
 
     /// Forgets the prompts before.

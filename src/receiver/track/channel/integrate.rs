@@ -80,8 +80,8 @@ impl Channel {
         self.companions.long.as_mut()?.add(period.number, code, |coded| scale * period.prompt(coded).re)
     }
 
-    /// Takes the early, prompt and late correlations of code period `number`.
-    fn take(&mut self, number: u64, taps: [Complex64; 3], report: &mut Report) {
+    /// Takes the correlations of code period `number`: early, prompt, late, and very early less very late.
+    fn take(&mut self, number: u64, taps: [Complex64; 4], report: &mut Report) {
         let prompt = taps[1];
         self.accumulator.add(taps);
         self.glances.add(number, prompt, self.accumulator.previous);
