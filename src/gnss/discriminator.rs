@@ -1,7 +1,7 @@
 //! Code discriminators by the taps that they take.
 //!
-//! Receivers and their judges name them alike. How a receiver normalises them, and what noise and rays make of
-//! them, is no matter of this room.
+//! Receivers and their judges name them alike. How a receiver normalises them, and what noise and rays make
+//! of them, is no matter of this room.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,9 +13,9 @@ pub enum CodeDiscriminator {
     EarlyMinusLate,
     /// (early − late)·prompt over prompt power.
     DotProduct,
-    /// The dot product of two pairs, (early − late − ½·(very early − very late))·prompt over prompt power. The
-    /// outer pair is twice as far apart. Late rays move it less than the others: the slopes of both pairs cancel
-    /// where no tap is near a ray's peak (G. A. McGraw and M. S. Braasch, ION NTM 1999).
+    /// The dot product of two pairs, (early − late − ½·(very early − very late))·prompt over prompt power.
+    /// The outer pair is twice as far apart. Late rays move it less than the others: the slopes of both pairs
+    /// cancel where no tap is near a ray's peak (G. A. McGraw and M. S. Braasch, ION NTM 1999).
     DoubleDelta,
 }
 
@@ -32,8 +32,8 @@ impl CodeDiscriminator {
         }
     }
 
-    /// Pairs of an early and a late tap: their distance in spacings from early to late, and the weight of their
-    /// difference.
+    /// Pairs of an early and a late tap: their distance in spacings from early to late, and the weight of
+    /// their difference.
     pub const fn pairs(self) -> &'static [(f64, f64)] {
         match self {
             Self::EarlyMinusLate | Self::DotProduct => &[(1.0, 1.0)],

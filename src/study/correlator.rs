@@ -213,8 +213,8 @@ pub fn simulate(case: &Case, mut each: impl FnMut(&Epoch)) -> (u64, Option<(f64,
     (channel.watch.interruptions, None)
 }
 
-/// Early, prompt and late; the taps on either side peak where those are watched; very early and very late where
-/// the discriminator takes them.
+/// Early, prompt and late; the taps on either side peak where those are watched; very early and very late
+/// where the discriminator takes them.
 #[derive(Clone, Copy, Debug)]
 struct Taps {
     count: usize,

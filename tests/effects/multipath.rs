@@ -29,9 +29,9 @@ fn envelope_chips(a: f64, delay: f64, d: f64) -> f64 {
     }
 }
 
-/// Error of a double delta loop with one echo: the zero of the sum of two pairs on the sides of two triangles. Of
-/// the inner pair early less late is 2x, d and 1 − x + d/2, of the outer one 2x, 2d and 1 − x + d (McGraw and
-/// Braasch 1999).
+/// Error of a double delta loop with one echo: the zero of the sum of two pairs on the sides of two
+/// triangles. Of the inner pair early less late is 2x, d and 1 − x + d/2, of the outer one 2x, 2d and 1 − x +
+/// d (McGraw and Braasch 1999).
 fn double_delta_chips(a: f64, delay: f64, d: f64) -> f64 {
     if delay <= 0.5 * (1.0 + a) * d {
         a * delay / (1.0 + a)

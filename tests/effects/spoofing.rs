@@ -54,8 +54,8 @@ fn a_time_pushed_off_is_captured_at_a_place_that_nobody_pushed() {
     let claimed_m = number("/spoofing/claimed_clock_max_m");
     assert!((claimed_m - 422.7).abs() < 1.0, "{claimed_m}");
     assert_eq!(number("/spoofing/claimed_displacement_max_m"), 0.0, "{summary}");
-    // While the channels go over one by one, within the ramp of 4 s, a fix mixes two clocks. After it nothing moves the
-    // place: 5 m are four sigma of a fix.
+    // While the channels go over one by one, within the ramp of 4 s, a fix mixes two clocks. After it nothing
+    // moves the place: 5 m are four sigma of a fix.
     let position = std::fs::read_to_string(run.join("position.csv")).unwrap();
     assert!(position.starts_with("sample,time_s,east_m,north_m,up_m,"), "{position}");
     let rows =

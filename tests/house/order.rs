@@ -127,7 +127,7 @@ pub const ORDER: Order<'static> = &[
             &["facts", "fault", "files", "word_file"],
             &["numbers", "spill_store"],
             &["rinex_obs", "nmea", "delay", "detection", "emission", "levels", "protection", "rows", "table"],
-            &["common", "fixes"],
+            &["common", "derived", "fixes"],
             &["run"],
             &["attacks", "inertial", "sky"],
         ],

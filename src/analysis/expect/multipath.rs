@@ -2,8 +2,9 @@
 //!
 //! E, P and L are the sums over the rays of amplitude, phase and correlation, at the loop's estimate and half
 //! a spacing to either side. A loop of early minus late power rests where |E|² = |L|², one of the dot product
-//! where Re((E−L)·P*) = 0, one of the double delta where that of both pairs is. Limits: the front end's rounding of the correlation is left out, and rays are
-//! taken as steady over the loop's time constant, so that what moves fast is overrated.
+//! where Re((E−L)·P*) = 0, one of the double delta where that of both pairs is. Limits: the front end's
+//! rounding of the correlation is left out, and rays are taken as steady over the loop's time constant, so
+//! that what moves fast is overrated.
 
 use std::collections::HashMap;
 use std::iter::Peekable;

@@ -30,7 +30,7 @@ pub struct MultipleAccess<'r> {
     sums_hz: RefCell<LevelFinder<'r, Emission>>,
 }
 
-/// What holds of a whole run.
+/// Tables that hold for a whole run.
 struct Tables {
     /// κ of the emissions that a signal meets, its own among them.
     kappa_s: HashMap<Emission, Vec<(Emission, f64)>>,

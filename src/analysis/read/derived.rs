@@ -1,4 +1,5 @@
-//! What measures derive from a whole run and share: it is made where it is first asked for, and once.
+//! Values that measures derive from a whole run and share: each is made where it is first asked for, and
+//! once.
 
 use std::any::{Any, TypeId};
 use std::collections::HashMap;

@@ -167,7 +167,7 @@ pub struct Run {
     pub peaks: Vec<PeakRow>,
     /// Speed of the stages.
     pub speed: Speed,
-    /// What measures share.
+    /// Values that measures share.
     pub derived: Derived,
 }
 

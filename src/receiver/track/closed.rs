@@ -120,7 +120,8 @@ impl Loops {
     }
 
     /// Closes the loops with the sums of early, prompt, late, and very early less very late where the
-    /// discriminator takes them, over the `periods` code periods of an integration of `t_s`. `before` is the prompt `t_s` earlier, `cn0_hz` the best estimate of C/N0.
+    /// discriminator takes them, over the `periods` code periods of an integration of `t_s`. `before` is the
+    /// prompt `t_s` earlier, `cn0_hz` the best estimate of C/N0.
     pub fn close(
         &mut self,
         mode: Mode,

@@ -226,9 +226,9 @@ fn two_pairs_count_as_one_of_half_the_slope_and_half_the_noise() {
             assert_eq!(CodeShape::of(discriminator, d, found, triangle), CodeShape::triangle(d));
         }
         let both = CodeShape::of(CodeDiscriminator::DoubleDelta, d, found, triangle);
-        // Chips of white noise under the weights: ±1 over d at either end for the inner pair, ∓½ over 2d for the
-        // outer one about the same middle. Half is left everywhere, over 2d at each end: a variance of d, which
-        // is 2·(1 − common).
+        // Chips of white noise under the weights: ±1 over d at either end for the inner pair, ∓½ over 2d for
+        // the outer one about the same middle. Half is left everywhere, over 2d at each end: a variance of d,
+        // which is 2·(1 − common).
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{both:?}");
         near(both.slope, 0.5);
         near(both.common, 1.0 - 0.5 * d);

@@ -189,8 +189,8 @@ impl Crowd {
     }
 
     /// Adds the other satellites' sums over intervals that begin with code periods and follow one another
-    /// with the same steps: for each interval one for each of `count` taps, of which `taps` are those from the
-    /// `first` on.
+    /// with the same steps: for each interval one for each of `count` taps, of which `taps` are those from
+    /// the `first` on.
     pub fn add(&self, intervals: &[Interval], taps: &Taps, (first, count): (usize, usize), sums: &mut [Complex64]) {
         for (intervals, sums) in intervals.chunks(TOGETHER).zip(sums.chunks_mut(TOGETHER * count.max(1))) {
             let parts = sums.chunks_mut(count.max(1)).map(|sums| sums.get_mut(first..).unwrap_or_default());

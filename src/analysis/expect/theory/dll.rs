@@ -40,8 +40,8 @@ impl Discriminator {
         CodeDiscriminator::ALL.into_iter().find(|one| one.name() == name).map(Self::from)
     }
 
-    /// Weighted sum of what `difference` gives for each pair of taps, which are so many chips from the prompt;
-    /// `half` is half the distance of early and late.
+    /// Weighted sum of what `difference` gives for each pair of taps, which are so many chips from the
+    /// prompt; `half` is half the distance of early and late.
     pub fn sum<T: Sum<T> + Mul<f64, Output = T>>(self, half: f64, difference: impl Fn(f64) -> T) -> T {
         let pairs: &[(f64, f64)] = match self {
             Self::DoubleDelta => &[(1.0, 1.0), (2.0, -0.5)],
@@ -80,8 +80,8 @@ pub struct Taps {
 }
 
 impl Taps {
-    /// Taps of a discriminator `d` chips apart. `found` gives height and slope, positive where it falls, of the
-    /// signal's correlation at an offset over the height of its peak, and `own` the correlation of noise.
+    /// Taps of a discriminator `d` chips apart. `found` gives height and slope, positive where it falls, of
+    /// the signal's correlation at an offset over the height of its peak, and `own` the correlation of noise.
     ///
     /// Of two pairs with weights 1 and w: slopes add as the weights say, and the variance of the sum is
     /// 1 − ρ(d) + w²·(1 − ρ(2d)) + 2w·(ρ(d/2) − ρ(3d/2)) where that of one pair is 1 − ρ(d).
