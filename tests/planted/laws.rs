@@ -24,6 +24,7 @@ use gnss::satellite::Sv;
 use gnss::signal::{Carrier, Signal};
 use gnss::time::{Epoch, Rate, SampleClock, TimePolynomial, TimeScale};
 use nalgebra::{DMatrix, Matrix3, Vector3};
+use num_complex::Complex64;
 use receiver::correlate::sums::{RunningSums, Samples};
 use receiver::correlate::{Arithmetic, Edge, Nco, Replica, chips_to_units};
 use receiver::position::smooth::Smoother;
