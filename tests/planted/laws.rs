@@ -506,7 +506,6 @@ fn jitter_is_kaplan_and_hegarty_s() {
 
 #[test]
 fn noise_shows_no_phase_lock_and_a_steady_phase_does() {
-    use num_complex::Complex64;
     use receiver::track::lock::PhaseLock;
     let mut normal = Normal(7);
     let (mut noise, mut steady) = (PhaseLock::new(100.0), PhaseLock::new(100.0));
