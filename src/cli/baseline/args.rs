@@ -34,6 +34,9 @@ pub struct Baseline {
     /// the truth of its run]
     #[arg(long, value_name = "LAT,LON,HEIGHT", allow_hyphen_values = true, value_parser = position)]
     pub base_position: Option<Geodetic>,
+    /// Take the base's position from its own codes, epoch by epoch: the base moves
+    #[arg(long, conflicts_with = "base_position")]
+    pub moving_base: bool,
     /// Signals that take part, by system and RINEX code [default: all that both observe]
     #[arg(long, value_name = "G1C,E5Q,...", value_delimiter = ',', value_parser = signal)]
     pub signals: Vec<(System, Code)>,

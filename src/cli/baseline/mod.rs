@@ -40,7 +40,11 @@ pub fn execute(arguments: &Arguments) -> Result<(), CliError> {
         rover: arguments.rover.clone(),
         navigation: arguments.navigation.clone(),
         choice: Choice { signals: arguments.signals.iter().copied().collect() },
-        position: arguments.base_position.map_or(BasePosition::Truth, |given| BasePosition::Given(given.to_ecef())),
+        position: match arguments.base_position {
+            Some(given) => BasePosition::Given(given.to_ecef()),
+            None if arguments.moving_base => BasePosition::Codes,
+            None => BasePosition::Truth,
+        },
     };
     let settings = Settings {
         mask_rad: arguments.mask_deg.to_radians(),
@@ -50,7 +54,7 @@ pub fn execute(arguments: &Arguments) -> Result<(), CliError> {
         ..Settings::default()
     };
     let found = baseline(&inputs, settings).map_err(rtk_error)?;
-    let verdict = judgements(&found);
+    let verdict = judgements(&found, inputs.position);
     let mut text = words(&found) + &verdict_lines(&verdict);
     let mut object = object(&found, &verdict);
     if let (Some(staging), Some(out)) = (staging, &arguments.out) {
@@ -76,7 +80,7 @@ fn rtk_error(error: RtkError) -> CliError {
 }
 
 /// Figures against their limits. Without a truth, what a receiver can know itself is judged alone.
-fn judgements(found: &Baseline) -> Vec<Judgement> {
+fn judgements(found: &Baseline, position: BasePosition) -> Vec<Judgement> {
     let figures = &found.figures;
     let mut rows = Vec::new();
     let mut judge = |figure: &str, value: Value, unit: &str, bound: Bound, source: &str| {
@@ -102,7 +106,11 @@ fn judgements(found: &Baseline) -> Vec<Judgement> {
     let source = "receivers resolve half cycles or say that they may be missing";
     judge("ambiguities that are not whole", count(figures.not_whole.len()), "", Bound::Max(0.0), source);
     if let Some(off_m) = figures.base_off_m {
-        judge("base off its true position", json!(off_m), "m", Bound::Max(LARGEST_BASE_M), "survey of the base");
+        let (most_m, source) = match position {
+            BasePosition::Codes => (LARGEST_FROM_FIXES_M, "single positions, with the ionosphere's error"),
+            BasePosition::Truth | BasePosition::Given(_) => (LARGEST_BASE_M, "survey of the base"),
+        };
+        judge("base off its true position", json!(off_m), "m", Bound::Max(most_m), source);
     }
     if let Some(off_m) = found.base_from_fixes_m {
         let source = "single positions, with the ionosphere's error";
