@@ -39,7 +39,10 @@ pub fn rows(pair: &Pair, base: &Site, rover: &Site, mask_rad: Option<f64>) -> Ve
         let model_m = of_rover_m - of_base_m;
         let (sv, code) = shared.track;
         let [code_m2, phase_m2] = variances(sv.system, code, elevation_rad, shared.cn0_dbhz);
-        let phase = shared.phases.map(|own| (own.phase_m[1] - own.phase_m[0] - model_m, own.is_broken, own.is_half));
+        let phase = shared.phases.map(|own| {
+            let [of_base_m, of_rover_m] = planted!("rtk.rows.sign", own.phase_m, [own.phase_m[1], own.phase_m[0]]);
+            (of_rover_m - of_base_m - model_m, own.is_broken, own.is_half)
+        });
         mask_rad.is_none_or(|mask_rad| elevation_rad >= mask_rad).then_some(Row {
             track: shared.track,
             wavelength_m: shared.wavelength_m,

@@ -223,7 +223,8 @@ impl Solver {
     pub fn pass(&mut self, pair: &Pair) {
         let goes_on = |track: Track| {
             let own = pair.shared.iter().find(|shared| shared.track == track);
-            own.and_then(|shared| shared.phases).is_some_and(|phases| !phases.is_broken)
+            let is_kept = own.and_then(|shared| shared.phases).is_some_and(|phases| !phases.is_broken);
+            planted!("rtk.solver.outage", is_kept, true)
         };
         self.lost.extend(self.ambiguities.iter().map(|own| own.track).filter(|track| !goes_on(*track)));
     }

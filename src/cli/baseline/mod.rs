@@ -101,6 +101,12 @@ fn judgements(found: &Baseline, position: BasePosition) -> Vec<Judgement> {
         let source = format!("{ON_TWO_BANDS} satellites on two bands fix at once");
         judge("time to it on two bands", json!(figures.first_fix_two_bands_s), "s", Bound::Max(0.0), &source);
     }
+    if figures.outages > 0 {
+        let source = "as the first fix, on one band";
+        judge("time to the fix after an outage", json!(figures.longest_refix_s), "s", Bound::Max(LONGEST_S), source);
+        let source = "what was lost comes back";
+        judge("outages without a fix after them", count(figures.outages_without_fix), "", Bound::Max(0.0), source);
+    }
     judge("epochs fixed from there on", json!(figures.fix_rate), "", Bound::Min(LEAST_FIXED), "continuity");
     judge("slips that were not announced", count(figures.slips), "", Bound::Max(0.0), "receivers say what they lose");
     let source = "receivers resolve half cycles or say that they may be missing";
@@ -148,6 +154,13 @@ fn words(found: &Baseline) -> String {
              {wrong_fixes} wrong fixes of {}, {expected_wrong:.2e} expected at most",
             figures.judged
         );
+    }
+    if figures.outages > 0 {
+        let again = match figures.longest_refix_s {
+            Some(most_s) => format!("fixed again {most_s:.1} s after the first solution at most"),
+            None => "never fixed again".to_owned(),
+        };
+        let _ = writeln!(text, "outages       {}: {again}", figures.outages);
     }
     if let Some(ratio) = figures.least_ratio {
         let _ = writeln!(text, "ratio         {ratio:.1} at least");
