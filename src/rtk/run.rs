@@ -21,7 +21,7 @@ pub enum BasePosition {
     Truth,
     /// A position that is given, ECEF in metres.
     Given(Vector3<f64>),
-    /// That of the base's own codes, epoch by epoch: the base moves, and nothing else knows where it is.
+    /// Position by the base's own codes, epoch by epoch: the base moves, and nothing else knows where it is.
     Codes,
 }
 

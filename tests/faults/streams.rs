@@ -1,4 +1,5 @@
-//! Fuzzing of receivers' binary protocols: bent streams, and messages whose content is bent and whose check holds.
+//! Fuzzing of receivers' binary protocols: bent streams, and messages whose content is bent and whose check
+//! holds.
 //!
 //! A frame whose check fails is skipped and counted, and costs no other: what follows a bent stream is read
 //! as if nothing were before it, wherever the stream begins and in whatever pieces it comes. Bent

@@ -49,8 +49,8 @@ fn real_messages_of_one_epoch_agree_in_time_and_in_code_and_carrier() {
         for value in &epoch.values {
             let channel = fdma::channel(value.sv.number).filter(|_| value.sv.system == System::Glonass);
             let hz = band_hz(value.sv.system, value.code.as_bytes()[0], channel).unwrap();
-            // The receiver begins its carriers near its codes, and the ionosphere has moved them apart since then;
-            // a fine part of twice its size is up to 146 m off.
+            // The receiver begins its carriers near its codes, and the ionosphere has moved them apart since
+            // then; a fine part of twice its size is up to 146 m off.
             let off_m = value.carrier_cycles.unwrap() * SPEED_OF_LIGHT_MPS / hz - value.pseudorange_m.unwrap();
             assert!(off_m.abs() < 60.0, "{} {}: {off_m}", value.sv, value.code);
         }
@@ -60,7 +60,7 @@ fn real_messages_of_one_epoch_agree_in_time_and_in_code_and_carrier() {
 #[test]
 fn lock_times_are_those_of_the_printed_table() {
     let label = Epoch::parse("2022-02-09T00:00:00").unwrap();
-    // DF407, table 3.5-75: the indicator of a lock time in milliseconds and the least time that it stands for.
+    // DF407, table 3.5-75: the indicator of a lock time in milliseconds, and the least time that it means.
     for (lock_ms, indicator, least_ms) in
         [(63.0, 63, 63), (100.0, 82, 100), (1000.0, 190, 992), (1e5, 400, 98_304), (1e8, 704, 67_108_864)]
     {

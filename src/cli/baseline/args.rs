@@ -14,7 +14,7 @@ use rtk::carrier::Code;
     after_help = "Examples:\n  gnss-twin baseline reports/base reports/rover --out reports/baseline\n  gnss-twin \
                         baseline reports/base reports/rover --signals G1C,E1C --check\n  gnss-twin baseline base.rnx \
                         rover.rnx --navigation brdc.rnx --base-position 37.605,-0.986,60\n  gnss-twin baseline \
-                        reports/rtk_moving_base/base reports/rtk_moving_base/rover --moving-base\n\nRuns with a truth are \
+                        reports/ship reports/drone --moving-base\n\nRuns with a truth are \
                         judged: error of the baseline, integers, fix rate, time to the first fix. Exit code with \
                         --check: 3 if a limit is broken"
 )]
