@@ -175,12 +175,12 @@ fn published_float_vectors_have_the_published_integers_and_norms() {
         let made = Decorrelated::new(&float, &covariance).unwrap();
         let found = made.search(0).unwrap();
         let (both, norms) = (line(&format!("F{number}")), line(&format!("s{number}")));
-        for index in 0..2 {
+        for (index, norm) in norms.into_iter().enumerate() {
             let expected: Vec<f64> = both.iter().skip(index).step_by(2).copied().collect();
             assert_eq!(made.back(&found.vectors[index]).as_slice(), expected, "case {number}, vector {index}");
             // Six decimals are printed, of covariances with six.
-            let miss = (found.squared_norms[index] - norms[index]).abs();
-            assert!(miss < 1e-4 * norms[index], "case {number}: {:?}", found.squared_norms);
+            let miss = (found.squared_norms[index] - norm).abs();
+            assert!(miss < 1e-4 * norm, "case {number}: {:?}", found.squared_norms);
         }
     }
 }
