@@ -71,7 +71,8 @@ pub fn framed(body: &[u8]) -> Vec<u8> {
     let length = body.len().min(1023);
     let mut frame = vec![0xd3, (length >> 8) as u8, length as u8];
     frame.extend(body.iter().take(length));
-    let bits = frame.iter().flat_map(|byte| (0..8).rev().map(move |bit| byte >> bit & 1 == 1));
+    let checked = planted!("logs.rtcm.check", &frame[..], &frame[3..]);
+    let bits = checked.iter().flat_map(|byte| (0..8).rev().map(move |bit| byte >> bit & 1 == 1));
     let check = crc24q(bits);
     frame.extend([(check >> 16) as u8, (check >> 8) as u8, check as u8]);
     frame

@@ -85,7 +85,8 @@ pub enum RtkError {
     NoEphemerides,
     /// A base whose position nothing tells.
     #[error(
-        "{}: no position of the base in truth/trajectory.csv: expected --base-position for a base without a truth",
+        "{}: no position of the base in truth/trajectory.csv: expected --base-position, or --moving-base, for a base \
+         without a truth",
         path.display()
     )]
     NoPosition {

@@ -82,8 +82,8 @@ pub struct Figures {
     pub float: usize,
     /// Mean length of the baseline, metres.
     pub length_m: Option<f64>,
-    /// Share of the solved epochs from the first fix on that are fixed. A part of the integers is a fix if it
-    /// gives a precise position ([`Solution::is_fix`]).
+    /// Share of the solved epochs from the first fix on that are fixed, without those between an outage and
+    /// the next fix. A part of the integers is a fix if it gives a precise position ([`Solution::is_fix`]).
     pub fix_rate: Option<f64>,
     /// Time from the first solution to the first fix, seconds.
     pub first_fix_s: Option<f64>,
@@ -91,6 +91,12 @@ pub struct Figures {
     pub on_two_bands: usize,
     /// Time to it from the first epoch with five satellites on two bands, seconds.
     pub first_fix_two_bands_s: Option<f64>,
+    /// Outages after the first fix: epochs without a solution, or a second and more without an epoch.
+    pub outages: usize,
+    /// Outages after which no fix came.
+    pub outages_without_fix: usize,
+    /// Longest time from the first solution after an outage to the next fix, seconds.
+    pub longest_refix_s: Option<f64>,
     /// Root mean square of the fixed epochs' errors, metres.
     pub east_rms_m: Option<f64>,
     /// Root mean square of the north component.
@@ -127,6 +133,8 @@ pub struct Figures {
 
 /// Satellites on two bands with which a first epoch is to be fixed at once.
 pub const ON_TWO_BANDS: usize = 5;
+/// Least time in seconds without an epoch that is an outage; of receivers with longer intervals two of them.
+const OUTAGE_S: f64 = 1.0;
 
 /// Collects the epochs of a baseline.
 #[derive(Debug, Default)]
@@ -136,9 +144,47 @@ pub struct Judge {
     first: Option<Epoch>,
     first_on_two: Option<Epoch>,
     fixed_from_here: [usize; 2],
+    outage: Outage,
     fixed_errors: Errors,
     float_errors: Errors,
     lengths_m: f64,
+}
+
+/// Outage after which no fix has come yet, and what tells the next one.
+#[derive(Debug, Default)]
+struct Outage {
+    is_open: bool,
+    /// First solution after it.
+    solved: Option<Epoch>,
+    /// Epoch before.
+    before: Option<Epoch>,
+    /// Shortest time between epochs, seconds.
+    interval_s: Option<f64>,
+}
+
+impl Outage {
+    /// Takes an epoch; true if an outage begins with it.
+    fn begins(&mut self, at: Epoch, is_solved: bool, is_after_fix: bool) -> bool {
+        let step_s = self.before.replace(at).map(|before| at.since(before));
+        let usual_s = self.interval_s.unwrap_or(f64::INFINITY);
+        let is_gap = step_s.is_some_and(|step_s| step_s > OUTAGE_S.max(2.0 * usual_s));
+        self.interval_s = step_s.map(|step_s| step_s.min(usual_s)).or(self.interval_s);
+        if is_solved && !is_gap || !is_after_fix {
+            if self.is_open {
+                self.solved.get_or_insert(at);
+            }
+            return false;
+        }
+        // What is solved in between is lost again.
+        self.solved = is_solved.then_some(at);
+        !std::mem::replace(&mut self.is_open, true)
+    }
+
+    /// Time in seconds from the first solution after the outage to a fix that ends it.
+    fn ends(&mut self, at: Epoch) -> Option<f64> {
+        let is_open = std::mem::replace(&mut self.is_open, false);
+        self.solved.take().filter(|_| is_open).map(|solved| at.since(solved))
+    }
 }
 
 /// Sums of squared errors.
@@ -176,6 +222,8 @@ impl Judge {
         }
         let events: Vec<String> =
             solved.events.iter().map(|(track, event)| format!("{} {}", named(*track), event.name())).collect();
+        let (is_solved, is_after_fix) = (solved.solution.is_some(), figures.first_fix_s.is_some());
+        figures.outages += usize::from(self.outage.begins(pair.labels[1], is_solved, is_after_fix));
         let mut row = Row::empty(pair, events.join("; "));
         let Some(solution) = &solved.solution else { return row };
         self.first.get_or_insert(pair.labels[1]);
@@ -218,7 +266,10 @@ impl Judge {
         if is_fixed && figures.first_fix_two_bands_s.is_none() {
             figures.first_fix_two_bands_s = self.first_on_two.map(|first| pair.labels[1].since(first));
         }
-        if figures.first_fix_s.is_some() {
+        if is_fixed && let Some(refix_s) = self.outage.ends(pair.labels[1]) {
+            figures.longest_refix_s = Some(figures.longest_refix_s.map_or(refix_s, |most_s| most_s.max(refix_s)));
+        }
+        if figures.first_fix_s.is_some() && !self.outage.is_open {
             self.fixed_from_here[0] += usize::from(is_fixed);
             self.fixed_from_here[1] += 1;
         }
@@ -247,6 +298,7 @@ impl Judge {
     /// Figures of all epochs.
     pub fn finish(mut self) -> Figures {
         let figures = &mut self.figures;
+        figures.outages_without_fix = usize::from(self.outage.is_open);
         let [fixed, all] = self.fixed_from_here;
         figures.fix_rate = (all > 0).then(|| fixed as f64 / all as f64);
         figures.length_m = (figures.solved > 0).then(|| self.lengths_m / figures.solved as f64);
@@ -283,7 +335,8 @@ fn verify(pair: &Pair, solution: &Solution, [of_base, of_rover]: [&Truth; 2]) ->
         let (track, _) = floats.tracks[index];
         let shared = pair.shared.iter().find(|shared| shared.track == track)?;
         let [base_m, rover_m] = shared.phases?.phase_m;
-        let base_cycles = base_m / shared.wavelength_m - of_base.carrier_cycles(pair.labels[0], track)?;
+        let of_base_cycles = of_base.carrier_cycles(pair.labels[0], track)?;
+        let base_cycles = base_m / shared.wavelength_m - planted!("rtk.judge.base", of_base_cycles, 0.0);
         let rover_cycles = rover_m / shared.wavelength_m - of_rover.carrier_cycles(pair.labels[1], track)?;
         Some(rover_cycles - base_cycles - floats.references[index])
     };
@@ -334,5 +387,32 @@ impl Row {
     fn set_error(&mut self, error_m: &Vector3<f64>) {
         (self.error_east_m, self.error_north_m) = (Some(error_m.x), Some(error_m.y));
         self.error_up_m = Some(error_m.z);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_outage_lasts_from_what_is_not_solved_to_the_next_fix() {
+        let at = |tenths: u32| Epoch::new(1_290_689_460, 0.0).plus_s(0.1 * f64::from(tenths));
+        let mut outage = Outage::default();
+        // Before the first fix nothing is out.
+        assert!((0..10).all(|tenths| !outage.begins(at(tenths), tenths % 3 == 0, false)));
+        assert!((10..20).all(|tenths| !outage.begins(at(tenths), true, true)) && outage.ends(at(19)).is_none());
+        // Ten epochs without, of which one has a solution in between: one outage.
+        let begun = (20..30).filter(|tenths| outage.begins(at(*tenths), *tenths == 25, true)).count();
+        assert_eq!((begun, outage.is_open), (1, true));
+        assert!(!outage.begins(at(30), true, true) && !outage.begins(at(31), true, true));
+        let refix_s = outage.ends(at(32)).unwrap();
+        assert!((refix_s - 0.2).abs() < 1e-6 && !outage.is_open, "{refix_s}");
+        // No epoch for half a second is none, for two seconds is one.
+        assert!(!outage.begins(at(37), true, true));
+        assert!(outage.begins(at(57), true, true));
+        assert_eq!(outage.ends(at(57)), Some(0.0));
+        // Epochs of half a minute are no outages.
+        let mut slow = Outage::default();
+        assert!((0..9).all(|epoch| !slow.begins(at(300 * epoch), true, epoch > 0)));
     }
 }

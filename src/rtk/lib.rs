@@ -9,6 +9,9 @@
 //!
 //! Internal crate: programs use the facade `gnss_twin`. What it does not hand on may change with any version.
 
+#[macro_use(planted)]
+extern crate gnss;
+
 pub mod carrier;
 pub mod error;
 pub mod files;

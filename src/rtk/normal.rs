@@ -60,7 +60,7 @@ impl Normal {
             clock_right += weight * one.misclosure_m;
             weights += weight;
         }
-        self.matrix.ger(-1.0 / weights, &of_clock, &of_clock, 1.0);
+        self.matrix.ger(planted!("rtk.normal.clock", -1.0, -0.5) / weights, &of_clock, &of_clock, 1.0);
         self.right.axpy(-clock_right / weights, &of_clock, 1.0);
     }
 

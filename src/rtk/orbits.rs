@@ -57,7 +57,7 @@ impl Orbits {
 
 /// Satellite at its transmission of what arrived at `label` by the receiver's clock after a pseudorange.
 pub fn emission(set: &Ephemeris, label: Epoch, pseudorange_m: f64) -> Option<Emission> {
-    let sent = label.plus_s(-pseudorange_m / SPEED_OF_LIGHT_MPS);
+    let sent = label.plus_s(-planted!("rtk.orbits.travel", pseudorange_m, 0.0) / SPEED_OF_LIGHT_MPS);
     // The clock's argument is GPS time; one correction leaves drift times offset squared, below a picosecond.
     let rough = set.clock(sent).ok()?;
     let emitted = sent.plus_s(-rough.offset_s);

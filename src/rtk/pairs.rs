@@ -148,7 +148,8 @@ fn shared(
         let Some(code) = Code::new(text).filter(|code| choice.takes((*sv, *code))) else { continue };
         let (Some(of_other), Some(of_own)) = (other.pseudorange_m, own.pseudorange_m) else { continue };
         let channel = rover.channels.get(sv).or_else(|| base.channels.get(sv)).copied();
-        let Some(hz) = band_hz(sv.system, code.band(), channel) else { continue };
+        let band = planted!("rtk.pairs.second_band", code.band(), b'1');
+        let Some(hz) = band_hz(sv.system, band, channel) else { continue };
         let both = emissions.entry(*sv).or_insert_with(|| {
             let set = orbits.serving(*sv, of_base.label)?;
             Some([emission(set, of_base.label, of_other)?, emission(set, of_rover.label, of_own)?])
@@ -171,7 +172,7 @@ fn phases(base: &Values, rover: &Values, wavelength_m: f64) -> Option<Phases> {
     let phase_m = [base.carrier_cycles? * wavelength_m, rover.carrier_cycles? * wavelength_m];
     Some(Phases {
         phase_m,
-        is_broken: base.lost_lock || rover.lost_lock,
+        is_broken: base.lost_lock || planted!("rtk.pairs.broken", rover.lost_lock, false),
         is_half: base.half_cycle_ambiguous || rover.half_cycle_ambiguous,
     })
 }

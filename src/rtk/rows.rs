@@ -39,7 +39,10 @@ pub fn rows(pair: &Pair, base: &Site, rover: &Site, mask_rad: Option<f64>) -> Ve
         let model_m = of_rover_m - of_base_m;
         let (sv, code) = shared.track;
         let [code_m2, phase_m2] = variances(sv.system, code, elevation_rad, shared.cn0_dbhz);
-        let phase = shared.phases.map(|own| (own.phase_m[1] - own.phase_m[0] - model_m, own.is_broken, own.is_half));
+        let phase = shared.phases.map(|own| {
+            let [of_base_m, of_rover_m] = planted!("rtk.rows.sign", own.phase_m, [own.phase_m[1], own.phase_m[0]]);
+            (of_rover_m - of_base_m - model_m, own.is_broken, own.is_half)
+        });
         mask_rad.is_none_or(|mask_rad| elevation_rad >= mask_rad).then_some(Row {
             track: shared.track,
             wavelength_m: shared.wavelength_m,
@@ -59,15 +62,45 @@ pub fn rows(pair: &Pair, base: &Site, rover: &Site, mask_rad: Option<f64>) -> Ve
 /// mask.
 pub fn by_codes(pair: &Pair, base: &Site, from_m: Option<Vector3<f64>>, mask_rad: f64) -> Option<Vector3<f64>> {
     let mask_rad = from_m.map(|_| mask_rad);
-    let mut position_m = from_m.unwrap_or(base.position_m);
-    for _ in 0..MOST_STEPS {
-        let rows = rows(pair, base, &Site::new(position_m), mask_rad);
-        let mut normal = Normal::new(OF_POSITION);
-        for group in groups(&rows).values() {
-            let codes: Vec<Difference> =
-                group.iter().map(|row| difference(row, row.code_m, row.code_m2, None)).collect();
-            normal.add_group(&codes);
+    settled(from_m.unwrap_or(base.position_m), |rover| {
+        let rows = rows(pair, base, rover, mask_rad);
+        let of_code = |row: &&Row| difference(row, row.code_m, row.code_m2, None);
+        groups(&rows).values().map(|group| group.iter().map(of_code).collect()).collect()
+    })
+}
+
+/// Position of the base by its own codes alone, as [`by_codes`] finds the rover: the receiver's single
+/// position, with the errors of the ionosphere. An error of 20 m turns a baseline by 1e-6 of its length.
+pub fn of_base(pair: &Pair, from_m: Option<Vector3<f64>>, mask_rad: f64) -> Option<Vector3<f64>> {
+    let mask_rad = from_m.map(|_| mask_rad);
+    // Satellites in view stand around the zenith.
+    let above_m: Vector3<f64> = pair.shared.iter().map(|shared| shared.emissions[0].position_m).sum();
+    let start_m = from_m.or_else(|| above_m.try_normalize(0.0).map(|up| up * EARTH_RADIUS_M))?;
+    settled(start_m, |base| {
+        let mut groups: BTreeMap<(System, Code), Vec<Difference>> = BTreeMap::new();
+        for shared in &pair.shared {
+            let (model_m, direction, elevation_rad) = modelled(&shared.emissions[0], base);
+            if mask_rad.is_some_and(|mask_rad| elevation_rad < mask_rad) {
+                continue;
+            }
+            let (sv, code) = shared.track;
+            let derivatives = (0..OF_POSITION).map(|axis| (axis, direction[axis])).collect();
+            let [code_m2, _] = variances(sv.system, code, elevation_rad, shared.cn0_dbhz);
+            let misclosure_m = shared.code_m[0] - model_m;
+            // Of one receiver.
+            let own = Difference { derivatives, misclosure_m, variance_m2: 0.5 * code_m2 };
+            groups.entry((sv.system, code)).or_default().push(own);
         }
+        groups.into_values().collect()
+    })
+}
+
+/// Position at which the equations of codes settle, from one that may be thousands of kilometres off.
+fn settled(from_m: Vector3<f64>, equations: impl Fn(&Site) -> Vec<Vec<Difference>>) -> Option<Vector3<f64>> {
+    let mut position_m = from_m;
+    for _ in 0..MOST_STEPS {
+        let mut normal = Normal::new(OF_POSITION);
+        equations(&Site::new(position_m)).iter().for_each(|group| normal.add_group(group));
         let (step, _) = normal.solve(&[0, 1, 2])?;
         position_m += step.fixed_rows::<3>(0);
         // An error of a metre moves a direction by 5e-8 rad, and a double difference by less than that.
@@ -77,6 +110,9 @@ pub fn by_codes(pair: &Pair, base: &Site, from_m: Option<Vector3<f64>>, mask_rad
     }
     None
 }
+
+/// Mean radius of the Earth, from which steps to a first position begin.
+const EARTH_RADIUS_M: f64 = 6.371e6;
 
 /// Steps to the approximate position, of which the first may be thousands of kilometres.
 const MOST_STEPS: usize = 12;

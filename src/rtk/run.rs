@@ -8,6 +8,7 @@ use crate::error::RtkError;
 use crate::files;
 use crate::judge::{Figures, Judge, Row};
 use crate::pairs::{Choice, Pair, pairs};
+use crate::rows::of_base as of_base_by_codes;
 use crate::solver::{Settings, Solver};
 use crate::truth::{Truth, each};
 use gnss::record::Fix;
@@ -20,6 +21,8 @@ pub enum BasePosition {
     Truth,
     /// A position that is given, ECEF in metres.
     Given(Vector3<f64>),
+    /// Position by the base's own codes, epoch by epoch: the base moves, and nothing else knows where it is.
+    Codes,
 }
 
 /// Inputs of a baseline.
@@ -79,16 +82,26 @@ pub fn solve(
     let resting_m = match inputs.position {
         BasePosition::Given(given_m) => Some(given_m),
         BasePosition::Truth => of_base.as_ref().and_then(Truth::resting_m),
+        BasePosition::Codes => None,
     };
+    let mut by_codes_m = None;
     let mut off_m: Option<f64> = None;
     for pair in pairs {
         let true_m = of_base.as_ref().and_then(|truth| truth.position_m(pair.labels[0]));
         let base_m = match inputs.position {
             BasePosition::Given(given_m) => Some(given_m),
             BasePosition::Truth => true_m.or(resting_m),
+            BasePosition::Codes => {
+                let found_m = of_base_by_codes(pair, by_codes_m, settings.mask_rad);
+                by_codes_m = found_m.or(by_codes_m);
+                found_m
+            }
         };
-        // Between two rows of its truth a base that moves has no position.
-        let Some(base_m) = base_m else { continue };
+        // Between two rows of its truth, or with too few codes, a base that moves has no position.
+        let Some(base_m) = base_m else {
+            solver.pass(pair);
+            continue;
+        };
         if let Some(true_m) = true_m {
             let own_m = (base_m - true_m).norm();
             off_m = Some(off_m.map_or(own_m, |most_m| most_m.max(own_m)));

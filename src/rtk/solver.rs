@@ -166,6 +166,8 @@ pub struct Solver {
     /// Phases less their model of the epoch before.
     before: BTreeMap<Track, f64>,
     not_whole: BTreeSet<Track>,
+    /// Tracks whose phases an epoch without a position did not have, or had broken.
+    lost: BTreeSet<Track>,
 }
 
 impl Solver {
@@ -180,6 +182,7 @@ impl Solver {
             rough_m: None,
             before: BTreeMap::new(),
             not_whole: BTreeSet::new(),
+            lost: BTreeSet::new(),
         }
     }
 
@@ -189,7 +192,10 @@ impl Solver {
         // At rest the first epoch's position serves for all.
         let mask_rad = self.settings.mask_rad;
         if self.rough_m.is_none() || !self.settings.is_static {
-            let Some(rough_m) = by_codes(pair, &base, self.rough_m, mask_rad) else { return Solved::default() };
+            let Some(rough_m) = by_codes(pair, &base, self.rough_m, mask_rad) else {
+                self.pass(pair);
+                return Solved::default();
+            };
             self.rough_m = Some(rough_m);
         }
         let Some(rover) = self.rough_m.map(Site::new) else { return Solved::default() };
@@ -212,9 +218,22 @@ impl Solver {
         solved
     }
 
+    /// Passes over an epoch without a position, and notes the phases that it does not continue. A receiver
+    /// says only once that a count is broken.
+    pub fn pass(&mut self, pair: &Pair) {
+        let goes_on = |track: Track| {
+            let own = pair.shared.iter().find(|shared| shared.track == track);
+            let is_kept = own.and_then(|shared| shared.phases).is_some_and(|phases| !phases.is_broken);
+            planted!("rtk.solver.outage", is_kept, true)
+        };
+        self.lost.extend(self.ambiguities.iter().map(|own| own.track).filter(|track| !goes_on(*track)));
+    }
+
     /// Ends ambiguities whose phases are gone, broken or slipped, and begins those of new phases.
     fn follow(&mut self, rows: &[Row], baseline_m: f64) -> Vec<(Track, Event)> {
         let mut events = Vec::new();
+        let lost = std::mem::take(&mut self.lost);
+        self.before.retain(|track, _| !lost.contains(track));
         let changes: Vec<Change> = rows
             .iter()
             .filter_map(|row| {
@@ -227,7 +246,8 @@ impl Solver {
         let mut kept = Vec::new();
         for (index, own) in self.ambiguities.iter().enumerate() {
             let row = rows.iter().find(|row| row.track == own.track);
-            let Some((_, is_broken, is_half)) = row.and_then(|row| row.phase) else { continue };
+            let phase = row.and_then(|row| row.phase).filter(|_| !lost.contains(&own.track));
+            let Some((_, is_broken, is_half)) = phase else { continue };
             let event = match (is_broken || is_half != own.is_half, slips.contains(&own.track)) {
                 (true, _) => Some(Event::Announced),
                 (false, true) => Some(Event::Slip),

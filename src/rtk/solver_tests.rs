@@ -270,3 +270,51 @@ fn too_few_satellites_give_no_solution() {
     let mut solver = Solver::new(Settings::default());
     assert!(solver.epoch(&sky.pair(0, &TWO), &sky.base_m).solution.is_none());
 }
+
+#[test]
+fn what_is_announced_in_an_epoch_without_a_solution_is_not_forgotten() {
+    let mut sky = Sky::new();
+    let mut solver = Solver::new(Settings::default());
+    for epoch in 0..12 {
+        let mut pair = sky.pair(epoch, &TWO);
+        for shared in &mut pair.shared {
+            let phases = shared.phases.as_mut().unwrap();
+            if epoch >= 6 {
+                phases.phase_m[1] += 1e4 * f64::from(shared.track.0.number) * shared.wavelength_m;
+                phases.is_broken = epoch == 6;
+            }
+        }
+        // Three satellites come back first, each with its only word on the break; others are seen again when
+        // there is a position.
+        if epoch == 6 {
+            pair.shared.truncate(3 * TWO.len());
+        }
+        let solved = solver.epoch(&pair, &sky.base_m);
+        assert_eq!(solved.solution.is_none(), epoch == 6);
+        if epoch != 6 {
+            assert_eq!(status(&solved), Status::Fixed, "epoch {epoch}");
+            assert!(sky.error_m(&solved) < 0.03, "epoch {epoch}: {}", sky.error_m(&solved));
+            assert!(solved.events.is_empty(), "epoch {epoch}: {:?}", solved.events);
+        }
+    }
+}
+
+#[test]
+fn codes_of_the_base_alone_find_it_from_nowhere_and_a_baseline_from_there_is_as_good() {
+    let mut sky = Sky::new();
+    let mut solver = Solver::new(Settings::default());
+    let mut own_m = None;
+    for epoch in 0..20 {
+        let pair = sky.pair(epoch, &TWO);
+        own_m = crate::rows::of_base(&pair, own_m, Settings::default().mask_rad);
+        let base_m = own_m.unwrap();
+        // Codes of 0.25 to 0.5 m with a dilution of three at most: four deviations.
+        let off_m = base_m - sky.base_m;
+        assert!(off_m.norm() < 6.0, "epoch {epoch}: {off_m}");
+        let solution = solver.epoch(&pair, &base_m).solution.unwrap();
+        assert_eq!(solution.status, Status::Fixed, "epoch {epoch}");
+        // 6 m at 2e7 m turn 0.6 km by 0.2 mm.
+        let error_m = solution.position_m - base_m - (sky.rover_m - sky.base_m);
+        assert!(error_m.norm() < 0.03, "epoch {epoch}: {error_m}");
+    }
+}

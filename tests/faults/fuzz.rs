@@ -143,16 +143,16 @@ fn word(bytes: &[u8], at: usize) -> (usize, usize) {
 }
 
 /// Parser of bytes. It returns an equal number for equal content, or its refusal.
-type Read<'a> = Box<dyn Fn(&[u8]) -> Result<u64, String> + 'a>;
+pub type Read<'a> = Box<dyn Fn(&[u8]) -> Result<u64, String> + 'a>;
 
-struct Target<'a> {
-    name: &'static str,
-    corpus: Vec<Vec<u8>>,
+pub struct Target<'a> {
+    pub name: &'static str,
+    pub corpus: Vec<Vec<u8>>,
     /// Beginning of the refusals.
-    prefix: String,
+    pub prefix: String,
     /// Executions in the long run and in the short one.
-    runs: (usize, usize),
-    read: Read<'a>,
+    pub runs: (usize, usize),
+    pub read: Read<'a>,
 }
 
 fn kept(names: &[&str]) -> Vec<Vec<u8>> {
@@ -175,7 +175,7 @@ fn corpus() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faults/corpus")
 }
 
-fn hashed(what: impl std::fmt::Debug) -> u64 {
+pub fn hashed(what: impl std::fmt::Debug) -> u64 {
     let mut hasher = DefaultHasher::new();
     format!("{what:?}").hash(&mut hasher);
     hasher.finish()
@@ -325,7 +325,7 @@ fn targets() -> Vec<Target<'static>> {
 }
 
 /// Runs a target's cases; seeds count from 0.
-fn run(target: &Target) -> Result<(), String> {
+pub fn run(target: &Target) -> Result<(), String> {
     let mut tally = Tally::new(FAMILY, format!("8. {}", target.name));
     for (number, base) in target.corpus.iter().enumerate() {
         let found = number > 0 && target.corpus.len() > 1;

@@ -22,5 +22,6 @@ mod scenario;
 mod scenes;
 mod signals;
 mod sizes;
+mod streams;
 mod sweep;
 mod tally;

@@ -113,6 +113,15 @@ const ORBITS: &str = "witness::orbit::broadcast_orbits_of_2010_meet_the_igs_fina
 const STATIONS: &str = "witness::pseudorange::two_japanese_stations_fit_the_model";
 const KLOB: &str = "witness::atmosphere::klobuchar_gives_the_worked_value_of_rtklib";
 const SAAS: &str = "witness::atmosphere::saastamoinen_gives_the_worked_value_of_rtklib";
+const INTEGERS: &str = "baselines::published_float_vectors_have_the_published_integers_and_norms";
+const SUCCESS: &str = "baselines::one_ambiguity_is_rounded_right_as_often_as_a_normal_number_is_within_half_a_cycle";
+const BASELINE: &str = "baselines::true_observations_of_two_stations_give_the_true_baseline_and_the_true_integers";
+const BROKEN: &str =
+    "baselines::a_broken_count_of_the_rover_is_heeded_where_there_is_a_position_and_where_there_is_none";
+const RTCM_PRINTED: &str = "rtcm::the_printed_station_has_the_printed_check";
+const RTCM_OBSERVED: &str = "rtcm::real_messages_of_one_epoch_agree_in_time_and_in_code_and_carrier";
+const RTCM_LOCK: &str = "rtcm::lock_times_are_those_of_the_printed_table";
+const RTCM_ORBITS: &str = "rtcm::real_ephemerides_are_orbits_of_their_systems";
 pub const LOOP: &str = "loops::a_short_ride_under_an_open_sky_keeps_every_limit";
 const ARRAY: &str = "arrays::satellites_reach_the_elements_with_the_phases_by_which_the_receiver_steers";
 const EXACT: &str = "laws::exact_ranges_give_the_exact_position_velocity_and_clock";
@@ -400,4 +409,21 @@ pub const FAULTS: &[Fault] = &[
     fault("analysis.theory.dll", "theory of the code loop has the wrong constant", JIT),
     fault("analysis.detection.label", "tests have the labels of the interval before", LABELS),
     fault("analysis.allan.half", "the Allan variance is not halved", JALL),
+    fault("rtk.rows.sign", "carriers are differenced base minus rover", BASELINE),
+    fault("rtk.pairs.second_band", "every band has the wavelength of the first", BASELINE),
+    fault("rtk.pairs.broken", "what the rover says of a broken count is not heard", BROKEN),
+    fault("rtk.solver.outage", "what is said of broken counts in an epoch without a position is forgotten", BROKEN),
+    fault("rtk.orbits.travel", "satellites are taken where they are at reception", BASELINE),
+    fault("rtk.normal.clock", "the common clock is eliminated by half", BASELINE),
+    fault("rtk.lambda.decorrelation", "the transformation is that of other integers", INTEGERS),
+    fault("rtk.lambda.norm", "squared norms are not divided by variances", INTEGERS),
+    fault("rtk.lambda.success_rate", "a success rate is that of half the deviation", SUCCESS),
+    fault("rtk.judge.base", "true integers are without the base's carriers", BASELINE),
+    fault("logs.rtcm.check", "the check of a frame is without its head", RTCM_PRINTED),
+    fault("logs.rtcm.beidou_time", "BeiDou's time is ahead of GPS time, as read", RTCM_OBSERVED),
+    fault("logs.rtcm.carrier_scale", "fine carriers have twice their scale, written and read", RTCM_OBSERVED),
+    fault("logs.rtcm.channel", "channels of GLONASS count downwards, as read", RTCM_OBSERVED),
+    fault("logs.rtcm.lock", "lock times double too late, written and read", RTCM_LOCK),
+    fault("logs.rtcm.magnitude", "a magnitude has no sign, as read", RTCM_ORBITS),
+    fault("logs.rtcm.semicircle", "angles are in radians, written and read", RTCM_ORBITS),
 ];

@@ -6,6 +6,7 @@
 
 mod arrays;
 mod bands;
+mod baselines;
 mod channels;
 mod faults;
 mod inertial;
@@ -14,6 +15,7 @@ mod laws;
 #[path = "../common/long.rs"]
 mod long;
 mod loops;
+mod rtcm;
 mod runner;
 mod sides;
 mod witness;

@@ -81,6 +81,15 @@ fn two_receivers_600_m_apart_are_fixed_at_the_first_epoch_of_two_bands_and_fault
     assert_eq!(resting["figures"]["wrong_fixes"], 0, "{resting}");
     assert!(resting["figures"]["up_rms_m"].as_f64().unwrap() <= 0.006, "{resting}");
 
+    // By the base's own codes: a base that is 10 m off turns 0.6 km by 0.3 mm.
+    let moving = judged(here, &["--moving-base"]);
+    assert_eq!(moving["figures"]["wrong_fixes"], 0, "{moving}");
+    assert!(moving["figures"]["horizontal_rms_m"].as_f64().unwrap() <= 0.003, "{moving}");
+    assert!(moving["figures"]["base_off_m"].as_f64().unwrap() > 0.1, "{moving}");
+    assert_eq!(status(&moving, "base off its true position"), "pass", "{moving}");
+    let both = ["baseline", "base", "rover", "--moving-base", "--base-position", "37.6056,-0.986,60"];
+    assert_eq!(code(&twin(&both, here)), 2);
+
     // 67 m to the north.
     let wrong = judged(here, &["--base-position", "37.6056,-0.986,60"]);
     assert_eq!(status(&wrong, "base off its true position"), "fail", "{wrong}");

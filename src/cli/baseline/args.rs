@@ -13,7 +13,8 @@ use rtk::carrier::Code;
 #[command(
     after_help = "Examples:\n  gnss-twin baseline reports/base reports/rover --out reports/baseline\n  gnss-twin \
                         baseline reports/base reports/rover --signals G1C,E1C --check\n  gnss-twin baseline base.rnx \
-                        rover.rnx --navigation brdc.rnx --base-position 37.605,-0.986,60\n\nRuns with a truth are \
+                        rover.rnx --navigation brdc.rnx --base-position 37.605,-0.986,60\n  gnss-twin baseline \
+                        reports/ship reports/drone --moving-base\n\nRuns with a truth are \
                         judged: error of the baseline, integers, fix rate, time to the first fix. Exit code with \
                         --check: 3 if a limit is broken"
 )]
@@ -34,6 +35,9 @@ pub struct Baseline {
     /// the truth of its run]
     #[arg(long, value_name = "LAT,LON,HEIGHT", allow_hyphen_values = true, value_parser = position)]
     pub base_position: Option<Geodetic>,
+    /// Take the base's position from its own codes, epoch by epoch: the base moves
+    #[arg(long, conflicts_with = "base_position")]
+    pub moving_base: bool,
     /// Signals that take part, by system and RINEX code [default: all that both observe]
     #[arg(long, value_name = "G1C,E5Q,...", value_delimiter = ',', value_parser = signal)]
     pub signals: Vec<(System, Code)>,

@@ -40,7 +40,11 @@ pub fn execute(arguments: &Arguments) -> Result<(), CliError> {
         rover: arguments.rover.clone(),
         navigation: arguments.navigation.clone(),
         choice: Choice { signals: arguments.signals.iter().copied().collect() },
-        position: arguments.base_position.map_or(BasePosition::Truth, |given| BasePosition::Given(given.to_ecef())),
+        position: match arguments.base_position {
+            Some(given) => BasePosition::Given(given.to_ecef()),
+            None if arguments.moving_base => BasePosition::Codes,
+            None => BasePosition::Truth,
+        },
     };
     let settings = Settings {
         mask_rad: arguments.mask_deg.to_radians(),
@@ -50,7 +54,7 @@ pub fn execute(arguments: &Arguments) -> Result<(), CliError> {
         ..Settings::default()
     };
     let found = baseline(&inputs, settings).map_err(rtk_error)?;
-    let verdict = judgements(&found);
+    let verdict = judgements(&found, inputs.position);
     let mut text = words(&found) + &verdict_lines(&verdict);
     let mut object = object(&found, &verdict);
     if let (Some(staging), Some(out)) = (staging, &arguments.out) {
@@ -76,7 +80,7 @@ fn rtk_error(error: RtkError) -> CliError {
 }
 
 /// Figures against their limits. Without a truth, what a receiver can know itself is judged alone.
-fn judgements(found: &Baseline) -> Vec<Judgement> {
+fn judgements(found: &Baseline, position: BasePosition) -> Vec<Judgement> {
     let figures = &found.figures;
     let mut rows = Vec::new();
     let mut judge = |figure: &str, value: Value, unit: &str, bound: Bound, source: &str| {
@@ -97,12 +101,22 @@ fn judgements(found: &Baseline) -> Vec<Judgement> {
         let source = format!("{ON_TWO_BANDS} satellites on two bands fix at once");
         judge("time to it on two bands", json!(figures.first_fix_two_bands_s), "s", Bound::Max(0.0), &source);
     }
+    if figures.outages > 0 {
+        let source = "as the first fix, on one band";
+        judge("time to the fix after an outage", json!(figures.longest_refix_s), "s", Bound::Max(LONGEST_S), source);
+        let source = "what was lost comes back";
+        judge("outages without a fix after them", count(figures.outages_without_fix), "", Bound::Max(0.0), source);
+    }
     judge("epochs fixed from there on", json!(figures.fix_rate), "", Bound::Min(LEAST_FIXED), "continuity");
     judge("slips that were not announced", count(figures.slips), "", Bound::Max(0.0), "receivers say what they lose");
     let source = "receivers resolve half cycles or say that they may be missing";
     judge("ambiguities that are not whole", count(figures.not_whole.len()), "", Bound::Max(0.0), source);
     if let Some(off_m) = figures.base_off_m {
-        judge("base off its true position", json!(off_m), "m", Bound::Max(LARGEST_BASE_M), "survey of the base");
+        let (most_m, source) = match position {
+            BasePosition::Codes => (LARGEST_FROM_FIXES_M, "single positions, with the ionosphere's error"),
+            BasePosition::Truth | BasePosition::Given(_) => (LARGEST_BASE_M, "survey of the base"),
+        };
+        judge("base off its true position", json!(off_m), "m", Bound::Max(most_m), source);
     }
     if let Some(off_m) = found.base_from_fixes_m {
         let source = "single positions, with the ionosphere's error";
@@ -140,6 +154,13 @@ fn words(found: &Baseline) -> String {
              {wrong_fixes} wrong fixes of {}, {expected_wrong:.2e} expected at most",
             figures.judged
         );
+    }
+    if figures.outages > 0 {
+        let again = match figures.longest_refix_s {
+            Some(most_s) => format!("fixed again {most_s:.1} s after the first solution at most"),
+            None => "never fixed again".to_owned(),
+        };
+        let _ = writeln!(text, "outages       {}: {again}", figures.outages);
     }
     if let Some(ratio) = figures.least_ratio {
         let _ = writeln!(text, "ratio         {ratio:.1} at least");

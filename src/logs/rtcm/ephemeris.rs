@@ -55,10 +55,15 @@ macro_rules! own {
     };
 }
 
+/// Angle in radians that messages count as one.
+fn semicircle_rad() -> f64 {
+    planted!("logs.rtcm.semicircle", GPS_PI, 1.0)
+}
+
 /// Entry of an angle, which the field has in semicircles.
 macro_rules! angle {
     ($field:expr, $member:ident) => {
-        ($field, |sent| sent.set.$member / GPS_PI, |sent, value| sent.set.$member = value * GPS_PI)
+        ($field, |sent| sent.set.$member / semicircle_rad(), |sent, value| sent.set.$member = value * semicircle_rad())
     };
 }
 

@@ -190,7 +190,7 @@ impl Field {
             Kind::Magnitude => {
                 let is_negative = bits.unsigned(1)? == 1;
                 let size = bits.unsigned(self.width - 1)? as i64;
-                self.value(if is_negative { -size } else { size })
+                self.value(if planted!("logs.rtcm.magnitude", is_negative, false) { -size } else { size })
             }
             Kind::Text => {
                 let count = bits.unsigned(self.width)? as usize;

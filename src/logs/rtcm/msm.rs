@@ -213,7 +213,8 @@ impl Kind {
     /// Scales of fine code and carrier in milliseconds, of C/N0 in dB-Hz.
     fn scales(self) -> [f64; 3] {
         let of = |halvings: u32| 1.0 / f64::from(1_u32 << halvings);
-        if self.is_fine() { [of(29), of(31), 0.0625] } else { [of(24), of(29), 1.0] }
+        let of_carrier = planted!("logs.rtcm.carrier_scale", 31, 30);
+        if self.is_fine() { [of(29), of(of_carrier), 0.0625] } else { [of(24), of(29), 1.0] }
     }
 
     fn row(
@@ -250,7 +251,10 @@ impl Kind {
         let metres = |part: Option<i64>, scale: f64| {
             rough_ms.zip(part).map(|(rough_ms, part)| (rough_ms + part as f64 * scale) * 1e-3 * SPEED_OF_LIGHT_MPS)
         };
-        let channel = satellite.extended.filter(|number| *number <= 13).map(|number| number as i8 - 7);
+        let channel = satellite
+            .extended
+            .filter(|number| *number <= 13)
+            .map(|number| planted!("logs.rtcm.channel", number as i8 - 7, 7 - number as i8));
         let carrier_hz = signals::carrier_hz(sv, code, channel);
         let cycles = |metres: f64| carrier_hz.map(|hz| metres * hz / SPEED_OF_LIGHT_MPS);
         let rate = satellite.rate_mps.zip(fine[5]).map(|(rough, fine)| rough as f64 + fine as f64 * 1e-4);
@@ -276,7 +280,7 @@ impl Kind {
             (true, 0..64) => indicator,
             (true, _) => {
                 let doublings = (indicator.min(704) >> 5) - 1;
-                (indicator.min(704) - 32 * doublings) << doublings
+                (indicator.min(704) - planted!("logs.rtcm.lock", 32, 31) * doublings) << doublings
             }
         }
     }
@@ -297,7 +301,7 @@ impl Message {
         let near = calendar.near()?;
         let time = i64::try_from(self.time).ok()?;
         let tow_ms = match self.kind.system {
-            System::BeiDou => time + 1000 * BDT_BEHIND_S,
+            System::BeiDou => time + planted!("logs.rtcm.beidou_time", 1000, -1000) * BDT_BEHIND_S,
             System::Glonass => {
                 // Moscow's time is UTC and three hours (DF034); day 7 is not known (DF416).
                 let (day, of_day) = (time >> 27, time & 0x7ff_ffff);

@@ -129,7 +129,8 @@ impl Decorrelated {
     /// 1998, equation 19).
     pub fn success_rate(&self, first: usize) -> f64 {
         let each = self.variances.iter().skip(first);
-        each.map(|variance| libm::erf(1.0 / (8.0 * variance).sqrt())).product()
+        let scale = planted!("rtk.lambda.success_rate", 8.0, 2.0);
+        each.map(|variance| libm::erf(1.0 / (scale * variance).sqrt())).product()
     }
 
     /// First element from which on bootstrapping succeeds with at least this probability; `None` if the last
@@ -195,7 +196,7 @@ impl Decorrelated {
             self.lower[(below, column)] -= whole * self.lower[(below, row)];
         }
         for index in 0..self.order() {
-            self.z[(index, column)] -= whole * self.z[(index, row)];
+            self.z[(index, column)] -= planted!("rtk.lambda.decorrelation", whole, -whole) * self.z[(index, row)];
             self.inverse[(row, index)] += whole * self.inverse[(column, index)];
         }
     }

@@ -38,7 +38,7 @@ impl Level {
     /// Squared distance of this level and those after it.
     fn distance(&self, variance: f64) -> f64 {
         let miss = self.float - self.integer;
-        self.above + miss * miss / variance
+        self.above + miss * miss / planted!("rtk.lambda.norm", variance, 1.0)
     }
 }
 
