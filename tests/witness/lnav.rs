@@ -323,6 +323,12 @@ fn a_week_s_last_frame_carries_its_own_week_and_the_next_week_s_first_count() {
     assert_eq!((at(4).id, at(4).tow_count, at(5).id, at(5).tow_count), (5, 0, 1, 1));
     let heard = lnav::ephemeris(sent.sv, &at(0), &at(1), &at(2), Epoch::from_week(3100, 5.0)).unwrap();
     assert_eq!(heard, Ephemeris { transmitted: start, ..lnav::LNAV.fields.quantised(&sent).unwrap() });
+    // The same from raw parameters, whether they are asked about in the week that they name or after its end.
+    let raw: BTreeMap<&str, i64> = (0..3).flat_map(|k| at(k).parameters()).collect();
+    for near in [start, Epoch::from_week(3072, 30.0)] {
+        let found = lnav::LNAV.fields.elements(sent.sv, &|name| raw.get(name).copied(), near).unwrap();
+        assert_eq!((found.toe, found.toc), (toe, toe), "{near}");
+    }
     assert!(matches!(
         lnav::ephemeris(sent.sv, &at(0), &at(2), &at(1), start),
         Err(SubframeError::Id { id: 3, expected: "2" })
