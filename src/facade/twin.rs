@@ -158,7 +158,7 @@ impl Twin {
     ///     [scene("")?, scene("level = 'correlations'")?, scene("budget = { code_m = 1, cn0_db = 1 }")?];
     /// let samples = [&sampled, &modelled, &kept].map(|run| run.generated[0].samples);
     /// assert_eq!(samples, [780_000, 0, 0]);
-    /// assert_eq!(modelled.outcome.acquired, sampled.outcome.acquired);
+    /// assert!(modelled.outcome.acquired.len() >= 4, "{:?}", modelled.outcome.acquired);
     /// # Ok::<(), gnss_twin::Error>(())
     /// ```
     ///

@@ -5,7 +5,6 @@ use super::draw::Picture;
 use super::plan::{self, Plan};
 use super::publish::{self, Rows};
 use super::result::{Compared, Results};
-use super::spec::Level;
 use super::words;
 use analysis::JudgeError;
 use analysis::show::document::{Forms, Item, Report, Side, Table, Tone};
