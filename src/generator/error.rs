@@ -27,7 +27,8 @@ pub enum GenerateError {
     Waveform(#[from] WaveformError),
     /// Samples of a scene that has none.
     #[error(
-        "fidelity.level = \"{0}\": no samples exist at this level: take \"balanced\", or `gnss-twin run`, which needs none"
+        "fidelity.level = \"{0}\": no samples exist at this level: take \"balanced\", or `gnss-twin run`, which \
+         needs none"
     )]
     NoSamples(&'static str),
     /// Front ends without a scene.

@@ -23,8 +23,8 @@ pub const STUDY: &[Key] = &[
     word(
         "level",
         || Level::NAMES.map(|(name, _)| name).to_vec(),
-        "correlator for loops on modelled correlations; samples for generator and receiver at the scene's `[fidelity]`, \
-         which makes samples by default; correlations or observations for scenes at this level",
+        "correlator for loops on modelled correlations; samples for generator and receiver at the scene's \
+         `[fidelity]`, which makes samples by default; correlations or observations for scenes at this level",
     )
     .required(),
     integer("seed", 0, i64::MAX as u64, "seed from which the seeds of all cases follow").or(1.0),

@@ -225,7 +225,8 @@ pub(super) fn level(plan: &Plan) -> &'static str {
              receiver alone receive the same ones."
         }
         Level::Samples => {
-            "generator and receiver run in memory, from a cold start, at the level that `[fidelity]` of the scene names."
+            "generator and receiver run in memory, from a cold start, at the level that `[fidelity]` of the scene \
+             names."
         }
         Level::Correlations => {
             "the receiver runs on modelled correlations of the scene (`run --level correlations`), from a cold start; \

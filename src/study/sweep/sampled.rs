@@ -59,7 +59,8 @@ pub fn changes_signal(key: &str) -> bool {
     !key.starts_with("receiver.")
 }
 
-/// True if a key changes what satellites, channel and receiver's hardware do, which levels of fidelity do not.
+/// True if a key changes what satellites, channel and receiver's hardware do, which levels of fidelity do
+/// not.
 pub fn changes_world(key: &str) -> bool {
     changes_signal(key) && !key.starts_with("fidelity.")
 }
@@ -184,7 +185,7 @@ fn receive(
     Ok(())
 }
 
-/// Receives a scene without samples, for each receiver anew. The truth is the first one's.
+/// Receives a scene without samples, once for each receiver. The truth is the first one's.
 fn model(
     scene: &Scene,
     ears: &mut [Ear],

@@ -71,9 +71,9 @@ fn width_chips(pulse: &PeakTable) -> f64 {
     f64::from(steps.unwrap_or(0) + 1) / f64::from(STEPS)
 }
 
-/// Rows of the lower triangle whose square is the correlation of noise at taps (Cholesky). `common` is that of
-/// two taps by their distance in chips. At most `N` taps count; a tap that lies on another has nothing of its
-/// own.
+/// Rows of the lower triangle whose square is the correlation of noise at taps (Cholesky). `common` is that
+/// of two taps by their distance in chips. At most `N` taps count; a tap that lies on another has nothing of
+/// its own.
 pub fn factors<const N: usize>(taps: &[f64], common: impl Fn(f64) -> f64) -> [[f64; N]; N] {
     let mut factors = [[0.0; N]; N];
     for row in 0..taps.len().min(N) {

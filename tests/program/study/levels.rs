@@ -118,8 +118,7 @@ fn a_scene_s_own_level_is_heard_and_may_be_varied() {
     for other in &rows[1..] {
         assert_eq!(number(other, 0), number(&rows[0], 0), "satellites: {rows:?}");
         // Ten satellites for ten seconds and more of code loops of 2 Hz (4·2 Hz·10 s·10 = 800 independent
-        // errors): each rms is known to 1/√(2·800) = 2.5 %, both with the slower common error of the receiver's
-        // clock; ten of that.
+        // errors): each rms is known to 1/√(2·800) = 2.5 %; ten of that.
         assert!((number(other, 3) / number(&rows[0], 3) - 1.0).abs() < 0.25, "pseudoranges: {rows:?}");
         assert_ne!(other[FIGURES + 3], rows[0][FIGURES + 3]);
     }
