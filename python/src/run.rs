@@ -14,7 +14,7 @@ use receiver::Reception;
 use receiver::output::{self, Output};
 use receiver::settings::Settings;
 use serde_json::Value;
-use twin::feed;
+use twin::{Done, Halting, feed, modelled};
 
 use crate::call::{Halt, long};
 use crate::failure::Failure;
@@ -54,6 +54,14 @@ fn closed_loop(
     records: &mut (dyn output::Sink + Send),
     halt: &Halt,
 ) -> Result<String, Failure> {
+    let mut stoppable = Halting { records, halt: &|| halt.is_set() };
+    let modelled = modelled(scenes, settings, (truth, &mut stoppable), &mut |_| ());
+    halt.check()?;
+    if let Some(Done { generated, outcome }) = modelled? {
+        let duration_s = scenes.first().map_or(0.0, |scene| scene.metadata.rate.elapsed_s(scene.samples));
+        let made: Vec<String> = generated.iter().map(|one| one.modelled(duration_s)).collect();
+        return Ok(format!("{}\n{outcome}", made.join("\n")));
+    }
     let metadata: Vec<IfMetadata> = scenes.iter().map(|scene| scene.metadata.clone()).collect();
     let mut reception = Reception::of_several(&metadata, settings)?;
     let fed = feed(scenes, truth, &mut |number, samples| {
@@ -94,17 +102,19 @@ impl Files {
 pub fn run(py: Python<'_>, scene: &Scene, settings: Option<&Bound<'_, PyAny>>, out: Option<PathBuf>) -> PyResult<Run> {
     let settings = scene.settings(settings)?;
     let (mut truth, mut received) = (Truth::default(), Received::default());
-    let (text, judgement) = long(py, |halt| match &out {
-        None => Ok((closed_loop(&scene.scenes, &settings, &mut truth, &mut received, halt)?, None)),
-        Some(target) => {
-            let Files { making, truth: mut rows, mut output } = Files::create(target)?;
-            let (truths, records) = (&mut (&mut truth, &mut rows), &mut (&mut received, &mut output));
-            let text = closed_loop(&scene.scenes, &settings, truths, records, halt)?;
-            drop((rows, output));
-            let judgement = judged(making.path())?;
-            making.finish(target).map_err(|error| Failure::file(target, &error))?;
-            Ok((text, Some(judgement)))
-        }
+    let (text, judgement) = long(py, |halt| {
+        let settled = scene.settled()?;
+        let scenes = settled.as_deref().unwrap_or(&scene.scenes);
+        let Some(target) = &out else {
+            return Ok((closed_loop(scenes, &settings, &mut truth, &mut received, halt)?, None));
+        };
+        let Files { making, truth: mut rows, mut output } = Files::create(target)?;
+        let (truths, records) = (&mut (&mut truth, &mut rows), &mut (&mut received, &mut output));
+        let text = closed_loop(scenes, &settings, truths, records, halt)?;
+        drop((rows, output));
+        let judgement = judged(making.path())?;
+        making.finish(target).map_err(|error| Failure::file(target, &error))?;
+        Ok((text, Some(judgement)))
     })?;
     Ok(Run {
         truth: truth.drain(py)?.into_any().unbind(),

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use generator::GenerateError;
 use generator::plan::Plan;
 use generator::scenario::{Overrides, Scenario};
-use generator::scene;
+use generator::scene::{self, Grade};
 use generator::stream::{Options, Stream};
 use gnss::samples::{Format, IfMetadata};
 use gnss::sigmf;
@@ -16,7 +16,7 @@ use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use receiver::settings::Settings;
-use twin::settings_for;
+use twin::{settings_for, settle};
 
 use crate::arrays;
 use crate::call::long;
@@ -122,6 +122,15 @@ impl Scene {
     /// Composes it again: a scene whose motion is pushed is driven once.
     pub fn fresh(&self) -> Result<Arc<Vec<scene::Scene>>, Failure> {
         Ok(Arc::new(self.scenario.compose_all(&self.directory, &self.overrides)?.0))
+    }
+
+    /// Front ends at the level that keeps their budget without samples; `None` where there is none.
+    pub fn settled(&self) -> Result<Option<Vec<scene::Scene>>, Failure> {
+        if !self.scenes.iter().any(|scene| matches!(scene.fidelity.grade, Grade::Budget(_))) {
+            return Ok(None);
+        }
+        let (mut scenes, _) = self.scenario.compose_all(&self.directory, &self.overrides)?;
+        Ok(settle(&mut scenes)?.then_some(scenes))
     }
 
     /// The settings that are asked for, or else the scene's own, with the scene's signals.

@@ -165,6 +165,35 @@ def test_a_run_has_the_tables_of_the_files_that_it_writes(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
 
 
+@pytest.mark.parametrize("level", ["correlations", "observations"])
+def test_a_run_without_samples_is_that_of_the_program(tmp_path, level):
+    text = TEXT.replace("duration_s = 0.2", "duration_s = 8") + f'fidelity = {{ level = "{level}" }}\n'
+    made = gnss_twin.Scene.from_toml(text)
+    run = gnss_twin.run(made, out=tmp_path / "mine")
+    assert str(run).startswith("8 s of ") and run.judgement["satellites"]["acquired"] >= 6
+    (tmp_path / "scene.toml").write_text(text)
+    program = Path(sys.executable).with_name("gnss-twin")
+    arguments = [program, "run", tmp_path / "scene.toml", "--out", tmp_path / "its", "--report", "none"]
+    subprocess.run(arguments, check=True, capture_output=True)
+    for name in ["rx/observations.csv", "rx/fixes.csv", "truth/observables.csv"]:
+        mine, its = [(tmp_path / side / name).read_bytes() for side in ("mine", "its")]
+        assert mine == its and len(mine) > 50, name
+    # There is nothing to slice, to iterate over or to step through.
+    for wanted in [lambda: made.slice(0, 100), lambda: next(gnss_twin.Generator(made))]:
+        with pytest.raises(gnss_twin.GenerateError, match=f'fidelity.level = "{level}": no samples exist'):
+            wanted()
+    with pytest.raises(gnss_twin.ScenarioError, match=r"has no model of \[\[interference\]\]"):
+        gnss_twin.run(gnss_twin.Scene.from_toml(text + '[[interference]]\nkind = "cw"\njs_db = 3\n'))
+
+
+def test_a_budget_chooses_the_level_of_a_run():
+    loose, tight = [{"code_m": 1.0, "carrier_cycles": cycles} for cycles in (1e-3, 5e-5)]
+    chosen = [str(gnss_twin.run(scene(fidelity={"budget": budget}))) for budget in (loose, tight)]
+    assert chosen[0].startswith("0.2 s of ") and "samples" in chosen[1].splitlines()[0], chosen
+    # The samples of the scene are there all the same.
+    assert np.any(scene(fidelity={"budget": loose}).slice(0, 20_000))
+
+
 def test_tables_are_what_pandas_and_polars_take():
     tables = gnss_twin.run(scene()).receiver
     pandas = pytest.importorskip("pandas")
@@ -285,8 +314,9 @@ def test_a_study_is_two_tables(tmp_path):
         gnss_twin.study(tmp_path / "typo.toml", out=tmp_path / "typo")
 
 
-def test_an_interrupt_ends_a_long_call():
-    made = scene(duration_s=600)
+@pytest.mark.parametrize("level", ["balanced", "correlations"])
+def test_an_interrupt_ends_a_long_call(level):
+    made = scene(duration_s=10_000, fidelity={"level": level})
     # Shells start background jobs with this signal ignored.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     timer = threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT))

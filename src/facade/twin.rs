@@ -38,7 +38,7 @@ use ::receiver::{Outcome, ReceiveError};
 use ::twin::Refused;
 #[doc(inline)]
 pub use ::twin::{Done, Fed, Listen, feed};
-use ::twin::{TwinError, run};
+use ::twin::{TwinError, run, settle};
 
 #[cfg(feature = "analysis")]
 use ::analysis::judge::limits::Limits;
@@ -135,12 +135,38 @@ pub struct Twin {
 }
 
 impl Twin {
-    /// Composes a scenario with all its front ends.
+    /// Composes a scenario with all its front ends, at the level of each. With a budget the level is
+    /// `correlations` where that keeps it.
+    ///
+    /// ```
+    /// use gnss_twin::Twin;
+    ///
+    /// let scene = |fidelity: &str| {
+    ///     let text = format!(
+    ///         r#"
+    ///         name = "levels"
+    ///         start = 2010-07-01T08:06:00
+    ///         duration_s = 0.3
+    ///         motion = {{ kind = "static", latitude_deg = 48.1, longitude_deg = 11.6, height_m = 520 }}
+    ///         noise = {{}}
+    ///         fidelity = {{ {fidelity} }}
+    ///         "#
+    ///     );
+    ///     Twin::from_toml(&text)?.run()
+    /// };
+    /// let [sampled, modelled, kept] =
+    ///     [scene("")?, scene("level = 'correlations'")?, scene("budget = { code_m = 1, cn0_db = 1 }")?];
+    /// let samples = [&sampled, &modelled, &kept].map(|run| run.generated[0].samples);
+    /// assert_eq!(samples, [780_000, 0, 0]);
+    /// assert!(modelled.outcome.acquired.len() >= 4, "{:?}", modelled.outcome.acquired);
+    /// # Ok::<(), gnss_twin::Error>(())
+    /// ```
     ///
     /// # Errors
     /// Values that are impossible together, files that cannot be read, settings that are refused.
     pub fn new(scenario: &Scenario) -> Result<Self, Error> {
-        let (scenes, warnings) = scenario.compose_all(&scenario.directory, &Overrides::default())?;
+        let (mut scenes, warnings) = scenario.compose_all(&scenario.directory, &Overrides::default())?;
+        settle(&mut scenes)?;
         let settings = match &scenario.receiver {
             Some(table) => Settings::from_table(table.clone(), "receiver")?,
             None => Settings::default(),

@@ -26,7 +26,10 @@ pub enum GenerateError {
     #[error(transparent)]
     Waveform(#[from] WaveformError),
     /// Samples of a scene that has none.
-    #[error("fidelity.level = \"{0}\": no samples exist at this level; `gnss-twin run` receives such a scene")]
+    #[error(
+        "fidelity.level = \"{0}\": no samples exist at this level: take \"balanced\", or `gnss-twin run`, which \
+         needs none"
+    )]
     NoSamples(&'static str),
     /// Front ends without a scene.
     #[error("no front end: expected one at least")]

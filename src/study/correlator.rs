@@ -23,6 +23,7 @@ use receiver::track::cn0::Cn0;
 use receiver::track::loops::Rates;
 use receiver::track::side::SidePeaks;
 use receiver::track::{TrackingSettings, pilot_group};
+use twin::correlations::factors;
 
 /// One channel to be simulated.
 #[derive(Clone, Debug)]
@@ -232,21 +233,8 @@ impl Taps {
         let [above, below] = side.map_or([0.0; 2], |side| side.taps().map(units_to_chips));
         let outer = settings.dll_discriminator.widest() * half;
         let ahead_chips = [half, 0.0, -half, above, below, outer, -outer];
+        let rows = factors(&ahead_chips, |apart| correlation.noise(apart));
         let count = if outer > half { MOST_TAPS } else { 3 + if side.is_some() { 2 } else { 0 } };
-        let mut rows = [[0.0; MOST_TAPS]; MOST_TAPS];
-        for (i, tap) in ahead_chips.iter().enumerate() {
-            let (before, rest) = rows.split_at_mut(i);
-            let Some(row) = rest.first_mut() else { continue };
-            for (j, (other, earlier)) in ahead_chips.iter().zip(before).enumerate() {
-                let known: f64 = row.iter().zip(&*earlier).take(j).map(|(a, b)| a * b).sum();
-                let own = earlier.get(j).copied().unwrap_or(0.0);
-                // A tap that lies on another has nothing of its own.
-                let shared = if own > 0.0 { (correlation.noise(tap - other) - known) / own } else { 0.0 };
-                row.iter_mut().skip(j).take(1).for_each(|factor| *factor = shared);
-            }
-            let own = row.iter().take(i).fold(1.0, |left, x| left - x * x).max(0.0).sqrt();
-            row.iter_mut().skip(i).take(1).for_each(|factor| *factor = own);
-        }
         Self { count, ahead_chips, rows }
     }
 }

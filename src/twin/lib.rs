@@ -110,14 +110,47 @@ pub fn modelled(
     sinks: (&mut (dyn truth::Sink + Send), &mut (dyn output::Sink + Send)),
     progress: &mut dyn FnMut(u64),
 ) -> Result<Option<Done>, TwinError> {
-    let is_any = |grade| scenes.iter().any(|scene| scene.fidelity.grade == grade);
-    if is_any(Grade::Correlations) {
-        return correlations::run(scenes, settings, (sinks.0, sinks.1), progress).map(Some);
+    match unsampled(scenes) {
+        Some(Grade::Correlations) => correlations::run(scenes, settings, (sinks.0, sinks.1), progress).map(Some),
+        Some(_) => observations::run(scenes, settings, sinks, progress).map(Some),
+        None => Ok(None),
     }
-    if is_any(Grade::Observations) {
-        return observations::run(scenes, settings, sinks, progress).map(Some);
+}
+
+/// Refuses the first effect of front ends that their level has no model of. Samples have all.
+///
+/// # Errors
+/// [`Refused`] with the name of the effect.
+pub fn refuse(scenes: &[Scene]) -> Result<(), Refused> {
+    match unsampled(scenes) {
+        Some(Grade::Correlations) => correlations::refuse(scenes),
+        Some(_) => observations::refuse(scenes),
+        None => Ok(()),
     }
-    Ok(None)
+}
+
+/// Level without samples at which scenes are received; `None` where samples are made.
+fn unsampled(scenes: &[Scene]) -> Option<Grade> {
+    let is_any = |grade: &Grade| scenes.iter().any(|scene| scene.fidelity.grade == *grade);
+    [Grade::Correlations, Grade::Observations].into_iter().find(is_any)
+}
+
+/// Sink that refuses a record, and thereby ends a run, once `halt` says so.
+pub struct Halting<'a> {
+    /// Sink of the records until then.
+    pub records: &'a mut (dyn output::Sink + Send),
+    /// True if the run is to end.
+    pub halt: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl output::Sink for Halting<'_> {
+    fn take(&mut self, record: output::Record) -> Result<(), output::OutputError> {
+        if (self.halt)() { Err(output::OutputError::Refused("stopped".into())) } else { self.records.take(record) }
+    }
+
+    fn finish(&mut self, summary: &serde_json::Value) -> Result<(), output::OutputError> {
+        self.records.finish(summary)
+    }
 }
 
 /// Takes the level of correlations for front ends with a budget, if it keeps that; true if it does.

@@ -2,6 +2,7 @@
 #![cfg(feature = "cli")]
 
 mod export;
+mod levels;
 mod refusal;
 mod samples;
 

@@ -28,6 +28,7 @@ use crate::cli::run::generator_error;
 use crate::cli::scenario;
 use crate::cli::sink::Spec;
 use account::{Handed, Intake, Made};
+use generator::GenerateError;
 use generator::scenario::Overrides;
 use generator::scene::Scene;
 use generator::truth;
@@ -74,6 +75,10 @@ pub fn execute(arguments: &args::Live) -> Result<(), CliError> {
     let [scene] = scenes.as_slice() else {
         return Err(CliError::usage("a stream carries one front end: choose one with --front-end NAME"));
     };
+    // Before a sink or a record is opened.
+    if !scene.fidelity.grade.is_sampled() {
+        return Err(generator_error(GenerateError::NoSamples(scene.fidelity.grade.name())));
+    }
     if arguments.motion.is_some() && scene.trajectory.grown().is_none_or(|grown| grown.ticks() > 0) {
         let name = &named.name;
         return Err(CliError::usage(format!("--motion: {name}: expected a scene with [motion] kind = \"pushed\"")));

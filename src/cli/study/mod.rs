@@ -79,12 +79,13 @@ fn summary(plan: &Plan) -> String {
     let grid = &plan.study.grid;
     let level = match plan.study.level {
         Level::Correlator => "correlator level: loops on modelled correlations",
-        Level::Samples => "sample level: generator and receiver",
+        Level::Samples if plan.is_sampled() => "sample level: generator and receiver",
+        Level::Samples => "levels of the scenes: generator and receiver",
+        Level::Correlations => "level correlations: generator and receiver, no samples",
+        Level::Observations => "level observations: generator and navigation, no samples",
     };
-    let shared = match (plan.study.level, grid.sharing()) {
-        (Level::Samples, 2..) => format!("; {} cases share each signal", grid.sharing()),
-        _ => String::new(),
-    };
+    let shares = plan.study.level != Level::Correlator && grid.sharing() > 1;
+    let shared = if shares { format!("; {} cases share each signal", grid.sharing()) } else { String::new() };
     format!(
         "{} · {level}\n{} cases ({} cells, {} repetitions) in {} shards of {}{shared}",
         plan.study.name,

@@ -177,7 +177,7 @@ fn rows(
                 Ok(model.figures(study.seed_of(case, ""), &study.keep))
             })
             .collect(),
-        Level::Samples => {
+        _ => {
             let base = cases.first().and_then(|case| plan.base(case));
             let base = base.ok_or_else(|| StudyError::Bug("a case without a scene".to_owned()))?;
             sampled::run(study, base, &cases, &plan.shard_directory(), halt)

@@ -1,5 +1,6 @@
 //! Every key of STUDY.toml, declared once: see [`generator::scenario::schema`].
 
+use super::spec::Level;
 use crate::correlator::signals;
 use generator::clock::oscillator::PowerLaw;
 use generator::scenario::schema::{
@@ -21,8 +22,9 @@ pub const STUDY: &[Key] = &[
     text("about", "a text", "introduction of the report"),
     word(
         "level",
-        || vec!["correlator", "samples"],
-        "correlator for loops on modelled correlations, samples for generator and receiver",
+        || Level::NAMES.map(|(name, _)| name).to_vec(),
+        "correlator for loops on modelled correlations; samples for generator and receiver at the scene's \
+         `[fidelity]`, which makes samples by default; correlations or observations for scenes at this level",
     )
     .required(),
     integer("seed", 0, i64::MAX as u64, "seed from which the seeds of all cases follow").or(1.0),
@@ -30,7 +32,7 @@ pub const STUDY: &[Key] = &[
     text(
         "scenario",
         "the path of a scene, relative to the study",
-        "base scene at level = \"samples\"; an axis may name scenes instead",
+        "base scene at all levels but correlator; an axis may name scenes instead",
     ),
     table("signal", SIGNAL, "Received signal, at level = \"correlator\"."),
     table("motion", MOTION, "Doppler and its changes, at level = \"correlator\"."),

@@ -2,8 +2,8 @@
 //! run.
 //!
 //! [`spec`] is STUDY.toml as written, [`axis`] its grid: case i follows from mixed radix, so no list of cases
-//! exists. A case is run by [`model`] (the loops on modelled correlations) or [`sampled`] (samples streamed
-//! from generator to receiver); [`engine`] runs what is missing on all cores, [`plan`] and [`shard`] keep
+//! exists. A case is run by [`model`] (the loops on modelled correlations) or [`sampled`] (generator and
+//! receiver of a scene); [`engine`] runs what is missing on all cores, [`plan`] and [`shard`] keep
 //! manifest and results on disk, [`result`] condenses repetitions, [`ensemble`] takes all cases together,
 //! [`draw`] and [`publish`] show them, [`export`] hands [`part`]s of the plan to other machines' engines.
 //!
@@ -12,6 +12,7 @@
 //! fails.
 
 pub mod axis;
+mod cost;
 pub mod draw;
 pub mod engine;
 pub mod ensemble;

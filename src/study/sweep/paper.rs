@@ -5,7 +5,6 @@ use super::draw::Picture;
 use super::plan::{self, Plan};
 use super::publish::{self, Rows};
 use super::result::{Compared, Results};
-use super::spec::Level;
 use super::words;
 use analysis::JudgeError;
 use analysis::show::document::{Forms, Item, Report, Side, Table, Tone};
@@ -21,12 +20,8 @@ pub(super) fn report(plan: &Plan, results: &Results, pictures: &[Picture]) -> Re
     // A study's words are broken into lines where it suits their file.
     let about = study.about.split_whitespace().collect::<Vec<_>>().join(" ");
     let mut report = Report::new(&study.title, about, &study.name);
-    let level = match study.level {
-        Level::Correlator => "correlator",
-        Level::Samples => "samples",
-    };
     report.add(Item::Facts(vec![
-        ("level".to_owned(), level.to_owned()),
+        ("level".to_owned(), study.level.name().to_owned()),
         ("cases".to_owned(), format!("{} ({} cells of {})", grid.cases(), grid.cells(), grid.repetitions)),
         ("seed".to_owned(), study.seed.to_string()),
         ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
@@ -34,7 +29,7 @@ pub(super) fn report(plan: &Plan, results: &Results, pictures: &[Picture]) -> Re
     report.text(format!(
         "What a case is: {} Intervals hold the mean with 95 % confidence. Every case is in cases.csv, every cell \
          in cells.csv; manifest.json binds them to their inputs.",
-        publish::level(results)
+        publish::level(plan)
     ));
     let agreements = results.agreement();
     if !agreements.is_empty() {

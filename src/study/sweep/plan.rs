@@ -14,22 +14,18 @@ use serde_json::Value as Json;
 use toml::Value;
 
 use super::axis::{Axis, Digit, text_of};
+use super::cost::{case_s, shard_size};
 use super::model::Model;
 use super::sampled::{self, Base};
 use super::spec::{Level, Study};
 use super::{StudyError, axis, sha256_hex, temporary, unit_of};
 use analysis::show::staged::Staged;
-use generator::scenario::{Overrides, Scenario, put};
+use generator::scenario::{Scenario, put};
+use generator::scene::Grade;
 
 /// Version of manifest and shards.
 const SCHEMA: u32 = 1;
 const TOOL: &str = concat!("gnss-twin ", env!("CARGO_PKG_VERSION"));
-/// Largest number of shards unless set otherwise: clusters take arrays of a thousand tasks by default.
-const MOST_SHARDS: u64 = 1000;
-/// Least number of shards where there are enough cases, so that a kill costs little.
-const LEAST_SHARDS: u64 = 50;
-/// Length of a shard unless set otherwise.
-const SHARD_MINUTES: f64 = 1.0;
 
 /// Rule that cuts a study into shards.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,7 +50,7 @@ pub struct Manifest {
     pub build: String,
     /// Name of the study.
     pub name: String,
-    /// Correlations or samples.
+    /// Level of the cases.
     pub level: String,
     /// Seed from which every case's seed follows.
     pub seed: u64,
@@ -113,7 +109,7 @@ pub struct Plan {
     pub manifest: Manifest,
     /// Hash of the manifest's bytes.
     pub hash: String,
-    /// Scenes of a study at samples level.
+    /// Scenes of a study; none at correlator level.
     pub bases: Vec<Base>,
 }
 
@@ -228,7 +224,15 @@ impl Plan {
         self.manifest.shard_size as f64 * case_s(&self.study, &self.bases)
     }
 
-    /// The scene of a case, at samples level.
+    /// True if the study runs scenes that all make samples.
+    pub fn is_sampled(&self) -> bool {
+        let makes = |grade: &Grade| grade.is_sampled() && !matches!(grade, Grade::Budget(_));
+        let mut grades = self.bases.iter().flat_map(|base| &base.grades);
+        let varied = self.study.axes.iter().any(|axis| sampled::changes_level(&axis.key));
+        self.study.level == Level::Samples && grades.all(makes) && !varied
+    }
+
+    /// The scene of a case; `None` at correlator level.
     pub fn base(&self, case: &axis::Case) -> Option<&Base> {
         let written = self.study.scenario_of(case)?;
         self.bases.iter().find(|base| base.written == written)
@@ -343,7 +347,8 @@ fn base(written: &Path, path: &Path, text: &str) -> Result<Base, StudyError> {
     let directory = path.parent().unwrap_or(Path::new(".")).to_owned();
     let scenario = Scenario::parse_in(text, &path.display().to_string(), &directory, false)?;
     let document = text.parse().map_err(|e: toml::de::Error| StudyError::input(path, e.message()))?;
-    Ok(Base { written: written.to_owned(), directory, name: scenario.name, document })
+    let grades = scenario.front_ends.iter().map(|front_end| front_end.fidelity.grade).collect();
+    Ok(Base { written: written.to_owned(), directory, name: scenario.name, document, grades })
 }
 
 /// The study and all files that it needs, from where its author has them.
@@ -433,10 +438,13 @@ fn check(study: &Study, bases: &[Base]) -> Result<(), StudyError> {
 
 /// Reason why one value of one axis is refused in the base by itself.
 fn bad_alone(study: &Study, bases: &[Base], axis: &Axis, value: &Value) -> Option<String> {
-    let read = |base| sampled::patched(base, &[(axis, value)]).and_then(|document| sampled::read(base, &document));
+    let read = |base| {
+        let document = sampled::patched(base, &[(axis, value)])?;
+        sampled::read(study.level, base, &document)
+    };
     match study.level {
         Level::Correlator => modelled(study, &[(axis, value)]).err(),
-        Level::Samples => bases.iter().find_map(|base| read(base).err()),
+        _ => bases.iter().find_map(|base| read(base).err()),
     }
 }
 
@@ -445,15 +453,11 @@ fn together(study: &Study, bases: &[Base], case: &axis::Case, compose: bool) -> 
     let values = study.values(case);
     match study.level {
         Level::Correlator => modelled(study, &values).map(|_| ()),
-        Level::Samples => {
+        level => {
             let base = bases.iter().find(|base| Some(base.written.as_path()) == study.scenario_of(case));
             let base = base.ok_or("the study names no scene")?;
-            let (scenario, _) = sampled::read(base, &sampled::patched(base, &values)?)?;
-            if !compose {
-                return Ok(());
-            }
-            let composed = scenario.compose(&base.directory, &Overrides::default());
-            composed.map(|_| ()).map_err(|e| e.without_place())
+            let (scenario, _) = sampled::read(level, base, &sampled::patched(base, &values)?)?;
+            if compose { sampled::composed(&scenario, base, None).map(|_| ()) } else { Ok(()) }
         }
     }
 }
@@ -471,51 +475,4 @@ pub(super) fn modelled(study: &Study, values: &[(&Axis, &Value)]) -> Result<Mode
         put(&mut document, &axis.key, value)?;
     }
     Model::of(&document, "model").map_err(|e| e.without_place())
-}
-
-/// Simulated seconds per second of one core, of the loops.
-const MODEL_SPEED: f64 = 3000.0;
-/// Samples per second of one core, for each satellite generated and tracked at 2.6 Msps.
-const SAMPLES_PER_S: f64 = 0.6e9;
-/// Number of satellites in a scene.
-const SATELLITES: f64 = 12.0;
-/// Cost of a search and of the judge, seconds.
-const OVERHEAD_S: f64 = 0.5;
-
-/// Seconds of one core that a case takes, roughly.
-fn cost_s(study: &Study, bases: &[Base], case: &axis::Case) -> f64 {
-    let values = study.values(case);
-    match study.level {
-        Level::Correlator => modelled(study, &values).map_or(1.0, |model| model.simulated_s() / MODEL_SPEED),
-        Level::Samples => {
-            let base = bases.iter().find(|base| Some(base.written.as_path()) == study.scenario_of(case));
-            let read = base.and_then(|base| sampled::read(base, &sampled::patched(base, &values).ok()?).ok());
-            read.map_or(OVERHEAD_S, |(scenario, _)| {
-                let rate_hz: f64 = scenario.front_ends.iter().map(|front_end| front_end.rate.hz()).sum();
-                OVERHEAD_S + scenario.duration_s * rate_hz * SATELLITES / SAMPLES_PER_S
-            })
-        }
-    }
-}
-
-/// Seconds of one core that a case in the middle takes, roughly.
-fn case_s(study: &Study, bases: &[Base]) -> f64 {
-    let grid = &study.grid;
-    let ends = [0, grid.cases().saturating_sub(1)].map(|case| cost_s(study, bases, &grid.case(case)));
-    0.5 * (ends[0] + ends[1])
-}
-
-/// Cases a shard: those that share a signal stay together.
-fn shard_size(study: &Study, bases: &[Base], cut: Cut) -> u64 {
-    let (grid, case_s) = (&study.grid, case_s(study, bases));
-    let of_minutes = |minutes: f64| (60.0 * minutes / case_s).clamp(1.0, grid.cases() as f64) as u64;
-    let size = match cut {
-        Cut::Shards(count) => grid.cases().div_ceil(count.max(1)),
-        Cut::Minutes(minutes) => of_minutes(minutes),
-        Cut::Default => {
-            let small = of_minutes(SHARD_MINUTES).min(grid.cases().div_ceil(LEAST_SHARDS));
-            small.max(grid.cases().div_ceil(MOST_SHARDS))
-        }
-    };
-    size.max(1).next_multiple_of(grid.sharing()).min(grid.cases())
 }

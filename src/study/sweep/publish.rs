@@ -78,13 +78,16 @@ fn text(plan: &Plan, results: &Results, pictures: &[Picture]) -> String {
     }
     let name = match study.level {
         Level::Correlator => "Correlator level",
-        Level::Samples => "Sample level",
+        Level::Samples if plan.is_sampled() => "Sample level",
+        Level::Samples => "Levels of the scenes",
+        Level::Correlations => "Level of correlations",
+        Level::Observations => "Level of observations",
     };
     let _ = write!(
         text,
         "\n**{name}**: {} {} cases: {} cells, {} repetitions each with other noise. Intervals hold the mean with 95 \
          % confidence. Everything: `cases.csv`, `cells.csv`.\n",
-        level(results),
+        level(plan),
         grid.cases(),
         grid.cells(),
         grid.repetitions
@@ -103,7 +106,7 @@ fn text(plan: &Plan, results: &Results, pictures: &[Picture]) -> String {
     let base = base(plan, results);
     let _ = match study.level {
         Level::Correlator => write!(text, "\n```toml\n{base}\n```\n"),
-        Level::Samples => write!(text, "\n{base}\n"),
+        _ => write!(text, "\n{base}\n"),
     };
     let _ = write!(text, "\nSeed {}; what is not named is the receiver's default.\n", study.seed);
     if let Some(rows) = cells(results) {
@@ -211,15 +214,27 @@ pub(super) fn cells(results: &Results) -> Option<Rows> {
 }
 
 /// The level in words.
-pub(super) fn level(results: &Results) -> &'static str {
-    match results.study.level {
+pub(super) fn level(plan: &Plan) -> &'static str {
+    match plan.study.level {
         Level::Correlator => {
             "the receiver's own loops on modelled correlations (means from signal and errors, noise of the taps' \
              covariance), no samples."
         }
-        Level::Samples => {
+        Level::Samples if plan.is_sampled() => {
             "samples go from the generator to the receiver in memory, from a cold start; cases that differ in the \
              receiver alone receive the same ones."
+        }
+        Level::Samples => {
+            "generator and receiver run in memory, from a cold start, at the level that `[fidelity]` of the scene \
+             names."
+        }
+        Level::Correlations => {
+            "the receiver runs on modelled correlations of the scene (`run --level correlations`), from a cold start; \
+             no samples are made."
+        }
+        Level::Observations => {
+            "the receiver's navigation runs on modelled observations of the scene (`run --level observations`), from a \
+             cold start; no samples are made."
         }
     }
 }
@@ -228,7 +243,7 @@ pub(super) fn level(results: &Results) -> &'static str {
 pub(super) fn base(plan: &Plan, results: &Results) -> String {
     match results.study.level {
         Level::Correlator => toml::to_string(&results.study.base).unwrap_or_default().trim().to_owned(),
-        Level::Samples => {
+        _ => {
             let names: Vec<String> = plan.bases.iter().map(|base| format!("`{}`", base.written.display())).collect();
             format!("Scenes: {}.", names.join(", "))
         }

@@ -1,5 +1,5 @@
-//! Cases at sample level: one stream of samples from the generator feeds every receiver that takes it, in
-//! memory.
+//! Cases of whole scenes: one stream of samples from the generator feeds every receiver that takes it, in
+//! memory. Where the scene's level makes no samples, the model answers each receiver by itself.
 //!
 //! Cases that differ in `receiver.…` alone share their signal, so it is generated once. Figures are those of
 //! `summary.json` by their path, the first search's detections, those of single fixes ([`super::fixes`]), and
@@ -17,7 +17,7 @@ use toml::Value;
 use super::axis::{self, Axis};
 use super::fixes::{self, Fixes};
 use super::model::SNR;
-use super::spec::{SCENARIO_KEY, Study};
+use super::spec::{Level, SCENARIO_KEY, Study};
 use super::{StudyError, temporary};
 use crate::correlator::Case;
 use crate::{expect, limits};
@@ -30,13 +30,14 @@ use analysis::measure::errors::Errors;
 use analysis::read::Run;
 use analysis::statistics::mean;
 use generator::scenario::{Overrides, Scenario, put};
+use generator::scene::{Grade, Scene};
 use generator::{GenerateError, truth};
 use gnss::signal::Signal;
+use receiver::Reception;
 use receiver::output::Output;
 use receiver::settings::Settings;
 use receiver::track::closed::Mode;
-use receiver::{ReceiveError, Reception};
-use twin;
+use twin::{Halting, TwinError};
 
 /// A scene that a study is based on.
 #[derive(Clone, Debug)]
@@ -49,11 +50,24 @@ pub struct Base {
     pub name: String,
     /// The scene as written.
     pub document: toml::Table,
+    /// Level of each front end.
+    pub grades: Vec<Grade>,
 }
 
 /// True if a key changes the received signal, and not only its processing in the receiver.
 pub fn changes_signal(key: &str) -> bool {
     !key.starts_with("receiver.")
+}
+
+/// True if a key changes what satellites, channel and receiver's hardware do, which levels of fidelity do
+/// not.
+pub fn changes_world(key: &str) -> bool {
+    changes_signal(key) && !key.starts_with("fidelity.")
+}
+
+/// True if a key names a scene's level of fidelity.
+pub fn changes_level(key: &str) -> bool {
+    key == "fidelity.level" || key.starts_with("fidelity.budget")
 }
 
 /// Figures that a study may keep. `acquisition.…` count the first search alone. `theory.…` predict for
@@ -114,16 +128,33 @@ pub fn patched(base: &Base, values: &[(&Axis, &Value)]) -> Result<toml::Table, S
     Ok(document)
 }
 
-/// Scene and receiver of a document, each as its own reader understands it.
+/// Scene and receiver of a document at the study's level, each as its own reader understands it.
 ///
 /// # Errors
 /// Refusals of the reader.
-pub fn read(base: &Base, document: &toml::Table) -> Result<(Scenario, Settings), String> {
+pub fn read(level: Level, base: &Base, document: &toml::Table) -> Result<(Scenario, Settings), String> {
     let text = toml::to_string(document).map_err(|e| e.to_string())?;
-    let scenario = Scenario::parse_in(&text, "scene", &base.directory, false).map_err(|e| e.without_place())?;
+    let mut scenario = Scenario::parse_in(&text, "scene", &base.directory, false).map_err(|e| e.without_place())?;
+    if let Some(grade) = level.grade() {
+        let each = scenario.front_ends.iter_mut();
+        each.for_each(|front_end| front_end.fidelity = front_end.fidelity.at(grade));
+    }
     let settings = Settings::from_table(scenario.receiver.clone().unwrap_or_default(), "receiver");
     let settings = settings.map_err(|e| e.to_string());
     settings.map(|settings| (scenario, settings)).map_err(|e| format!("{}: {e}", base.written.display()))
+}
+
+/// Composes the scene of a case at the level at which it runs: with a budget, that which keeps it.
+///
+/// # Errors
+/// Refusals of the scene, and an effect that its level has no model of.
+pub fn composed(scenario: &Scenario, base: &Base, seed: Option<u64>) -> Result<Scene, String> {
+    let overrides = Overrides { seed, ..Overrides::default() };
+    let (mut scene, _) = scenario.compose(&base.directory, &overrides).map_err(|e| e.without_place())?;
+    let front_ends = std::slice::from_mut(&mut scene);
+    twin::settle(front_ends).map_err(|e| e.to_string())?;
+    twin::refuse(front_ends).map_err(|e| e.to_string())?;
+    Ok(scene)
 }
 
 /// One receiver at work.
@@ -131,14 +162,45 @@ struct Ear {
     directory: PathBuf,
     settings: Settings,
     output: Output,
-    /// Reception, which is moved out at the end.
-    reception: Option<Reception>,
 }
 
-impl Ear {
-    fn take(&mut self, bytes: &[u8]) -> Result<(), ReceiveError> {
-        self.reception.as_mut().map_or(Ok(()), |reception| reception.take(bytes, &mut self.output))
-    }
+/// Receives a scene's samples, which are made once.
+fn receive(
+    scene: &Scene,
+    ears: &mut [Ear],
+    truth: &mut truth::Writer,
+    halt: &(dyn Fn() -> bool + Sync),
+) -> Result<(), StudyError> {
+    let receptions = ears.iter().map(|ear| Reception::new(&scene.metadata, &ear.settings));
+    let receptions: Vec<Reception> = receptions.collect::<Result<_, _>>()?;
+    let mut pairs: Vec<(&mut Ear, Reception)> = ears.iter_mut().zip(receptions).collect();
+    twin::feed(std::slice::from_ref(scene), truth, &mut |_, samples| {
+        if halt() {
+            return Err(StudyError::Stopped);
+        }
+        let each = pairs.par_iter_mut();
+        Ok(each.try_for_each(|(ear, reception)| reception.take(samples, &mut ear.output))?)
+    })?;
+    pairs.into_iter().try_for_each(|(ear, reception)| reception.finish(&mut ear.output).map(|_| ()))?;
+    Ok(())
+}
+
+/// Receives a scene without samples, once for each receiver. The truth is the first one's.
+fn model(
+    scene: &Scene,
+    ears: &mut [Ear],
+    truth: &mut truth::Writer,
+    halt: &(dyn Fn() -> bool + Sync),
+) -> Result<(), TwinError> {
+    let one = |ear: &mut Ear, truth: &mut (dyn truth::Sink + Send)| {
+        let mut records = Halting { records: &mut ear.output, halt };
+        let front_ends = std::slice::from_ref(scene);
+        twin::modelled(front_ends, &ear.settings, (truth, &mut records), &mut |_| ()).map(|_| ())
+    };
+    let Some((first, others)) = ears.split_first_mut() else { return Ok(()) };
+    let (first, others) =
+        rayon::join(|| one(first, truth), || others.par_iter_mut().try_for_each(|ear| one(ear, &mut ())));
+    first.and(others)
 }
 
 /// Runs cases that share their signal; gives the figures asked for, case by case.
@@ -161,11 +223,11 @@ pub fn run(
     };
     let of = |case: &axis::Case| {
         let document = patched(base, &study.values(case)).map_err(|reason| refused(case, reason))?;
-        read(base, &document).map_err(|reason| refused(case, reason))
+        read(study.level, base, &document).map_err(|reason| refused(case, reason))
     };
     let (scenario, _) = of(first)?;
-    let overrides = Overrides { seed: Some(study.seed_of(first, &base.name)), ..Overrides::default() };
-    let (scene, _) = scenario.compose(&base.directory, &overrides).map_err(|e| refused(first, e.without_place()))?;
+    let seed = study.seed_of(first, &base.name);
+    let scene = composed(&scenario, base, Some(seed)).map_err(|reason| refused(first, reason))?;
     let here = temporary::directory(scratch)?;
     let below = |name: &str| {
         let path = here.path().join(name);
@@ -182,21 +244,19 @@ pub fn run(
         let settings = twin::settings_for(std::slice::from_ref(&scene), &settings);
         let directory = below(&format!("rx{number}"))?;
         let output = Output::create(&directory)?;
-        let reception = Some(Reception::new(&scene.metadata, &settings)?);
-        ears.push(Ear { directory, settings, output, reception });
+        ears.push(Ear { directory, settings, output });
     }
-    twin::feed(std::slice::from_ref(&scene), &mut truth, &mut |_, samples| {
-        if halt() {
-            return Err(StudyError::Stopped);
-        }
-        Ok(ears.par_iter_mut().try_for_each(|ear| ear.take(samples))?)
-    })?;
+    if scene.fidelity.grade.is_sampled() {
+        receive(&scene, &mut ears, &mut truth, halt)?;
+    } else {
+        model(&scene, &mut ears, &mut truth, halt).map_err(|error| match error {
+            _ if halt() => StudyError::Stopped,
+            TwinError::Refused(error) => refused(first, error.to_string()),
+            TwinError::Generate(error) => error.into(),
+            TwinError::Receive(error) => error.into(),
+        })?;
+    }
     drop(truth);
-    for ear in &mut ears {
-        if let Some(reception) = ear.reception.take() {
-            reception.finish(&mut ear.output)?;
-        }
-    }
     ears.iter().map(|ear| figures(here.path(), &truth_path, ear, &study.keep)).collect()
 }
 

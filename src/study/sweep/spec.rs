@@ -1,8 +1,7 @@
 //! STUDY.toml as written, every key checked.
 //!
-//! The base is a scene's file (`level = "samples"`) or, at correlator level, the tables `[signal]`,
-//! `[motion]`, `[loop]`, `[measure]` and `[receiver]` of the study itself. Axes put their values under any
-//! key of the base.
+//! The base is a scene's file or, at correlator level, the tables `[signal]`, `[motion]`, `[loop]`,
+//! `[measure]` and `[receiver]` of the study itself. Axes put their values under any key of the base.
 
 use std::path::{Path, PathBuf};
 
@@ -13,6 +12,7 @@ use super::axis::{self, Axis, Grid};
 use super::{fixes, keys, model, sampled, words};
 use generator::scenario::ScenarioError;
 use generator::scenario::read::{Refusals, Source, Table};
+use generator::scene::Grade;
 use gnss::place::nearest;
 use receiver::settings::{Settings, SettingsError};
 
@@ -21,16 +21,35 @@ use receiver::settings::{Settings, SettingsError};
 pub enum Level {
     /// The receiver's loops on modelled correlations.
     Correlator,
-    /// Generator and receiver on samples.
+    /// Generator and receiver of a scene at the scene's own level, which makes samples unless the scene says
+    /// otherwise.
     Samples,
+    /// Generator and receiver of a scene on modelled correlations, whatever level the scene names.
+    Correlations,
+    /// Generator and navigation of a scene on modelled observations, whatever level the scene names.
+    Observations,
 }
 
 impl Level {
+    /// Levels and their names in a study's text.
+    pub(super) const NAMES: [(&'static str, Self); 4] = [
+        ("correlator", Self::Correlator),
+        ("samples", Self::Samples),
+        ("correlations", Self::Correlations),
+        ("observations", Self::Observations),
+    ];
+
     /// Name of the level in a study's text.
     pub fn name(self) -> &'static str {
+        Self::NAMES.iter().find(|(_, level)| *level == self).map_or("", |(name, _)| *name)
+    }
+
+    /// Level of fidelity that replaces that of every scene.
+    pub(super) fn grade(self) -> Option<Grade> {
         match self {
-            Self::Correlator => "correlator",
-            Self::Samples => "samples",
+            Self::Correlator | Self::Samples => None,
+            Self::Correlations => Some(Grade::Correlations),
+            Self::Observations => Some(Grade::Observations),
         }
     }
 }
@@ -46,7 +65,7 @@ pub struct Study {
     pub title: String,
     /// Text at the beginning of the report.
     pub about: String,
-    /// Correlations or samples.
+    /// Level of its cases.
     pub level: Level,
     /// Seed from which every case's seed follows.
     pub seed: u64,
@@ -56,7 +75,7 @@ pub struct Study {
     pub grid: Grid,
     /// Tables of the study that make its base, at correlator level.
     pub base: toml::Table,
-    /// File of the scene as written, at samples level; absent where an axis names the files.
+    /// File of the scene as written; absent at correlator level, and where an axis names the files.
     pub scenario: Option<PathBuf>,
     /// Figures to keep; at correlator level those of theory follow the ones that they predict.
     pub keep: Vec<String>,
@@ -131,11 +150,10 @@ impl Study {
         let document = DeTable::parse(text).map_err(toml)?;
         let root = Table::new(&source, "", 0, document.get_ref(), keys::STUDY);
         root.allow_own()?;
-        let levels = [("correlator", Level::Correlator), ("samples", Level::Samples)];
-        let level = root.need_choice("level", &levels)?;
+        let level = root.need_choice("level", &Level::NAMES)?;
         let axes: Vec<Axis> =
             root.tables("axis")?.unwrap_or_default().iter().map(Axis::read).collect::<Result<_, _>>()?;
-        unlike(&root, &axes)?;
+        unlike(&root, level, &axes)?;
         let scenario = scenario(&root, level, &axes)?;
         let base = base(&root, (text, origin), level).map_err(|e| match e {
             Ok(refused) => refused,
@@ -144,7 +162,7 @@ impl Study {
         let repetitions = root.need_integer("repetitions")?;
         let signal = |key: &str| match level {
             Level::Correlator => model::changes_signal(key),
-            Level::Samples => sampled::changes_signal(key),
+            _ => sampled::changes_signal(key),
         };
         let grid = Grid::new(&axes, repetitions, signal).map_err(|(number, reason)| ScenarioError::Toml {
             place: axes.get(number).map_or_else(|| root.place("axis"), |axis| axis.place.clone()),
@@ -185,7 +203,7 @@ impl Study {
         words.join(", ")
     }
 
-    /// The scene of a case as the study writes it, at samples level.
+    /// The scene of a case as the study writes it; none at correlator level.
     pub fn scenario_of<'s>(&'s self, case: &axis::Case) -> Option<&'s Path> {
         let named = self.values(case).into_iter().find(|(axis, _)| axis.key == SCENARIO_KEY);
         match named {
@@ -202,12 +220,12 @@ impl Study {
     }
 
     /// The seed of a case: a hash of the study's seed, the scene's name, the values that change the signal,
-    /// by name, and the repetition. Cases that differ in the receiver alone have the same noise, and another
-    /// axis of the receiver or other values of an axis change no case's seed.
+    /// by name, and the repetition. Cases that differ in the receiver or in the fidelity alone have the same
+    /// seed, and another axis of the receiver or other values of an axis change no case's seed.
     pub fn seed_of(&self, case: &axis::Case, scene: &str) -> u64 {
         let acts = |key: &str| match self.level {
             Level::Correlator => model::changes_signal(key),
-            Level::Samples => sampled::changes_signal(key) && key != SCENARIO_KEY,
+            _ => sampled::changes_world(key) && key != SCENARIO_KEY,
         };
         let mut named: Vec<String> = self
             .values(case)
@@ -231,12 +249,15 @@ fn name(root: &Table<'_>) -> Result<String, ScenarioError> {
 }
 
 /// Refuses keys that occur twice, or that are the study's own matter.
-fn unlike(root: &Table<'_>, axes: &[Axis]) -> Result<(), ScenarioError> {
+fn unlike(root: &Table<'_>, level: Level, axes: &[Axis]) -> Result<(), ScenarioError> {
+    let is_chosen = |key: &str| level.grade().is_some() && sampled::changes_level(key);
     for (number, axis) in axes.iter().enumerate() {
         let message = if axes.iter().take(number).any(|other| other.key == axis.key) {
             format!("axis {}: expected each key but once", axis.key)
         } else if ["seed", "name"].contains(&axis.key.as_str()) {
             format!("axis {}: expected a key of the base; repetitions vary the seed", axis.key)
+        } else if is_chosen(&axis.key) {
+            format!("axis {}: expected level = \"samples\", at which a scene's [fidelity] is heard", axis.key)
         } else {
             continue;
         };
@@ -251,11 +272,11 @@ fn scenario(root: &Table<'_>, level: Level, axes: &[Axis]) -> Result<Option<Path
     match (level, written, axis) {
         (Level::Correlator, None, None) => Ok(None),
         (Level::Correlator, ..) => Err(root.bad(SCENARIO_KEY, "nothing at level = \"correlator\", which has no scene")),
-        (Level::Samples, Some(_), Some(_)) => Err(root.bad(SCENARIO_KEY, "nothing beside the axis \"scenario\"")),
-        (Level::Samples, None, None) => Err(root.bad(SCENARIO_KEY, "the path of a scene, relative to the study")),
-        (Level::Samples, written, None) => Ok(written.map(PathBuf::from)),
-        (Level::Samples, None, Some(axis)) if axis.values.iter().all(Value::is_str) => Ok(None),
-        (Level::Samples, None, Some(axis)) => {
+        (_, Some(_), Some(_)) => Err(root.bad(SCENARIO_KEY, "nothing beside the axis \"scenario\"")),
+        (_, None, None) => Err(root.bad(SCENARIO_KEY, "the path of a scene, relative to the study")),
+        (_, written, None) => Ok(written.map(PathBuf::from)),
+        (_, None, Some(axis)) if axis.values.iter().all(Value::is_str) => Ok(None),
+        (_, None, Some(axis)) => {
             let message = "axis scenario: expected paths of scenes, relative to the study".to_owned();
             Err(ScenarioError::Toml { place: axis.place.clone(), message })
         }
@@ -275,9 +296,9 @@ fn base(
     (text, origin): (&str, &str),
     level: Level,
 ) -> Result<toml::Table, Result<ScenarioError, Box<toml::de::Error>>> {
-    if level == Level::Samples {
+    if level != Level::Correlator {
         let written = BASE.iter().find(|name| root.has(name));
-        let expected = "nothing at level = \"samples\": the scene's file holds it";
+        let expected = format!("nothing at level = \"{}\": the scene's file holds it", level.name());
         return written.map_or_else(|| Ok(toml::Table::new()), |name| Err(Ok(root.bad(name, expected))));
     }
     let mut whole: toml::Table = toml::from_str(text).map_err(|e| Err(Box::new(e)))?;
@@ -295,7 +316,7 @@ fn base(
 fn keep(root: &Table<'_>, level: Level) -> Result<Vec<String>, ScenarioError> {
     let known: Vec<&str> = match level {
         Level::Correlator => model::FIGURES.iter().map(|figure| figure.name).collect(),
-        Level::Samples => [sampled::FIGURES, fixes::FIGURES].concat(),
+        _ => [sampled::FIGURES, fixes::FIGURES].concat(),
     };
     let expected = "an array of figures";
     let written = root.words("keep", expected)?.ok_or_else(|| root.bad("keep", expected))?;
@@ -305,7 +326,7 @@ fn keep(root: &Table<'_>, level: Level) -> Result<Vec<String>, ScenarioError> {
             let hint = nearest(word, &known).map_or(String::new(), |near| format!(" (did you mean {near}?)"));
             return Err(root.bad("keep", format!("figures out of {}; {word:?} is none{hint}", known.join(", "))));
         }
-        // On samples theory is for scenes of thermal noise alone, so a study has to ask for it.
+        // In a scene theory is for scenes of thermal noise alone, so a study has to ask for it.
         let theory = (level == Level::Correlator).then(|| format!("theory.{word}"));
         for name in [Some(word.to_owned()), theory].into_iter().flatten() {
             if known.contains(&name.as_str()) && !keep.contains(&name) {

@@ -54,6 +54,7 @@ use ray::Question;
 pub use refusal::refuse;
 use sent::Sent;
 use separation::Sampled;
+pub use taps::factors;
 use taps::{LANES, MOST, is_near};
 use train::Train;
 

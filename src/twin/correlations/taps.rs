@@ -53,7 +53,9 @@ impl Taps {
         }
         let ordered: Vec<f64> = order.iter().filter_map(|index| chips.get(*index).copied()).collect();
         let count = (last - first + 1) as usize;
-        Self { factors: factors(&ordered, own), chips: chips.to_vec(), order, first, count, weights }
+        let power = own.value(0.0);
+        let factors = factors(&ordered, |apart| own.value(apart) / power);
+        Self { factors, chips: chips.to_vec(), order, first, count, weights }
     }
 
     /// Shares of the chips that any tap meets, for a prompt at one of [`POSITIONS`].
@@ -69,17 +71,18 @@ fn width_chips(pulse: &PeakTable) -> f64 {
     f64::from(steps.unwrap_or(0) + 1) / f64::from(STEPS)
 }
 
-/// Rows of the lower triangle whose square is the correlation of noise at taps.
-fn factors(taps: &[f64], own: &PeakTable) -> [[f64; MOST]; MOST] {
-    let power = own.value(0.0);
-    let mut factors = [[0.0; MOST]; MOST];
-    for row in 0..taps.len().min(MOST) {
+/// Rows of the lower triangle whose square is the correlation of noise at taps (Cholesky). `common` is that
+/// of two taps by their distance in chips. At most `N` taps count; a tap that lies on another has nothing of
+/// its own.
+pub fn factors<const N: usize>(taps: &[f64], common: impl Fn(f64) -> f64) -> [[f64; N]; N] {
+    let mut factors = [[0.0; N]; N];
+    for row in 0..taps.len().min(N) {
         let mut left = 1.0;
         for column in 0..row {
             let inner: f64 = (0..column).map(|k| factors[row][k] * factors[column][k]).sum();
             let pivot: f64 = factors[column][column];
-            let common = own.value(taps[row] - taps[column]) / power;
-            factors[row][column] = if pivot > 1e-6 { (common - inner) / pivot } else { 0.0 };
+            let shared = common(taps[row] - taps[column]);
+            factors[row][column] = if pivot > 1e-6 { (shared - inner) / pivot } else { 0.0 };
             left -= factors[row][column] * factors[row][column];
         }
         factors[row][row] = f64::max(left, 0.0).sqrt();

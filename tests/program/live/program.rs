@@ -328,3 +328,24 @@ fn what_does_not_fit_is_refused_before_anything_is_sent() {
     assert_eq!(done.status.code(), Some(65), "{}", errors(&done));
     assert!(errors(&done).contains("gnss-twin live"), "{}", errors(&done));
 }
+
+/// A stream is samples: without them there is nothing to send, and no sink or record is begun.
+#[test]
+fn a_level_without_samples_is_refused_by_name() {
+    let bench = Bench::new();
+    for level in ["correlations", "observations"] {
+        let scene = SCENE.replacen("noise = {}", &format!("noise = {{}}\nfidelity = {{ level = \"{level}\" }}"), 1);
+        let known = scene.replacen("\"pushed\"", "\"static\"", 1);
+        for scene in [scene, known] {
+            fs::write(bench.path("scene.toml"), scene).unwrap();
+            let arguments = ["--clock", "free", "--to", "file:sent.bin", "--record", "flight"];
+            let done = bench.start(&arguments).wait_with_output().unwrap();
+            assert_eq!(done.status.code(), Some(65), "{}", errors(&done));
+            let expected = format!("fidelity.level = \"{level}\": no samples exist at this level: take \"balanced\"");
+            assert!(errors(&done).contains(&expected), "{}", errors(&done));
+            let left: Vec<_> =
+                fs::read_dir(bench.directory.path()).unwrap().map(|one| one.unwrap().file_name()).collect();
+            assert_eq!(left, ["scene.toml"], "{}", errors(&done));
+        }
+    }
+}
