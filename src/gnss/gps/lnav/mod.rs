@@ -83,8 +83,8 @@ pub static LNAV_SETS: SetForm = SetForm { name: "LNAV", serves: |signal| signal.
 /// The page of subframe 4 that carries the ionosphere, counted from 0 (IS-GPS-200N, 20.3.3.5.1.7).
 const IONOSPHERE_PAGE_AT: i64 = 17;
 
-/// The elements that raw integers give, as if their subframes had been sent at `near`, or in the week that they
-/// name as near to it as can be.
+/// The elements that raw integers give, as if their subframes had been sent at `near`, or in the week that
+/// they name as near to it as can be.
 fn of_integers(sv: Sv, raw: &dyn Fn(&str) -> Option<i64>, near: Epoch) -> Option<Ephemeris> {
     let from_s = near.nearest_week(raw("week")?, 1024) * WEEK_S;
     let sent = Epoch::new(near.seconds().clamp(from_s, from_s + WEEK_S - SUBFRAME_S), 0.0);
