@@ -415,24 +415,20 @@ fn first_sent(set: &Ephemeris) -> Epoch {
 }
 
 fn spans(sets: &[Ephemeris]) -> Vec<Span> {
-    let fit = |set: &Ephemeris| {
-        let end = set.toe.plus_s(set.fit_interval_s() / 2.0);
-        // Half hours of GLONASS are those of UTC: one that ends with a leap second lasts a second longer.
-        let leap =
-            if set.sv.system == System::Glonass { end.plus_s(1.0).leap_seconds() - set.toe.leap_seconds() } else { 0 };
+    let fits = |set: &Ephemeris| {
+        let half = set.fit_interval_s() / 2.0;
         // A long fit begins with the transmission and is not centred on it, so never begin before.
-        (first_sent(set), end.plus_s(leap as f64))
+        (first_sent(set), set.toe.plus_s(half))
     };
-    let fits: Vec<(Epoch, Epoch)> = sets.iter().map(fit).collect();
-    let mut instants: Vec<Epoch> = fits.iter().flat_map(|(from, to)| [*from, *to]).collect();
+    let mut instants: Vec<Epoch> = sets.iter().flat_map(|set| [fits(set).0, fits(set).1]).collect();
     instants.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
     instants.dedup();
     let mut spans: Vec<Span> = Vec::new();
     for from in instants {
-        let on_air = fits.iter().enumerate().filter(|(_, fit)| fit.0 <= from && from < fit.1);
+        let on_air = sets.iter().enumerate().filter(|(_, set)| fits(set).0 <= from && from < fits(set).1);
         // The one that began last; `sets` is in order of reference time, and the later wins a tie.
         let set = on_air
-            .max_by(|(_, a), (_, b)| a.0.partial_cmp(&b.0).unwrap_or(std::cmp::Ordering::Equal))
+            .max_by(|(_, a), (_, b)| first_sent(a).partial_cmp(&first_sent(b)).unwrap_or(std::cmp::Ordering::Equal))
             .map(|(index, _)| index);
         if spans.last().is_none_or(|span| span.set != set) {
             spans.push(Span { from, set });

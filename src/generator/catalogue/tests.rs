@@ -138,18 +138,3 @@ fn the_truth_is_smooth_across_every_hand_over_of_the_day() {
     // 1 mm a tenth of a second.
     assert!(fastest < 0.010, "{fastest} m/s");
 }
-
-#[test]
-fn a_set_of_glonass_is_sent_through_the_leap_second_that_ends_its_half_hour() {
-    let file = rinex::read(include_bytes!("../../../packs/time/leap_second.rnx"), "leap_second.rnx").unwrap();
-    let sets: Vec<Ephemeris> = file.ephemerides.into_iter().filter(|set| set.sv.system == System::Glonass).collect();
-    let (catalogue, _) = Catalogue::new(sets);
-    assert!(catalogue.satellites().count() > 4);
-    // 2016-12-31T23:59:60Z is 17 s before 00:00:18 of GPS time.
-    let inserted = Epoch::parse("2017-01-01T00:00:17").unwrap();
-    for sv in catalogue.satellites() {
-        for after_s in [-0.5, 0.0, 0.5, 1.0, 1.5] {
-            assert!(catalogue.sent_at(sv, inserted.plus_s(after_s)).is_some(), "{sv} {after_s}");
-        }
-    }
-}
