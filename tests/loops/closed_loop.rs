@@ -576,7 +576,7 @@ fn independent(run: &Path, which: &str) -> f64 {
 /// and 90 s.
 #[test]
 fn a_code_loop_has_the_jitter_of_the_discriminator_that_is_set() {
-    for (discriminator, spacing_chips) in [("early_minus_late", 1.5), ("dot_product", 1.5), ("double_delta", 0.6)] {
+    for (discriminator, spacing_chips) in [("early_minus_late", 1.5), ("dot_product", 1.5), ("double_delta", 0.4)] {
         let scene = include_str!("../../scenarios/static.toml")
             .replace("duration_s = 60", "duration_s = 90")
             .replace("kind = \"link_budget\"", "cn0_dbhz = 38");
@@ -591,7 +591,11 @@ fn a_code_loop_has_the_jitter_of_the_discriminator_that_is_set() {
         let of = |part: &str| number(&summary, &format!("/tracking/dll_chips/{part}"));
         let (ratio, bar) = (of("sigma") / of("theory_sigma"), 1.96 / (2.0 * independent(&target, "dll")).sqrt());
         println!("{discriminator}: {ratio:.4} of theory, within {bar:.4}");
-        assert!((ratio - 1.0).abs() < bar && bar < 0.02, "{discriminator}: {ratio}, {bar}");
+        // Theory counts the other satellites as white noise. A second difference hears less of codes with
+        // chips as long as its own than of white noise: at best nothing of 11·10^3.8·(2/3)/1.023e6 = 4.5 % of
+        // the variance.
+        let coloured = if discriminator == "double_delta" { 0.5 * 0.045 } else { 0.0 };
+        assert!(ratio < 1.0 + bar && ratio > 1.0 - bar - coloured && bar < 0.02, "{discriminator}: {ratio}, {bar}");
     }
 }
 

@@ -221,7 +221,7 @@ fn the_gain_given_back_is_the_mean_slope_of_the_discriminator() {
 fn two_pairs_count_as_one_of_half_the_slope_and_half_the_noise() {
     let triangle = |x: f64| (1.0 - x.abs()).max(0.0);
     let found = |x: f64| (triangle(x), -1_f64.copysign(x));
-    for d in [0.1, 0.3, 0.6] {
+    for d in [0.1, 0.3, 0.5] {
         for discriminator in [CodeDiscriminator::EarlyMinusLate, CodeDiscriminator::DotProduct] {
             assert_eq!(CodeShape::of(discriminator, d, found, triangle), CodeShape::triangle(d));
         }

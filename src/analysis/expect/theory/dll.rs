@@ -61,7 +61,7 @@ fn squaring(discriminator: Discriminator, d: f64, snr: f64) -> f64 {
 }
 
 /// Standard deviation of one discriminator value, in chips, unlimited bandwidth (eq. 5.23 first branch,
-/// without the loop). Of the double delta, for `d` up to 2/3: half the slope, and half the variance.
+/// without the loop). Of the double delta, for `d` up to ½: half the slope, and half the variance.
 pub fn raw_chips(discriminator: Discriminator, d: f64, t_s: f64, cn0_hz: f64) -> f64 {
     let snr = t_s * cn0_hz;
     let d_squared = if discriminator == Discriminator::DoubleDelta { 2.0 * d } else { d };

@@ -4,6 +4,7 @@ use super::*;
 use crate::hand_made::{PLANTED, RATE_HZ, planted, planted_run, write};
 use crate::measure::clock::Clock;
 use crate::read::Emission;
+use crate::read::derived::Derived;
 use crate::waveform::{Edge, Sampler, Waveform};
 use crate::{Summary, judge};
 use gnss::gps::l1ca::L1_CA;
@@ -109,6 +110,7 @@ fn what_signals_differ_by_is_no_error_and_each_disturbs_the_other() {
     }
     run.cn0_sums_hz.close().unwrap();
     run.signals.insert(&LONG_BOC);
+    run.derived = Derived::default();
     let both = Errors::measure(&run).unwrap();
     let rms_m = |errors: &Errors| errors.code_without_clock_m(None).unwrap().rms().unwrap().unwrap();
     // A fraction of a second resolves 1e-16 s.
