@@ -63,7 +63,7 @@ fn a_time_pushed_off_is_captured_at_a_place_that_nobody_pushed() {
     let settled: Vec<f64> = rows
         .map(|row| row.collect::<Vec<_>>())
         .filter(|row| row[0] > 36.0)
-        .map(|row| row[1].hypot(row[2]).hypot(row[3]))
+        .map(|row| libm::hypot(libm::hypot(row[1], row[2]), row[3]))
         .collect();
     assert!(settled.len() > 350 && settled.iter().all(|error_m| *error_m < 5.0), "{settled:?}");
     assert!(number("/spoofing/captured_share") > 0.9, "{summary}");
