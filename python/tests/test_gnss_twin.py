@@ -175,7 +175,7 @@ def test_a_run_without_samples_is_that_of_the_program(tmp_path, level):
     program = Path(sys.executable).with_name("gnss-twin")
     arguments = [program, "run", tmp_path / "scene.toml", "--out", tmp_path / "its", "--report", "none"]
     subprocess.run(arguments, check=True, capture_output=True)
-    for name in ["rx/observations.csv", "rx/fixes.csv", "truth/observables.csv"]:
+    for name in ["rx/observations.csv", "rx/fixes.csv", "truth/observations.csv"]:
         mine, its = [(tmp_path / side / name).read_bytes() for side in ("mine", "its")]
         assert mine == its and len(mine) > 50, name
     # There is nothing to slice, to iterate over or to step through.
