@@ -3,6 +3,8 @@
 //! Receivers and their judges name them alike. How a receiver normalises them, and what noise and rays make
 //! of them, is no matter of this room.
 
+use serde::de::IntoDeserializer;
+use serde::de::value::{self, StrDeserializer};
 use serde::{Deserialize, Serialize};
 
 /// Discriminator of a code loop.
@@ -23,13 +25,10 @@ impl CodeDiscriminator {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::EarlyMinusLate, Self::DotProduct, Self::DoubleDelta];
 
-    /// Name in settings.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::EarlyMinusLate => "early_minus_late",
-            Self::DotProduct => "dot_product",
-            Self::DoubleDelta => "double_delta",
-        }
+    /// Discriminator by its name in settings; `None` of another name.
+    pub fn named(name: &str) -> Option<Self> {
+        let name: StrDeserializer<'_, value::Error> = name.into_deserializer();
+        Self::deserialize(name).ok()
     }
 
     /// Pairs of an early and a late tap: their distance in spacings from early to late, and the weight of

@@ -45,8 +45,7 @@ fn spacing_chips(receiver: &Value, signal: &Signal) -> f64 {
 fn discriminator(receiver: &Value) -> CodeDiscriminator {
     let settings = receiver.get("settings").unwrap_or(receiver);
     let named = settings.pointer("/tracking/dll_discriminator").and_then(Value::as_str);
-    let known = CodeDiscriminator::ALL.into_iter().find(|one| Some(one.name()) == named);
-    known.unwrap_or(CodeDiscriminator::EarlyMinusLate)
+    named.and_then(CodeDiscriminator::named).unwrap_or(CodeDiscriminator::EarlyMinusLate)
 }
 
 /// The common part.

@@ -393,15 +393,18 @@ impl Correlations<'_> {
         for sent in self.alike(place) {
             train.add(sent, taps, sums);
         }
-        if let Some(crowd) = place.and_then(|place| self.crowd(place)) {
+        let (number, count) = (code.link.sv.number, taps.len());
+        let crowd = place.and_then(|place| self.crowd(place));
+        if let Some(crowd) = crowd.filter(|_| count > LANES) {
             // As many taps at once as it looks up.
             for (first, part) in (0..).step_by(LANES).zip(taps.chunks(LANES)) {
-                made.with_taps(code.link.sv.number, part, |part| {
-                    crowd.add(train.intervals, part, (first, taps.len()), sums);
-                });
+                made.with_taps(number, part, |part| crowd.add(train.intervals, part, (first, count), sums));
             }
         }
-        made.with_taps(code.link.sv.number, taps, |taps| {
+        made.with_taps(number, taps, |taps| {
+            if let Some(crowd) = crowd.filter(|_| count <= LANES) {
+                crowd.add(train.intervals, taps, (0, count), sums);
+            }
             if deviation <= 0.0 {
                 return;
             }

@@ -37,17 +37,17 @@ impl From<CodeDiscriminator> for Discriminator {
 impl Discriminator {
     /// Discriminator by the name that a receiver's settings have for it; `None` of another name.
     pub fn named(name: &str) -> Option<Self> {
-        CodeDiscriminator::ALL.into_iter().find(|one| one.name() == name).map(Self::from)
+        CodeDiscriminator::named(name).map(Self::from)
     }
 
     /// Weighted sum of what `difference` gives for each pair of taps, which are so many chips from the
     /// prompt; `half` is half the distance of early and late.
     pub fn sum<T: Sum<T> + Mul<f64, Output = T>>(self, half: f64, difference: impl Fn(f64) -> T) -> T {
-        let pairs: &[(f64, f64)] = match self {
-            Self::DoubleDelta => &[(1.0, 1.0), (2.0, -0.5)],
-            Self::EarlyMinusLate | Self::DotProduct | Self::Coherent => &[(1.0, 1.0)],
+        let of = match self {
+            Self::DoubleDelta => CodeDiscriminator::DoubleDelta,
+            Self::EarlyMinusLate | Self::DotProduct | Self::Coherent => CodeDiscriminator::DotProduct,
         };
-        pairs.iter().map(|(apart, weight)| difference(apart * half) * *weight).sum()
+        of.pairs().iter().map(|(apart, weight)| difference(apart * half) * *weight).sum()
     }
 }
 
@@ -64,8 +64,8 @@ fn squaring(discriminator: Discriminator, d: f64, snr: f64) -> f64 {
 /// without the loop). Of the double delta, for `d` up to ½: half the slope, and half the variance.
 pub fn raw_chips(discriminator: Discriminator, d: f64, t_s: f64, cn0_hz: f64) -> f64 {
     let snr = t_s * cn0_hz;
-    let d_squared = if discriminator == Discriminator::DoubleDelta { 2.0 * d } else { d };
-    (d_squared / (planted!("analysis.theory.dll", 4.0, 2.0) * snr) * (1.0 + squaring(discriminator, d, snr))).sqrt()
+    let spread = if discriminator == Discriminator::DoubleDelta { 2.0 * d } else { d };
+    (spread / (planted!("analysis.theory.dll", 4.0, 2.0) * snr) * (1.0 + squaring(discriminator, d, snr))).sqrt()
 }
 
 /// Correlation of a code at early and late, relative to 1 at the prompt.
@@ -83,18 +83,17 @@ impl Taps {
     /// Taps of a discriminator `d` chips apart. `found` gives height and slope, positive where it falls, of
     /// the signal's correlation at an offset over the height of its peak, and `own` the correlation of noise.
     ///
-    /// Of two pairs with weights 1 and w: slopes add as the weights say, and the variance of the sum is
+    /// With weights 1 and w of two pairs slopes add as the weights say, and the variance of the sum is
     /// 1 − ρ(d) + w²·(1 − ρ(2d)) + 2w·(ρ(d/2) − ρ(3d/2)) where that of one pair is 1 − ρ(d).
     pub fn of(discriminator: Discriminator, d: f64, found: impl Fn(f64) -> [f64; 2], own: impl Fn(f64) -> f64) -> Self {
-        let half = 0.5 * d;
-        let [height, slope] = found(half);
-        let rho = own(d);
+        let (half, rho) = (0.5 * d, own(d));
+        let [height, _] = found(half);
+        let slope = discriminator.sum(half, |x| found(x)[1]);
         if discriminator != Discriminator::DoubleDelta {
             return Self { height, slope, common: rho };
         }
-        let [_, outer] = found(d);
         let variance = 1.0 - rho + 0.25 * (1.0 - own(2.0 * d)) - (own(half) - own(3.0 * half));
-        Self { height, slope: slope - 0.5 * outer, common: 1.0 - variance }
+        Self { height, slope, common: 1.0 - variance }
     }
 }
 

@@ -195,45 +195,28 @@ impl Accumulator {
     ) -> Correlations {
         let Some(coded) = &self.coded else { return Correlations::default() };
         let [e, p, l] = self.taps;
-        if self.takes_outer {
-            let [x, y] = [2 * e, 2 * l];
-            return match (quiet, sides) {
-                (None, None) => {
-                    let [e, p, l, x, y] = period.sums_ahead(&mut self.ahead, coded, &[e, p, l, x, y]);
-                    Correlations { sums: [e, p, l, x - y], ..Correlations::default() }
-                }
-                (Some(quiet), None) => {
-                    let [e, p, l, noise, x, y] = period.sums(coded, &[e, p, l, quiet, x, y]);
-                    Correlations { sums: [e, p, l, x - y], noise: Some(noise), sides: None }
-                }
-                (None, Some([a, b])) => {
-                    let [e, p, l, x, y, a, b] = period.sums_ahead(&mut self.ahead, coded, &[e, p, l, x, y, a, b]);
-                    Correlations { sums: [e, p, l, x - y], noise: None, sides: Some([a, b]) }
-                }
-                (Some(quiet), Some([a, b])) => {
-                    let [e, p, l, noise, x, y, a, b] = period.sums(coded, &[e, p, l, quiet, x, y, a, b]);
-                    Correlations { sums: [e, p, l, x - y], noise: Some(noise), sides: Some([a, b]) }
-                }
-            };
-        }
-        let none = Complex64::ZERO;
-        match (quiet, sides) {
-            (None, None) => {
-                let [e, p, l] = period.sums_ahead(&mut self.ahead, coded, &self.taps);
-                Correlations { sums: [e, p, l, none], ..Correlations::default() }
-            }
-            (Some(quiet), None) => {
-                let [e, p, l, noise] = period.sums(coded, &[e, p, l, quiet]);
-                Correlations { sums: [e, p, l, none], noise: Some(noise), sides: None }
-            }
-            (None, Some([a, b])) => {
-                let [e, p, l, a, b] = period.sums_ahead(&mut self.ahead, coded, &[e, p, l, a, b]);
-                Correlations { sums: [e, p, l, none], noise: None, sides: Some([a, b]) }
-            }
-            (Some(quiet), Some([a, b])) => {
-                let [e, p, l, noise, a, b] = period.sums(coded, &[e, p, l, quiet, a, b]);
-                Correlations { sums: [e, p, l, none], noise: Some(noise), sides: Some([a, b]) }
-            }
+        // Taps that are asked for follow early, prompt and late in this order.
+        let outer = self.takes_outer.then_some([2 * e, 2 * l]);
+        let read = |found: &[Complex64]| {
+            let (three, rest) = found.split_at(3);
+            let mut rest = rest.iter().copied();
+            let noise = quiet.and_then(|_| rest.next());
+            let outer = outer.and_then(|_| Some(rest.next()? - rest.next()?));
+            let sides = sides.and_then(|_| Some([rest.next()?, rest.next()?]));
+            let mut sums = [Complex64::ZERO; 4];
+            sums.iter_mut().zip(three.iter().copied().chain(outer)).for_each(|(sum, tap)| *sum = tap);
+            Correlations { sums, noise, sides }
+        };
+        let ahead = &mut self.ahead;
+        match (quiet, outer, sides) {
+            (None, None, None) => read(&period.sums_ahead(ahead, coded, &[e, p, l])),
+            (Some(q), None, None) => read(&period.sums(coded, &[e, p, l, q])),
+            (None, None, Some([a, b])) => read(&period.sums_ahead(ahead, coded, &[e, p, l, a, b])),
+            (Some(q), None, Some([a, b])) => read(&period.sums(coded, &[e, p, l, q, a, b])),
+            (None, Some([x, y]), None) => read(&period.sums_ahead(ahead, coded, &[e, p, l, x, y])),
+            (Some(q), Some([x, y]), None) => read(&period.sums(coded, &[e, p, l, q, x, y])),
+            (None, Some([x, y]), Some([a, b])) => read(&period.sums_ahead(ahead, coded, &[e, p, l, x, y, a, b])),
+            (Some(q), Some([x, y]), Some([a, b])) => read(&period.sums(coded, &[e, p, l, q, x, y, a, b])),
         }
     }
 
