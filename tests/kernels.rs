@@ -53,7 +53,7 @@ fn fast(level: Level, edge: Edge<'_>, run: &Run<'_>, samples: usize) -> (Vec<f32
 
 #[test]
 fn the_fast_kernel_keeps_to_the_reference_at_all_lengths_phases_and_rates() {
-    let filter = Filter::new(0.45);
+    let filter = Filter::default();
     for rate_hz in [1.5e6, 2.046e6, 2.6e6, 25e6, 0.9e6] {
         for edge in edges(&filter) {
             for length in (0..=130).chain([1000, 4096]) {
@@ -91,7 +91,7 @@ fn edge_is_nearest(edge: Edge<'_>) -> bool {
 
 #[test]
 fn runs_together_are_the_sum_of_each_by_itself() {
-    let filter = Filter::new(0.45);
+    let filter = Filter::default();
     for rates in [[2.6e6; 5], [25e6; 5], [2.6e6, 0.9e6, 1.5e6, 0.9e6, 25e6]] {
         for length in [1, 31, 32, 33, 1000, 4096] {
             let cases: Vec<Case> = (0..)
@@ -157,7 +157,7 @@ fn the_carrier_of_the_fast_kernel_is_within_a_millionth_of_a_cycle_and_has_no_sp
 
 #[test]
 fn every_instruction_set_gives_the_same_bits() {
-    let filter = Filter::new(0.45);
+    let filter = Filter::default();
     for level in Level::ALL.into_iter().filter(|level| level.is_available()) {
         for rate_hz in [0.7e6, 1.5e6, 2.6e6, 60e6] {
             for length in [1, 31, 32, 33, 500, 4096] {
@@ -179,7 +179,7 @@ fn every_instruction_set_gives_the_same_bits() {
 
 #[test]
 fn every_code_edge_keeps_the_mean_power_of_the_waveform() {
-    let filter = Filter::new(0.45);
+    let filter = Filter::default();
     let waveform = Waveform::new(L1_CA.link(Sv::gps(11)), 0).unwrap().unwrap();
     for rate_hz in [0.6e6, 1.5e6, 2.6e6, 10e6] {
         for edge in edges(&filter) {
@@ -253,7 +253,7 @@ fn code_bias_m(edge: Edge<'_>, rate_khz: usize, start_chips: f64) -> f64 {
 
 #[test]
 fn band_limited_edges_leave_no_code_bias_and_area_edges_none_once_the_phase_moves() {
-    let filter = Filter::new(0.45);
+    let filter = Filter::default();
     let starts: Vec<f64> = (0..24).map(|k| f64::from(k) * 0.618_034 % 1.0 + f64::from(k * 37)).collect();
     let [nearest, area, band] = edges(&filter).map(|edge| {
         let bias: Vec<f64> = starts.iter().map(|&start| code_bias_m(edge, 2600, start)).collect();

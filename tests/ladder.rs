@@ -119,7 +119,7 @@ fn pieces(signal: &'static Signal) -> Vec<(f64, Grade)> {
 
 /// Makes every piece of a signal twice. callgrind counts the second time.
 fn make(signal: &'static Signal) {
-    let filter = Filter::new(0.45);
+    let filter = Filter::default();
     let mut bank = Bank::default();
     let mut planes = [(); 2].map(|()| vec![0.0; RUN_SAMPLES]);
     assert!(LEVEL.is_available(), "{LEVEL:?}");

@@ -10,22 +10,27 @@ use generator::synth::bank::Bank;
 use generator::synth::isa::Level;
 use generator::synth::waveform::{Voice, Waveform};
 use generator::synth::{CODE_ONE, Edge, Kernel, RUN_SAMPLES, Run};
+use gnss::satellite::System;
 use gnss::signal::{Layers, SIGNALS, Signal};
 use gnss::time::Epoch;
 use rayon::prelude::*;
 use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::lines::{Code, Found};
 
 const RATES_MSPS: [f64; 8] = [2.6, 4.092, 4.1, 6.5, 10.23, 12.5, 25.0, 65.0];
-/// Satellites whose samples are timed together, and those whose errors are looked at.
+/// Satellites whose samples are timed together.
 const TIMED: usize = 6;
-pub const JUDGED: usize = 8;
+/// Satellites of a component whose errors are looked at, at least and at most. All are taken if there are fewer.
+pub const JUDGED: [usize; 2] = [8, 32];
+/// Code phases of each, at least and at most.
+pub const PHASES: [usize; 2] = [2, 8];
 /// Runs of each timing.
 pub const ROUNDS: usize = 15;
 /// Codes that repeat after more are left out.
 const LONGEST_S: f64 = 0.0201;
-/// Samples of all code phases on the grid, at most.
+/// Samples of all satellites and code phases of a component, about.
 const SAMPLES: f64 = 1e6;
 
 /// A median with what it may be: ranks of the sorted runs that hold it with 95 %.
@@ -64,7 +69,9 @@ pub struct SignalRow {
     /// Error of the code at rest of the component that errs most, root mean square over satellites and
     /// code phases.
     pub code_rms_m: f64,
-    /// Satellites and code phases.
+    /// Satellites of that component whose codes differ.
+    pub codes: usize,
+    /// Satellites and code phases of it.
     pub draws: usize,
     /// Error that the plan states for it, in metres.
     pub stated_m: f64,
@@ -90,6 +97,14 @@ impl SignalRow {
     /// Ratio of the stated error to the measured one.
     pub fn ratio(&self) -> f64 {
         self.stated_m / self.code_rms_m
+    }
+
+    /// Both ends of the ratio to what infinitely many random codes would measure, with 95 %. The error of one
+    /// code is a wave over its phase, of two random amplitudes: a mean square of n codes is χ² of 2n degrees.
+    pub fn ratio_of_many(&self) -> [f64; 2] {
+        let degrees = 2.0 * self.codes as f64;
+        let squares = ChiSquared::new(degrees).unwrap();
+        [0.025, 0.975].map(|share| self.ratio() * (squares.inverse_cdf(share) / degrees).sqrt())
     }
 }
 
@@ -263,11 +278,17 @@ struct Draw {
 
 /// Errors at code phases all over the grid, of the setting's edge.
 fn draws(codes: &[(usize, u8, Code)], kernels: [Kernel<'_>; 2], rate_hz: f64) -> Vec<Draw> {
-    let all = codes.iter().flat_map(|one| {
-        let places = (SAMPLES / (one.2.period_s * rate_hz * codes.len() as f64)).clamp(2.0, 16.0) as usize;
-        (0..places).map(move |place| (one, place))
-    });
-    let all: Vec<_> = all.collect();
+    let mut all = Vec::new();
+    for of_component in codes.chunk_by(|a, b| a.0 == b.0) {
+        let Some((_, _, first)) = of_component.first() else { continue };
+        // More codes before more phases.
+        let periods = SAMPLES / (first.period_s * rate_hz);
+        let wanted = (periods as usize / PHASES[0]).clamp(JUDGED[0], JUDGED[1]).min(of_component.len());
+        let places = (periods as usize / wanted).clamp(PHASES[0], PHASES[1]);
+        let step = of_component.len() / wanted;
+        let some = of_component.iter().step_by(step).take(wanted);
+        all.extend(some.flat_map(|one| (0..places).map(move |place| (one, place))));
+    }
     let of = |&((component, number, code), place): &(&(usize, u8, Code), usize)| {
         // Golden-section places within a period: of the grid and of the code both.
         let delay_s =
@@ -289,7 +310,7 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
 
 /// Rows of every signal whose name holds `wanted`.
 pub fn measure(wanted: &str) -> Vec<SignalRow> {
-    let filter = Filter::new(0.45);
+    let filter = Filter::default();
     let kernels = kernels(&filter);
     let signals = || SIGNALS.into_iter().filter(|signal| signal.name.contains(wanted));
     // Costs first: they take a minute of a quiet machine.
@@ -300,10 +321,10 @@ pub fn measure(wanted: &str) -> Vec<SignalRow> {
     let mut rows = Vec::new();
     for (signal, all_costs) in signals().zip(&all_costs) {
         let numbers: Vec<u8> = signal.satellites().map(|sv| sv.number).collect();
-        let step = (numbers.len() / JUDGED).max(1);
+        let step = (numbers.len() / JUDGED[1]).max(1);
         let mut codes = Vec::new();
         for (index, _) in signal.components.iter().enumerate().filter(|(_, c)| c.period_s() < LONGEST_S) {
-            let some = numbers.iter().step_by(step).take(JUDGED);
+            let some = numbers.iter().step_by(step).take(JUDGED[1]);
             codes.extend(some.filter_map(|&number| Some((index, number, Code::new(signal, index, number)?))));
         }
         for (rate_msps, costs) in RATES_MSPS.into_iter().zip(all_costs) {
@@ -314,11 +335,15 @@ pub fn measure(wanted: &str) -> Vec<SignalRow> {
                 // Of the component that errs most, as the model states it.
                 let of = |index: usize| {
                     let own = || draws.iter().filter(move |draw| draw.component == index);
-                    (rms(own().map(|draw| draw.found[1].code_m)), own().count())
+                    let mut numbers: Vec<_> = own().map(|draw| draw.number).collect();
+                    numbers.dedup();
+                    // All satellites of GLONASS send one code.
+                    let codes = if signal.system == System::Glonass { 1 } else { numbers.len() };
+                    (rms(own().map(|draw| draw.found[1].code_m)), own().count(), codes)
                 };
-                let (code_rms_m, count) = (0..signal.components.len())
+                let (code_rms_m, count, codes) = (0..signal.components.len())
                     .map(of)
-                    .fold((0.0, 0), |worst, one| if one.0 > worst.0 { one } else { worst });
+                    .fold((0.0, 0, 0), |worst, one| if one.0 > worst.0 { one } else { worst });
                 let Some(worst) =
                     draws.iter().max_by(|a, b| a.found[1].code_m.abs().total_cmp(&b.found[1].code_m.abs()))
                 else {
@@ -335,6 +360,7 @@ pub fn measure(wanted: &str) -> Vec<SignalRow> {
                     f64_low_ns: costs[1].low,
                     f64_high_ns: costs[1].high,
                     code_rms_m,
+                    codes,
                     draws: count,
                     stated_m: code_bias_m(pair[0].0, signal, rate_hz),
                     code_largest_m: worst.found[1].code_m,

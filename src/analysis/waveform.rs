@@ -12,7 +12,7 @@ use gnss::facts::SceneFacts;
 use gnss::signal::{Component, Layers, Shape, Signal};
 
 /// Cut-off of band-limited edges where a scene's facts do not state it, in cycles a sample.
-pub const CUTOFF_CPS: f64 = 0.45;
+pub const CUTOFF_CPS: f64 = 0.40;
 /// Half width in samples and shape parameter of the window of that filter.
 const LIMITED: (f64, f64) = (8.0, 5.65);
 
@@ -428,7 +428,7 @@ mod tests {
         let kept = |edge| alone.power(&Sampler::new(edge, 6.5e6));
         assert!((kept(Edge::Nearest) / (10.0 / 11.0) - 1.0).abs() < 3e-3, "{}", kept(Edge::Nearest));
         // Midpoints every kilohertz up to where the filter has stopped.
-        let filter = |hz: f64| direct(hz / 6.5e6, 0.45).powi(2);
+        let filter = |hz: f64| direct(hz / 6.5e6, 0.40).powi(2);
         let at = |k: i32| 1e3 * (f64::from(k) + 0.5);
         let expected = 10.0 / 11.0 * (0..4500).map(|k| 2e3 * printed(at(k), 1.0) * filter(at(k))).sum::<f64>();
         let found = kept(Edge::BandLimited);
@@ -455,7 +455,7 @@ mod tests {
 
     #[test]
     fn a_band_limiting_filter_has_the_response_of_its_taps() {
-        for cutoff_cps in [0.2, 0.45] {
+        for cutoff_cps in [0.2, 0.40] {
             let sampler = Sampler::with_cutoff(Edge::BandLimited, 1.0, cutoff_cps);
             for k in 0..60 {
                 let f_cps = 0.025 * f64::from(k);

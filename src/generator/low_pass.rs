@@ -3,8 +3,10 @@
 
 use std::f64::consts::PI;
 
-/// Cut-off of band-limited edges, in cycles per sample.
-pub(crate) const CUTOFF_CPS: f64 = 0.45;
+/// Cut-off (−6 dB) of band-limited edges, in cycles per sample. The filter falls from 0.29 to 0.51 cycles per
+/// sample: what folds back is down by 50 dB at least. A cut-off of 0.45 would let codes of C/A at 2.6 Msps err
+/// 24 times as much, and would keep 0.02 dB more of their power.
+pub(crate) const CUTOFF_CPS: f64 = 0.40;
 /// Half width of the low-pass filter in samples.
 pub const HALF_WIDTH: usize = 8;
 /// Kaiser's shape parameter: 60 dB in the stop band.

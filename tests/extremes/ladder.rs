@@ -29,7 +29,7 @@ const RUN: u64 = 4096;
 fn carrier_error(scene: &Scene, grade: Grade, first: u64, places: u64, apart_s: f64) -> (f64, f64) {
     let sv = Sv::gps(23);
     let fidelity = Fidelity::of(grade);
-    let filter = Filter::new(0.45);
+    let filter = Filter::default();
     let edge = match fidelity.code_edge {
         CodeEdge::Nearest => Edge::Nearest,
         CodeEdge::Area => Edge::Area,

@@ -136,7 +136,7 @@ fn bias_m(rate_khz: usize, edge: Edge<'_>) -> f64 {
 #[test]
 fn where_the_rate_meets_the_chips_nearest_edges_are_metres_off_and_band_limited_ones_are_not() {
     let the = case(29, "fs = k · 1.023 MHz at zero Doppler", CA);
-    let filter = Filter::new(0.45);
+    let filter = Filter::default();
     for rate_khz in [2046, 4092, 10_230] {
         let name = |edge: &str| format!("{:.3} Msps, {edge} edges: rms over phases", rate_khz as f64 / 1e3);
         // All edges move by one part of a sample, uniform over it: rms 1/√12 of a sample.

@@ -54,7 +54,7 @@ fn composite_chips_have_a_tenth_as_much_power_in_the_quick_layer_as_in_the_slow_
 
 #[test]
 fn what_edges_take_from_a_component_is_not_put_back() {
-    let filter = Filter::new(0.45);
+    let filter = Filter::default();
     let sv = Sv { system: System::Galileo, number: 11 };
     for component in 0..2 {
         let waveform = Waveform::new(E1.link(sv), component).unwrap().unwrap();

@@ -163,13 +163,13 @@ fn figures_of_the_observations_are_those_of_their_rows() {
     let observables = &summary.observables;
     near("pseudorange", observables.pseudorange_rms_m, rms(without_clock));
     near("Doppler", observables.doppler_rms_hz, rms(doppler_hz.into_iter()));
-    // Eight equal satellites of 50 dB-Hz. A filter at 0.45 of 2.048 Msps and a replica by means over samples
-    // leave −0.52 dB: (∫ S·X·R)²/∫ S·R², by another program. Each meets seven others as noise of κ·C,
+    // Eight equal satellites of 50 dB-Hz. A filter at 0.40 of 2.048 Msps and a replica by means over samples
+    // leave −0.58 dB: (∫ S·X·R)²/∫ S·R², by another program. Each meets seven others as noise of κ·C,
     // κ = 0.76 chip of their power at the antenna, which costs 10 lg(1 + 7·0.76/1.023e6·1e5) = 1.82 dB.
     let count = cn0_dbhz.len() as f64;
     let measured = cn0_dbhz.iter().map(|(measured, _)| measured).sum::<f64>() / count;
     let bias = observables.cn0_bias_db.unwrap();
-    let expected = measured - 50.0 + 0.52 + 1.82;
+    let expected = measured - 50.0 + 0.58 + 1.82;
     assert!((bias - expected).abs() < 0.2, "C/N0 {bias} dB off, by hand {expected}");
 }
 

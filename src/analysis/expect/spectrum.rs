@@ -352,7 +352,7 @@ mod tests {
 
     /// Gain of a replica of BOC(1,1) by means over samples, over its assumption for the whole signal, by
     /// samples made step by step. The signal is a pilot of CBOC whose samples are means too, or are taken
-    /// behind a filter of 0.45 cycles a sample.
+    /// behind a filter of 0.40 cycles a sample.
     fn made(limited: bool, rate_hz: f64) -> f64 {
         const FINE: usize = 120; // steps a chip
         let fine_hz = FINE as f64 * 1.023e6;
@@ -373,7 +373,7 @@ mod tests {
                 if !limited {
                     return 1.0;
                 }
-                let turn = std::f64::consts::TAU * 0.45 * x;
+                let turn = std::f64::consts::TAU * 0.40 * x;
                 let sinc = if k == 0 { 1.0 } else { libm::sin(turn) / turn };
                 let bessel = |y: f64| {
                     (1..40)

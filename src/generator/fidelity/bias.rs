@@ -75,8 +75,8 @@ mod tests {
     #[test]
     fn codes_err_as_random_ones_do_in_another_language() {
         use CodeEdge::{Area, BandLimited, Nearest};
-        // 240 to 800 random codes and phases each: samples by integrals of the waveform, lines by an FFT, one
-        // standard error 1.7 to 8 %. The model is within 13 % of all of them.
+        // 240 to 3000 random codes and phases each: samples by integrals of the waveform, lines by an FFT, one
+        // standard error 1.3 to 8 %. The model is within 13 % of all of them.
         for (edge, signal, rate_hz, expected_m) in [
             (Nearest, &L1_CA, 2.6e6, 1.150),
             (Nearest, &L1_CA, 6.5e6, 0.4112),
@@ -84,12 +84,12 @@ mod tests {
             (Area, &L1_CA, 4.1e6, 0.054_72),
             (Area, &L1_CA, 6.5e6, 0.013_25),
             (Area, &L1_CA, 25e6, 1.526e-3),
-            (BandLimited, &L1_CA, 2.6e6, 0.010_80),
+            (BandLimited, &L1_CA, 2.6e6, 4.273e-4),
             // Every chip meets the same four positions.
             (Area, &L1_CA, 4.092e6, 1.712),
             (Area, &L5, 12.5e6, 0.015_22),
-            (BandLimited, &L5, 12.5e6, 2.579e-3),
-            (BandLimited, &L5, 4.1e6, 0.028_07),
+            (BandLimited, &L5, 12.5e6, 1.006e-4),
+            (BandLimited, &L5, 4.1e6, 1.429e-3),
         ] {
             let found_m = code_bias_m(edge, signal, rate_hz);
             assert!((found_m / expected_m - 1.0).abs() < 0.15, "{edge:?} {signal} {rate_hz}: {found_m} {expected_m}");

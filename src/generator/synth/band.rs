@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::pulse::Pulse;
 pub use crate::low_pass::HALF_WIDTH;
-use crate::low_pass::impulse;
+use crate::low_pass::{CUTOFF_CPS, impulse};
 
 /// Samples of the response.
 pub(super) const WIDTH: usize = 2 * HALF_WIDTH;
@@ -81,6 +81,13 @@ impl UnitCell {
             values[k] = middle[k].wrapping_add(counted.to_bits() as i32);
         }
         values
+    }
+}
+
+impl Default for Filter {
+    /// The filter of a scene's band-limited edges.
+    fn default() -> Self {
+        Self::new(CUTOFF_CPS)
     }
 }
 
@@ -222,7 +229,7 @@ mod tests {
 
     #[test]
     fn the_step_response_has_no_delay_and_ends_at_one() {
-        let filter = Filter::new(0.45);
+        let filter = Filter::default();
         for k in 0..200 {
             let x = f64::from(k) * 0.05;
             // Odd about the edge: a linear-phase filter with zero group delay.

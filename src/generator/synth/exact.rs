@@ -236,7 +236,7 @@ mod tests {
 
     #[test]
     fn it_is_the_definition_to_the_rounding_of_the_sum() {
-        let filter = Filter::new(0.45);
+        let filter = Filter::default();
         let spreading = plain(&L1_CA, 11).unwrap();
         for rate_hz in [0.9e6, 2.046e6, 2.6e6, 25e6] {
             for edge in [Edge::Nearest, Edge::Area, Edge::BandLimited(&filter)] {

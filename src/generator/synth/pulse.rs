@@ -222,7 +222,7 @@ mod tests {
 
     #[test]
     fn a_tile_is_the_sum_of_the_responses_to_its_edges_wherever_chips_fall_and_however_fast_they_move() {
-        let filter = Filter::new(0.45);
+        let filter = Filter::default();
         let mut scratch = Pulses::default();
         let mut word = 0x9e37_79b9_7f4a_7c15_u64;
         let bits: Vec<u64> = std::iter::repeat_with(|| {

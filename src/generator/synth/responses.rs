@@ -385,7 +385,7 @@ mod tests {
 
     #[test]
     fn a_tile_is_the_definition_wherever_changes_fall() {
-        let filter = Filter::new(0.45);
+        let filter = Filter::default();
         let mut scratch = Responses::default();
         // Xorshift; and changes at every step.
         let mut word = 0x9e37_79b9_7f4a_7c15_u64;

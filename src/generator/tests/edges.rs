@@ -178,7 +178,7 @@ fn found(scene: &Scene, (signal, sv): (&'static Signal, Sv), edge: Edge<'_>, lat
 
 #[test]
 fn samples_have_of_each_component_s_power_at_the_antenna_what_edges_leave_of_its_printed_spectrum() {
-    let filter = Filter::new(0.45);
+    let filter = Filter::default();
     for Printed { signal, chip_rate_hz, components } in PRINTED {
         for edge in [Edge::Nearest, Edge::Area, Edge::BandLimited(&filter)] {
             let (scene, sv) = alone(signal, edge, RATE_HZ);

@@ -189,7 +189,7 @@ fn rendered(
 
 #[test]
 fn every_component_is_its_definition_with_every_edge() {
-    let filter = Filter::new(0.45);
+    let filter = Filter::default();
     for signal in every_signal() {
         for (index, number) in (0..signal.components.len()).flat_map(|index| [1, 7, 10].map(|n| (index, n))) {
             let definition = Definition::new(signal, index, number);
@@ -283,7 +283,7 @@ fn kernel(edge: Edge<'_>) -> Kernel<'_> {
 
 #[test]
 fn every_component_has_the_mean_power_that_its_edges_keep() {
-    let filter = Filter::new(0.45);
+    let filter = Filter::default();
     for signal in every_signal() {
         for index in 0..signal.components.len() {
             let waveform = Waveform::new(signal.link(Sv { system: signal.system, number: 5 }), index).unwrap().unwrap();
@@ -491,7 +491,7 @@ pub(super) fn samples(scene: &Scene, part: std::ops::Range<u64>) -> (Vec<Complex
 #[test]
 fn a_scene_is_the_sum_of_its_satellites_definitions() {
     const RATE_HZ: f64 = 26.123e6;
-    let filter = Filter::new(0.45);
+    let filter = Filter::default();
     for signal in SYNTHETIC {
         for edge in [Edge::Nearest, Edge::Area, Edge::BandLimited(&filter)] {
             let scene = scene(signal, name(edge), RATE_HZ);

@@ -68,7 +68,7 @@ fn exact_bar(edge: Edge<'_>) -> f64 {
 
 #[test]
 fn signals_are_their_twins_at_every_length_and_offset() {
-    let filter = Filter::new(0.45);
+    let filter = Filter::default();
     let spreading = plain(&L1_CA, 11).unwrap();
     for rate_hz in [1.5e6, 2.6e6, 25e6] {
         let step = (1.023e6 / rate_hz * CODE_ONE as f64) as u64;
@@ -108,7 +108,7 @@ fn signals_are_their_twins_at_every_length_and_offset() {
 #[test]
 fn the_longest_runs_are_their_twins_to_the_last_sample() {
     const SAMPLES: usize = 4096;
-    let filter = Filter::new(0.45);
+    let filter = Filter::default();
     let spreading = plain(&L1_CA, 11).unwrap();
     let step = (MAX_STEP * CODE_ONE as f64) as u64 - 12_345;
     let mut bits = Vec::new();
@@ -132,7 +132,7 @@ fn the_longest_runs_are_their_twins_to_the_last_sample() {
 /// right angles, of GPS L1C with layers that take turns as one.
 #[test]
 fn rays_of_several_runs_are_the_sums_of_their_twins_at_every_length_and_offset() {
-    let filter = Filter::new(0.45);
+    let filter = Filter::default();
     let signals = [(&E1, 11, 4), (&B1C, 27, 3), (&B2A, 27, 2), (&L1C, 14, 2)];
     // A sample spans up to 2.5, 1.93, 1.23 and 0.49 steps of BOC(6,1).
     for ((signal, number, count), rate_hz) in
