@@ -241,7 +241,7 @@ fn scenes(text: &mut String, rows: &[SceneRow]) {
         "\n## Whole scenes\n\n\
          ![Scenes](trade_scenes.png)\n\n\
          Costs are processor seconds of all threads for one simulated second, tables included: first the generator \
-         alone, then a run of both less that. They are medians of the runs, and the CSV file has both ends. Runs \
+         alone, with the ratio of what `plan` states to it, then a run of both less that. They are medians of the runs, and the CSV file has both ends. Runs \
          differ by their seed, and every setting has the same seeds, so that positions of two settings are paired. The \
          position is that of every fix of all runs against the truth, with the least and the greatest of the \
          runs. C/N0 loss is what the scene makes, other satellites counted as noise, less what the \
@@ -249,10 +249,10 @@ fn scenes(text: &mut String, rows: &[SceneRow]) {
          user who combines two bands without ionosphere sees about 2.6 times as much. `full_sky` is too short for a \
          position.\n\n",
     );
-    let head = "| setting | generator (s/s) | receiver (s/s) | fixes | position rms (runs) / 95 % (m) | \
+    let head = "| setting | generator (s/s) | `plan` over it | receiver (s/s) | fixes | position rms (runs) / 95 % (m) | \
                 pseudoranges (m, rms) | \
                 C/N0 loss (dB) | between signals (m) | ionosphere-free (m) |\n\
-                | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
+                | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
     let mut last = "";
     for row in rows {
         if row.scene != last {
@@ -261,9 +261,10 @@ fn scenes(text: &mut String, rows: &[SceneRow]) {
         }
         let _ = writeln!(
             text,
-            "| `{}` | {:.3} | {:.3} | {:.0} | {}{} / {} | {} | {} | {} | {} |",
+            "| `{}` | {:.3} | {:.2} | {:.3} | {:.0} | {}{} / {} | {} | {} | {} | {} |",
             row.setting,
             row.generator_s,
+            row.planned_s / row.generator_s,
             row.receiver_s,
             row.fixes,
             maybe(row.position_rms_m, 3),

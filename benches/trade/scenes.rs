@@ -5,6 +5,7 @@ use std::path::Path;
 
 use analysis::judge::summary::Summary;
 use analysis::statistics::{self, Spread};
+use generator::plan::Plan;
 use generator::scenario::{Overrides, Scenario};
 use generator::scene::Scene;
 use generator::stream::GenerateError;
@@ -77,6 +78,8 @@ pub struct SceneRow {
     pub receiver_s: f64,
     pub receiver_low_s: f64,
     pub receiver_high_s: f64,
+    /// Processor time of the generator for a simulated second as `plan` states it.
+    pub planned_s: f64,
     /// Mean number of fixes of a run.
     pub fixes: f64,
     /// Errors over all runs, and both ends of the position's by runs.
@@ -201,7 +204,9 @@ fn row(site: &Site, setting: &str, changes: &[&str]) -> SceneRow {
     };
     let positions = found(&position_m);
     let between = mean(&between_m);
-    let bands = scenes(&changed(site, 0, changes), site.name).len();
+    let front_ends = scenes(&changed(site, 0, changes), site.name);
+    // After the runs, when the stores of a process are full as they are in a long scene.
+    let planned_s = front_ends.iter().map(|scene| Plan::of(scene).unwrap().time_s).sum::<f64>() / site.seconds;
     let row = SceneRow {
         scene: site.name.to_owned(),
         simulated_s: site.seconds,
@@ -213,6 +218,7 @@ fn row(site: &Site, setting: &str, changes: &[&str]) -> SceneRow {
         receiver_s,
         receiver_low_s,
         receiver_high_s,
+        planned_s,
         fixes: mean(&|s| Some(s.position.fixes as f64)).unwrap_or(0.0),
         position_rms_m: rms(&position_m),
         position_low_m: positions.iter().copied().reduce(f64::min),
@@ -222,7 +228,7 @@ fn row(site: &Site, setting: &str, changes: &[&str]) -> SceneRow {
         carrier_rms_cycles: rms(&|s| s.observables.carrier_rms_cycles),
         cn0_loss_db: mean(&|s| Some(s.details.cn0_effective_dbhz? - s.details.cn0_measured_dbhz?)),
         between_signals_m: between,
-        ionosphere_free_m: between.filter(|_| bands > 1).map(|m| 2.6 * m),
+        ionosphere_free_m: between.filter(|_| front_ends.len() > 1).map(|m| 2.6 * m),
     };
     println!("{row:?}");
     row
