@@ -15,7 +15,7 @@ const BETA: f64 = 5.65;
 /// Frequency response of the filter.
 #[derive(Debug)]
 pub struct Response {
-    /// The impulse response from its middle on, at [`Response::CELLS`] points per sample.
+    /// The impulse response from its middle on, at [`Response::CELLS`] points per sample; half of the last one.
     impulse: Vec<f64>,
 }
 
@@ -26,7 +26,10 @@ impl Response {
     /// Computes the response of the filter with this cut-off, in cycles per sample.
     pub fn new(cutoff_cps: f64) -> Self {
         let points = 0..=HALF_WIDTH * Self::CELLS;
-        Self { impulse: points.map(|k| impulse(k as f64 / Self::CELLS as f64, cutoff_cps)).collect() }
+        let mut impulse: Vec<f64> = points.map(|k| impulse(k as f64 / Self::CELLS as f64, cutoff_cps)).collect();
+        // The trapezoid rule: the window ends at a fiftieth of its height.
+        impulse.last_mut().into_iter().for_each(|end| *end *= 0.5);
+        Self { impulse }
     }
 
     /// The amplitude left at that many cycles per sample, one at zero. The phase is not turned.

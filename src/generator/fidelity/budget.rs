@@ -269,7 +269,7 @@ mod tests {
         assert_eq!(free.knot_tolerance_cycles, 4e-4);
         // Area edges err by 0.015 m rms, the nearest chip by 0.4 m.
         assert_eq!(of(Budget { code_m: 0.1, ..NONE }).unwrap().code_edge, CodeEdge::Area);
-        assert_eq!(of(Budget { cn0_db: 0.2, ..NONE }).unwrap().code_edge, CodeEdge::BandLimited);
+        assert_eq!(of(Budget { cn0_db: 0.25, ..NONE }).unwrap().code_edge, CodeEdge::BandLimited);
         let fine = of(Budget { carrier_cycles: 1.5e-6, ..NONE }).unwrap();
         assert_eq!(fine.carrier, Arithmetic::F64);
         assert!((1e-6..1.5e-6).contains(&fine.knot_tolerance_cycles), "{fine:?}");

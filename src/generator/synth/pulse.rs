@@ -254,9 +254,9 @@ mod tests {
                         let mut wave = [0.0; TILE];
                         scratch.add(&pulse, &run, [(&bits[..], 0.75), (&bits[..], -0.25)].into_iter(), &mut wave);
                         // As documented: of each edge in reach, and of the stretch; and of the corner, whose
-                        // slope is 4.5e-4 and which a cubic polynomial misses by 0.068 of that times a cell.
+                        // slope is 7.5e-4 and which a cubic polynomial misses by 0.068 of that times a cell.
                         let edges = levels.len() as f64 * (16.0 / samples + 2.0);
-                        let corner = 2.0 * 0.068 * 4.5e-4 / CELLS as f64;
+                        let corner = 2.0 * 0.068 * 7.5e-4 / CELLS as f64;
                         let bound = 0.5 * (edges * 1.3e-9 + edges * (stretch * 0.5 * samples).powi(2) + corner);
                         for (n, value) in (0..).zip(wave) {
                             let error = value - 0.5 * pulse.waveform(&filter, &run, position + step * n);

@@ -85,7 +85,7 @@ fn density(chips: &[(f64, Waves)], chip_rate_hz: f64, hz: f64) -> f64 {
 }
 
 /// Amplitude that an edge leaves of a frequency, as documented: all, the mean over a sample, or a sinc cut
-/// off at 0.45 cycles a sample under a Kaiser window of ±8 samples with β = 5.65.
+/// off at 0.40 cycles a sample under a Kaiser window of ±8 samples with β = 5.65.
 fn left(edge: Edge<'_>, cps: f64) -> f64 {
     match edge {
         Edge::Nearest => 1.0,
@@ -101,7 +101,7 @@ fn left(edge: Edge<'_>, cps: f64) -> f64 {
             };
             let taps = (-256..=256).map(|k| {
                 let x = f64::from(k) / 32.0;
-                let tap = sinc(0.9 * x) * bessel(5.65 * (1.0 - x * x / 64.0).max(0.0).sqrt());
+                let tap = sinc(0.8 * x) * bessel(5.65 * (1.0 - x * x / 64.0).max(0.0).sqrt());
                 (tap, tap * libm::cos(TAU * cps * x))
             });
             let (all, of) = taps.fold((0.0, 0.0), |(all, of), (tap, part)| (all + tap, of + part));

@@ -64,8 +64,10 @@ impl Folds {
         let code = (1..=u8::MAX).find_map(component.code).unwrap_or_default();
         let sent = |chip: usize| code.get(chip).is_none_or(|sign| *sign != 0);
         let kind = |chip: usize| layered.get(chip % layered.len()).copied().filter(|_| sent(chip));
-        let [least, most] = CLASSES;
-        let classes = ((LINES * chip_hz / rate_hz) as usize).clamp(least, most);
+        // What a filter lets fold back lies in a few per cent of the band.
+        let finer = if edge == CodeEdge::BandLimited { 2 } else { 1 };
+        let [least, most] = CLASSES.map(|classes| finer * classes);
+        let classes = ((finer as f64 * LINES * chip_hz / rate_hz) as usize).clamp(least, most);
         let mut folds = Self {
             edge,
             response: (edge == CodeEdge::BandLimited).then(|| Response::new(CUTOFF_CPS)),

@@ -158,10 +158,13 @@ fn noise_and_strong_signals_decide_how_good_balanced_edges_are() {
 
 #[test]
 fn a_budget_that_a_front_end_cannot_keep_is_refused_with_the_least() {
-    let refused = composed(&format!("{WIDE}{NARROW}[noise]\n[fidelity]\nbudget = {{ code_m = 1e-3 }}\n"));
+    let refused = composed(&format!("{WIDE}{NARROW}[noise]\n[fidelity]\nbudget = {{ code_m = 1e-6 }}\n"));
     let error = refused.map(|_| ()).unwrap_err();
     assert!(error.contains("fidelity.budget") && error.contains("front end wide"), "{error}");
-    assert!(error.contains("code_m = 0.001 cannot be promised: at least") && error.contains("10.000 Msps"), "{error}");
+    assert!(
+        error.contains("code_m = 0.000001 cannot be promised: at least") && error.contains("10.000 Msps"),
+        "{error}"
+    );
 }
 
 #[test]
