@@ -24,6 +24,7 @@ pub struct Code {
     bare: &'static Signal,
     number: u8,
     pub period_s: f64,
+    chip_s: f64,
     /// Early-late spacing of the correlator in seconds: half a step of the waveform.
     spacing_s: f64,
     /// Steps of the waveform in a period, transformed.
@@ -33,7 +34,7 @@ pub struct Code {
 /// Errors of a period's samples against the exact code.
 #[derive(Clone, Copy, Debug)]
 pub struct Found {
-    /// Delay of the code, in metres.
+    /// Delay of the code, in metres; a chip at most, where a correlator has lost the code.
     pub code_m: f64,
     /// Lead of the carrier, in cycles.
     pub carrier_cycles: f64,
@@ -77,6 +78,7 @@ impl Code {
             bare: Box::leak(Box::new(bare)),
             number,
             period_s: component.period_s(),
+            chip_s: 1.0 / component.chip_rate_hz,
             spacing_s: 0.5 / (component.chip_rate_hz * steps as f64),
             lines,
         })
@@ -130,25 +132,26 @@ impl Code {
             let pulse = if k == 0 { 1.0 } else { libm::sin(x) / x };
             self.lines[k.rem_euclid(steps) as usize] * Complex64::from_polar(pulse, TAU * (k as f64 * into).fract() - x)
         };
-        // The weight's mean over the spectrum goes with the carrier's phase, not with the delay.
-        let (mut exact_power, mut weighed) = (0.0, 0.0);
+        let [mut prompt, mut apart, mut steep, mut turning] = [Complex64::ZERO; 4];
+        let mut exact_power = 0.0;
         for k in -half..=half {
-            let power = exact(k).norm_sqr();
-            exact_power += power;
-            weighed += power * weight(k);
-        }
-        let centre = weighed / exact_power;
-        let [mut prompt, mut apart, mut slope] = [Complex64::ZERO; 3];
-        for k in -half..=half {
-            let cross = found[k.rem_euclid(count as i64) as usize] * exact(k).conj();
+            let line = exact(k);
+            let cross = found[k.rem_euclid(count as i64) as usize] * line.conj();
+            let turn = TAU * k as f64 * line_hz;
+            exact_power += line.norm_sqr();
             prompt += cross;
-            apart += cross * (weight(k) - centre);
-            slope += cross * (weight(k) - centre) * TAU * k as f64 * line_hz;
+            apart += cross * weight(k);
+            turning += cross * turn;
+            steep += cross * weight(k) * turn;
         }
         let power: f64 = found.iter().map(|x| x.norm_sqr()).sum();
         let ahead = prompt / prompt.norm();
+        // A delay turns the prompt correlation by the mean frequency of what the samples have of the code, and the
+        // carrier's loop follows that: what is left moves the code.
+        let mean = (apart * ahead.conj()).re / prompt.norm();
+        let slope = (steep * ahead.conj()).re - mean * (turning * ahead.conj()).re;
         Found {
-            code_m: -(apart * ahead.conj()).im / (slope * ahead.conj()).re * LIGHT_MPS,
+            code_m: (-(apart * ahead.conj()).im / slope).clamp(-self.chip_s, self.chip_s) * LIGHT_MPS,
             carrier_cycles: ahead.arg() / TAU,
             lost: 1.0 - prompt.norm_sqr() / (power * exact_power),
         }

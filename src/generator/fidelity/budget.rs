@@ -13,7 +13,7 @@ use super::{Arithmetic, CodeEdge, Fidelity, Grade, worst};
 use crate::low_pass::{CUTOFF_CPS, Response};
 
 /// Bound of a code's error in root mean squares of the model: 4.7 at most over the signals, rates and edges
-/// of `reports/trade_signals.csv`, each over up to 128 codes and positions.
+/// of `reports/trade_signals.csv`, each over up to 256 codes and positions.
 pub const LARGEST_OVER_RMS: f64 = 5.0;
 /// Tolerances of knots in cycles that are chosen: the least is that of the reference level, beyond the
 /// largest a run's parabola has sidebands above −70 dBc.
