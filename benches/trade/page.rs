@@ -113,7 +113,8 @@ fn signals(text: &mut String, rows: &[SignalRow], dopplers: &[DopplerRow]) {
          Cost is the time of one core for one sample of one satellite in the kernels, code strips included: median of \
          {ROUNDS} \
          interleaved runs of six satellites, with the 95 % interval of the median by ranks. The error is that of the \
-         code at rest on the sampling grid, root mean square over {} to {} satellites, or all, and {} to {} phases, of the \
+         code at rest on the sampling grid, root mean square over {} to {} satellites, or all, and {} to {} phases, \
+         of the \
          component that errs most. Its truth is not the `reference` level but the spectral lines of the code, computed \
          from chips and waveform alone (`tests/common/lines.rs`). The table has each signal at the \
          lowest measured rate \
@@ -167,10 +168,12 @@ fn models(text: &mut String, rows: &[SignalRow]) {
         "\n### What `plan` states against what is measured\n\n\
          `balanced` and `plan` read one error model (`code_bias_m`). The ratio is stated over measured; below 0.9 the \
          model is optimistic by more than 10 %. The model is for random codes. What n real ones measure scatters as χ² \
-         of 2n degrees, since the error of one code is a wave over its phase: for 8 codes by a third, for 32 by a sixth \
+         of 2n degrees, since the error of one code is a wave over its phase: for 8 codes by a third, for 32 by a \
+         sixth \
          (95 %). \"Surely\" counts the rows whose whole interval lies there. Rates that are too low cut main lobes \
          off.\n\n\
-         | edge | rates | rows | median ratio | lowest | highest | within 25 % | surely not | optimistic by more than 10 % \
+         | edge | rates | rows | median ratio | lowest | highest | within 25 % | surely not | optimistic by more \
+         than 10 % \
          | surely |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
     );
     let holds = |row: &SignalRow| {
@@ -241,7 +244,8 @@ fn scenes(text: &mut String, rows: &[SceneRow]) {
         "\n## Whole scenes\n\n\
          ![Scenes](trade_scenes.png)\n\n\
          Costs are processor seconds of all threads for one simulated second, tables included: first the generator \
-         alone, with the ratio of what `plan` states to it, then a run of both less that. They are medians of the runs, and the CSV file has both ends. Runs \
+         alone, with the ratio of what `plan` states to it, then a run of both less that. They are medians of the \
+         runs, and the CSV file has both ends. Runs \
          differ by their seed, and every setting has the same seeds, so that positions of two settings are paired. The \
          position is that of every fix of all runs against the truth, with the least and the greatest of the \
          runs. C/N0 loss is what the scene makes, other satellites counted as noise, less what the \
@@ -249,7 +253,8 @@ fn scenes(text: &mut String, rows: &[SceneRow]) {
          user who combines two bands without ionosphere sees about 2.6 times as much. `full_sky` is too short for a \
          position.\n\n",
     );
-    let head = "| setting | generator (s/s) | `plan` over it | receiver (s/s) | fixes | position rms (runs) / 95 % (m) | \
+    let head = "| setting | generator (s/s) | `plan` over it | receiver (s/s) | fixes | \
+                position rms (runs) / 95 % (m) | \
                 pseudoranges (m, rms) | \
                 C/N0 loss (dB) | between signals (m) | ionosphere-free (m) |\n\
                 | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";

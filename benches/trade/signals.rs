@@ -22,7 +22,8 @@ use super::lines::{Code, Found};
 const RATES_MSPS: [f64; 8] = [2.6, 4.092, 4.1, 6.5, 10.23, 12.5, 25.0, 65.0];
 /// Satellites whose samples are timed together.
 const TIMED: usize = 6;
-/// Satellites of a component whose errors are looked at, at least and at most. All are taken if there are fewer.
+/// Satellites of a component whose errors are looked at, at least and at most. All are taken if there are
+/// fewer.
 pub const JUDGED: [usize; 2] = [8, 32];
 /// Code phases of each, at least and at most.
 pub const PHASES: [usize; 2] = [2, 8];

@@ -45,8 +45,8 @@ pub enum CodeEdge {
     /// The mean of the waveform over the sample's interval: 1 − d/3 is kept of steps that are 1/d ≥ 1 samples
     /// long.
     Area,
-    /// The waveform through a linear-phase low-pass filter of half amplitude at 0.40 of the sample rate, which
-    /// stops what would fold back.
+    /// The waveform through a linear-phase low-pass filter of half amplitude at 0.40 of the sample rate,
+    /// which stops what would fold back.
     BandLimited,
 }
 

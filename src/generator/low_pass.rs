@@ -4,8 +4,8 @@
 use std::f64::consts::PI;
 
 /// Cut-off (−6 dB) of band-limited edges, in cycles per sample. The filter falls from 0.29 to 0.51 cycles per
-/// sample: what folds back is down by 50 dB at least. A cut-off of 0.45 would let codes of C/A at 2.6 Msps err
-/// 24 times as much, and would keep 0.02 dB more of their power.
+/// sample: what folds back is down by 42 dB at the end of the band and by 60 dB from 0.51 on. With a cut-off
+/// of 0.45, codes of C/A at 2.6 Msps err 24 times as much and keep 0.02 dB more of their power.
 pub(crate) const CUTOFF_CPS: f64 = 0.40;
 /// Half width of the low-pass filter in samples.
 pub const HALF_WIDTH: usize = 8;
@@ -15,7 +15,8 @@ const BETA: f64 = 5.65;
 /// Frequency response of the filter.
 #[derive(Debug)]
 pub struct Response {
-    /// The impulse response from its middle on, at [`Response::CELLS`] points per sample; half of the last one.
+    /// The impulse response from its middle on, at [`Response::CELLS`] points per sample; half of the last
+    /// one.
     impulse: Vec<f64>,
 }
 

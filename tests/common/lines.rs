@@ -146,8 +146,8 @@ impl Code {
         }
         let power: f64 = found.iter().map(|x| x.norm_sqr()).sum();
         let ahead = prompt / prompt.norm();
-        // A delay turns the prompt correlation by the mean frequency of what the samples have of the code, and the
-        // carrier's loop follows that: what is left moves the code.
+        // A delay turns the prompt correlation by the mean frequency of what the samples have of the code,
+        // and the carrier's loop follows that: what is left moves the code.
         let mean = (apart * ahead.conj()).re / prompt.norm();
         let slope = (steep * ahead.conj()).re - mean * (turning * ahead.conj()).re;
         Found {

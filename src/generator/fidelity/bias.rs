@@ -75,8 +75,8 @@ mod tests {
     #[test]
     fn codes_err_as_random_ones_do_in_another_language() {
         use CodeEdge::{Area, BandLimited, Nearest};
-        // 240 to 3000 random codes and phases each: samples by integrals of the waveform, lines by an FFT, one
-        // standard error 1.3 to 8 %. The model is within 13 % of all of them.
+        // 240 to 3000 random codes and phases each: samples by integrals of the waveform, lines by an FFT,
+        // one standard error 1.3 to 8 %. The model is within 13 % of all of them.
         for (edge, signal, rate_hz, expected_m) in [
             (Nearest, &L1_CA, 2.6e6, 1.150),
             (Nearest, &L1_CA, 6.5e6, 0.4112),
