@@ -146,14 +146,14 @@ def trade():
                          make.Page("reports/trade.md", TRADE, pattern=pattern, text=r"\1 ns, \2 m", runs="15"),
                          ("src/generator/synth", "src/fft"))
     yield Figure("trade.static.one_bit.loss", "scene static, 50 s, adc.bits = 1: loss of C/N0", "dB",
-                 make.Page("reports/trade.md", TRADE, pattern=r"(?s)^### `static`.*?^\| `adc\.bits = 1` \|(?: \S+ \|){3} [^|]*\| \S+ \| (\S+) \|", runs="3"),
+                 make.Page("reports/trade.md", TRADE, pattern=r"(?s)^### `static`.*?^\| `adc\.bits = 1` \|(?: \S+ \|){4} [^|]*\| \S+ \| (\S+) \|", runs="3"),
                  ("src/generator", "src/receiver", "src/fft"))
     for name, row in [("one_bit", "ci8, adc 1 bit"), ("two_bits", "ci8, adc 2 bits")]:
         yield Figure(f"trade.widths.{name}.loss", f"one satellite in noise at 2.6 Msps, {row}: loss of C/N0", "dB",
                      make.Page("reports/widths.md", f"{TRADE} -- --widths", row=row, column="C/N0 loss (dB)"),
                      ("src/generator", "src/fft"), "", 3)
     for level in ("fast", "balanced", "reference"):
-        pattern = rf"(?s)^### `static`.*?^\| `{level}` \| (\S+) \| \S+ \| \d+ \| \S+ / (\S+) \| (\S+) \| (\S+) \|"
+        pattern = rf"(?s)^### `static`.*?^\| `{level}` \| (\S+) \| \S+ \| \S+ \| \d+ \| [^/|]* / (\S+) \| (\S+) \| (\S+) \|"
         for group, name, unit, what in [(1, "generator", "", "generator, seconds a second of signal"), (2, "position", "m", "position error, 95 %"),
                                         (3, "code", "m", "pseudorange error, rms"), (4, "loss", "dB", "loss of C/N0")]:
             yield Figure(f"trade.static.{level}.{name}", f"scene static, 50 s, {level}: {what}", unit,
