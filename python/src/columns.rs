@@ -210,7 +210,7 @@ mod fields {
         TrackingRow { sample, sv, signal, prompt_i, prompt_q, dll_discriminator_chips, pll_discriminator_cycles,
             fll_discriminator_hz, cn0_dbhz, phase_lock, integration_s, early_i, early_q, late_i, late_q,
             tap_spacing_chips }
-        NavigationRow { sv, issue, parameter, raw, message }
+        NavigationRow { sample, sv, issue, parameter, raw, message }
         EventRow { sample, sv, signal, event }
         TagRow { gst_week, tow_s, sender, satellite, adkd, position, result, reason }
         FrontEnd { front_end }

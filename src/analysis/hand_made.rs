@@ -94,7 +94,14 @@ pub(crate) fn true_observation(index: usize, tick: u64) -> Observation {
 }
 
 pub(crate) fn parameter(prn: u8, name: &str, raw: i64) -> NavigationRow {
-    NavigationRow { sv: Sv::gps(prn), issue: 17, parameter: name.to_owned(), raw, message: "LNAV".to_owned() }
+    NavigationRow {
+        sample: 0,
+        sv: Sv::gps(prn),
+        issue: 17,
+        parameter: name.to_owned(),
+        raw,
+        message: "LNAV".to_owned(),
+    }
 }
 
 /// Writes the truth's half of a run.

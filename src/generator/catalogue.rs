@@ -138,10 +138,15 @@ impl Catalogue {
 
     /// The ephemeris that `sv` sends at `at`; `None` when none is within its fit interval.
     pub fn sent_at(&self, sv: Sv, at: Epoch) -> Option<&Ephemeris> {
+        self.sent_since(sv, at).map(|(_, set)| set)
+    }
+
+    /// That one with the time from which it is sent.
+    pub fn sent_since(&self, sv: Sv, at: Epoch) -> Option<(Epoch, &Ephemeris)> {
         let timeline = self.satellites.get(&sv)?;
         let count = timeline.spans.partition_point(|span| span.from <= at);
         let span = timeline.spans.get(count.checked_sub(1)?)?;
-        timeline.sets.get(span.set?)
+        Some((span.from, timeline.sets.get(span.set?)?))
     }
 
     /// Times after `from`, up to `to`, from which satellites send another ephemeris than before, in order of

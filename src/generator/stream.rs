@@ -36,6 +36,7 @@ use crate::truth::{Record, Sink};
 use gnss::place::counted;
 use gnss::record::{NavigationRow, PassRow};
 use gnss::satellite::Sv;
+use gnss::time::Rate;
 
 /// Partition of the work; no option changes a byte of the output.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -226,18 +227,22 @@ impl<'a> Stream<'a> {
     /// A sink that does not take the truth.
     pub fn finish(self, truth: &mut dyn Sink) -> Result<Generated, GenerateError> {
         let mut front = self.front;
-        end(truth, front.navigation(), front.passes().collect())?;
+        end(truth, front.scene.clock.rate, front.navigation(), front.passes().collect())?;
         Ok(front.done())
     }
 }
 
-/// Passes the records to `truth` that are known only at the end.
+/// Passes the records to `truth` that are known only at the end; `rate` is the one that its samples count by.
 fn end(
     truth: &mut dyn Sink,
-    navigation: BTreeSet<NavigationRow>,
+    rate: Rate,
+    navigation: BTreeSet<(u32, NavigationRow)>,
     passes: BTreeSet<PassRow>,
 ) -> Result<(), GenerateError> {
-    navigation.into_iter().try_for_each(|row| truth.take(Record::Navigation(row)))?;
+    for (since_s, row) in navigation {
+        let sample = rate.first_sample_at(u64::from(since_s), 1);
+        truth.take(Record::Navigation(NavigationRow { sample, ..row }))?;
+    }
     passes.into_iter().try_for_each(|row| truth.take(Record::Pass(row)))?;
     Ok(truth.finish()?)
 }

@@ -583,6 +583,10 @@ pub struct TrackingRow {
 /// Parameter of a navigation message as its raw integer: `navigation.csv`, from generator and receiver.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct NavigationRow {
+    /// Sample at which a receiver had read it; in the truth, the one at which the data set began to be sent, 0
+    /// for those before the samples. Short issues come again within hours: this is what tells sets apart.
+    #[serde(default)]
+    pub sample: u64,
     /// The satellite.
     pub sv: Sv,
     /// Identifier of the data set within the satellite: the issue of data for ephemerides, 0 otherwise.
@@ -601,7 +605,7 @@ fn lnav() -> String {
 }
 
 impl NavigationRow {
-    /// Creates one row for each parameter of a satellite's message.
+    /// Creates one row for each parameter of a satellite's message, at sample 0.
     pub fn each(
         sv: Sv,
         message: &'static str,
@@ -609,6 +613,7 @@ impl NavigationRow {
         parameters: Vec<(&'static str, i64)>,
     ) -> impl Iterator<Item = Self> {
         let row = move |(parameter, raw): (&str, i64)| Self {
+            sample: 0,
             sv,
             issue,
             parameter: parameter.to_owned(),
@@ -616,6 +621,11 @@ impl NavigationRow {
             message: message.to_owned(),
         };
         parameters.into_iter().map(row)
+    }
+
+    /// What the row says, whenever that was.
+    pub fn content(&self) -> (Sv, &str, u32, &str, i64) {
+        (self.sv, &self.message, self.issue, &self.parameter, self.raw)
     }
 }
 

@@ -109,11 +109,22 @@ impl Floats {
         (values, covariance)
     }
 
-    /// The best integers of the double differences, or of a part of them; `None` if there is none that could
-    /// be searched for.
-    pub fn fix(&self, doubles: &Doubles, belief: Belief) -> Option<Integers> {
+    /// The best integers of the double differences, or of a part of them, `None` if there is none that could be
+    /// searched for; and the probability that bootstrapping gives all of the true ones, `None` without double
+    /// differences.
+    pub fn fix(&self, doubles: &Doubles, belief: Belief) -> (Option<Integers>, Option<f64>) {
         let (values, covariance) = self.differenced(doubles);
-        let made = Decorrelated::new(&values, &covariance).ok()?;
+        let Ok(made) = Decorrelated::new(&values, &covariance) else { return (None, None) };
+        (self.searched(doubles, (&values, &covariance), &made, belief), Some(made.success_rate(0)))
+    }
+
+    fn searched(
+        &self,
+        doubles: &Doubles,
+        (values, covariance): (&DVector<f64>, &DMatrix<f64>),
+        made: &Decorrelated,
+        belief: Belief,
+    ) -> Option<Integers> {
         let first = made.first_for(belief.success_rate).unwrap_or(0);
         let success_rate = made.success_rate(first);
         // What bootstrapping cannot fix is not searched for: the search would take for ever.
@@ -127,12 +138,12 @@ impl Floats {
         let is_believed = success_rate >= belief.success_rate && ratio >= belief.ratio && is_near;
         // Rows of Zᵀ from the first fixed one on.
         let rows = made.transformation().transpose().rows(first, fixed.len()).into_owned();
-        let inverse = (&rows * &covariance * rows.transpose()).cholesky()?;
+        let inverse = (&rows * covariance * rows.transpose()).cholesky()?;
         let pairs = &doubles.pairs;
         let crossed = DMatrix::from_fn(self.with_position.nrows(), pairs.len(), |row, column| {
             self.with_position[(row, pairs[column].0)] - self.with_position[(row, pairs[column].1)]
         }) * rows.transpose();
-        let correction_m = &crossed * inverse.solve(&(&fixed - &rows * &values));
+        let correction_m = &crossed * inverse.solve(&(&fixed - &rows * values));
         let gain_m2 = &crossed * inverse.solve(&crossed.transpose());
         Some(Integers {
             doubles: doubles.clone(),
@@ -153,7 +164,7 @@ impl Floats {
         let fixed = candidates.filter_map(|left_out| {
             let track = self.tracks[left_out].0;
             let doubles = self.doubles(|other| takes(other) && other != track);
-            let integers = self.fix(&doubles, belief).filter(|found| found.is_believed)?;
+            let integers = self.fix(&doubles, belief).0.filter(|found| found.is_believed)?;
             let is_fractional = self.is_fractional(left_out, &integers)?;
             (is_fractional && doubles.pairs.len() >= LEAST_LEFT).then_some((track, integers))
         });
@@ -232,7 +243,7 @@ mod tests {
         let all = floats.doubles(|_| true);
         // The highest is the pivot.
         assert!(all.pairs.iter().all(|(_, pivot)| *pivot == 6));
-        let found = floats.fix(&all, BELIEF).unwrap();
+        let found = floats.fix(&all, BELIEF).0.unwrap();
         assert!(found.is_believed && found.is_whole());
         let whole = [0.0, 3.0, -2.0, 5.0, 0.0, 8.0, -4.0];
         for (row, fixed) in found.fixed.iter().enumerate() {
@@ -253,7 +264,7 @@ mod tests {
             let others = (0..7).filter(|index| if at == 0 { *index != 0 } else { *index == at });
             others.for_each(|index| floats.values[index] += 0.5);
             let all = floats.doubles(|_| true);
-            assert!(floats.fix(&all, BELIEF).is_none_or(|found| !found.is_believed), "{at}");
+            assert!(floats.fix(&all, BELIEF).0.is_none_or(|found| !found.is_believed), "{at}");
             let (track, found) = floats.without_one(|_| true, BELIEF).unwrap();
             assert_eq!(track, floats.tracks[at].0);
             assert!(found.is_believed);
@@ -265,9 +276,12 @@ mod tests {
         let mut floats = floats();
         floats.covariance[(3, 3)] = 9.0;
         let all = floats.doubles(|_| true);
-        let found = floats.fix(&all, BELIEF).unwrap();
+        let (found, whole) = floats.fix(&all, BELIEF);
+        let found = found.unwrap();
         assert!(found.is_believed && !found.is_whole());
         assert_eq!(found.fixed.len(), 5);
+        // Of all it is the chance of the weak one, whose deviation is 3: 2Φ(1/6) − 1.
+        assert!((whole.unwrap() - 0.1324).abs() < 1e-4 && found.success_rate > 0.999, "{whole:?}");
     }
 
     #[test]

@@ -55,8 +55,10 @@ pub struct Row {
     pub two_bands: usize,
     /// Squared norm of the second best integers relative to the best.
     pub ratio: Option<f64>,
-    /// Success rate of bootstrapping.
+    /// Success rate of bootstrapping of the numbers that were searched for.
     pub success_rate: Option<f64>,
+    /// Success rate of bootstrapping of all numbers.
+    pub whole_success_rate: Option<f64>,
     /// Fixed numbers that are those of the truth.
     pub right: Option<usize>,
     /// Fixed numbers that are not.
@@ -91,6 +93,14 @@ pub struct Figures {
     pub on_two_bands: usize,
     /// Time to it from the first epoch with five satellites on two bands, seconds.
     pub first_fix_two_bands_s: Option<f64>,
+    /// Epochs in which the success rate of all integers is the one that a fix asks for.
+    pub allowed: usize,
+    /// Those of them that are a fix.
+    pub allowed_fixed: usize,
+    /// Time from the first epoch with five satellites on two bands to the first of those, seconds.
+    pub first_allowed_two_bands_s: Option<f64>,
+    /// Largest success rate of all integers.
+    pub most_success_rate: Option<f64>,
     /// Outages after the first fix: epochs without a solution, or a second and more without an epoch.
     pub outages: usize,
     /// Outages after which no fix came.
@@ -139,6 +149,8 @@ const OUTAGE_S: f64 = 1.0;
 /// Collects the epochs of a baseline.
 #[derive(Debug, Default)]
 pub struct Judge {
+    /// Success rate that a fix asks for.
+    asked: f64,
     /// Figures so far.
     pub figures: Figures,
     first: Option<Epoch>,
@@ -209,6 +221,11 @@ impl Errors {
 pub type Truths<'a> = Option<[&'a Truth; 2]>;
 
 impl Judge {
+    /// Judge of a baseline whose fixes ask for that success rate.
+    pub fn new(asked: f64) -> Self {
+        Self { asked, ..Self::default() }
+    }
+
     /// Takes an epoch, and returns its row.
     pub fn take(&mut self, pair: &Pair, base_m: &Vector3<f64>, solved: &Solved, truths: Truths<'_>) -> Row {
         let figures = &mut self.figures;
@@ -259,6 +276,16 @@ impl Judge {
             Status::Fixed => figures.fixed += 1,
             Status::Partial => figures.partial += 1,
             Status::Float => figures.float += 1,
+        }
+        if let Some(rate) = solution.success_rate {
+            figures.most_success_rate = Some(figures.most_success_rate.map_or(rate, |most| most.max(rate)));
+            if rate >= self.asked {
+                figures.allowed += 1;
+                figures.allowed_fixed += usize::from(is_fixed);
+                if figures.first_allowed_two_bands_s.is_none() {
+                    figures.first_allowed_two_bands_s = self.first_on_two.map(|first| pair.labels[1].since(first));
+                }
+            }
         }
         if is_fixed && figures.first_fix_s.is_none() {
             figures.first_fix_s = self.first.map(|first| pair.labels[1].since(first));
@@ -366,6 +393,7 @@ impl Row {
             two_bands: 0,
             ratio: None,
             success_rate: None,
+            whole_success_rate: None,
             right: None,
             wrong: None,
             not_fixed: None,
@@ -382,6 +410,7 @@ impl Row {
         (self.satellites, self.two_bands) = (solution.satellites, solution.on_two_bands);
         self.ratio = solution.integers.as_ref().map(|found| found.ratio).filter(|ratio| ratio.is_finite());
         self.success_rate = solution.integers.as_ref().map(|found| found.success_rate);
+        self.whole_success_rate = solution.success_rate;
     }
 
     fn set_error(&mut self, error_m: &Vector3<f64>) {

@@ -78,7 +78,8 @@ pub fn solve(
     (settings, fixes): (Settings, Option<Vector3<f64>>),
 ) -> Result<Baseline, RtkError> {
     let truths = of_base.as_ref().zip(of_rover.as_ref()).map(|(base, rover)| [base, rover]);
-    let (mut solver, mut judge, mut rows) = (Solver::new(settings), Judge::default(), Vec::new());
+    let judge = Judge::new(settings.belief.success_rate);
+    let (mut solver, mut judge, mut rows) = (Solver::new(settings), judge, Vec::new());
     let resting_m = match inputs.position {
         BasePosition::Given(given_m) => Some(given_m),
         BasePosition::Truth => of_base.as_ref().and_then(Truth::resting_m),

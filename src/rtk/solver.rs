@@ -114,6 +114,8 @@ pub struct Solution {
     pub floats: Floats,
     /// Integers that were found, whether believed or not.
     pub integers: Option<Integers>,
+    /// Probability that bootstrapping gives all of the true integers; `None` without double differences.
+    pub success_rate: Option<f64>,
 }
 
 /// Largest formal deviation in three dimensions of a position that a part of the integers makes a fix,
@@ -206,13 +208,13 @@ impl Solver {
         let floats = self.floats(&whole, &rows);
         let mut solved = Solved { solution: None, events };
         if let Some((position_m, covariance_m2, floats)) = floats {
-            let (integers, not_whole) = self.integers(&floats);
+            let (integers, success_rate, not_whole) = self.integers(&floats);
             if let Some(track) = not_whole {
                 self.not_whole.insert(track);
                 solved.events.push((track, Event::NotWhole));
             }
             let float_m = rover.position_m + position_m;
-            solved.solution = Some(solution(&rows, float_m, covariance_m2, floats, integers));
+            solved.solution = Some(solution(&rows, (float_m, covariance_m2), floats, (integers, success_rate)));
         }
         self.keep(whole, pair.labels[1]);
         solved
@@ -393,22 +395,22 @@ impl Solver {
         Some((solution.fixed_rows::<3>(0).into_owned(), of_position, floats))
     }
 
-    /// The integers, and a track that turned out not to be whole.
-    fn integers(&self, floats: &Floats) -> (Option<Integers>, Option<Track>) {
+    /// The integers, the success rate of all, and a track that turned out not to be whole.
+    fn integers(&self, floats: &Floats) -> (Option<Integers>, Option<f64>, Option<Track>) {
         let belief = self.settings.belief;
         let takes = |track: Track| {
             let (sv, code) = track;
             let is_half = self.ambiguities.iter().any(|own| own.track == track && own.is_half);
             !is_half && !is_divided(sv.system, code) && !self.not_whole.contains(&track)
         };
-        let found = floats.fix(&floats.doubles(takes), belief);
+        let (found, success_rate) = floats.fix(&floats.doubles(takes), belief);
         let is_suspect = |found: &Integers| !found.is_believed && found.success_rate >= belief.success_rate;
         if found.as_ref().is_some_and(is_suspect)
             && let Some((track, without)) = floats.without_one(takes, belief)
         {
-            return (Some(without), Some(track));
+            return (Some(without), success_rate, Some(track));
         }
-        (found, None)
+        (found, success_rate, None)
     }
 
     /// Keeps the information of an epoch, if its noise is independent of what is kept already.
@@ -441,10 +443,9 @@ fn obliquity(elevation_rad: f64) -> f64 {
 
 fn solution(
     rows: &[Row],
-    float_m: Vector3<f64>,
-    covariance_m2: DMatrix<f64>,
+    (float_m, covariance_m2): (Vector3<f64>, DMatrix<f64>),
     floats: Floats,
-    integers: Option<Integers>,
+    (integers, success_rate): (Option<Integers>, Option<f64>),
 ) -> Solution {
     let mut bands: BTreeMap<Sv, BTreeSet<u8>> = BTreeMap::new();
     for row in rows {
@@ -464,7 +465,7 @@ fn solution(
         Some(found) => (float_m + found.correction_m.fixed_rows::<3>(0), covariance_m2 - &found.gain_m2),
         None => (float_m, covariance_m2),
     };
-    Solution { status, position_m, covariance_m2, float_m, satellites, on_two_bands, floats, integers }
+    Solution { status, position_m, covariance_m2, float_m, satellites, on_two_bands, floats, integers, success_rate }
 }
 
 #[cfg(test)]

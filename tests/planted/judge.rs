@@ -206,7 +206,7 @@ fn damaged_tables_fail_by_the_row_that_names_the_damage() {
     let add = |by: f64| move |cell: &str| (cell.parse::<f64>().unwrap() + by).to_string();
     let shifted = |number: usize, line: &str| if number > 0 { with(line, 5, &add(50.0)) } else { line.to_owned() };
     damaged("rx/fixes.csv", &shifted, "error, 95 %");
-    let one_wrong = |number: usize, line: &str| if number == 9 { with(line, 3, &add(1.0)) } else { line.to_owned() };
+    let one_wrong = |number: usize, line: &str| if number == 9 { with(line, 4, &add(1.0)) } else { line.to_owned() };
     damaged("rx/navigation.csv", &one_wrong, "wrong navigation parameters");
     let never_there =
         |_: usize, line: &str| if line.contains(",G25,") { line.replace("false", "true") } else { line.to_owned() };

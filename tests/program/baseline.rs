@@ -131,3 +131,53 @@ fn two_receivers_600_m_apart_are_fixed_at_the_first_epoch_of_two_bands_and_fault
     let odd = twin(&["baseline", "base", "rover", "--signals", "X1C"], here);
     assert_eq!(code(&odd), 2, "{}", stderr(&odd));
 }
+
+/// 30 km below the edge of a storm the success rate of all integers stays low where the ionosphere is said as
+/// it is, and no fix is due; below the maps of a quiet day the same receivers are fixed. One who expects a quiet
+/// day in the storm is promised a fix, which the residuals refuse.
+#[test]
+fn fixes_are_lost_in_a_storm_as_their_success_rate_says() {
+    let here = tempfile::tempdir().unwrap();
+    let here = here.path();
+    assert_eq!(code(&twin(&["scenes", "rtk_ionosphere"], here)), 0);
+    let scene = here.join("rtk_ionosphere.toml");
+    let storm = fs::read_to_string(&scene).unwrap();
+    let map = "file = \"storm_front.25i.gz\"\n";
+    let quiet = storm.replace(map, "file = \"igrg3380.10i.gz\"\nmap_start = 2010-12-04T04:51:56\n");
+    assert_ne!(storm, quiet);
+    fs::write(here.join("quiet.toml"), quiet).unwrap();
+    let shipped = format!("{}/scenarios/igrg3380.10i.gz", env!("CARGO_MANIFEST_DIR"));
+    fs::copy(shipped, here.join("igrg3380.10i.gz")).unwrap();
+    for (scene, run) in [("rtk_ionosphere.toml", "storm"), ("quiet.toml", "quiet")] {
+        let arguments = ["run", scene, "--level", "correlations", "--out", run, "--report", "none", "--quiet"];
+        let done = twin(&arguments, here);
+        assert_eq!(code(&done), 0, "{}", stderr(&done));
+    }
+    let found = |run: &str, ppm: &str| -> Value {
+        let [base, rover] = ["base", "rover"].map(|station| format!("{run}/{station}"));
+        let done = twin(&["baseline", &base, &rover, "--ionosphere-ppm", ppm, "--json"], here);
+        assert_eq!(code(&done), 0, "{}", stderr(&done));
+        serde_json::from_slice(&done.stdout).unwrap()
+    };
+    let failed = |result: &Value| {
+        let rows = result["verdict"].as_array().unwrap();
+        let failed: Vec<String> =
+            rows.iter().filter(|row| row["status"] == "fail").map(|row| row["figure"].to_string()).collect();
+        failed
+    };
+    let number = |result: &Value, name: &str| result["figures"][name].as_f64().unwrap_or(f64::NAN);
+
+    let lost = found("storm", "20");
+    assert!(number(&lost, "epochs") > 300.0 && number(&lost, "fixed") == 0.0, "{lost}");
+    assert!(number(&lost, "most_success_rate") < 0.9 && number(&lost, "wrong_fixes") == 0.0, "{lost}");
+    assert!(lost["not_judged"].as_str().unwrap().contains("success rate of all integers"), "{lost}");
+    assert_eq!(failed(&lost), Vec::<String>::new(), "{lost}");
+
+    let promised = found("storm", "1");
+    assert!(number(&promised, "most_success_rate") > 0.999 && number(&promised, "fixed") == 0.0, "{promised}");
+    assert!(failed(&promised).iter().any(|figure| figure.contains("epochs fixed of those that may be")), "{promised}");
+
+    let fixed = found("quiet", "1");
+    assert!(number(&fixed, "fixed") > 100.0 && number(&fixed, "wrong_fixes") == 0.0, "{fixed}");
+    assert!(fixed["not_judged"].is_null() && failed(&fixed).is_empty(), "{fixed}");
+}

@@ -56,6 +56,9 @@ pub fn execute(arguments: &Arguments) -> Result<(), CliError> {
     let found = baseline(&inputs, settings).map_err(rtk_error)?;
     let verdict = judgements(&found, inputs.position);
     let mut text = words(&found) + &verdict_lines(&verdict);
+    if let Some(why) = excuse(&found.figures) {
+        let _ = writeln!(text, "not judged    {why}");
+    }
     let mut object = object(&found, &verdict);
     if let (Some(staging), Some(out)) = (staging, &arguments.out) {
         write(staging.path(), &found, &verdict, &object)?;
@@ -87,19 +90,30 @@ fn judgements(found: &Baseline, position: BasePosition) -> Vec<Judgement> {
         rows.push(Judgement::new(figure, value, unit, bound, MARGINAL_SHARE, source));
     };
     let count = |count: usize| json!(count);
-    if found.is_judged {
+    let is_due = !is_excused(figures);
+    if found.is_judged && is_due {
         let far_m = LARGEST_PER_KM_M * figures.length_m.unwrap_or(0.0) / 1000.0;
         let source = "carriers at short distances: 3 mm and 6 mm, and 1 mm a kilometre";
         judge("horizontal error, rms", json!(figures.horizontal_rms_m), "m", Bound::Max(LARGEST_M[0] + far_m), source);
         judge("vertical error, rms", json!(figures.up_rms_m), "m", Bound::Max(LARGEST_M[1] + far_m), source);
+    }
+    if found.is_judged {
         let allowed = allowed_wrong(figures.expected_wrong);
         let source = "success rates of bootstrapping, a lower bound for least squares";
         judge("fixes with a wrong integer", count(figures.wrong_fixes), "", Bound::Max(allowed), source);
     }
-    judge("time to the first fix", json!(figures.first_fix_s), "s", Bound::Max(LONGEST_S), "one band");
-    if figures.on_two_bands > 0 {
-        let source = format!("{ON_TWO_BANDS} satellites on two bands fix at once");
-        judge("time to it on two bands", json!(figures.first_fix_two_bands_s), "s", Bound::Max(0.0), &source);
+    if is_due {
+        judge("time to the first fix", json!(figures.first_fix_s), "s", Bound::Max(LONGEST_S), "one band");
+    }
+    if is_due && figures.on_two_bands > 0 {
+        let source = format!("{ON_TWO_BANDS} satellites on two bands fix once their success rate allows it");
+        let due = Bound::Max(figures.first_allowed_two_bands_s.unwrap_or(0.0));
+        judge("time to it on two bands", json!(figures.first_fix_two_bands_s), "s", due, &source);
+    }
+    if figures.allowed > 0 {
+        let share = figures.allowed_fixed as f64 / figures.allowed as f64;
+        let source = "integers whose success rate is the one asked for are those of a fix";
+        judge("epochs fixed of those that may be", json!(share), "", Bound::Min(LEAST_FIXED), source);
     }
     if figures.outages > 0 {
         let source = "as the first fix, on one band";
@@ -107,7 +121,9 @@ fn judgements(found: &Baseline, position: BasePosition) -> Vec<Judgement> {
         let source = "what was lost comes back";
         judge("outages without a fix after them", count(figures.outages_without_fix), "", Bound::Max(0.0), source);
     }
-    judge("epochs fixed from there on", json!(figures.fix_rate), "", Bound::Min(LEAST_FIXED), "continuity");
+    if is_due {
+        judge("epochs fixed from there on", json!(figures.fix_rate), "", Bound::Min(LEAST_FIXED), "continuity");
+    }
     judge("slips that were not announced", count(figures.slips), "", Bound::Max(0.0), "receivers say what they lose");
     let source = "receivers resolve half cycles or say that they may be missing";
     judge("ambiguities that are not whole", count(figures.not_whole.len()), "", Bound::Max(0.0), source);
@@ -123,6 +139,19 @@ fn judgements(found: &Baseline, position: BasePosition) -> Vec<Judgement> {
         judge("base off its own fixes", json!(off_m), "m", Bound::Max(LARGEST_FROM_FIXES_M), source);
     }
     rows
+}
+
+/// True if no fix is due: none came, and in no epoch the success rate of all integers was the one asked for.
+/// Then the noise and the ionosphere that the settings expect leave the integers open.
+fn is_excused(figures: &Figures) -> bool {
+    figures.first_fix_s.is_none() && figures.allowed == 0
+}
+
+/// The reason for which figures of fixes are not judged.
+fn excuse(figures: &Figures) -> Option<String> {
+    let most = figures.most_success_rate.map_or_else(|| "none".to_owned(), |most| format!("{most:.4} at most"));
+    let why = || format!("fixes, their error and their time: the success rate of all integers is {most}");
+    is_excused(figures).then(why)
 }
 
 /// Wrong fixes that are no surprise: the expected number and three deviations of it, whole.
@@ -200,6 +229,7 @@ fn object(found: &Baseline, verdict: &[Judgement]) -> Value {
         "figures": found.figures,
         "base_from_fixes_m": found.base_from_fixes_m,
         "verdict": rows.collect::<Vec<_>>(),
+        "not_judged": excuse(&found.figures),
     })
 }
 

@@ -174,8 +174,8 @@ impl<'a> Front<'a> {
         self.next = to.max(from);
     }
 
-    /// Navigation data that were sent.
-    pub fn navigation(&mut self) -> BTreeSet<NavigationRow> {
+    /// Navigation data that were sent, with the seconds at which their sets were due.
+    pub fn navigation(&mut self) -> BTreeSet<(u32, NavigationRow)> {
         let mut navigation = BTreeSet::new();
         self.transmitters.iter_mut().for_each(|t| navigation.append(&mut t.symbols.navigation));
         navigation

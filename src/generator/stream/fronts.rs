@@ -17,6 +17,7 @@ use crate::transmit::Transmitter;
 use crate::truth::Sink;
 use gnss::record::PassRow;
 use gnss::signal::Link;
+use gnss::time::Rate;
 
 /// Streams of the front ends of a scene.
 pub struct Fronts<'a> {
@@ -183,7 +184,8 @@ impl<'a> Fronts<'a> {
     pub fn finish(mut self, truth: &mut dyn Sink) -> Result<Vec<Generated>, GenerateError> {
         let mut navigation = BTreeSet::new();
         self.fronts.iter_mut().for_each(|front| navigation.append(&mut front.navigation()));
-        end(truth, navigation, self.passes())?;
+        let rate = self.fronts.first().map_or(Rate::MEGAHERTZ, |first| first.scene.clock.rate);
+        end(truth, rate, navigation, self.passes())?;
         Ok(self.fronts.iter().map(Front::done).collect())
     }
 

@@ -33,8 +33,11 @@ fn spoofed(keys: &str) -> Scene {
     scene("2010-07-01T10:00:00", &format!("[[spoofer]]\npower_db = 3\n{keys}\n"))
 }
 
+/// Parameters with the seconds at which their sets were due.
+type Parameters = BTreeSet<(u32, NavigationRow)>;
+
 /// Phases of the carrier and of the code at some samples, and the parameters sent in the first 40 s.
-fn sent(scene: &Scene, from: &Constellation, sv: Sv) -> (Vec<(u64, CodeTime)>, BTreeSet<NavigationRow>) {
+fn sent(scene: &Scene, from: &Constellation, sv: Sv) -> (Vec<(u64, CodeTime)>, Parameters) {
     let from = std::sync::Arc::new(from.clone());
     let mut transmitter = Transmitter::of(scene, from, sv, &L1_CA, Edge::Nearest).unwrap().unwrap();
     let mut phases = Vec::new();

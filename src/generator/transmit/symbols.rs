@@ -16,8 +16,9 @@ use gnss::time::Epoch;
 pub struct Symbols {
     /// Units by their number since 1980-01-06T00:00:00 of the system's time, of each form of message.
     units: Vec<(&'static Message, BTreeMap<i64, Vec<bool>>)>,
-    /// Navigation data that have been sent so far.
-    pub navigation: BTreeSet<NavigationRow>,
+    /// Navigation data that have been sent so far, each with the second after the start of the samples at which
+    /// its set was due, 0 for those before.
+    pub navigation: BTreeSet<(u32, NavigationRow)>,
 }
 
 /// Message symbols of a component: index of the form among the satellite's, and code periods per symbol.
@@ -67,6 +68,7 @@ impl Symbols {
         let own = |fault: &&MessageFault| fault.constellation == from.number;
         let faults: Vec<MessageFault> = scene.message_faults.iter().filter(own).cloned().collect();
         let catalogue = scene.catalogue_of(from);
+        let start = from.ahead(scene.clock.start);
         let messages = scene.messages.of_constellation(from.number);
         for (message, units) in &mut self.units {
             let Some(sender) = messages.of(message) else { continue };
@@ -78,10 +80,11 @@ impl Symbols {
                     continue;
                 }
                 let slot = Slot { message, time: signal.time, unit };
-                let fallback = || catalogue.sent_at(sv, received);
-                let Some(ephemeris) = catalogue.sent_at(sv, slot.set_chosen()).or_else(fallback) else {
+                let fallback = || catalogue.sent_since(sv, received);
+                let Some((since, ephemeris)) = catalogue.sent_since(sv, slot.set_chosen()).or_else(fallback) else {
                     continue;
                 };
+                let since_s = since.since(start).max(0.0).round() as u32;
                 let earlier = Slot { unit: unit - 1, ..slot }.set_chosen();
                 let before = catalogue.sent_at(sv, earlier).unwrap_or(ephemeris);
                 let SentSymbols { encoded, symbols, restored } =
@@ -91,8 +94,10 @@ impl Symbols {
                 let distinct = if symbols == encoded { 1 } else { 2 };
                 let sent = both.into_iter().take(distinct).chain(&restored);
                 for (of_set, parameters) in sent.filter_map(|sent| (message.parameters)(sent)) {
-                    let issue = if of_set { u32::from((message.form)(ephemeris).iode) } else { 0 };
-                    self.navigation.extend(NavigationRow::each(sv, message.name, issue, parameters));
+                    let (since_s, issue) =
+                        if of_set { (since_s, u32::from((message.form)(ephemeris).iode)) } else { (0, 0) };
+                    let rows = NavigationRow::each(sv, message.name, issue, parameters);
+                    self.navigation.extend(rows.map(|row| (since_s, row)));
                 }
                 units.insert(unit, symbols);
             }

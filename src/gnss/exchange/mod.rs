@@ -14,7 +14,7 @@ mod observation;
 mod offset;
 mod track;
 
-pub use navigation::NavigationSets;
+pub use navigation::{NavigationSets, bears_issue};
 pub use observation::ObservationFile;
 pub use track::{Track, TrackForm};
 

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
+use std::sync::OnceLock;
 
 use super::offset::offsets;
 use super::{Version, calendar, header_line, opening};
@@ -10,11 +11,12 @@ use crate::ionosphere::{Coefficients, Model};
 use crate::message::{Message, Raw, RecordLine, Records};
 use crate::record::NavigationRow;
 use crate::satellite::{Sv, System};
-use crate::signal::Signal;
+use crate::signal::{self, Signal};
 use crate::time::{BDT, BDT_WEEK, Epoch, TimeScale, UTC};
 
-/// Parameters of an ephemeris, or parameters that are common to all satellites, by name.
-type Raws = BTreeMap<String, i64>;
+/// Parameters of an ephemeris, or parameters that are common to all satellites, by name: raw integers, and the
+/// sample of the row that said each last.
+type Raws = BTreeMap<String, (i64, u64)>;
 
 /// Message, satellite and issue of an ephemeris.
 type Sent = (String, Sv, u32);
@@ -28,26 +30,60 @@ fn messages(signals: &[&'static Signal]) -> BTreeMap<&'static str, (&'static Mes
     signals.iter().flat_map(of).collect()
 }
 
+/// True if a parameter is one of those that an ephemeris has, whose issue it bears, be it 0.
+pub fn bears_issue(row: &NavigationRow) -> bool {
+    static BOUND: OnceLock<BTreeMap<&'static str, BTreeSet<&'static str>>> = OnceLock::new();
+    let bound = BOUND.get_or_init(|| {
+        let messages = messages(&signal::all());
+        messages.into_iter().map(|(name, (own, _))| (name, own.fields.parameters().into_iter().collect())).collect()
+    });
+    bound.get(row.message.as_str()).is_some_and(|own| own.contains(row.parameter.as_str()))
+}
+
 /// Collects parameters as they come; an ephemeris is some kilobytes, however often it is read again.
 #[derive(Debug, Default)]
 pub struct NavigationSets {
-    /// Parameters by message, satellite and issue. Parameters that belong to no issue are in `common`, the
-    /// newest only.
-    sets: BTreeMap<Sent, Raws>,
+    /// Parameters by message, satellite and issue, and one after the other where an issue came again. Parameters
+    /// that belong to no issue are in `common`, the newest only.
+    sets: BTreeMap<Sent, Vec<Raws>>,
     common: BTreeMap<String, Raws>,
 }
 
 impl NavigationSets {
     /// Takes a parameter.
     pub fn take(&mut self, row: &NavigationRow) {
-        let raws = if row.issue == 0 {
+        self.insert(row);
+    }
+
+    /// Takes a parameter; true if it was not known of its set.
+    pub fn insert(&mut self, row: &NavigationRow) -> bool {
+        let said = (row.raw, row.sample);
+        if row.issue == 0 {
             // Those of an issue 0 are of an ephemeris too.
-            self.common.entry(row.message.clone()).or_default().insert(row.parameter.clone(), row.raw);
-            self.sets.entry((row.message.clone(), row.sv, 0)).or_default()
-        } else {
-            self.sets.entry((row.message.clone(), row.sv, row.issue)).or_default()
-        };
-        raws.insert(row.parameter.clone(), row.raw);
+            self.common.entry(row.message.clone()).or_default().insert(row.parameter.clone(), said);
+        }
+        let again = self.is_issued_again(row);
+        let sets = self.sets.entry((row.message.clone(), row.sv, row.issue)).or_default();
+        match sets.last() {
+            Some(last) if again => {
+                // What was sent with it is of the new set, though it be as before.
+                let with_it = |(_, (_, sample)): &(&String, &(i64, u64))| *sample == row.sample;
+                let begun = last.iter().filter(with_it).map(|(name, said)| (name.clone(), *said)).collect();
+                sets.push(begun);
+            }
+            Some(_) => {}
+            None => sets.push(Raws::new()),
+        }
+        let before = sets.last_mut().and_then(|raws| raws.insert(row.parameter.clone(), said));
+        before.is_none_or(|(raw, _)| raw != row.raw)
+    }
+
+    /// True if the row begins a new set under an issue that an earlier one had: issues of four bits come again
+    /// after hours. It says another value than that one did at another sample.
+    pub fn is_issued_again(&self, row: &NavigationRow) -> bool {
+        let last = self.sets.get(&(row.message.clone(), row.sv, row.issue)).and_then(|sets| sets.last());
+        let before = last.and_then(|raws| raws.get(&row.parameter));
+        before.is_some_and(|(raw, sample)| *raw != row.raw && *sample != row.sample) && bears_issue(row)
     }
 
     /// All complete ephemerides, each once for each message, near a time by which their weeks are resolved;
@@ -55,20 +91,26 @@ impl NavigationSets {
     pub fn ephemerides(&self, signals: &[&'static Signal], near: Epoch) -> Vec<Ephemeris> {
         let messages = messages(signals);
         let mut known = BTreeSet::new();
-        let complete = self.sets.keys().filter_map(|sent| {
+        let complete = self.each().filter_map(|(sent, turn, raws)| {
             let (message, time) = messages.get(sent.0.as_str())?;
-            let raw = |name: &str| self.raw(sent, name);
+            let raw = |name: &str| self.raw(sent, raws, name);
             let set = message.fields.elements(sent.1, &raw, time.label(near))?.timed(|label| time.instant(label));
-            known.insert((sent.1, sent.2, set.form.name)).then_some(set)
+            known.insert((sent.1, sent.2, turn, set.form.name)).then_some(set)
         });
         complete.collect()
     }
 
+    /// All sets, those of one issue numbered by their turn.
+    fn each(&self) -> impl Iterator<Item = (&Sent, usize, &Raws)> {
+        self.sets.iter().flat_map(|(sent, sets)| sets.iter().enumerate().map(move |(turn, raws)| (sent, turn, raws)))
+    }
+
     /// Raw integer of a parameter of an ephemeris. What it needs and bears no issue is found under issue 0:
     /// delays and health of I/NAV's word 5.
-    fn raw(&self, sent: &Sent, name: &str) -> Option<i64> {
-        let of = |issue: u32| self.sets.get(&(sent.0.clone(), sent.1, issue))?.get(name).copied();
-        of(sent.2).or_else(|| of(0))
+    fn raw<'s>(&'s self, (message, sv, _): &Sent, raws: &'s Raws, name: &str) -> Option<i64> {
+        let newest = |sets: &'s Vec<Raws>| sets.iter().rev().find_map(|raws| raws.get(name));
+        let common = || self.sets.get(&(message.clone(), *sv, 0)).and_then(newest);
+        raws.get(name).or_else(common).map(|(raw, _)| *raw)
     }
 
     /// Writes all complete ephemerides, each once, near a time by which their weeks are resolved; `signals`
@@ -91,21 +133,21 @@ impl NavigationSets {
         let mut text = opening(version, "N: GNSS NAV DATA", &systems, near);
         let (mut body, mut described) = (String::new(), BTreeSet::new());
         for (name, (message, _)) in &messages {
-            let own = self.sets.iter().filter(|((known, ..), _)| known == name);
-            let (Some(records), Some(((_, sv, _), _))) = (message.rinex, own.clone().next()) else { continue };
+            let own = || self.each().filter(|((known, ..), ..)| known == name);
+            let (Some(records), Some(((_, sv, _), ..))) = (message.rinex, own().next()) else { continue };
             // Messages of one system that send the same have one record, and one line in a header.
             let form = if version == Version::Four { records.common } else { "" };
             let mut once = |what| described.insert((sv.system, form, what));
             let common = self.common.get(*name);
             // BeiDou's, and those of NavIC on L1, come with the ephemerides.
-            let mut raws = common.into_iter().chain(own.map(|(_, raws)| raws));
+            let mut raws = common.into_iter().chain(own().map(|(.., raws)| raws));
             let sent = raws.find_map(|raws| {
-                let raw = |name: &str| raws.get(name).copied();
+                let raw = |name: &str| raws.get(name).map(|(raw, _)| *raw);
                 Some(((message.ionosphere.coefficients)(&raw)?, region(&raw)))
             });
             // A header of version 3 has no lines for BDGIM, but for BeiDou's older model.
             let sent = sent.filter(|(sent, _)| version == Version::Four || sent.model() != Model::Bdgim);
-            let raw = |name: &str| common.and_then(|raws| raws.get(name)).copied();
+            let raw = |name: &str| common.and_then(|raws| raws.get(name)).map(|(raw, _)| *raw);
             if let Some(sent) = sent.filter(|_| once("")) {
                 match version {
                     Version::Three => text += &ionosphere(sent.0, sv.system),
@@ -123,16 +165,16 @@ impl NavigationSets {
         text += &header_line("", "END OF HEADER");
         text += &body;
         let mut known = BTreeSet::new();
-        for sent in self.sets.keys() {
+        for (sent, turn, raws) in self.each() {
             let (name, sv, issue) = sent;
             let Some((message, time)) = messages.get(name.as_str()) else { continue };
             let Some(records) = message.rinex else { continue };
-            let raw = |name: &str| self.raw(sent, name);
+            let raw = |name: &str| self.raw(sent, raws, name);
             let set = message.fields.elements(sent.1, &raw, time.label(near));
             let set = set.map(|set| set.timed(|label| time.instant(label)));
             // Version 3 has no records of the newer messages.
             let writes = records.lines.is_none() || version == Version::Four;
-            if let Some(set) = set.filter(|set| writes && known.insert((*sv, *issue, set.form.name))) {
+            if let Some(set) = set.filter(|set| writes && known.insert((*sv, *issue, turn, set.form.name))) {
                 text += &heading(version, records, *sv);
                 let own = signals.iter().find(|signal| signal.system == sv.system);
                 let channel = own.and_then(|signal| signal.link(*sv).channel());
@@ -501,6 +543,42 @@ mod tests {
             let Some((of_set, parameters)) = (message.parameters)(&symbols) else { continue };
             let issue = if of_set { u32::from(set.iode) } else { 0 };
             NavigationRow::each(set.sv, message.name, issue, parameters).for_each(|row| sets.take(&row));
+        }
+    }
+
+    #[test]
+    fn an_issue_that_comes_again_names_another_set_and_neither_is_lost() {
+        let both = rinex::embedded_two_systems().unwrap().ephemerides;
+        let set = both.iter().find(|set| set.sv.system == System::Gps && set.is_healthy()).unwrap();
+        // The later one has the earlier one's orbit, most of its values are those of before.
+        for iode in [8, 0] {
+            let earlier = Ephemeris { iode, ..set.clone() };
+            let toe = earlier.toe.plus_s(14_400.0);
+            let later = Ephemeris { toe, toc: toe, af0_s: earlier.af0_s + 1e-6, ..earlier.clone() };
+            let sender = (LNAV.sender)(&Common::default()).unwrap();
+            let (mut sets, mut written) = (NavigationSets::default(), NavigationSets::default());
+            for (sample, set) in [(1, &earlier), (100_000, &later)] {
+                let begin = set.toe.seconds().div_euclid(4500) * 4500;
+                for unit in 0..10 {
+                    let symbols = sender.unit(set, Epoch::new(begin + 6 * unit, 0.0)).unwrap();
+                    let Some((true, parameters)) = (LNAV.parameters)(&symbols) else { continue };
+                    let rows = NavigationRow::each(set.sv, LNAV.name, u32::from(iode), parameters);
+                    // A file that has each row once for each set, as the receiver writes it, says the same.
+                    let rows: Vec<_> = rows.map(|row| NavigationRow { sample: sample + unit as u64, ..row }).collect();
+                    let begins = rows.iter().any(|row| sets.is_issued_again(row));
+                    let new = |row: &&NavigationRow| sets.insert(row) || begins;
+                    rows.iter().filter(new).for_each(|row| written.take(row));
+                }
+            }
+            for sets in [&sets, &written] {
+                let found = sets.ephemerides(&[&L1_CA], set.toe);
+                let clocks: Vec<(f64, f64)> = found.iter().map(|own| (own.toe.since(set.toe), own.af0_s)).collect();
+                let expected = [&earlier, &later].map(|own| (own.toe.since(set.toe), own.af0_s));
+                assert_eq!(clocks.len(), 2, "issue {iode}: {clocks:?}");
+                for ((at, clock), (own_at, own)) in clocks.iter().zip(expected) {
+                    assert!(*at == own_at && (clock - own).abs() < 3e-10, "issue {iode}: {clocks:?}");
+                }
+            }
         }
     }
 

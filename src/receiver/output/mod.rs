@@ -18,6 +18,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use thiserror::Error;
 
+use gnss::exchange::{NavigationSets, bears_issue};
 use gnss::record::{
     AcquisitionRow, ClockRow, DetectionRow, EventRow, Fix, Geographic, IntegrityRow, IonosphereRow, LineRow,
     NavigationRow, Observation, SightRow, TagRow, TrackingRow,
@@ -221,8 +222,10 @@ pub struct Output {
     integrity: Option<Sheet>,
     /// File of the detectors' tests, which exists once there is one.
     detection: Option<Sheet>,
-    /// Parameters written so far: those of one issue are written once.
-    parameters: BTreeSet<NavigationRow>,
+    /// Parameters beside those of ephemerides that were written so far, at sample 0: each is written once.
+    common: BTreeSet<NavigationRow>,
+    /// Those of ephemerides, once for each set.
+    sets: NavigationSets,
 }
 
 const OBSERVATIONS: [&str; 10] = [
@@ -308,7 +311,7 @@ const TRACKING: [&str; 16] = [
     "late_q",
     "tap_spacing_chips",
 ];
-const NAVIGATION: [&str; 5] = ["sv", "issue", "parameter", "raw", "message"];
+const NAVIGATION: [&str; 6] = ["sample", "sv", "issue", "parameter", "raw", "message"];
 const EVENTS: [&str; 4] = ["sample", "sv", "signal", "event"];
 const INTERFERENCE: [&str; 8] =
     ["sample", "frequency_hz", "jn0_dbhz", "js_db", "statistic", "threshold", "lines", "resolution_hz"];
@@ -342,7 +345,8 @@ impl Output {
             tags: None,
             integrity: None,
             detection: None,
-            parameters: BTreeSet::new(),
+            common: BTreeSet::new(),
+            sets: NavigationSets::default(),
         })
     }
 
@@ -430,12 +434,18 @@ impl Output {
         sheet.write(row)
     }
 
-    /// Writes decoded parameters, each but once.
+    /// Writes decoded parameters, each but once for each set.
     fn navigation(&mut self, rows: Vec<NavigationRow>) -> Result<(), OutputError> {
+        // What came with the first parameter of a new set is of that set.
+        let begins = rows.iter().any(|row| self.sets.is_issued_again(row));
         for row in rows {
-            if !self.parameters.contains(&row) {
+            let is_new = if bears_issue(&row) {
+                self.sets.insert(&row) || begins
+            } else {
+                self.common.insert(NavigationRow { sample: 0, ..row.clone() })
+            };
+            if is_new {
                 self.navigation.write(&row)?;
-                self.parameters.insert(row);
             }
         }
         Ok(())
@@ -509,7 +519,7 @@ mod tests {
         assert_eq!(header(&row), ACQUISITION.join(","));
         let row: TrackingRow = from_csv(&TRACKING, &format!("0,G03,{},{}", L1_CA.name, zero(13)));
         assert_eq!(header(&row), TRACKING.join(","));
-        let row = NavigationRow { sv, issue: 1, parameter: "x".into(), raw: 0, message: "LNAV".into() };
+        let row = NavigationRow { sample: 0, sv, issue: 1, parameter: "x".into(), raw: 0, message: "LNAV".into() };
         assert_eq!(header(&row), NAVIGATION.join(","));
         let row = EventRow { sample: 0, sv, signal: &L1_CA, event: Event::Acquired };
         assert_eq!(header(&row), EVENTS.join(","));

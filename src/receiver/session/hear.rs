@@ -134,7 +134,8 @@ impl Shared {
                     }
                     None
                 }
-                News::Parameters(rows) => {
+                News::Parameters(mut rows) => {
+                    rows.iter_mut().for_each(|row| row.sample = step.main(sample));
                     sink.take(Record::Navigation(rows))?;
                     None
                 }

@@ -188,7 +188,7 @@ fn fixes(run: &Run, rows: &mut Rows) -> Result<(), JudgeError> {
 fn short(run: &Run, rows: &mut Rows) {
     let mut seen = HashSet::new();
     for row in &run.navigation {
-        if !seen.insert((row.sv, row.message.as_str(), row.issue, row.parameter.as_str(), row.raw)) {
+        if !seen.insert((row.sample, row.content())) {
             rows.doubled.add(|| format!("{} of {} in navigation", row.parameter, row.sv));
         }
     }

@@ -501,10 +501,10 @@ fn tracking(run: &Run, errors: &Errors, details: &mut Details) -> Result<Trackin
 }
 
 fn navigation(run: &Run, details: &mut Details) -> Navigation {
-    let sent: BTreeSet<&NavigationRow> = run.truth_navigation.iter().collect();
-    let decoded: BTreeSet<&NavigationRow> = run.navigation.iter().collect();
-    details.wrong_parameters =
-        planted!("analysis.summary.navigation", &decoded, &sent).difference(&sent).map(|row| (*row).clone()).collect();
+    let sent: BTreeSet<_> = run.truth_navigation.iter().map(NavigationRow::content).collect();
+    let decoded: BTreeMap<_, &NavigationRow> = run.navigation.iter().map(|row| (row.content(), row)).collect();
+    let wrong = decoded.iter().filter(|(said, _)| !sent.contains(*said)).map(|(_, row)| (*row).clone());
+    details.wrong_parameters = planted!("analysis.summary.navigation", wrong.collect(), Vec::new());
     Navigation { parameters_checked: decoded.len(), parameters_wrong: details.wrong_parameters.len() }
 }
 
