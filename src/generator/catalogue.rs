@@ -141,7 +141,7 @@ impl Catalogue {
         self.sent_since(sv, at).map(|(_, set)| set)
     }
 
-    /// That one with the time from which it is sent.
+    /// Ephemeris that is sent at a time, with the time from which it is.
     pub fn sent_since(&self, sv: Sv, at: Epoch) -> Option<(Epoch, &Ephemeris)> {
         let timeline = self.satellites.get(&sv)?;
         let count = timeline.spans.partition_point(|span| span.from <= at);

@@ -583,8 +583,8 @@ pub struct TrackingRow {
 /// Parameter of a navigation message as its raw integer: `navigation.csv`, from generator and receiver.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct NavigationRow {
-    /// Sample at which a receiver had read it; in the truth, the one at which the data set began to be sent, 0
-    /// for those before the samples. Short issues come again within hours: this is what tells sets apart.
+    /// Sample at which a receiver had read it; in the truth, the one at which the data set began to be sent,
+    /// 0 for those before the samples. Short issues come again within hours: this is what tells sets apart.
     #[serde(default)]
     pub sample: u64,
     /// The satellite.
@@ -623,7 +623,7 @@ impl NavigationRow {
         parameters.into_iter().map(row)
     }
 
-    /// What the row says, whenever that was.
+    /// Content of the row, without its sample.
     pub fn content(&self) -> (Sv, &str, u32, &str, i64) {
         (self.sv, &self.message, self.issue, &self.parameter, self.raw)
     }

@@ -109,9 +109,9 @@ impl Floats {
         (values, covariance)
     }
 
-    /// The best integers of the double differences, or of a part of them, `None` if there is none that could be
-    /// searched for; and the probability that bootstrapping gives all of the true ones, `None` without double
-    /// differences.
+    /// The best integers of the double differences, or of a part of them, `None` if there is none that could
+    /// be searched for; and the probability that bootstrapping gives all of the true ones, `None` without
+    /// double differences.
     pub fn fix(&self, doubles: &Doubles, belief: Belief) -> (Option<Integers>, Option<f64>) {
         let (values, covariance) = self.differenced(doubles);
         let Ok(made) = Decorrelated::new(&values, &covariance) else { return (None, None) };

@@ -95,7 +95,7 @@ pub struct Figures {
     pub first_fix_two_bands_s: Option<f64>,
     /// Epochs in which the success rate of all integers is the one that a fix asks for.
     pub allowed: usize,
-    /// Those of them that are a fix.
+    /// Epochs of those that are a fix.
     pub allowed_fixed: usize,
     /// Time from the first epoch with five satellites on two bands to the first of those, seconds.
     pub first_allowed_two_bands_s: Option<f64>,

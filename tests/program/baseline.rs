@@ -133,8 +133,8 @@ fn two_receivers_600_m_apart_are_fixed_at_the_first_epoch_of_two_bands_and_fault
 }
 
 /// 30 km below the edge of a storm the success rate of all integers stays low where the ionosphere is said as
-/// it is, and no fix is due; below the maps of a quiet day the same receivers are fixed. One who expects a quiet
-/// day in the storm is promised a fix, which the residuals refuse.
+/// it is, and no fix is due; below the maps of a quiet day the same receivers are fixed. One who expects a
+/// quiet day in the storm is promised a fix, which the residuals refuse.
 #[test]
 fn fixes_are_lost_in_a_storm_as_their_success_rate_says() {
     let here = tempfile::tempdir().unwrap();

@@ -2,8 +2,8 @@
 //!
 //! The raw integers of `truth/navigation.csv` go through the message's own tables. Limits: a satellite whose
 //! ephemeris is incomplete there has none. Where a satellite sends a new ephemeris during the run, the one
-//! that the receiver says that it had read last counts, as all of them are right. Of sets that have one issue,
-//! as those of four bits have after hours, it is the newest that was due by then.
+//! that the receiver says that it had read last counts, as all of them are right. Of sets that have one
+//! issue, as those of four bits have after hours, it is the newest that was due by then.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -24,8 +24,8 @@ type Issue = (u32, u64);
 pub struct Message {
     /// Ephemerides of each satellite and message, with their issues and the samples at which they were due.
     sets: BTreeMap<(Sv, &'static str), Vec<(Issue, Ephemeris)>>,
-    /// Issues that the receiver had, each with the sample from which it had it, ascending; none where its file
-    /// does not say samples.
+    /// Issues that the receiver had, each with the sample from which it had it, ascending; none where its
+    /// file does not say samples.
     read: BTreeMap<(Sv, &'static str), Vec<(u64, u32)>>,
     /// The ionosphere's coefficients, where they were sent: one of a model.
     ionospheres: Vec<Coefficients>,

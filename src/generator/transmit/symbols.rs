@@ -16,8 +16,8 @@ use gnss::time::Epoch;
 pub struct Symbols {
     /// Units by their number since 1980-01-06T00:00:00 of the system's time, of each form of message.
     units: Vec<(&'static Message, BTreeMap<i64, Vec<bool>>)>,
-    /// Navigation data that have been sent so far, each with the second after the start of the samples at which
-    /// its set was due, 0 for those before.
+    /// Navigation data that have been sent so far, each with the second after the start of the samples at
+    /// which its set was due, 0 for those before.
     pub navigation: BTreeSet<(u32, NavigationRow)>,
 }
 

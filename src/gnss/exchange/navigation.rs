@@ -14,8 +14,8 @@ use crate::satellite::{Sv, System};
 use crate::signal::{self, Signal};
 use crate::time::{BDT, BDT_WEEK, Epoch, TimeScale, UTC};
 
-/// Parameters of an ephemeris, or parameters that are common to all satellites, by name: raw integers, and the
-/// sample of the row that said each last.
+/// Parameters of an ephemeris, or parameters that are common to all satellites, by name: raw integers, and
+/// the sample of the row that said each last.
 type Raws = BTreeMap<String, (i64, u64)>;
 
 /// Message, satellite and issue of an ephemeris.
@@ -43,8 +43,8 @@ pub fn bears_issue(row: &NavigationRow) -> bool {
 /// Collects parameters as they come; an ephemeris is some kilobytes, however often it is read again.
 #[derive(Debug, Default)]
 pub struct NavigationSets {
-    /// Parameters by message, satellite and issue, and one after the other where an issue came again. Parameters
-    /// that belong to no issue are in `common`, the newest only.
+    /// Parameters by message, satellite and issue, and one after the other where an issue came again.
+    /// Parameters that belong to no issue are in `common`, the newest only.
     sets: BTreeMap<Sent, Vec<Raws>>,
     common: BTreeMap<String, Raws>,
 }
@@ -78,8 +78,8 @@ impl NavigationSets {
         before.is_none_or(|(raw, _)| raw != row.raw)
     }
 
-    /// True if the row begins a new set under an issue that an earlier one had: issues of four bits come again
-    /// after hours. It says another value than that one did at another sample.
+    /// True if the row begins a new set under an issue that an earlier one had: issues of four bits come
+    /// again after hours. It says another value than that one did at another sample.
     pub fn is_issued_again(&self, row: &NavigationRow) -> bool {
         let last = self.sets.get(&(row.message.clone(), row.sv, row.issue)).and_then(|sets| sets.last());
         let before = last.and_then(|raws| raws.get(&row.parameter));

@@ -224,7 +224,7 @@ pub struct Output {
     detection: Option<Sheet>,
     /// Parameters beside those of ephemerides that were written so far, at sample 0: each is written once.
     common: BTreeSet<NavigationRow>,
-    /// Those of ephemerides, once for each set.
+    /// Parameters of ephemerides, each written once for each set.
     sets: NavigationSets,
 }
 
