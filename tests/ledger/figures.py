@@ -216,6 +216,17 @@ def counts():
     yield Figure("validation.levels.differences", "figures of the verdict that differ between samples and correlations, all scenes", "",
                  make.Page("reports/levels.md", "cargo bench --bench levels", pattern=r"^\*\*\d+ scenes.*: (\d+) differences"),
                  (*ALL_SAMPLES, "src/twin", "src/analysis/measure", "benches/levels"), "= 0")
+    page, command = "reports/baselines.md", 'python3 tests/baselines.py "$GNSS_TWIN" --page reports/baselines.md'
+    rooms = ("src/gnss", "src/generator", "src/receiver", "src/twin", "src/rtk", "tests/baselines.py")
+    for name, way in [("two_bands", "two bands"), ("one_band", "one band")]:
+        row = rf"^\| {way} \|"
+        yield Figure(f"baselines.{name}.right", f"baselines of 0.6 km that are fixed rightly and in time, {way}", "",
+                     make.Page(page, command, pattern=rf"{row} (\d+ of \d+) \|"), rooms)
+        skipped = r"(?:[^|]*\|){6} "
+        yield Figure(f"baselines.{name}.horizontal_mm", f"horizontal error of their fixed epochs, rms, {way}", "mm",
+                     make.Page(page, command, pattern=rf"{row}{skipped}([\d.]+) \|"), rooms, "≤ 3")
+        yield Figure(f"baselines.{name}.up_mm", f"vertical error of their fixed epochs, rms, {way}", "mm",
+                     make.Page(page, command, pattern=rf"{row}{skipped}[\d.]+ \| ([\d.]+) \|"), rooms, "≤ 6")
     page, command = "reports/protection.md", "cargo bench --bench protection"
     rooms = ("src/gnss", "src/generator", "src/receiver", "src/twin", "src/analysis/measure", "benches/protection")
     yield Figure("integrity.fixes", "fixes of a case without a fault, RAIM", "",
