@@ -20,8 +20,8 @@ import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-# Hours of the embedded navigation file that have ephemerides of all four systems.
-STARTS = [f"2020-11-29T{time}:26" for time in ("12:22", "13:10", "14:03", "15:07", "16:31")]
+# Starts at which the embedded navigation file has ephemerides of all four systems.
+STARTS = [f"2020-11-29T{time}:26" for time in ("12:22", "13:10", "14:03", "14:36", "15:07")]
 SIGNALS = ["GPS L1 C/A", "GPS L5", "Galileo E1", "Galileo E5a", "BeiDou B1C", "BeiDou B2a", "GLONASS G1", "GLONASS G2"]
 # Name, middle and rate of each front end, Hz.
 FRONT_ENDS = [("l1", 1575.42e6, 25e6), ("g1", 1602e6, 12e6), ("g2", 1246e6, 12e6), ("l5", 1176.45e6, 25e6)]
