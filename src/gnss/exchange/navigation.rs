@@ -552,7 +552,7 @@ mod tests {
         let set = both.iter().find(|set| set.sv.system == System::Gps && set.is_healthy()).unwrap();
         // The later one has the earlier one's orbit, most of its values are those of before.
         for iode in [8, 0] {
-            let earlier = Ephemeris { iode, ..set.clone() };
+            let earlier = Ephemeris { iode, iodc: iode, ..set.clone() };
             let toe = earlier.toe.plus_s(14_400.0);
             let later = Ephemeris { toe, toc: toe, af0_s: earlier.af0_s + 1e-6, ..earlier.clone() };
             let sender = (LNAV.sender)(&Common::default()).unwrap();
