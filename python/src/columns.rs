@@ -4,9 +4,9 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 
 use gnss::record::{
-    AcquisitionRow, ClockRow, DetectionRow, Detector, Event, EventRow, Fix, Geographic, IntegrityRow, InterferenceRow,
-    IonosphereModel, IonosphereRow, LineRow, NavigationRow, Observation, PassEnd, PassRow, RayRow, SightRow, SkyRow,
-    TagRow, TrackingRow, TrajectoryRow,
+    AcquisitionRow, AttitudeRow, BodyRow, ClockRow, DetectionRow, Detector, ElementRow, Event, EventRow, Fix,
+    Geographic, InertialRow, IntegrityRow, InterferenceRow, IonosphereModel, IonosphereRow, LineRow, NavigationRow,
+    Observation, PassEnd, PassRow, RayRow, SightRow, SkyRow, TagRow, TrackingRow, TrajectoryRow,
 };
 use gnss::satellite::Sv;
 use gnss::signal::Signal;
@@ -205,6 +205,12 @@ mod fields {
         IntegrityRow { sample, gps_s, gps_fraction_s, method, hpl_m, vpl_m, emt_m, sigma_v_acc_m, satellites,
             detected, excluded, available, reason }
         DetectionRow { sample, detector, sv, signal, statistic, threshold, alarm }
+        InertialRow { gps_s, gps_fraction_s, rate_x_radps, rate_y_radps, rate_z_radps, force_x_mps2, force_y_mps2,
+            force_z_mps2 }
+        BodyRow { gps_s, gps_fraction_s, x_m, y_m, z_m, vx_mps, vy_mps, vz_mps, qw, qx, qy, qz }
+        AttitudeRow { sample, yaw_deg, pitch_deg, roll_deg, sigma_east_deg, sigma_north_deg, sigma_up_deg, signals,
+            chi_square, freedom }
+        ElementRow { sample, signal, element, phase_deg, sigma_deg }
         AcquisitionRow { sample, sv, signal, acquired, statistic, threshold, doppler_hz, code_phase_chips, cn0_dbhz }
         LineRow { sample, frequency_hz, jn0_dbhz, js_db, statistic, threshold, lines, resolution_hz }
         TrackingRow { sample, sv, signal, prompt_i, prompt_q, dll_discriminator_chips, pll_discriminator_cycles,

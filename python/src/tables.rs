@@ -1,15 +1,17 @@
 //! The records of generator and receiver as tables, each under the name of the file that the program writes.
 
-use std::collections::BTreeSet;
+use std::ops::Range;
 
-use generator::truth::{self, TruthError};
+use generator::scene::Scene;
+use generator::truth::{self, SensorRow, Sensors, TruthError};
 use gnss::record::{
-    AcquisitionRow, ClockRow, DetectionRow, EventRow, Fix, Geographic, IntegrityRow, InterferenceRow, IonosphereRow,
-    LineRow, NavigationRow, Observation, PassRow, RayRow, SightRow, SkyRow, TagRow, TrackingRow, TrajectoryRow,
+    AcquisitionRow, AttitudeRow, BodyRow, ClockRow, DetectionRow, ElementRow, EventRow, Fix, Geographic, InertialRow,
+    IntegrityRow, InterferenceRow, IonosphereRow, LineRow, NavigationRow, Observation, PassRow, RayRow, SightRow,
+    SkyRow, TagRow, TrackingRow, TrajectoryRow,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use receiver::output::{self, OutputError};
+use receiver::output::{self, OutputError, Parameters};
 use serde_json::Value;
 
 use crate::columns::{FrontEnd, Spoofer, Table};
@@ -26,6 +28,9 @@ pub struct Truth {
     spoofed: Table<(Observation, Spoofer)>,
     navigation: Table<NavigationRow>,
     passes: Table<PassRow>,
+    imu: Table<InertialRow>,
+    body: Table<BodyRow>,
+    sensors: Option<Sensors>,
 }
 
 /// A row with its position in degrees.
@@ -34,10 +39,41 @@ fn placed(row: TrajectoryRow) -> (TrajectoryRow, Geographic) {
     (row, place)
 }
 
+impl Truth {
+    /// Takes the rows of the sensors that `ask` asks for.
+    fn sense(
+        &mut self,
+        ask: impl FnOnce(&mut Sensors, truth::Take<'_>) -> Result<(), TruthError>,
+    ) -> Result<(), TruthError> {
+        let Self { imu, body, sensors, .. } = self;
+        let mut take = |row| {
+            match row {
+                SensorRow::Measured(row) => imu.push(&row),
+                SensorRow::Body(row) => body.push(&row),
+            }
+            Ok(())
+        };
+        sensors.as_mut().map_or(Ok(()), |sensors| ask(sensors, &mut take))
+    }
+}
+
 impl truth::Sink for Truth {
+    fn begin(&mut self, scenes: &[Scene], part: &Range<u64>) -> Result<(), TruthError> {
+        self.sensors = scenes.first().and_then(|scene| Sensors::of(scene, part));
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<(), TruthError> {
+        self.sense(|sensors, take| sensors.finish(take))
+    }
+
     fn take(&mut self, record: truth::Record) -> Result<(), TruthError> {
         match record {
-            truth::Record::Trajectory(row) => self.trajectory.push(&placed(row)),
+            truth::Record::Trajectory(row) => {
+                let time = row.time();
+                self.sense(|sensors, take| sensors.until(time, take))?;
+                self.trajectory.push(&placed(row));
+            }
             truth::Record::Observation(row) => self.observations.push(&row),
             truth::Record::Sky(row) => self.sky.push(&row),
             truth::Record::Ray(row) => self.rays.push(&row),
@@ -63,7 +99,10 @@ macro_rules! tables {
 impl Truth {
     /// The tables by their names; they are empty after it.
     pub fn drain<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        tables!(self, py; trajectory, observations, sky, rays, interference, claimed, spoofed, navigation, passes)
+        tables!(
+            self, py;
+            trajectory, observations, sky, rays, interference, claimed, spoofed, navigation, passes, imu, body
+        )
     }
 }
 
@@ -81,10 +120,11 @@ pub struct Received {
     ionosphere: Table<IonosphereRow>,
     integrity: Table<IntegrityRow>,
     detection: Table<DetectionRow>,
+    attitude: Table<AttitudeRow>,
+    elements: Table<ElementRow>,
     interference: Table<(LineRow, FrontEnd)>,
     osnma: Table<TagRow>,
-    /// Parameters so far: those of one issue are reported once.
-    parameters: BTreeSet<NavigationRow>,
+    parameters: Parameters,
     /// Summary of the reception, once it has ended.
     pub summary: Option<Value>,
 }
@@ -97,12 +137,7 @@ impl output::Sink for Received {
             output::Record::Event(row) => self.events.push(&row),
             output::Record::Observation(row) => self.observations.push(&row),
             output::Record::Navigation(rows) => {
-                for row in rows {
-                    if !self.parameters.contains(&row) {
-                        self.navigation.push(&row);
-                        self.parameters.insert(row);
-                    }
-                }
+                self.parameters.fresh(rows).iter().for_each(|row| self.navigation.push(row));
             }
             output::Record::Fix(fix) => {
                 let place = Geographic::of(&fix.position_m(), fix.time());
@@ -114,6 +149,10 @@ impl output::Sink for Received {
             output::Record::Tag(row) => self.osnma.push(&row),
             output::Record::Integrity(row) => self.integrity.push(&*row),
             output::Record::Detection(row) => self.detection.push(&row),
+            output::Record::Attitude(row, elements) => {
+                self.attitude.push(&row);
+                elements.iter().for_each(|row| self.elements.push(row));
+            }
             output::Record::Interference { front_end, row } => self.interference.push(&(row, FrontEnd { front_end })),
         }
         Ok(())
@@ -131,7 +170,7 @@ impl Received {
         tables!(
             self, py;
             acquisition, tracking, events, observations, navigation, fixes, clocks, sights, ionosphere, integrity,
-            detection, interference, osnma
+            detection, attitude, elements, interference, osnma
         )
     }
 

@@ -130,18 +130,32 @@ def test_arrays_of_another_type_or_shape_are_refused():
         receiver.push(np.zeros(10, np.int8), front_end=1)
 
 
-def test_a_run_has_the_tables_of_the_files_that_it_writes(tmp_path):
-    made = scene(duration_s=1.0)
+ARMS = [[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]]
+SENSORS = {"duration_s": 1.0, "attitude": {"kind": "fixed"}, "imu": {"rate_hz": 100, "grade": "low"}}
+ARRAY = {
+    "duration_s": 25.0,
+    "attitude": {"kind": "fixed", "yaw_deg": 30},
+    "array": {"element": [{"lever_arm_m": arm} for arm in ARMS]},
+    "receiver": {"array": {"filter": "none", "attitude_ms": 1000, "lever_arms_m": ARMS}},
+}
+
+
+@pytest.mark.parametrize(
+    ("keys", "tables"), [(SENSORS, {"truth/imu", "truth/body"}), (ARRAY, {"rx/attitude", "rx/elements"})]
+)
+def test_a_run_has_the_tables_of_the_files_that_it_writes(tmp_path, keys, tables):
+    made = scene(**keys)
     run = gnss_twin.run(made, out=tmp_path / "run")
     plain = gnss_twin.run(made)
     assert plain.judgement is None
-    for side, tables in [("truth", run.truth), ("rx", run.receiver)]:
+    for side, found in [("truth", run.truth), ("rx", run.receiver)]:
         files = list((tmp_path / "run" / side).glob("*.csv"))
         assert files
+        tables -= {f"{side}/{file.stem}" for file in files}
         for file in files:
             with file.open() as text:
                 header, *body = csv.reader(text)
-            table = tables[file.stem]
+            table = found[file.stem]
             # Files have lines of one front end each, the table those of all.
             assert [name for name in table if name != "front_end"] == header, file
             assert rows(table) == len(body), file
@@ -153,6 +167,7 @@ def test_a_run_has_the_tables_of_the_files_that_it_writes(tmp_path):
                     assert [str(x).lower() for x in table[column]] == written
                 else:
                     assert [str(x) for x in table[column]] == written, (file, column)
+    assert not tables
     for mine, other in [(run.truth, plain.truth), (run.receiver, plain.receiver)]:
         for name, table in mine.items():
             for column, values in table.items():

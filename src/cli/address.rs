@@ -40,6 +40,17 @@ pub fn listen_address(text: &str) -> Result<SocketAddr, String> {
     })
 }
 
+/// Address of a datagram's receiver: `udp:` and PORT on this machine, or IP:PORT.
+///
+/// # Errors
+/// Something else, in words.
+pub fn udp_address(text: &str) -> Result<SocketAddr, String> {
+    let address = text.strip_prefix("udp:").and_then(|address| listen_address(address).ok());
+    address
+        .filter(|address| address.port() > 0)
+        .ok_or_else(|| format!("'{text}': expected udp:PORT for this machine, or udp:IP:PORT"))
+}
+
 /// Begins to listen, says so, and warns where others than this machine can come in.
 ///
 /// # Errors

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::builder::UnknownArgumentValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::cli::address::listen_address;
+use crate::cli::address::{listen_address, udp_address};
 use crate::cli::baseline::args::Baseline;
 use crate::cli::lines;
 use crate::cli::live::intake::Origin;
@@ -359,6 +359,11 @@ pub struct Live {
     /// Origin of the times in motion states
     #[arg(long, value_enum, default_value_t = MotionTime::Scene)]
     pub motion_time: MotionTime,
+    /// Destination of the rows of inertial sensors, a datagram each, with the columns of truth/imu.csv:
+    /// udp:ADDR. ADDR is PORT on this machine, or IP:PORT. A row leaves when the tick is made in which its
+    /// interval ends
+    #[arg(long, value_name = "DEST", value_parser = udp_address)]
+    pub imu: Option<SocketAddr>,
     /// Directory for a record of the run: the received motion and events, the truth, and replay.toml
     #[arg(long, value_name = "DIR")]
     pub record: Option<PathBuf>,

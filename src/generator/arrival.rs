@@ -89,7 +89,8 @@ pub(super) fn seen_near(
         let (time, elapsed_s, motion) = received(scene, from, local);
         let emission = emission_near(scene.catalogue_of(from), sv, time, &motion, guess_s)?;
         let bias_s = from.ahead(local).since(time) - from.clock_s(elapsed_s);
-        Ok(emission.map(|emission| Arriving { emission, bias_s, gain: from.gain(elapsed_s) }))
+        let (path_s, gain) = (from.path_s(&scene.trajectory, elapsed_s), from.gain(elapsed_s));
+        Ok(emission.map(|emission| Arriving { emission, bias_s, path_s, gain }))
     };
     let found = match known {
         Some(known) => known.at(local, guess_s, find)?,
@@ -120,8 +121,8 @@ pub fn seen_on(
     let place = places.map_or_else(find, |places| places.at(local, find));
     let bias_s = from.ahead(local).since(place.time) - from.clock_s(place.elapsed_s);
     let found = arc.emission(&place)?;
-    let gain = from.gain(place.elapsed_s);
-    Ok(found.map(|emission| arriving(scene, from, signal, Arriving { emission, bias_s, gain })))
+    let (path_s, gain) = (from.path_s(&scene.trajectory, place.elapsed_s), from.gain(place.elapsed_s));
+    Ok(found.map(|emission| arriving(scene, from, signal, Arriving { emission, bias_s, path_s, gain })))
 }
 
 /// Computes the rays of a signal from the arrival of its satellite. Cycles of a replay's delay are not
@@ -130,7 +131,7 @@ fn arriving(
     scene: &Scene,
     from: &Constellation,
     signal: &Signal,
-    Arriving { emission, bias_s, gain }: Arriving,
+    Arriving { emission, bias_s, path_s, gain }: Arriving,
 ) -> Seen {
     let mut rays = vec![Ray { code_delay_s: 0.0, carrier_delay_s: 0.0, phase_cycles: 0.0, cn0_hz: 0.0 }];
     let now = from.in_scene(&emission.sight);
@@ -142,7 +143,7 @@ fn arriving(
     let sent = emission.sight.received.plus_s(-emission.travel_s);
     let ahead_s = scene.catalogue_of(from).signal_clock_s(emission.sight.sv, sent, signal);
     let satellite_clock_s = emission.satellite_clock_s + ahead_s;
-    let common_s = bias_s + emission.travel_s - satellite_clock_s;
+    let common_s = bias_s + emission.travel_s - satellite_clock_s + planted!("generator.spoof.path", path_s, 0.0);
     let counted_s = common_s - from.replay_s;
     rays.iter_mut().for_each(|ray| ray.cn0_hz *= gain);
     let arrivals = rays

@@ -25,6 +25,8 @@ pub struct Arriving {
     pub emission: Emission,
     /// Clock offset of the receiver minus that of the sender, in seconds.
     pub bias_s: f64,
+    /// Delay of an emitter's wave beyond that at the antenna for which it is meant, in seconds.
+    pub path_s: f64,
     /// Factor on the power of every ray.
     pub gain: f64,
 }
@@ -123,7 +125,7 @@ mod tests {
             let find = || {
                 computed.set(computed.get() + 1);
                 let emission = emission_near(&catalogue, Sv::gps(13), local, &motion, guess_s)?;
-                Ok(emission.map(|emission| Arriving { emission, bias_s: 0.0, gain: 1.0 }))
+                Ok(emission.map(|emission| Arriving { emission, bias_s: 0.0, path_s: 0.0, gain: 1.0 }))
             };
             geometry.at(local, guess_s, find).unwrap().unwrap().emission.travel_s
         };

@@ -1,9 +1,10 @@
 //! Constellations whose signals reach the antenna: the true one, or that of a spoofer.
 //!
 //! A spoofer sends what would arrive from the true satellites at a claimed position and by a clock of its
-//! own, with the same messages; every signal of it goes through the machinery of the true ones. It may begin
-//! on top of them (claiming the antenna's true motion) and drag the position off smoothly. One that claims
-//! another time, or has ephemerides of its own, sends their satellites, messages and code phases. Limits: its
+//! own, with the same messages; every signal of it goes through the machinery of the true ones. It may
+//! begin on top of them (claiming the antenna's true motion) and drag the position off smoothly. One that
+//! claims another time, or has ephemerides of its own, sends their satellites, messages and code phases.
+//! An [`Emitter`] stands somewhere: its waves reach each element of an array from there. Limits: its
 //! carriers are those of the claimed geometry (no phase of its own), its own path's delay is taken as
 //! compensated, it knows the victim's motion and the orbits without error, atmosphere and surroundings are
 //! those of the scene's time, and it repeats no fault of a satellite's clock or message.
@@ -17,6 +18,7 @@ use crate::catalogue::Catalogue;
 use crate::clock::ReceiverClock;
 use crate::ray::Sight;
 use crate::vehicle::{Motion, Trajectory};
+use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::satellite::Sv;
 use gnss::time::{Epoch, SampleClock};
 
@@ -43,6 +45,15 @@ pub struct Drag {
     pub speed_mps: f64,
     /// Acceleration in m/s² until the final speed is reached.
     pub acceleration_mps2: f64,
+}
+
+/// Antenna of a spoofer, whose signals all come from there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Emitter {
+    /// Position, ECEF.
+    pub position_m: Vector3<f64>,
+    /// Motion of the antenna for which the signals are meant: the first element of an array.
+    pub meant_for: Trajectory,
 }
 
 /// Power over that of the true signals (what the scene's effects give at the claimed position).
@@ -84,6 +95,8 @@ pub struct Constellation {
     pub clock_bias_s: f64,
     /// Rate of the clock offset, in s/s.
     pub clock_drift: f64,
+    /// Antenna that sends it; `None` without a direction of its own.
+    pub emitter: Option<Emitter>,
     /// Seconds by which its time and its messages lie behind the true ones.
     pub replay_s: f64,
     /// Whole seconds by which the time of its satellites and messages is ahead of the true one.
@@ -127,6 +140,7 @@ impl Constellation {
             drag: None,
             clock_bias_s: 0.0,
             clock_drift: 0.0,
+            emitter: None,
             replay_s: 0.0,
             ahead_s: 0,
             sky: None,
@@ -139,7 +153,7 @@ impl Constellation {
     /// Motion for which the signals are made, if the antenna's is `antenna`.
     pub fn motion(&self, antenna: &Trajectory, t_s: f64) -> Motion {
         let mut motion = match &self.place {
-            Place::Antenna => antenna.at(t_s),
+            Place::Antenna => self.meant_for(antenna).at(t_s),
             Place::Claimed(trajectory) => trajectory.at(t_s),
         };
         if let Some(drag) = &self.drag {
@@ -151,11 +165,22 @@ impl Constellation {
         motion
     }
 
+    fn meant_for<'a>(&'a self, antenna: &'a Trajectory) -> &'a Trajectory {
+        self.emitter.as_ref().map_or(antenna, |emitter| &emitter.meant_for)
+    }
+
+    /// Delay in seconds by which its waves reach an antenna after the one for which they are meant.
+    pub fn path_s(&self, antenna: &Trajectory, t_s: f64) -> f64 {
+        let Some(Emitter { position_m, meant_for }) = &self.emitter else { return 0.0 };
+        let [own_m, meant_m] = [antenna, meant_for].map(|one| (one.at(t_s).position_m - position_m).norm());
+        (own_m - meant_m) / SPEED_OF_LIGHT_MPS
+    }
+
     /// Upper bound in m/s of the speed of that motion until `until_s`. `None` if the motion is pushed while
     /// the scene runs.
     pub fn fastest_mps(&self, antenna: &Trajectory, until_s: f64) -> Option<f64> {
         let trajectory = match &self.place {
-            Place::Antenna => antenna,
+            Place::Antenna => self.meant_for(antenna),
             Place::Claimed(trajectory) => trajectory,
         };
         // Between the instants that extremes are sampled at, a quintic is little faster.
@@ -261,6 +286,9 @@ impl Constellation {
         }
         if let Some(drag) = &self.drag {
             text += &format!(", dragged at {} m/s from {} s", drag.speed_mps, drag.start_s);
+        }
+        if self.emitter.is_some() {
+            text += ", from one direction";
         }
         if self.ahead_s != 0 {
             text += &format!(", time {:+} s", self.ahead_s);

@@ -359,6 +359,7 @@ fn take_elements(
     let first = blocks.first().map_or(0, |block| block.first);
     former.form(&blocks, stream)?;
     session.process(&[Stretch::Packed(Packed::new(first, former.metadata().format, stream))], sink)?;
+    session.compare(&blocks, sink)?;
     queues.iter_mut().for_each(|queue| queue.take(end));
     Ok(())
 }

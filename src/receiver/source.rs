@@ -68,6 +68,13 @@ impl<'a> Packed<'a> {
         self.first + self.samples() as u64
     }
 
+    /// Planes of the samples of `range`, counted from the first one.
+    pub fn planes(&self, range: Range<usize>) -> Planes {
+        let mut planes = Planes::default();
+        self.unpack(range, &mut planes);
+        planes
+    }
+
     /// The samples of `range`, counted from the first one and cut to those that are there, unpacked into
     /// `planes`.
     pub fn unpack<'b>(&self, range: Range<usize>, planes: &'b mut Planes) -> Block<'b> {
@@ -123,9 +130,8 @@ impl Stretch<'_> {
         match self {
             Self::Planes(block) => [block.i, block.q].map(|plane| plane.iter().take(samples).copied().collect()),
             Self::Packed(packed) => {
-                let mut planes = Planes::default();
-                packed.unpack(0..samples, &mut planes);
-                [planes.i, planes.q]
+                let Planes { i, q, .. } = packed.planes(0..samples);
+                [i, q]
             }
             Self::Modelled(_) => [Vec::new(), Vec::new()],
         }

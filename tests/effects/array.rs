@@ -1,6 +1,7 @@
-//! Jammers against an array with a spatial filter and against its first element alone, through samples,
-//! receiver and judge.
+//! Jammers against an array with a spatial filter and against its first element alone, attitude and phases of
+//! channels by the elements' carriers, and a spoofer's direction: through samples, receiver and judge.
 
+use std::collections::HashMap;
 use std::path::Path;
 use std::process::Command;
 
@@ -19,7 +20,7 @@ fn run(scenario: &Path, directory: &Path) -> (String, Vec<f64>, Value) {
     let run = directory.join("run");
     let mut fixes = csv::Reader::from_path(run.join("rx/fixes.csv")).unwrap();
     let times_s = fixes.deserialize().map(|row| {
-        let row: std::collections::HashMap<String, String> = row.unwrap();
+        let row: HashMap<String, String> = row.unwrap();
         row["sample"].parse::<f64>().unwrap() / 2.6e6
     });
     let times_s = times_s.collect();
@@ -57,4 +58,84 @@ fn a_spatial_filter_holds_the_fix_under_jammers_that_take_every_satellite_from_o
     let (_, times_s, receiver) = run(&scenario, directory.path());
     assert!(within(&times_s, 25.0, 30.0) >= 49 && within(&times_s, 30.5, 45.0) == 0, "{}", times_s.len());
     assert_eq!(receiver.pointer("/array/filter").and_then(Value::as_str), Some("none"));
+}
+
+/// Rows of a table as numbers by their columns; what is no number is left out.
+fn rows(path: &Path) -> Vec<HashMap<String, f64>> {
+    let mut table = csv::Reader::from_path(path).unwrap();
+    let numbers = |row: HashMap<String, String>| {
+        let number = |(key, value): (String, String)| Some((key, value.parse::<f64>().ok()?));
+        row.into_iter().filter_map(number).collect()
+    };
+    table.deserialize().map(|row| numbers(row.unwrap())).collect()
+}
+
+/// The scene says yaw 137, pitch 4, roll −6 degrees; phases of 70 and −155 degrees; 0.2 ns late; nothing.
+#[test]
+fn carriers_of_the_elements_give_the_attitude_and_the_phases_of_cables() {
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/array_calibration.toml");
+    let directory = tempfile::tempdir().unwrap();
+    let (verdict, times_s, _) = run(&scenario, directory.path());
+    assert!(!verdict.lines().any(|line| line.contains(",fail,")), "{verdict}");
+    for figure in ["attitude error over its deviation", "stated deviation of the attitude over theory"] {
+        assert!(verdict.lines().any(|line| line.contains(figure) && line.contains(",pass,")), "{figure}: {verdict}");
+    }
+    let attitudes = rows(&directory.path().join("run/rx/attitude.csv"));
+    assert!(attitudes.len() as f64 >= (50.0 - times_s[0]).floor(), "{} from {} s on", attitudes.len(), times_s[0]);
+    for row in &attitudes {
+        let off_deg = [row["yaw_deg"] - 137.0, row["pitch_deg"] - 4.0, row["roll_deg"] + 6.0];
+        assert!(off_deg.iter().all(|off| off.abs() < 0.15), "{row:?}");
+    }
+    let late_deg = -360.0 * 0.2e-9 * 1_575.42e6;
+    let channels_deg = [70.0, late_deg, -155.0, 0.0];
+    let elements = rows(&directory.path().join("run/rx/elements.csv"));
+    assert_eq!(elements.len(), 4 * attitudes.len());
+    for row in elements {
+        let off_deg = row["phase_deg"] - channels_deg[row["element"] as usize - 2];
+        assert!(off_deg.abs() < 2.0, "{row:?}");
+    }
+
+    // A receiver that states another attitude does not pass.
+    let path = directory.path().join("run/rx/attitude.csv");
+    let table = std::fs::read_to_string(&path).unwrap();
+    let moved = |line: &str| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if let Ok(yaw_deg) = cells[1].parse::<f64>() {
+            cells[1] = (yaw_deg + 0.2).to_string();
+        }
+        cells.join(",") + "\n"
+    };
+    std::fs::write(&path, table.lines().map(moved).collect::<String>()).unwrap();
+    let judged = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
+        .args(["analyze", "run", "--out", "again"])
+        .current_dir(directory.path())
+        .output()
+        .unwrap();
+    assert!(judged.status.success(), "{}", String::from_utf8_lossy(&judged.stderr));
+    let verdict = std::fs::read_to_string(directory.path().join("again/verdict.csv")).unwrap();
+    let is_refused = |line: &str| line.contains("attitude error over its deviation") && line.contains(",fail,");
+    assert!(verdict.lines().any(is_refused), "{verdict}");
+}
+
+/// The spoofer begins at 55 s, 20 dB below the true signals, and is 6 dB above them 4 s later.
+#[test]
+fn signals_of_one_direction_raise_an_alarm_and_those_of_satellites_do_not() {
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/array_spoofed.toml");
+    let directory = tempfile::tempdir().unwrap();
+    let (verdict, _, _) = run(&scenario, directory.path());
+    assert!(!verdict.lines().any(|line| line.contains(",fail,")), "{verdict}");
+    let text = std::fs::read_to_string(directory.path().join("run/rx/detection.csv")).unwrap();
+    let tests = text.lines().filter(|line| line.contains(",directions,")).map(|line| {
+        let (sample, rest) = line.split_once(',').unwrap();
+        (sample.parse::<f64>().unwrap() / 2.6e6, rest.ends_with(",true"))
+    });
+    let tests: Vec<(f64, bool)> = tests.collect();
+    let count = |from_s: f64, to_s: f64, alarm: bool| {
+        tests.iter().filter(|(time_s, own)| (from_s..to_s).contains(time_s) && *own == alarm).count()
+    };
+    assert!(count(0.0, 56.0, false) >= 30 && count(0.0, 56.0, true) == 0, "{tests:?}");
+    assert!(count(59.0, 76.0, true) >= 16 && count(59.0, 76.0, false) == 0, "{tests:?}");
+    // Nothing is stated of a body that the signals do not show.
+    let attitudes = rows(&directory.path().join("run/rx/attitude.csv"));
+    assert!(attitudes.iter().all(|row| row["sample"] / 2.6e6 < 59.0 && (row["yaw_deg"] - 20.0).abs() < 2.0));
 }

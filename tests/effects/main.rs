@@ -11,6 +11,7 @@ mod array;
 mod detection;
 mod front_end;
 mod interference;
+mod issues;
 mod laws;
 mod link;
 mod multipath;

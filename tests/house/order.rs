@@ -167,7 +167,7 @@ pub const ORDER: Order<'static> = &[
         &[
             &["allan", "errors", "independent", "ionosphere", "lines", "osnma", "peaks", "psd", "spectrum", "spoofing"],
             &["clock", "consistency", "elevation", "inertial", "jitter", "protection"],
-            &["detection", "slips"],
+            &["attitude", "detection", "slips"],
             &["labelled"],
         ],
     ),
@@ -213,6 +213,7 @@ pub const ORDER: Order<'static> = &[
             &["judged"],
             &[
                 "array",
+                "attitude",
                 "clock",
                 "consistency",
                 "delays",

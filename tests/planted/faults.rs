@@ -123,6 +123,8 @@ const RTCM_OBSERVED: &str = "rtcm::real_messages_of_one_epoch_agree_in_time_and_
 const RTCM_LOCK: &str = "rtcm::lock_times_are_those_of_the_printed_table";
 const RTCM_ORBITS: &str = "rtcm::real_ephemerides_are_orbits_of_their_systems";
 pub const LOOP: &str = "loops::a_short_ride_under_an_open_sky_keeps_every_limit";
+const ARRAY_SPOOFED: &str = "arrays::a_spoofer_reaches_the_elements_from_its_own_direction";
+const ARRAY_ATTITUDE: &str = "arrays::an_attitude_is_that_of_the_body_whose_elements_were_turned";
 const ARRAY: &str = "arrays::satellites_reach_the_elements_with_the_phases_by_which_the_receiver_steers";
 const EXACT: &str = "laws::exact_ranges_give_the_exact_position_velocity_and_clock";
 const COV: &str = "laws::the_covariance_is_the_inverse_of_the_weighted_geometry";
@@ -243,6 +245,8 @@ pub const FAULTS: &[Fault] = &[
     fault("generator.sky.clock_sign", "satellite clocks with the wrong sign", LOOP),
     fault("generator.synth.delay", "code delays are 2e-7 of themselves too long", LOOP),
     fault("generator.array.phase", "phases of an array's channels with the wrong sign", ARRAY),
+    fault("generator.spoof.path", "a spoofer reaches all elements at once", ARRAY_SPOOFED),
+    fault("receiver.array.attitude", "elements nearer to a satellite hear it later", ARRAY_ATTITUDE),
     fault("receiver.array.steering", "an array steers to the other side", ARRAY),
     fault("generator.synth.carrier_phase", "the carrier is a tenth of a cycle ahead", LOOP),
     fault("generator.knots.change", "rates within a run are 1 % too high", LOOP),

@@ -59,6 +59,21 @@ fn moved(text: &str, satellite: &str, first: usize, cycles: f64) -> String {
     text.lines().map(change).collect()
 }
 
+/// Observations without any phase: code, phase, Doppler and strength follow one another.
+fn without_phases(text: &str) -> String {
+    let mut header = true;
+    let line = |line: &str| {
+        let is_header = header;
+        header &= !line.contains("END OF HEADER");
+        if is_header || line.starts_with('>') {
+            return format!("{line}\n");
+        }
+        let kept = |(column, byte): (usize, char)| if column >= 3 && (column - 3) / 16 % 4 == 1 { ' ' } else { byte };
+        line.chars().enumerate().map(kept).chain(['\n']).collect()
+    };
+    text.lines().map(line).collect()
+}
+
 #[test]
 fn two_receivers_600_m_apart_are_fixed_at_the_first_epoch_of_two_bands_and_faults_are_named() {
     let here = tempfile::tempdir().unwrap();
@@ -110,6 +125,15 @@ fn two_receivers_600_m_apart_are_fixed_at_the_first_epoch_of_two_bands_and_fault
     fs::write(&path, moved(&sound, "E27", 100, 3.0)).unwrap();
     let slipped = judged(here, &[]);
     assert_eq!((&slipped["figures"]["slips"], &slipped["figures"]["wrong_fixes"]), (&1.into(), &0.into()), "{slipped}");
+
+    // Nothing excuses that no phase was observed: neither at the usual doubt of the ionosphere nor at any
+    // other.
+    fs::write(&path, without_phases(&sound)).unwrap();
+    for more in [[].as_slice(), &["--ionosphere-ppm", "1000"]] {
+        let codes = judged(here, more);
+        assert_eq!((&codes["figures"]["fixed"], &codes["not_judged"]), (&0.into(), &Value::Null), "{codes}");
+        assert_eq!(status(&codes, "time to the first fix"), "fail", "{codes}");
+    }
 
     for (text, arguments, expected) in [
         (

@@ -4,4 +4,5 @@
 mod clients;
 mod program;
 mod replay;
+mod sensors;
 mod web;

@@ -74,6 +74,8 @@ pub enum Group {
     Samples,
     /// Interference and spoofing.
     Interference,
+    /// Attitude by the elements of an array.
+    Attitude,
     /// Inertial measurements.
     Inertial,
     /// Completeness and agreement of the tables.
@@ -94,6 +96,7 @@ impl Group {
             Self::Protection => "protection levels",
             Self::Samples => "samples",
             Self::Interference => "interference and spoofing",
+            Self::Attitude => "attitude",
             Self::Inertial => "inertial measurements",
             Self::Tables => "consistency of the tables",
         }

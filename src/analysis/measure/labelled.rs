@@ -56,6 +56,7 @@ pub struct LabelledSignal {
     raim: Option<f64>,
     position_jump: Option<f64>,
     clock_jump: Option<f64>,
+    directions: Option<f64>,
     label: Label,
     /// Number of the attack, from 1.
     attack: Option<usize>,
@@ -150,6 +151,7 @@ impl Sums {
             raim: ratio(Detector::Raim),
             position_jump: ratio(Detector::PositionJump),
             clock_jump: ratio(Detector::ClockJump),
+            directions: ratio(Detector::Directions),
             label: truth.0,
             attack: truth.1,
         }

@@ -12,6 +12,7 @@
 //! beside the correlations. [`independent`] says how many independent values a correlated series is worth.
 
 pub mod allan;
+pub mod attitude;
 pub mod clock;
 pub mod consistency;
 pub mod detection;

@@ -24,7 +24,7 @@ pub(crate) fn each<T: DeserializeOwned>(
 }
 
 /// Gives every row of a CSV file to `take`, if the run has that file.
-pub(super) fn each_of_any<T: DeserializeOwned>(
+pub(crate) fn each_of_any<T: DeserializeOwned>(
     path: &Path,
     take: impl FnMut(u64, T) -> Result<(), JudgeError>,
 ) -> Result<(), JudgeError> {

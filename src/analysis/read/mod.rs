@@ -31,7 +31,7 @@ pub use common::Common;
 pub(crate) use common::replica_edge;
 pub use emission::{Emission, MeanSignal};
 pub use fault::Fault;
-pub(crate) use files::each;
+pub(crate) use files::{each, each_of_any};
 pub use fixes::Fixes;
 pub use numbers::Numbers;
 pub use protection::Level;

@@ -14,7 +14,8 @@ pub const DETECTION: &str = "sample,time_s,detector,sv,signal,statistic,threshol
 pub const LABELLED: &str = "\
     sample,time_s,sv,signal,updates,cn0_dbhz,phase_lock,prompt,prompt_sigma,prompt_q,early,late,early_q,late_q,\
     early_sigma,late_sigma,tap_spacing_chips,dll_discriminator_chips,dll_sigma_chips,pll_sigma_cycles,level,cn0_fall,\
-    correlation_ratio,correlation_phase,correlation_delta,code_carrier,raim,position_jump,clock_jump,label,attack";
+    correlation_ratio,correlation_phase,correlation_delta,code_carrier,raim,position_jump,clock_jump,directions,\
+    label,attack";
 /// `roc.csv`.
 pub const ROC: &str = "detector,threshold_ratio,false_alarm_share,detection_share";
 /// `position.csv`.

@@ -31,6 +31,8 @@ const LEAST_FIXED: f64 = 0.9;
 const LARGEST_BASE_M: f64 = 0.01;
 /// Largest distance of the base's position from the mean of its own fixes, which the ionosphere moves.
 const LARGEST_FROM_FIXES_M: f64 = 30.0;
+/// Ionosphere between the receivers that leaves integers of L1 open: a quarter of its wavelength.
+const OPEN_IONOSPHERE_M: f64 = 0.05;
 
 /// Finds the baseline, writes its tables if a directory is named, and prints figures and verdict.
 pub fn execute(arguments: &Arguments) -> Result<(), CliError> {
@@ -54,12 +56,13 @@ pub fn execute(arguments: &Arguments) -> Result<(), CliError> {
         ..Settings::default()
     };
     let found = baseline(&inputs, settings).map_err(rtk_error)?;
-    let verdict = judgements(&found, inputs.position);
+    let excuse = excuse(&found.figures, settings.ionosphere);
+    let verdict = judgements(&found, inputs.position, excuse.is_none());
     let mut text = words(&found) + &verdict_lines(&verdict);
-    if let Some(why) = excuse(&found.figures) {
+    if let Some(why) = &excuse {
         let _ = writeln!(text, "not judged    {why}");
     }
-    let mut object = object(&found, &verdict);
+    let mut object = object(&found, &verdict, excuse.as_deref());
     if let (Some(staging), Some(out)) = (staging, &arguments.out) {
         write(staging.path(), &found, &verdict, &object)?;
         staging.commit()?;
@@ -82,15 +85,15 @@ fn rtk_error(error: RtkError) -> CliError {
     }
 }
 
-/// Figures against their limits. Without a truth, what a receiver can know itself is judged alone.
-fn judgements(found: &Baseline, position: BasePosition) -> Vec<Judgement> {
+/// Figures against their limits, those of fixes only where fixes are due. Without a truth, what a receiver
+/// can know itself is judged alone.
+fn judgements(found: &Baseline, position: BasePosition, is_due: bool) -> Vec<Judgement> {
     let figures = &found.figures;
     let mut rows = Vec::new();
     let mut judge = |figure: &str, value: Value, unit: &str, bound: Bound, source: &str| {
         rows.push(Judgement::new(figure, value, unit, bound, MARGINAL_SHARE, source));
     };
     let count = |count: usize| json!(count);
-    let is_due = !is_excused(figures);
     if found.is_judged && is_due {
         let far_m = LARGEST_PER_KM_M * figures.length_m.unwrap_or(0.0) / 1000.0;
         let source = "carriers at short distances: 3 mm and 6 mm, and 1 mm a kilometre";
@@ -141,17 +144,18 @@ fn judgements(found: &Baseline, position: BasePosition) -> Vec<Judgement> {
     rows
 }
 
-/// True if no fix is due: none came, and in no epoch the success rate of all integers was the one asked for.
-/// Then the noise and the ionosphere that the settings expect leave the integers open.
-fn is_excused(figures: &Figures) -> bool {
-    figures.first_fix_s.is_none() && figures.allowed == 0
-}
-
-/// The reason for which figures of fixes are not judged.
-fn excuse(figures: &Figures) -> Option<String> {
-    let most = figures.most_success_rate.map_or_else(|| "none".to_owned(), |most| format!("{most:.4} at most"));
-    let why = || format!("fixes, their error and their time: the success rate of all integers is {most}");
-    is_excused(figures).then(why)
+/// The reason for which no fix is due: none came, the ionosphere that the settings expect is larger than what
+/// integers can do with, and in no epoch did their success rate reach the one asked for.
+fn excuse(figures: &Figures, ionosphere: f64) -> Option<String> {
+    let (most, length_m) = figures.most_success_rate.zip(figures.length_m)?;
+    let expected_m = ionosphere * length_m;
+    let is_open = figures.first_fix_s.is_none() && figures.allowed == 0 && expected_m >= OPEN_IONOSPHERE_M;
+    is_open.then(|| {
+        format!(
+            "fixes, their error and their time: with {expected_m:.2} m of ionosphere expected between the receivers, \
+             the success rate of all integers is {most:.4} at most"
+        )
+    })
 }
 
 /// Wrong fixes that are no surprise: the expected number and three deviations of it, whole.
@@ -215,7 +219,7 @@ fn verdict_lines(verdict: &[Judgement]) -> String {
     verdict.iter().map(|row| line(row).replace(" ,", ",")).collect()
 }
 
-fn object(found: &Baseline, verdict: &[Judgement]) -> Value {
+fn object(found: &Baseline, verdict: &[Judgement], excuse: Option<&str>) -> Value {
     let rows = verdict.iter().map(|row| {
         json!({
             "figure": row.figure,
@@ -229,7 +233,7 @@ fn object(found: &Baseline, verdict: &[Judgement]) -> Value {
         "figures": found.figures,
         "base_from_fixes_m": found.base_from_fixes_m,
         "verdict": rows.collect::<Vec<_>>(),
-        "not_judged": excuse(&found.figures),
+        "not_judged": excuse,
     })
 }
 

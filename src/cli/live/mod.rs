@@ -10,6 +10,7 @@ mod output;
 mod peers;
 mod record;
 mod ring;
+mod sensors;
 mod times;
 mod web;
 
@@ -42,6 +43,7 @@ use live::wire::{Message, Reader};
 use output::{Output, Pace};
 use record::{Recorder, Run};
 use ring::{Block, Put};
+use sensors::Sender;
 use times::{Zero, instant};
 use web::Page;
 
@@ -90,6 +92,7 @@ pub fn execute(arguments: &args::Live) -> Result<(), CliError> {
             intake::begin(origin, Reader::new(scene.clock.start, Geodetic::from_ecef(&first_m).height_m))
         })
         .transpose()?;
+    let imu = arguments.imu.map(|to| Sender::begin(to, scene)).transpose()?;
     let page = Page::begin(arguments, scene)?;
     let mut recorder = arguments.record.as_ref().map(|target| Recorder::create(target, scene)).transpose()?;
     let driver = match &mut recorder {
@@ -110,7 +113,7 @@ pub fn execute(arguments: &args::Live) -> Result<(), CliError> {
         .collect();
     scenario::note(&format!("the first sample is of {0}: gnss-twin receive --start {0}", scene.clock.start));
     let zero = (arguments.motion_time == MotionTime::First).then(Zero::default);
-    let live = Live { driver, recorder, page, inbox, outputs: outputs?, pace, scene, made: Made::default(), zero };
+    let live = Live { driver, recorder, page, imu, inbox, outputs: outputs?, pace, scene, made: Made::default(), zero };
     live.run(arguments, &Run { named: &named, scene, overrides: &overrides, restarted: start.is_some() })
 }
 
@@ -119,6 +122,7 @@ struct Live<'a> {
     driver: Driver<'a>,
     recorder: Option<Recorder>,
     page: Option<Page>,
+    imu: Option<Sender>,
     inbox: Option<Arc<Inbox>>,
     outputs: Vec<Output>,
     pace: Pace,
@@ -162,6 +166,9 @@ impl Live<'_> {
         if let Some(object) = summary.as_object_mut() {
             object.insert("ended_by".to_owned(), word.into());
             object.insert("stated_latency_ms".to_owned(), self.stated(arguments));
+            if let Some(imu) = &self.imu {
+                object.insert("imu".to_owned(), imu.status());
+            }
         }
         print(&json!({ "summary": &summary }));
         if let Some(page) = self.page.take() {
@@ -244,6 +251,9 @@ impl Live<'_> {
             let Some(tick) = self.driver.tick(&mut (truth, seen), &mut bytes).map_err(generator_error)? else { break };
             self.made.slowest_tick = self.made.slowest_tick.max(begun.elapsed());
             self.made.tick(tick.samples.0, tick.samples.1.min(self.scene.samples), tick.tick.as_ref());
+            if let Some(imu) = &mut self.imu {
+                imu.until(self.scene.elapsed_s(tick.samples.1.min(self.scene.samples)))?;
+            }
             if let Some(recorder) = &mut self.recorder {
                 recorder.tick(&tick, &bytes, self.scene.metadata.format.bytes())?;
                 recorder.keep(run)?;

@@ -3,7 +3,7 @@
 //! A scene with an array is one with several front ends that sample alike: the scene's one `[front_end]`
 //! stands for each. The first element is the one whose position and signals the truth states. Limits: sixteen
 //! elements; one antenna pattern for all; nothing whose waves come from more directions than the geometry
-//! has (echoes, spoofers without a position), no pushed motion and no modelled correlations.
+//! has (echoes), no pushed motion and no modelled correlations.
 
 use std::sync::Arc;
 
@@ -22,8 +22,7 @@ use crate::vehicle::attitude::Nose;
 /// Elements of one array at most.
 const MOST: usize = 16;
 /// Tables beside which there is no array, and the reason.
-const BESIDE: [(&str, &str); 4] = [
-    ("spoofer", "it has no position from which elements could hear it"),
+const BESIDE: [(&str, &str); 3] = [
     ("multipath", "echoes have no direction"),
     ("city", "echoes are made for one antenna"),
     ("playback", "the transmitter plays the samples of one receiver"),

@@ -183,6 +183,8 @@ pub struct SpooferSpec {
     pub motion: Option<MotionSpec>,
     /// Drag of the claimed position; absent means that it stays.
     pub drag: Option<DragSpec>,
+    /// Position from which its signals come; absent means that they have no direction.
+    pub transmitter: Option<Geodetic>,
 }
 
 /// The times between which something is on.
@@ -328,6 +330,7 @@ pub(super) fn spoofer(table: &Table<'_>) -> Result<SpooferSpec, ScenarioError> {
         osnma: spoofed(table)?,
         motion: motion.transpose()?,
         drag: table.table("drag")?.map(|drag| read_drag(&drag)).transpose()?,
+        transmitter: table.table("transmitter")?.map(|table| place(&table)).transpose()?,
     })
 }
 

@@ -11,7 +11,7 @@ use super::{MotionSpec, Overrides, Power, Scenario, ScenarioError};
 use crate::effect::link::LinkBudget;
 use crate::levels::strongest;
 use crate::scene::{CodeEdge, Scene};
-use crate::spoof::{Constellation, Drag, Place};
+use crate::spoof::{Constellation, Drag, Emitter, Place};
 use crate::stage::interference::arrival::{Path as Way, Repetition, Tuning};
 use crate::stage::interference::period::Period;
 use crate::stage::interference::{ChipEdge, Interferer, Recorded, Waveform};
@@ -401,6 +401,7 @@ pub(super) fn spoofers(
             drag: None,
             clock_bias_s: spec.clock_bias_s,
             clock_drift: spec.clock_drift,
+            emitter: emitter(scenario, (number, spec), scene)?,
             replay_s: spec.replay_s,
             ahead_s: spec.ahead_s,
             sky: own.iter().find(|own| own.number == number).and_then(|own| own.sky.clone()),
@@ -412,6 +413,32 @@ pub(super) fn spoofers(
         found.push(Arc::new(constellation));
     }
     Ok(found)
+}
+
+/// Antenna of a spoofer beside an array.
+fn emitter(
+    scenario: &Scenario,
+    (number, spec): (usize, &SpooferSpec),
+    scene: &Scene,
+) -> Result<Option<Emitter>, ScenarioError> {
+    let conflict =
+        |reason: &str| Err(scenario.conflict("spoofer.transmitter", format!("of spoofer {number}: {reason}")));
+    match (spec.transmitter, &scenario.array) {
+        (None, None) => Ok(None),
+        (None, Some(_)) => conflict(
+            "elements of an array hear it from where it is: write its position ([spoofer.transmitter], latitude_deg, \
+             longitude_deg and height_m)",
+        ),
+        (Some(_), None) => conflict("nothing without [array]: one antenna does not tell where signals come from"),
+        (Some(_), Some(elements)) if elements.iter().any(|element| !element.coupling.is_empty()) => {
+            conflict("expected elements without coupling_db, which acts on directions of satellites alone")
+        }
+        (Some(place), Some(_)) => {
+            // With one front end alone, the scene may be that of another element than the first.
+            let body = scene.element.as_ref().map_or(&scene.trajectory, |element| &element.body);
+            Ok(Some(Emitter { position_m: place.to_ecef(), meant_for: scenario.element_motion(body, 0) }))
+        }
+    }
 }
 
 /// The drag in ECEF, its direction that at the position where it begins.

@@ -287,6 +287,12 @@ fn what_an_array_cannot_have_is_refused_by_name() {
     let placed =
         format!("latitude_deg = {}\nlongitude_deg = {}\nheight_m = {:?}\n", EMITTER[0], EMITTER[1], EMITTER[2]);
     let placed = placed.replace("180.0", "180");
+    let spoofer = format!("[[spoofer]]\npower_db = 3\n[spoofer.transmitter]\n{placed}");
+    let rows = |own: &str, other: &str| {
+        let entry = |k| if k % 5 == 0 { own } else { other };
+        (0..16).map(entry).collect::<Vec<_>>().join(", ")
+    };
+    let coupling = format!("coupling_db = [{}]\ncoupling_deg = [{}]\n", rows("0", "-20"), rows("0", "0"));
     for (text, expected) in [
         (format!("{whole}{many}"), "1 to 16 elements, not 17"),
         (whole.replacen("[attitude]", "[x]", 1), "unknown key 'x'"),
@@ -302,7 +308,12 @@ fn what_an_array_cannot_have_is_refused_by_name() {
         (whole.replacen("[front_end]\n", "[front_end]\nname = \"x\"\n", 1), "no name beside [array]"),
         (whole.replacen("[[array.element]]\n", "[[array.element]]\nname = \"E2\"\n", 1), "that no other element has"),
         (whole.replacen(&placed, "", 1).replacen("eirp_dbw = -20", "power_dbw = -120", 1), "write its position"),
-        (format!("{whole}[[spoofer]]\npower_db = 3\n"), "spoofer = [[spoofer]]: expected nothing beside [array]"),
+        (format!("{whole}[[spoofer]]\npower_db = 3\n"), "write its position ([spoofer.transmitter]"),
+        (
+            whole.replacen("[array]\n", &format!("[array]\n{coupling}"), 1) + &spoofer,
+            "expected elements without coupling_db",
+        ),
+        (whole.split("[array]").next().unwrap().to_owned() + &spoofer, "nothing without [array]"),
         (format!("{whole}[fidelity]\nlevel = \"correlations\"\n"), "correlations beside [array]"),
     ] {
         let error = refused(&text);

@@ -1,71 +1,83 @@
-//! Files of inertial sensors: `imu.csv`, a row for each interval, and `body.csv`, the true motion and
+//! Rows of inertial sensors in step with the truth: a measurement for each interval, and the true motion and
 //! attitude at the first of them and once in each interval of the truth.
 
 use std::ops::Range;
-use std::path::Path;
 
 use super::record::TruthError;
-use super::writer::Table;
 use crate::inertial::Measurements;
 use crate::scene::Scene;
+use gnss::record::{BodyRow, InertialRow};
 use gnss::time::Epoch;
 
-/// Tables of the sensors, which grow with the scene.
-pub(super) struct Inertial {
+/// Row of inertial sensors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SensorRow {
+    /// Measurement over an interval: `imu.csv`.
+    Measured(InertialRow),
+    /// True motion and attitude at its end: `body.csv`.
+    Body(BodyRow),
+}
+
+/// Receiver of rows.
+pub type Take<'a> = &'a mut dyn FnMut(SensorRow) -> Result<(), TruthError>;
+
+/// Sensors of a scene, or of a part of it.
+pub struct Sensors {
     measurements: Measurements,
-    imu: Table,
-    body: Table,
     /// True time from which the sensors' intervals count, and the end of the scene after it in seconds.
     start: Epoch,
     end_s: f64,
     /// Last true time that was asked for, and the interval between two of them, in seconds.
     asked_s: f64,
     interval_s: f64,
-    /// Intervals between rows of `body.csv`.
+    /// Intervals between rows of the body.
     every: u64,
+    has_begun: bool,
 }
 
-impl Inertial {
-    /// Creates the tables for a part of a scene with sensors, and writes where they begin.
-    pub fn create(directory: &Path, scene: &Scene, part: &Range<u64>) -> Result<Option<Self>, TruthError> {
-        let Some(imu) = &scene.imu else { return Ok(None) };
+impl Sensors {
+    /// Sensors over a part of a scene, in samples; `None` of a scene without them.
+    pub fn of(scene: &Scene, part: &Range<u64>) -> Option<Self> {
+        let imu = scene.imu.as_ref()?;
         let (start, from_s) = (scene.clock.start, scene.elapsed_s(part.start));
-        let Some(measurements) = Measurements::new(imu, &scene.trajectory, start, from_s) else { return Ok(None) };
-        let mut inertial = Self {
-            measurements,
-            imu: Table::create(directory, "imu.csv")?,
-            body: Table::create(directory, "body.csv")?,
+        Some(Self {
+            measurements: Measurements::new(imu, &scene.trajectory, start, from_s)?,
             start,
             end_s: scene.elapsed_s(part.end),
             asked_s: from_s,
             interval_s: scene.truth_interval_s,
             every: (imu.facts.rate_hz * scene.truth_interval_s).round().max(1.0) as u64,
-        };
-        inertial.body.write(inertial.measurements.body())?;
-        Ok(Some(inertial))
+            has_begun: false,
+        })
     }
 
-    /// Writes the rows up to a true time.
-    pub fn until(&mut self, time: Epoch) -> Result<(), TruthError> {
+    /// Gives the rows up to a true time to `take`.
+    ///
+    /// # Errors
+    /// Errors of `take`.
+    pub fn until(&mut self, time: Epoch, take: Take<'_>) -> Result<(), TruthError> {
         self.asked_s = time.since(self.start).min(self.end_s);
-        self.until_s(self.asked_s)
+        self.until_s(self.asked_s, take)
     }
 
-    fn until_s(&mut self, to_s: f64) -> Result<(), TruthError> {
+    /// Gives the rows up to the end of the scene, or of the truth where it ends early.
+    ///
+    /// # Errors
+    /// Errors of `take`.
+    pub fn finish(&mut self, take: Take<'_>) -> Result<(), TruthError> {
+        self.until_s(self.end_s.min(self.asked_s + self.interval_s), take)
+    }
+
+    fn until_s(&mut self, to_s: f64, take: Take<'_>) -> Result<(), TruthError> {
+        if !std::mem::replace(&mut self.has_begun, true) {
+            take(SensorRow::Body(self.measurements.body()))?;
+        }
         while let Some(row) = self.measurements.next(to_s) {
-            self.imu.write(row)?;
+            take(SensorRow::Measured(row))?;
             if self.measurements.count().is_multiple_of(self.every) {
-                self.body.write(self.measurements.body())?;
+                take(SensorRow::Body(self.measurements.body()))?;
             }
         }
         Ok(())
-    }
-
-    /// Writes the rows up to the end of the scene, or of the truth where it ends early, and everything that
-    /// is still buffered.
-    pub fn finish(&mut self) -> Result<(), TruthError> {
-        self.until_s(self.end_s.min(self.asked_s + self.interval_s))?;
-        self.imu.flush()?;
-        self.body.flush()
     }
 }

@@ -24,6 +24,7 @@ use gnss::earth::SPEED_OF_LIGHT_MPS;
 use gnss::record::{Observation, RayRow, SkyRow, TrajectoryRow};
 use gnss::satellite::Sv;
 use gnss::signal::Signal;
+pub use inertial::{SensorRow, Sensors, Take};
 pub use place::{Nmea, Tracks};
 pub use record::{Record, Several, Sink, TruthError};
 pub use rinex::Rinex;

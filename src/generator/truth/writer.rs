@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use super::inertial::Inertial;
+use super::inertial::{SensorRow, Sensors};
 use super::record::{Record, Sink, TruthError};
 use super::skyline::skyline_deg;
 use crate::scene::{CodeEdge, Scene, sources};
@@ -215,7 +215,10 @@ impl Writer {
                 trajectory: Table::of_places(&self.directory, &format!("claimed{suffix}.csv"))?,
             });
         }
-        self.inertial = Inertial::create(&self.directory, scene, part)?;
+        if let Some(sensors) = Sensors::of(scene, part) {
+            let tables = [Table::create(&self.directory, "imu.csv")?, Table::create(&self.directory, "body.csv")?];
+            self.inertial = Some(Inertial { sensors, tables });
+        }
         self.write_keys(scene, part)?;
         let (orbits, departures) = scene.catalogue.describe();
         let file = SceneFacts {
@@ -295,6 +298,19 @@ impl Writer {
     }
 }
 
+/// Sensors and their tables, `imu.csv` and `body.csv`.
+struct Inertial {
+    sensors: Sensors,
+    tables: [Table; 2],
+}
+
+fn written([imu, body]: &mut [Table; 2], row: SensorRow) -> Result<(), TruthError> {
+    match row {
+        SensorRow::Measured(row) => imu.write(row),
+        SensorRow::Body(row) => body.write(row),
+    }
+}
+
 impl Sink for Writer {
     fn begin(&mut self, scenes: &[Scene], part: &Range<u64>) -> Result<(), TruthError> {
         scenes.first().map_or(Ok(()), |first| self.facts(first, scenes, part))
@@ -303,7 +319,9 @@ impl Sink for Writer {
     fn take(&mut self, record: Record) -> Result<(), TruthError> {
         match record {
             Record::Trajectory(row) => {
-                self.inertial.as_mut().map_or(Ok(()), |inertial| inertial.until(row.time()))?;
+                if let Some(Inertial { sensors, tables }) = &mut self.inertial {
+                    sensors.until(row.time(), &mut |row| written(tables, row))?;
+                }
                 self.trajectory.write_place(row)
             }
             Record::Observation(row) => self.observations.write(row),
@@ -332,7 +350,10 @@ impl Sink for Writer {
         }
         opened(&mut self.navigation, &self.directory, "navigation.csv")?.flush()?;
         opened(&mut self.passes, &self.directory, "passes.csv")?.flush()?;
-        self.inertial.as_mut().map_or(Ok(()), Inertial::finish)?;
+        if let Some(Inertial { sensors, tables }) = &mut self.inertial {
+            sensors.finish(&mut |row| written(tables, row))?;
+            tables.iter_mut().try_for_each(Table::flush)?;
+        }
         self.observations.flush()?;
         self.sky.flush()?;
         self.rays.iter_mut().chain(&mut self.interference).try_for_each(Table::flush)?;

@@ -6,7 +6,11 @@
 //! time, so waves must be narrow against the array (bandwidth times delay across it); the phase of the beam
 //! may change from block to block by what the estimate of the weights scatters.
 
-mod sums;
+pub mod attitude;
+pub mod compass;
+#[cfg(test)]
+mod compass_tests;
+pub(crate) mod sums;
 #[cfg(test)]
 mod tests;
 pub mod weights;
@@ -248,10 +252,5 @@ impl Former {
 
 /// Planes of samples `from` to `from + samples` of each input.
 fn planes(inputs: &[Packed<'_>], from: usize, samples: usize) -> Vec<Planes> {
-    let of = |input: &Packed<'_>| {
-        let mut planes = Planes::default();
-        input.unpack(from..from + samples, &mut planes);
-        planes
-    };
-    inputs.iter().map(of).collect()
+    inputs.iter().map(|input| input.planes(from..from + samples)).collect()
 }

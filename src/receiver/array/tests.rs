@@ -29,10 +29,10 @@ fn towards(azimuth_deg: f64, elevation_deg: f64) -> Vector3<f64> {
 }
 
 /// Numbers of a normal distribution by splitmix64 and Box and Muller: no generator of the project.
-struct Random(u64);
+pub(super) struct Random(pub u64);
 
 impl Random {
-    fn uniform(&mut self) -> f64 {
+    pub fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -40,7 +40,7 @@ impl Random {
     }
 
     /// Complex number of unit power.
-    fn complex(&mut self) -> Complex64 {
+    pub fn complex(&mut self) -> Complex64 {
         let size = (-libm::log(1.0 - self.uniform())).sqrt();
         Complex64::from_polar(size, std::f64::consts::TAU * self.uniform())
     }
@@ -109,6 +109,7 @@ fn beam(places: &[[f64; 3]], block_ms: f64, loading_db: f64) -> ArraySettings {
         lever_arms_m: places.to_vec(),
         azimuth_deg: SATELLITE.0,
         elevation_deg: SATELLITE.1,
+        ..ArraySettings::default()
     }
 }
 

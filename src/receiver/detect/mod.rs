@@ -2,13 +2,14 @@
 //!
 //! [`level`] watches the power of the samples, [`shapes`] the correlation and the C/N0 of every signal,
 //! [`divergence`] code against carrier, [`jumps`] positions and clock against velocity and drift; the
-//! residual test of a fix ([`crate::position::exclusion`]) is the detector `raim`. The sums that they need
-//! are gathered as the receiver works, and an interval is tested as a whole at its end. Each module derives
-//! the law of its statistic under a clean sky, and [`law`] has the thresholds. Levels, C/N0 and shapes are
-//! compared with the intervals before, without those that raised an alarm. A signal is not tested in an
-//! interval in which its code meets another one ([`meeting`]). Without `[detection]` in the settings nothing
-//! is gathered. Limits: what is stated holds for one test. A sky of the first intervals that
-//! is spoofed already is taken for clean by the detectors that compare.
+//! residual test of a fix ([`crate::position::exclusion`]) is the detector `raim`, that of an array's
+//! carriers ([`crate::array::compass`]) the detector `directions`. The sums that they need are gathered as
+//! the receiver works, and an interval is tested as a whole at its end. Each module derives the law of its
+//! statistic under a clean sky, and [`law`] has the thresholds. Levels, C/N0 and shapes are compared with
+//! the intervals before, without those that raised an alarm. A signal is not tested in an interval in
+//! which its code meets another one ([`meeting`]). Without `[detection]` in the settings nothing is
+//! gathered. Limits: what is stated holds for one test. A sky of the first intervals that is spoofed
+//! already is taken for clean by the detectors that compare.
 
 pub mod divergence;
 pub mod jumps;
@@ -62,6 +63,8 @@ pub struct Detection {
     jumps: Jumps,
     /// Latest residual test: its sum of squares and their degrees of freedom.
     residuals: Option<(f64, usize)>,
+    /// Latest comparison of an array's elements: its sum of squares and their degrees of freedom.
+    directions: Option<(f64, usize)>,
     counts: BTreeMap<Detector, Counted>,
 }
 
@@ -82,6 +85,7 @@ impl Detection {
             codes: BTreeMap::new(),
             jumps: Jumps::default(),
             residuals: None,
+            directions: None,
             counts: BTreeMap::new(),
         })
     }
@@ -118,6 +122,12 @@ impl Detection {
         self.residuals = residuals.or(self.residuals);
     }
 
+    /// Takes the sum of squares of the phases' residuals in an array's elements, and their degrees of
+    /// freedom.
+    pub fn take_directions(&mut self, tested: (f64, usize)) {
+        self.directions = Some(tested);
+    }
+
     /// Takes a fix.
     pub fn take_fix(&mut self, fix: &Fix) {
         let rate = self.rate;
@@ -132,6 +142,7 @@ impl Detection {
         self.codes.clear();
         self.jumps.interrupt();
         self.residuals = None;
+        self.directions = None;
     }
 
     /// True if the running interval ends before a sample.
@@ -253,8 +264,10 @@ impl Detection {
     fn test_fixes(&mut self, rows: &mut Vec<Test>) {
         let none = || (String::new(), String::new());
         let probability = self.settings.false_alarm;
-        if let Some((statistic, freedom)) = self.residuals.take() {
-            rows.push((Detector::Raim, none(), statistic, threshold(probability, freedom as u32)));
+        let residuals = [(Detector::Raim, self.residuals.take()), (Detector::Directions, self.directions.take())];
+        for (detector, tested) in residuals {
+            let of = |(statistic, freedom)| (detector, none(), statistic, threshold(probability, freedom as u32));
+            rows.extend(tested.map(of));
         }
         if let Some(jump) = self.jumps.close() {
             rows.push((Detector::PositionJump, none(), jump.position, threshold(probability, COORDINATES)));

@@ -61,6 +61,7 @@ impl<W: Write> Sink for JsonLines<W> {
             Record::Ionosphere(rows) => self.row("ionosphere", &rows),
             Record::Integrity(row) => self.row("integrity", &row),
             Record::Detection(row) => self.row("detection", &row),
+            Record::Attitude(row, _) => self.row("attitude", &row),
             Record::Tracking(row) => self.row("channel", &row),
             Record::Event(row) => self.row("event", &row),
             Record::Acquisition(row) => self.row("search", &row),

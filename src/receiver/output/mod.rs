@@ -20,8 +20,8 @@ use thiserror::Error;
 
 use gnss::exchange::{NavigationSets, bears_issue};
 use gnss::record::{
-    AcquisitionRow, ClockRow, DetectionRow, EventRow, Fix, Geographic, IntegrityRow, IonosphereRow, LineRow,
-    NavigationRow, Observation, SightRow, TagRow, TrackingRow,
+    AcquisitionRow, AttitudeRow, ClockRow, DetectionRow, ElementRow, EventRow, Fix, Geographic, IntegrityRow,
+    IonosphereRow, LineRow, NavigationRow, Observation, SightRow, TagRow, TrackingRow,
 };
 use gnss::time::GPST;
 pub use json::JsonLines;
@@ -80,6 +80,8 @@ pub enum Record {
     Integrity(Box<IntegrityRow>),
     /// Test of a detector of jamming or spoofing, where detection is asked for.
     Detection(DetectionRow),
+    /// Attitude of an array's body and the phases of its channels, where they are asked for.
+    Attitude(AttitudeRow, Vec<ElementRow>),
     /// A line in the spectrum of a front end's samples; front ends count from 0.
     Interference {
         /// The front end's index, from 0 on.
@@ -168,6 +170,32 @@ impl Sheet {
     }
 }
 
+/// A CSV file that exists once it has a row.
+struct Later {
+    name: &'static str,
+    header: &'static [&'static str],
+    sheet: Option<Sheet>,
+}
+
+impl Later {
+    /// Removes the file of another run.
+    fn new(directory: &Path, name: &'static str, header: &'static [&'static str]) -> Result<Self, OutputError> {
+        let path = directory.join(name);
+        if path.exists() {
+            fs::remove_file(&path).map_err(|error| write_error(&path, error))?;
+        }
+        Ok(Self { name, header, sheet: None })
+    }
+
+    fn write<T: Serialize>(&mut self, directory: &Path, rows: &[T]) -> Result<(), OutputError> {
+        if self.sheet.is_none() && !rows.is_empty() {
+            self.sheet = Some(Sheet::create(directory, self.name, self.header)?);
+        }
+        let Some(sheet) = &mut self.sheet else { return Ok(()) };
+        rows.iter().try_for_each(|row| sheet.write(row))
+    }
+}
+
 /// Root key of a hot start, as hexadecimal digits.
 pub const STORED_ROOT: &str = "kroot.hex";
 
@@ -200,6 +228,28 @@ impl TagTable {
     }
 }
 
+/// Parameters of messages that were reported so far.
+#[derive(Debug, Default)]
+pub struct Parameters {
+    /// Parameters beside ephemerides, at sample 0.
+    common: BTreeSet<NavigationRow>,
+    /// Parameters of ephemerides.
+    sets: NavigationSets,
+}
+
+impl Parameters {
+    /// Parameters of a message that are new: of an ephemeris once for each set, others once.
+    pub fn fresh(&mut self, mut rows: Vec<NavigationRow>) -> Vec<NavigationRow> {
+        // What came with the first parameter of a new set is of that set.
+        let begins = rows.iter().any(|row| self.sets.is_issued_again(row));
+        rows.retain(|row| match bears_issue(row) {
+            true => self.sets.insert(row) || begins,
+            false => self.common.insert(NavigationRow { sample: 0, ..row.clone() }),
+        });
+        rows
+    }
+}
+
 /// All files of one reception.
 pub struct Output {
     directory: PathBuf,
@@ -212,20 +262,16 @@ pub struct Output {
     interference: Sheet,
     /// Files of the second and later front ends; each exists once it has a line.
     interference_of: BTreeMap<usize, Sheet>,
-    /// File of the clocks, which exists once a fix has another time scale than GPS time.
-    clocks: Option<Sheet>,
-    /// File of the ionosphere, which exists once a satellite has two bands.
-    ionosphere: Option<Sheet>,
     /// File of the results of tags, which exists where authentication is verified.
     tags: Option<TagTable>,
-    /// File of the protection levels, which exists once a fix has a row of them.
-    integrity: Option<Sheet>,
-    /// File of the detectors' tests, which exists once there is one.
-    detection: Option<Sheet>,
-    /// Parameters beside those of ephemerides that were written so far, at sample 0: each is written once.
-    common: BTreeSet<NavigationRow>,
-    /// Parameters of ephemerides, each written once for each set.
-    sets: NavigationSets,
+    /// Clocks of fixes that have another time scale than GPS time.
+    clocks: Later,
+    ionosphere: Later,
+    integrity: Later,
+    detection: Later,
+    attitude: Later,
+    elements: Later,
+    parameters: Parameters,
 }
 
 const OBSERVATIONS: [&str; 10] = [
@@ -323,13 +369,7 @@ impl Output {
     /// # Errors
     /// [`OutputError::Create`] with the path that cannot be made.
     pub fn create(directory: &Path) -> Result<Self, OutputError> {
-        // Of another run, where this one may have none.
-        for name in ["clocks.csv", "ionosphere.csv", "integrity.csv", "detection.csv"] {
-            let path = directory.join(name);
-            if path.exists() {
-                fs::remove_file(&path).map_err(|error| write_error(&path, error))?;
-            }
-        }
+        let later = |name, header| Later::new(directory, name, header);
         Ok(Self {
             directory: directory.to_owned(),
             observations: Sheet::create(directory, "observations.csv", &OBSERVATIONS)?,
@@ -340,13 +380,14 @@ impl Output {
             events: Sheet::create(directory, "events.csv", &EVENTS)?,
             interference: Sheet::create(directory, "interference.csv", &INTERFERENCE)?,
             interference_of: BTreeMap::new(),
-            clocks: None,
-            ionosphere: None,
             tags: None,
-            integrity: None,
-            detection: None,
-            common: BTreeSet::new(),
-            sets: NavigationSets::default(),
+            clocks: later("clocks.csv", &CLOCKS)?,
+            ionosphere: later("ionosphere.csv", &IONOSPHERE)?,
+            integrity: later("integrity.csv", &INTEGRITY)?,
+            detection: later("detection.csv", &DETECTION)?,
+            attitude: later("attitude.csv", &AttitudeRow::COLUMNS)?,
+            elements: later("elements.csv", &ElementRow::COLUMNS)?,
+            parameters: Parameters::default(),
         })
     }
 
@@ -366,33 +407,11 @@ impl Output {
         ] {
             sheet.flush()?;
         }
-        self.clocks.as_mut().map_or(Ok(()), Sheet::flush)?;
-        self.ionosphere.as_mut().map_or(Ok(()), Sheet::flush)?;
+        let Self { clocks, ionosphere, integrity, detection, attitude, elements, .. } = self;
+        let later = [clocks, ionosphere, integrity, detection, attitude, elements];
+        later.into_iter().filter_map(|later| later.sheet.as_mut()).try_for_each(Sheet::flush)?;
         self.tags.as_mut().map_or(Ok(()), |tags| tags.0.flush())?;
-        self.integrity.as_mut().map_or(Ok(()), Sheet::flush)?;
-        self.detection.as_mut().map_or(Ok(()), Sheet::flush)?;
         self.interference_of.values_mut().try_for_each(Sheet::flush)
-    }
-
-    /// Writes a fix's clocks, if they are more than that of GPS time.
-    fn clocks(&mut self, rows: &[ClockRow]) -> Result<(), OutputError> {
-        if rows.iter().all(|row| row.time_scale == GPST.name) {
-            return Ok(());
-        }
-        if self.clocks.is_none() {
-            self.clocks = Some(Sheet::create(&self.directory, "clocks.csv", &CLOCKS)?);
-        }
-        let Some(sheet) = &mut self.clocks else { return Ok(()) };
-        rows.iter().try_for_each(|row| sheet.write(row))
-    }
-
-    /// Writes what two bands show of the ionosphere.
-    fn ionosphere(&mut self, rows: &[IonosphereRow]) -> Result<(), OutputError> {
-        if self.ionosphere.is_none() && !rows.is_empty() {
-            self.ionosphere = Some(Sheet::create(&self.directory, "ionosphere.csv", &IONOSPHERE)?);
-        }
-        let Some(sheet) = &mut self.ionosphere else { return Ok(()) };
-        rows.iter().try_for_each(|row| sheet.write(row))
     }
 
     fn tags(&mut self) -> Result<&mut TagTable, OutputError> {
@@ -401,22 +420,6 @@ impl Output {
             None => TagTable::create(&self.directory)?,
         };
         Ok(self.tags.insert(tags))
-    }
-
-    /// Writes the protection levels of a fix.
-    fn integrity(&mut self, row: &IntegrityRow) -> Result<(), OutputError> {
-        if self.integrity.is_none() {
-            self.integrity = Some(Sheet::create(&self.directory, "integrity.csv", &INTEGRITY)?);
-        }
-        self.integrity.as_mut().map_or(Ok(()), |sheet| sheet.write(row))
-    }
-
-    /// Writes a test of a detector.
-    fn detection(&mut self, row: &DetectionRow) -> Result<(), OutputError> {
-        if self.detection.is_none() {
-            self.detection = Some(Sheet::create(&self.directory, "detection.csv", &DETECTION)?);
-        }
-        self.detection.as_mut().map_or(Ok(()), |sheet| sheet.write(row))
     }
 
     /// Writes a line of a front end's spectrum.
@@ -433,41 +436,32 @@ impl Output {
         };
         sheet.write(row)
     }
-
-    /// Writes decoded parameters, each but once for each set.
-    fn navigation(&mut self, rows: Vec<NavigationRow>) -> Result<(), OutputError> {
-        // What came with the first parameter of a new set is of that set.
-        let begins = rows.iter().any(|row| self.sets.is_issued_again(row));
-        for row in rows {
-            let is_new = if bears_issue(&row) {
-                self.sets.insert(&row) || begins
-            } else {
-                self.common.insert(NavigationRow { sample: 0, ..row.clone() })
-            };
-            if is_new {
-                self.navigation.write(&row)?;
-            }
-        }
-        Ok(())
-    }
 }
 
 impl Sink for Output {
     fn take(&mut self, record: Record) -> Result<(), OutputError> {
+        let directory = &self.directory;
         match record {
             Record::Acquisition(row) => self.acquisition.write(&row),
             Record::Tracking(row) => self.tracking.write(&row),
             Record::Event(row) => self.events.write(&row),
             Record::Observation(row) => self.observations.write(&row),
-            Record::Navigation(rows) => self.navigation(rows),
+            Record::Navigation(rows) => {
+                self.parameters.fresh(rows).iter().try_for_each(|row| self.navigation.write(row))
+            }
             Record::Fix(row) => {
                 let place = Geographic::of(&row.position_m(), row.time());
                 self.fixes.write(&(row, place))
             }
-            Record::Clocks(rows) => self.clocks(&rows),
-            Record::Ionosphere(rows) => self.ionosphere(&rows),
-            Record::Integrity(row) => self.integrity(&row),
-            Record::Detection(row) => self.detection(&row),
+            Record::Clocks(rows) if rows.iter().all(|row| row.time_scale == GPST.name) => Ok(()),
+            Record::Clocks(rows) => self.clocks.write(directory, &rows),
+            Record::Ionosphere(rows) => self.ionosphere.write(directory, &rows),
+            Record::Integrity(row) => self.integrity.write(directory, &[row]),
+            Record::Detection(row) => self.detection.write(directory, &[row]),
+            Record::Attitude(row, elements) => {
+                self.attitude.write(directory, &[row])?;
+                self.elements.write(directory, &elements)
+            }
             // It follows from the fix and the ephemerides.
             Record::Sights(_) => Ok(()),
             Record::Tag(row) => self.tags()?.write(&row),

@@ -212,6 +212,7 @@ impl Shared {
         }
         sink.take(Record::Fix(solved.fix.clone()))?;
         sink.take(Record::Clocks(solved.clocks))?;
+        self.sights.clone_from(&solved.sights);
         sink.take(Record::Sights(solved.sights))?;
         sink.take(Record::Ionosphere(solved.ionosphere))?;
         if let Some(row) = solved.integrity {

@@ -1,11 +1,13 @@
 //! The state of a reception between blocks: front ends at work, what their channels decoded, clock and
 //! solver.
 //!
-//! Every [`FrontEnd`] searches and follows in its own samples: [`search`] starts and ends channels, [`plan`]
-//! aims, [`part`] measures how code and carrier part, [`gap`] watches for lost samples, [`detect`] tests for
-//! jamming and spoofing. What they find is [`Shared`]: [`decode`] takes in messages, [`measure`] observes and
-//! solves with the signals of all. Records count samples of the first front end ([`step`]).
+//! Every [`FrontEnd`] searches and follows in its own samples: [`search`] starts and ends channels,
+//! [`plan`] aims, [`part`] measures how code and carrier part, [`gap`] watches for lost samples,
+//! [`detect`] tests for jamming and spoofing, [`compare`] looks at an array's elements. What they find is
+//! [`Shared`]: [`decode`] takes in messages, [`measure`] observes and solves with the signals of all.
+//! Records count samples of the first front end ([`step`]).
 
+use crate::array::compass::Compass;
 use crate::authentic::Authentic;
 use crate::correlate::layers_refusal;
 use crate::detect::Detection;
@@ -27,6 +29,7 @@ use shared::Shared;
 use step::{Step, Tick};
 pub(super) use suited::held;
 
+mod compare;
 mod decode;
 mod detect;
 mod front_end;
@@ -97,6 +100,8 @@ fn share(
 pub(super) struct Session {
     front_ends: Vec<FrontEnd>,
     shared: Shared,
+    /// Comparison of an array's elements.
+    compass: Option<Compass>,
     next_tick: u64,
     loops: [LoopMargin; 5],
 }
@@ -117,7 +122,9 @@ impl Session {
             front_ends.push(FrontEnd::new(step, metadata, own, signals.clone())?);
         }
         let (shared, loops) = share(metadata, settings, noises)?;
-        Ok(Self { front_ends, shared, next_tick: 0, loops })
+        let array = settings.array.as_ref();
+        let compass = array.and_then(|array| Compass::new(array, first.rate, first.inverted));
+        Ok(Self { front_ends, shared, compass, next_tick: 0, loops })
     }
 
     /// Ends of a block in the samples of every front end, for a block that ends at `main` in those of the

@@ -14,7 +14,7 @@ use crate::position::{CodeNoise, NoFix, Noises, Sets, Solver};
 use crate::settings::Settings;
 use crate::track::LoopMargin;
 use gnss::ionosphere::{Coefficients, Model};
-use gnss::record::Fix;
+use gnss::record::{Fix, SightRow};
 use gnss::satellite::Sv;
 use gnss::signal::{Link, Signal};
 use gnss::time::{Epoch, Rate};
@@ -60,6 +60,8 @@ pub(super) struct Shared {
     pub last_fix: Option<LastFix>,
     /// Fix that predicts the satellites.
     pub latest: Option<Fix>,
+    /// Directions of the satellites at that fix.
+    pub sights: Vec<SightRow>,
     /// Dopplers that are followed, in parts of the carrier.
     pub dopplers: BTreeMap<Link, f64>,
     pub clock_drift: Option<f64>,
@@ -104,6 +106,7 @@ impl Shared {
             detection,
             last_fix: None,
             latest: None,
+            sights: Vec::new(),
             dopplers: BTreeMap::new(),
             clock_drift: None,
             fixes: 0,

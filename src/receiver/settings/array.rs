@@ -3,6 +3,7 @@
 //! The table `[array]` turns it on: the front ends are then elements of an array. Without it several front
 //! ends are several bands.
 
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::described::described;
@@ -41,7 +42,25 @@ pub struct ArraySettings {
     pub azimuth_deg: f64,
     /// Elevation of the beam of mvdr over the plane of nose and right side.
     pub elevation_deg: f64,
+    /// Time over which the carriers of the elements are compared, satellite by satellite; 0: not at all. They
+    /// give the attitude, the phases of the elements' channels and a test of directions, and need the lever
+    /// arms of three elements that are not in a line.
+    pub attitude_ms: u32,
+    /// Deviation of the elements' phases by what depends on the direction, as their patterns do, beside
+    /// noise.
+    pub phase_sigma_deg: f64,
 }
+}
+
+/// Distance in metres of an element from the line through two others that makes a plane.
+const OFF_LINE_M: f64 = 1e-3;
+
+/// True if elements at these lever arms are not in a line.
+pub fn span_a_plane(lever_arms_m: &[[f64; 3]]) -> bool {
+    let Some(first) = lever_arms_m.first().copied().map(Vector3::from) else { return false };
+    let arms_m: Vec<Vector3<f64>> = lever_arms_m.iter().map(|arm| Vector3::from(*arm) - first).collect();
+    let Some(longest) = arms_m.iter().max_by(|a, b| a.norm().total_cmp(&b.norm())) else { return false };
+    arms_m.iter().any(|arm| longest.cross(arm).norm() > OFF_LINE_M * longest.norm())
 }
 
 impl Default for ArraySettings {
@@ -53,30 +72,38 @@ impl Default for ArraySettings {
             lever_arms_m: Vec::new(),
             azimuth_deg: 0.0,
             elevation_deg: 90.0,
+            attitude_ms: 0,
+            phase_sigma_deg: 2.0,
         }
     }
 }
 
 impl ArraySettings {
     /// Each number with the smallest and the largest value that it may have.
-    pub fn ranges(&self) -> [(&'static str, f64, f64, f64); 4] {
+    pub fn ranges(&self) -> [(&'static str, f64, f64, f64); 6] {
         [
             ("array.block_ms", self.block_ms, 0.05, 50.0),
             ("array.loading_db", self.loading_db, -100.0, 60.0),
             ("array.azimuth_deg", self.azimuth_deg, -360.0, 360.0),
             ("array.elevation_deg", self.elevation_deg, -90.0, 90.0),
+            ("array.attitude_ms", f64::from(self.attitude_ms), 0.0, 60_000.0),
+            ("array.phase_sigma_deg", self.phase_sigma_deg, 0.0, 30.0),
         ]
     }
 
     /// Key, value and expectation of lever arms that are refused.
     ///
     /// # Errors
-    /// A lever arm that is not finite or longer than a kilometre, or none where the filter needs them.
+    /// A lever arm that is not finite or longer than a kilometre, or none where filter or attitude need them.
     pub fn validate(&self) -> Result<(), (&'static str, String, String)> {
         let key = "array.lever_arms_m";
         if self.filter == SpatialFilter::Mvdr && self.lever_arms_m.is_empty() {
             let expected = "the lever arm of each element, because filter = \"mvdr\" has a direction";
             return Err((key, "[]".to_owned(), expected.to_owned()));
+        }
+        if self.attitude_ms > 0 && !span_a_plane(&self.lever_arms_m) {
+            let expected = "lever arms of three elements that are not in a line, because attitude_ms is given";
+            return Err((key, format!("{:?}", self.lever_arms_m), expected.to_owned()));
         }
         match self.lever_arms_m.iter().flatten().find(|x| !(-1e3..=1e3).contains(*x)) {
             Some(value) => Err((key, value.to_string(), "-1000 to 1000".to_owned())),

@@ -32,6 +32,7 @@ mod detectors;
 mod integrate;
 mod measure;
 mod oscillators;
+mod past;
 mod reseat;
 mod signs;
 mod stage;
@@ -45,6 +46,7 @@ use reseat::Glances;
 use signs::Signs;
 use stage::Stage;
 
+pub use past::Past;
 pub use reseat::Glance;
 pub use supervise::pilot_group;
 

@@ -39,7 +39,7 @@ mod tests;
 #[cfg(test)]
 mod weak_tests;
 
-pub use channel::{Channel, Glance, pilot_group};
+pub use channel::{Channel, Glance, Past, pilot_group};
 pub use model::ReplicaModel;
 pub use settings::{CodeDiscriminator, LoopMargin, TrackingSettings, TrackingSettingsError};
 

@@ -22,6 +22,7 @@ use receiver::track::{Measurement, Report, Symbol};
 use super::clock::Instant;
 use super::law::Law;
 use super::listening::Listening;
+use super::oscillator::OscillatorLoop;
 use super::rays::Sight;
 
 /// Longest step in which rays, lock and strength are followed where they change.
@@ -108,6 +109,7 @@ pub(super) struct World<'a> {
     pub settings: &'a Settings,
     pub law: &'a Law,
     pub transmitter: &'a Transmitter,
+    pub oscillator: Option<&'a OscillatorLoop>,
     /// Time of the first search, and samples of the first front end a second.
     pub first_search_s: f64,
     pub rate_hz: f64,
@@ -188,7 +190,7 @@ impl Channel {
 
     fn see(&self, world: &World<'_>, instant: &Instant) -> Option<Sight> {
         let (own, later_s) = instant.own(world.law.front)?;
-        Sight::new(world.scene, world.transmitter, world.law, (own, later_s))
+        Sight::new((world.scene, world.transmitter, world.law), world.oscillator, (own, later_s))
     }
 
     /// C/N0 of the whole signal in the noise that the replica meets, where the code loop is.
@@ -349,7 +351,8 @@ impl Channel {
         let is_noisy = self.density.is_some();
         let State::Followed(followed) = &mut self.state else { return };
         let code_m = if is_noisy { law.code.sigma_m(cn0_hz) * self.code } else { 0.0 };
-        let delay_s = sight.delay_s + (self.rest_chips + code_m / law.code.chip_m) / chip_rate_hz;
+        let delay_s =
+            sight.delay_s - sight.oscillator_lag_s + (self.rest_chips + code_m / law.code.chip_m) / chip_rate_hz;
         let Some((own, later_s)) = tick.own(law.front) else { return };
         let Some(code) = world.transmitter.code_at(world.scene, law.lead, own, delay_s + later_s) else { return };
         if followed.base == 0 {

@@ -99,6 +99,7 @@ pub(super) struct Law {
     /// Energy of a symbol over the noise density, at a C/N0 of the whole signal of one hertz.
     pub symbol_s: f64,
     pub tracking: TrackingSettings,
+    pub gains: Gains,
     pub pll: Answer,
     /// Lag of the phase loop over the jerk of the carrier, or over its acceleration for a loop of order two.
     lag: (f64, u32),
@@ -172,6 +173,7 @@ impl Law {
             spacing_chips: tracking.spacing_chips,
             symbol_s: of_message * f64::from(pps) * message.period_s(),
             carrier_memory: pll.correlation(tick_s),
+            gains,
             pll,
             lag: (lag, tracking.pll_order),
             code_root: ((1.0 - gain * of_code.phase).max(0.0), update_s),

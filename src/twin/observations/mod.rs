@@ -1,16 +1,17 @@
 //! Observations in place of samples and loops: the receiver's navigation part on measurements by theory.
 //!
-//! A channel's code and carrier are those of the satellite's rays at a tick, with errors of the loops' noise
-//! in the noise density that the replica meets (`law`), and rest where reflections put them (`rays`).
-//! Searches (`search`), lock, slips and losses (`channel`) are drawn from C/N0. Symbols are those that
-//! satellites send, in noise, and the receiver's own decoders read them (`listening` says when). Limits:
-//! front ends without stages ([`refuse`]); loops are linear and in step with the motion; short codes of other
-//! satellites are noise.
+//! A channel's code and carrier are those of the satellite's rays at a tick, with errors of the loops'
+//! noise in the noise density that the replica meets (`law`), lag behind the oscillator (`oscillator`) and
+//! rest where reflections put them (`rays`). Searches (`search`), lock, slips and losses (`channel`) are
+//! drawn from C/N0. Symbols are those that satellites send, in noise, and the receiver's own decoders read
+//! them (`listening` says when). Limits: front ends without stages ([`refuse`]); loops are linear and in
+//! step with the motion; short codes of other satellites are noise.
 
 mod channel;
 mod clock;
 mod law;
 mod listening;
+mod oscillator;
 mod rays;
 mod refusal;
 mod search;
@@ -36,6 +37,7 @@ use receiver::{Given, Navigator, ReceiveError};
 use channel::{Around, Channel, World};
 use clock::Instant;
 use law::Law;
+use oscillator::OscillatorLoop;
 pub use refusal::refuse;
 
 use crate::correlations::Plan;
@@ -122,6 +124,9 @@ struct Model<'a> {
     plans: &'a [Plan<'a>],
     settings: Settings,
     laws: Vec<Law>,
+    /// Loops on the oscillator, and that of each law.
+    oscillators: Vec<OscillatorLoop>,
+    oscillator_of: Vec<Option<usize>>,
     channels: Vec<Channel>,
     /// Time of the first search of each front end.
     first_search_s: Vec<f64>,
@@ -141,6 +146,7 @@ impl<'a> Model<'a> {
         let interval_ms = u64::from(operation.measurement_interval_ms) / step_ms * step_ms;
         let tick_s = 1e-3 * interval_ms as f64;
         let (mut laws, mut channels, mut first_search_s) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut oscillators, mut oscillator_of): (Vec<OscillatorLoop>, Vec<_>) = (Vec::new(), Vec::new());
         for (front, ((scene, transmitters), signals)) in
             scenes.iter().zip(fronts.transmitters()).zip(navigator.assigned()).enumerate()
         {
@@ -153,6 +159,12 @@ impl<'a> Model<'a> {
             for signal in signals {
                 let number = laws.len();
                 let Some(law) = Law::new((scene, plan, front), signal, &settings, tick_s) else { continue };
+                let (gains, update_s) = (law.gains, law.code.integration_s);
+                let known = oscillators.iter().position(|one| one.is_of(scene, &gains, update_s));
+                oscillator_of.push(known.or_else(|| {
+                    oscillators.push(OscillatorLoop::new(scene, gains, update_s)?);
+                    Some(oscillators.len() - 1)
+                }));
                 laws.push(law);
                 let stream = Stream::new(scene.noise_seed(), "observations");
                 let of_it = transmitters.iter().enumerate().filter(|(_, one)| one.signal == *signal);
@@ -160,7 +172,19 @@ impl<'a> Model<'a> {
             }
         }
         channels.sort_by_key(|channel| channel.link);
-        Ok(Self { scenes, plans, settings, laws, channels, first_search_s, interval_ms, number: 0 })
+        let number = 0;
+        Ok(Self {
+            scenes,
+            plans,
+            settings,
+            laws,
+            oscillators,
+            oscillator_of,
+            channels,
+            first_search_s,
+            interval_ms,
+            number,
+        })
     }
 
     /// Leaves a link alone whose message leads nowhere.
@@ -200,13 +224,16 @@ impl<'a> Model<'a> {
         if let Some(first) = ticks.first() {
             self.load(&transmitters, first);
         }
+        if let Some(last) = ticks.last() {
+            self.oscillators.iter_mut().for_each(|one| one.run(last.seconds, SLAB_S as f64 + BEFORE_S));
+        }
         let followed: BTreeSet<(Sv, &str)> = self
             .channels
             .iter()
             .filter(|one| one.is_followed())
             .map(|one| (one.link.sv, one.link.signal.name))
             .collect();
-        let Self { scenes, settings, laws, channels, first_search_s, .. } = self;
+        let Self { scenes, settings, laws, oscillators, oscillator_of, channels, first_search_s, .. } = self;
         let rate_hz = scenes.first().map_or(1.0, |scene| scene.clock.rate.hz());
         let one = |channel: &mut Channel| -> Option<Vec<Given>> {
             let link = channel.link;
@@ -216,7 +243,8 @@ impl<'a> Model<'a> {
             let around = Around { has_fix: known.has_fix, is_led };
             let first_search_s = first_search_s.get(law.front).copied().unwrap_or(0.0);
             let scene = scenes.get(law.front)?;
-            let world = World { scene, settings, law, transmitter, first_search_s, rate_hz };
+            let oscillator = oscillator_of.get(channel.law).copied().flatten().and_then(|place| oscillators.get(place));
+            let world = World { scene, settings, law, transmitter, oscillator, first_search_s, rate_hz };
             let follow = |tick: &Instant| {
                 let at = |seconds: f64| {
                     let sample = tick.sample_at(seconds);

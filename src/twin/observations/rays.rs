@@ -11,6 +11,7 @@ use num_complex::Complex64;
 use receiver::track::CodeDiscriminator;
 
 use super::law::Law;
+use super::oscillator::{OscillatorError, OscillatorLoop};
 
 /// Halvings of the interval in which a loop rests.
 const HALVINGS: u32 = 28;
@@ -25,8 +26,10 @@ pub(super) struct Sight {
     pub carrier_cycles: f64,
     /// Rate of the first ray's carrier, in cycles a second.
     pub rate_hz: f64,
-    /// Cycles by which the phase loop lags behind the motion.
+    /// Cycles by which the phase loop lags behind the motion and the oscillator.
     pub lag_cycles: f64,
+    /// Seconds by which it lags behind the oscillator: the code's replica runs with the carrier's.
+    pub oscillator_lag_s: f64,
     /// Amplitude of each ray in the root of its C/N0, its carrier's phasor against the first one's, and its
     /// delay behind that in chips.
     rays: Vec<(Complex64, f64)>,
@@ -35,12 +38,20 @@ pub(super) struct Sight {
 impl Sight {
     /// Rays at an instant `later_s` before sample `own` of the front end; `None` where the satellite is not
     /// received.
-    pub fn new(scene: &Scene, transmitter: &Transmitter, law: &Law, (own, later_s): (u64, f64)) -> Option<Self> {
-        let rays = transmitter.rays(scene, own)?;
+    pub fn new(
+        (scene, transmitter, law): (&Scene, &Transmitter, &Law),
+        oscillator: Option<&OscillatorLoop>,
+        (own, later_s): (u64, f64),
+    ) -> Option<Self> {
+        let calm =
+            Calm { rays: transmitter.rays(scene, own)?, carrier_hz: transmitter.link().carrier_hz(), oscillator };
+        let rays = &calm.rays;
         let rate_hz = scene.clock.rate.hz();
         let first = rays.at(0, own)?;
-        let (delay_rate, carrier_hz) = rates(&rays, own, rate_hz)?;
-        let lag_cycles = if scene.trajectory.is_static() { 0.0 } else { lag_cycles(&rays, law, (own, rate_hz)) };
+        let (delay_rate, calm_hz) = calm.rates(own, rate_hz)?;
+        let error = oscillator.map_or_else(OscillatorError::default, |oscillator| oscillator.at(own));
+        let carrier_hz = calm_hz + calm.carrier_hz * error.rate;
+        let lag_cycles = if scene.trajectory.is_static() { 0.0 } else { calm.lag_cycles(law, (own, rate_hz)) };
         let one = |ray: RayAt| {
             let cycles = ray.carrier_cycles - first.carrier_cycles;
             let (sin, cos) = libm::sincos(-std::f64::consts::TAU * (cycles - cycles.floor()));
@@ -51,7 +62,8 @@ impl Sight {
             delay_s: first.delay_s - delay_rate * later_s,
             carrier_cycles: first.carrier_cycles - carrier_hz * later_s,
             rate_hz: carrier_hz,
-            lag_cycles,
+            lag_cycles: lag_cycles + calm.carrier_hz * error.lag_s,
+            oscillator_lag_s: error.lag_s,
             rays: (0..rays.count()).filter_map(|number| rays.at(number, own)).map(one).collect(),
         })
     }
@@ -93,22 +105,37 @@ impl Sight {
     }
 }
 
-/// Rates of a first ray's delay, and of its carrier in cycles a second.
-fn rates(rays: &Rays<'_>, sample: u64, rate_hz: f64) -> Option<(f64, f64)> {
-    let span = ((RATE_S * rate_hz) as u64).max(1);
-    let before = sample.saturating_sub(span);
-    let (a, b) = (rays.at(0, before)?, rays.at(0, sample + span)?);
-    let seconds = (sample + span - before) as f64 / rate_hz;
-    Some(((b.delay_s - a.delay_s) / seconds, (b.carrier_cycles - a.carrier_cycles) / seconds))
+/// Carrier of a first ray without the oscillator's quick noise.
+struct Calm<'a> {
+    rays: Rays<'a>,
+    carrier_hz: f64,
+    oscillator: Option<&'a OscillatorLoop>,
 }
 
-/// Lag of the phase loop behind the motion of the last quarters of its bandwidth's inverse.
-fn lag_cycles(rays: &Rays<'_>, law: &Law, (sample, rate_hz): (u64, f64)) -> f64 {
-    let span = ((0.25 / law.tracking.pll_bandwidth_hz * rate_hz) as u64).max(1);
-    let at = |count: u64| rays.at(0, sample.saturating_sub(count * span)).map(|ray| ray.carrier_cycles);
-    let [Some(a), Some(b), Some(c), Some(d)] = [0, 1, 2, 3].map(at) else { return 0.0 };
-    let seconds = span as f64 / rate_hz;
-    let acceleration = (a - 2.0 * b + c) / (seconds * seconds);
-    let jerk = (a - 3.0 * b + 3.0 * c - d) / (seconds * seconds * seconds);
-    law.lag_cycles(acceleration, jerk)
+impl Calm<'_> {
+    fn carrier_cycles(&self, sample: u64) -> Option<f64> {
+        let noise_s = self.oscillator.map_or(0.0, |oscillator| oscillator.noise_s(sample));
+        Some(self.rays.at(0, sample)?.carrier_cycles - self.carrier_hz * noise_s)
+    }
+
+    /// Rates of the delay, and of the carrier in cycles a second.
+    fn rates(&self, sample: u64, rate_hz: f64) -> Option<(f64, f64)> {
+        let span = ((RATE_S * rate_hz) as u64).max(1);
+        let (before, after) = (sample.saturating_sub(span), sample + span);
+        let seconds = (after - before) as f64 / rate_hz;
+        let delay_s = self.rays.at(0, after)?.delay_s - self.rays.at(0, before)?.delay_s;
+        let cycles = self.carrier_cycles(after)? - self.carrier_cycles(before)?;
+        Some((delay_s / seconds, cycles / seconds))
+    }
+
+    /// Lag of the phase loop behind the motion of the last quarters of its bandwidth's inverse.
+    fn lag_cycles(&self, law: &Law, (sample, rate_hz): (u64, f64)) -> f64 {
+        let span = ((0.25 / law.tracking.pll_bandwidth_hz * rate_hz) as u64).max(1);
+        let at = |count: u64| self.carrier_cycles(sample.saturating_sub(count * span));
+        let [Some(a), Some(b), Some(c), Some(d)] = [0, 1, 2, 3].map(at) else { return 0.0 };
+        let seconds = span as f64 / rate_hz;
+        let acceleration = (a - 2.0 * b + c) / (seconds * seconds);
+        let jerk = (a - 3.0 * b + 3.0 * c - d) / (seconds * seconds * seconds);
+        law.lag_cycles(acceleration, jerk)
+    }
 }

@@ -5,6 +5,7 @@
 //! figure that a scene cannot have is named with the reason why it is not judged. Limits: the thresholds are
 //! rules of thumb, not the points at which a receiver fails; several figures of one run share their causes.
 
+mod attitude;
 mod availability;
 mod cases;
 mod detection;
@@ -77,6 +78,7 @@ impl Verdict {
         verdict.about(Group::Interference).interference(summary);
         verdict.spoofing(run, summary)?;
         verdict.detection(summary);
+        verdict.about(Group::Attitude).attitude(run, summary);
         verdict.about(Group::Inertial).inertial(run, summary);
         verdict.about(Group::Tables).tables(run, errors)?;
         if run.scene.fidelity == OBSERVATIONS {

@@ -19,7 +19,6 @@ use crate::measure::clock::{Of, Series};
 use crate::measure::consistency::{Calibration, Consistency};
 use crate::measure::detection;
 use crate::measure::errors::{Errors, Link, SignalError};
-use crate::measure::inertial;
 use crate::measure::ionosphere::Ionosphere;
 use crate::measure::jitter::{Jitter as LoopJitter, Loop, Pooled};
 use crate::measure::lines::Lines;
@@ -27,6 +26,7 @@ use crate::measure::osnma::Osnma;
 use crate::measure::protection;
 use crate::measure::slips::{Cause, Slips};
 use crate::measure::spoofing::Spoofing;
+use crate::measure::{attitude, inertial};
 use crate::read::{Numbers, Run, Speed};
 use crate::statistics::{Sum, mean};
 use crate::waveform::leading;
@@ -77,6 +77,9 @@ pub struct Summary {
     /// Verification of Galileo's authentication; absent of a receiver that does not verify.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub osnma: Option<Osnma>,
+    /// Attitudes by the elements of an array; absent of a receiver that was not asked for them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub attitude: Option<attitude::Figures>,
     /// Inertial measurements integrated back, and their noise; absent of a scene without inertial sensors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inertial: Option<inertial::Figures>,
@@ -294,6 +297,7 @@ impl Summary {
             interference: Lines::of(run)?,
             spoofing: Spoofing::of(run)?,
             osnma: Osnma::of(run)?,
+            attitude: attitude::Figures::of(run)?,
             inertial: inertial::Figures::of(run)?,
             ionosphere: Ionosphere::of(run)?,
             protection: None,

@@ -1,13 +1,15 @@
 //! The pictures of a run, one a question, with the words that go below them.
 //!
-//! [`canvas`] wraps the drawing library and [`drawing`] what becomes of its SVG; every other file here says
-//! what is drawn, as a sketch that holds all it needs: a run's rows are gone before the first picture is
-//! drawn. A picture with nothing to show is drawn with empty axes, so that a script finds the files it
-//! expects; only `psd.png` and `peaks.png` depend on `psd.csv` and `peaks.csv` being there, `spoofing.png` on
-//! a spoofer, `multipath.png` on `truth/rays.csv`, `stanford.png` on `rx/integrity.csv`, `array.png` on a
-//! spatial filter and interference, `detection.png` on `rx/detection.csv`, and `discriminators.png` on loops.
+//! [`canvas`] wraps the drawing library and [`drawing`] what becomes of its SVG; every other file here
+//! says what is drawn, as a sketch that holds all it needs: a run's rows are gone before the first picture
+//! is drawn. A picture with nothing to show is drawn with empty axes, so that a script finds the files it
+//! expects; only `psd.png` and `peaks.png` depend on `psd.csv` and `peaks.csv` being there, `spoofing.png`
+//! on a spoofer, `multipath.png` on `truth/rays.csv`, `stanford.png` on `rx/integrity.csv`, `array.png` on
+//! a spatial filter and interference, `attitude.png` on `rx/attitude.csv`, `detection.png` on
+//! `rx/detection.csv`, and `discriminators.png` on loops.
 
 mod array;
+mod attitude;
 pub mod canvas;
 pub mod chart;
 mod clip;
@@ -60,7 +62,7 @@ pub(crate) struct Picture {
 }
 
 /// The pictures in the order of the report, where a tall one and a low one share a page.
-pub(crate) const PICTURES: [Picture; 21] = [
+pub(crate) const PICTURES: [Picture; 22] = [
     Picture {
         name: "sky",
         title: "sky",
@@ -226,6 +228,14 @@ pub(crate) const PICTURES: [Picture; 21] = [
                   of clean ones, for thresholds from high to low.",
         numbers: &["detection.csv"],
         sketch: detection::detection,
+    },
+    Picture {
+        name: "attitude",
+        title: "attitude",
+        caption: "Errors of the attitude that the carriers of an array's elements give, as a rotation about three \
+                  axes, between the receiver's own ±1.96 σ.",
+        numbers: &["rx/attitude.csv"],
+        sketch: attitude::attitude,
     },
     Picture {
         name: "array",

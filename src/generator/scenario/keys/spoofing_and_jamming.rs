@@ -1,6 +1,6 @@
 //! Keys of `[[interference]]` and `[[spoofer]]`.
 
-use super::motion::{MOTION, PLACE_IF_ANY};
+use super::motion::{MOTION, PLACE, PLACE_IF_ANY};
 use super::{A_PATH, LONGEST_S, SATELLITES};
 use crate::scenario::osnma::spoofed_names;
 use crate::scenario::schema::{Key, flag, number, table, text, texts, time, word, words};
@@ -103,6 +103,12 @@ pub(crate) const SPOOFER: &[Key] = &[
     .or_else("true"),
     table("motion", MOTION, "Claimed motion, as `[motion]`. Absent: the antenna's own."),
     table("drag", DRAG, "Drag of the claimed position away from the antenna's."),
+    table(
+        "transmitter",
+        &PLACE,
+        "Position from which all its signals come, for the elements of an array. The first element receives what is \
+         claimed, the others by their positions.",
+    ),
 ];
 
 pub(crate) const DRAG: &[Key] = &[

@@ -89,7 +89,7 @@ pub(super) struct Accumulator {
     /// Sums of the code periods to come.
     ahead: Ahead,
     /// Mean power of the replica's samples.
-    replica_power: f64,
+    pub replica_power: f64,
     /// Code phases of early, prompt and late.
     pub taps: [i64; 3],
     /// True if the discriminator takes taps twice as far from the prompt as early and late too.
