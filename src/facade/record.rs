@@ -33,6 +33,7 @@
 
 #[doc(inline)]
 pub use ::gnss::record::{
-    AcquisitionRow, ClockRow, Event, EventRow, Fix, InterferenceRow, IonosphereRow, LineRow, NavigationRow,
-    Observation, PassRow, RayRow, SightRow, SkyRow, TrackingRow, TrajectoryRow,
+    AcquisitionRow, AttitudeRow, BodyRow, ClockRow, DetectionRow, Detector, ElementRow, Event, EventRow, Fix,
+    InertialRow, IntegrityRow, InterferenceRow, IonosphereRow, LineRow, NavigationRow, Observation, PassRow, RayRow,
+    SightRow, SkyRow, TrackingRow, TrajectoryRow,
 };

@@ -95,26 +95,48 @@ fn carriers_of_the_elements_give_the_attitude_and_the_phases_of_cables() {
         assert!(off_deg.abs() < 2.0, "{row:?}");
     }
 
-    // A receiver that states another attitude does not pass.
-    let path = directory.path().join("run/rx/attitude.csv");
-    let table = std::fs::read_to_string(&path).unwrap();
-    let moved = |line: &str| {
-        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
-        if let Ok(yaw_deg) = cells[1].parse::<f64>() {
-            cells[1] = (yaw_deg + 0.2).to_string();
-        }
-        cells.join(",") + "\n"
-    };
-    std::fs::write(&path, table.lines().map(moved).collect::<String>()).unwrap();
-    let judged = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
-        .args(["analyze", "run", "--out", "again"])
-        .current_dir(directory.path())
-        .output()
-        .unwrap();
-    assert!(judged.status.success(), "{}", String::from_utf8_lossy(&judged.stderr));
-    let verdict = std::fs::read_to_string(directory.path().join("again/verdict.csv")).unwrap();
-    let is_refused = |line: &str| line.contains("attitude error over its deviation") && line.contains(",fail,");
-    assert!(verdict.lines().any(is_refused), "{verdict}");
+    // A receiver that states what is not so does not pass.
+    let directory = directory.path();
+    for (table, change, figure) in SABOTAGED {
+        let path = directory.join("run/rx").join(table);
+        let sound = std::fs::read_to_string(&path).unwrap();
+        let changed = |(number, line): (usize, &str)| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            (number == 0 || change(number, &mut cells)).then(|| cells.join(",") + "\n")
+        };
+        std::fs::write(&path, sound.lines().enumerate().filter_map(changed).collect::<String>()).unwrap();
+        let judged = Command::new(env!("CARGO_BIN_EXE_gnss-twin"))
+            .args(["analyze", "run"])
+            .current_dir(directory)
+            .output()
+            .unwrap();
+        assert!(judged.status.success(), "{}", String::from_utf8_lossy(&judged.stderr));
+        std::fs::write(&path, sound).unwrap();
+        let verdict = std::fs::read_to_string(directory.join("run/verdict.csv")).unwrap();
+        let is_refused = |line: &str| line.contains(figure) && line.contains(",fail,");
+        assert!(verdict.lines().any(is_refused), "{figure}: {verdict}");
+    }
+}
+
+/// Change of the cells of a row, by its number; false leaves the row out.
+type Change = fn(usize, &mut [String]) -> bool;
+
+/// Tables with changes of their rows, and the figure that refuses each.
+const SABOTAGED: [(&str, Change, &str); 4] = [
+    ("attitude.csv", |_, cells| add(cells, 1, 0.2), "attitude error over its deviation"),
+    ("attitude.csv", |_, cells| (4..7).all(|column| times(cells, column, 1.3)), "stated deviation of the attitude"),
+    ("attitude.csv", |number, _| number % 4 != 0, "intervals with an attitude"),
+    ("elements.csv", |_, cells| add(cells, 3, 3.0), "phases of the elements' channels over their deviation"),
+];
+
+fn add(cells: &mut [String], column: usize, more: f64) -> bool {
+    cells[column] = (cells[column].parse::<f64>().unwrap() + more).to_string();
+    true
+}
+
+fn times(cells: &mut [String], column: usize, factor: f64) -> bool {
+    cells[column] = (cells[column].parse::<f64>().unwrap() * factor).to_string();
+    true
 }
 
 /// The spoofer begins at 55 s, 20 dB below the true signals, and is 6 dB above them 4 s later.

@@ -46,10 +46,10 @@ fn sets(table: &str) -> Vec<(f64, u32)> {
 }
 
 /// Rows of the verdict that failed.
-fn failed(directory: &Path, arguments: &[&str], verdict: &str) -> Vec<String> {
+fn failed(directory: &Path, arguments: &[&str]) -> Vec<String> {
     let done = Command::new(env!("CARGO_BIN_EXE_gnss-twin")).args(arguments).current_dir(directory).output().unwrap();
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-    let verdict = fs::read_to_string(directory.join(verdict)).unwrap();
+    let verdict = fs::read_to_string(directory.join("run/verdict.csv")).unwrap();
     verdict.lines().filter(|line| line.contains(",fail,")).map(str::to_owned).collect()
 }
 
@@ -72,7 +72,7 @@ fn of_two_sets_of_one_issue_the_newest_that_was_due_counts() {
     fs::write(directory.join("sky.rnx"), shipped("full_sky_2026-03-09_10h_12h.rnx")).unwrap();
     fs::write(directory.join("again.toml"), SCENE).unwrap();
     let run = ["run", "again.toml", "--out", "run", "--report", "none", "--quiet"];
-    assert_eq!(failed(directory, &run, "run/verdict.csv"), Vec::<String>::new());
+    assert_eq!(failed(directory, &run), Vec::<String>::new());
 
     // By the file the second set is sent from 10:09:00 on; each is read within a sub-frame's repetition of
     // 18 s.
@@ -89,6 +89,6 @@ fn of_two_sets_of_one_issue_the_newest_that_was_due_counts() {
     let late = (1000.0 * RATE_HZ) as u64 - 1;
     assert!(truth.contains(&format!("\n{due},I10,")));
     fs::write(&path, truth.replace(&format!("\n{due},I10,"), &format!("\n{late},I10,"))).unwrap();
-    let found = failed(directory, &["analyze", "run", "--out", "late"], "late/verdict.csv");
+    let found = failed(directory, &["analyze", "run"]);
     assert!(found.iter().any(|line| line.contains("offset error")), "{found:?}");
 }

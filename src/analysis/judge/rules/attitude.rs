@@ -1,5 +1,7 @@
 //! Rules for attitudes that a receiver finds by the elements of an array.
 
+use serde_json::Value;
+
 use crate::judge::judgement::Bound;
 use crate::judge::summary::Summary;
 use crate::judge::verdict::Verdict;
@@ -12,9 +14,17 @@ const LARGEST_STATED: f64 = 1.15;
 
 impl Verdict {
     pub(super) fn attitude(&mut self, run: &Run, summary: &Summary) {
-        let Some(figures) = &summary.attitude else { return };
-        if run.scene.interference.is_empty() && run.scene.spoofers.is_empty() {
-            let share = figures.intervals as f64 / figures.due.max(1) as f64;
+        let Some(figures) = &summary.attitude else {
+            let is_asked = run.receiver.pointer("/settings/array/attitude_ms").and_then(Value::as_u64) > Some(0);
+            if is_asked && run.scene.array.as_ref().is_some_and(|facts| !facts.is_still) {
+                self.not_judged.push("attitude: the body moves or turns".to_owned());
+            }
+            return;
+        };
+        if figures.due == 0 {
+            self.not_judged.push("intervals with an attitude: none is due".to_owned());
+        } else if run.scene.interference.is_empty() && run.scene.spoofers.is_empty() {
+            let share = figures.intervals as f64 / figures.due as f64;
             let source = "the elements hear the satellites of the fix";
             self.judge("intervals with an attitude, of those due", "", share, "of 1", Bound::Min(LEAST_SHARE), source);
         } else {
