@@ -133,7 +133,7 @@ def test_arrays_of_another_type_or_shape_are_refused():
 ARMS = [[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]]
 SENSORS = {"duration_s": 1.0, "attitude": {"kind": "fixed"}, "imu": {"rate_hz": 100, "grade": "low"}}
 ARRAY = {
-    "duration_s": 25.0,
+    "duration_s": 42.0,
     "attitude": {"kind": "fixed", "yaw_deg": 30},
     "array": {"element": [{"lever_arm_m": arm} for arm in ARMS]},
     "receiver": {"array": {"filter": "none", "attitude_ms": 1000, "lever_arms_m": ARMS}},
