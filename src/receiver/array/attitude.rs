@@ -64,7 +64,7 @@ pub struct Solution {
     pub is_unique: bool,
 }
 
-/// Lever arms from the first element, and the two that span their plane.
+/// Lever arms from the first element, and which of them is the longest.
 #[derive(Clone, Debug)]
 pub struct Body {
     arms_m: Vec<Vector3<f64>>,
