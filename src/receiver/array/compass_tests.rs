@@ -99,8 +99,8 @@ fn compass(places: &[[f64; 3]], phase_sigma_deg: f64, is_inverted: bool) -> Comp
 
 const CHANNELS_RAD: [f64; 6] = [0.3, 2.0, -1.1, 0.0, 3.0, -2.4];
 
-/// Any attitude is found, by arms of half a wavelength, of six and of ten, with channels of any phase; errors scatter
-/// as stated, and the residuals are chi-square.
+/// Any attitude is found, by arms of half a wavelength, of six and of ten, with channels of any phase;
+/// errors scatter as stated, and the residuals are chi-square.
 #[test]
 fn any_attitude_is_found_with_the_deviations_that_are_stated() {
     for (size_m, seed) in [(0.5 * WAVE_M, 1), (6.3 * WAVE_M, 2), (10.5 * WAVE_M, 3)] {
