@@ -33,7 +33,6 @@
 
 #[doc(inline)]
 pub use ::gnss::record::{
-    AcquisitionRow, AttitudeRow, BodyRow, ClockRow, DetectionRow, Detector, ElementRow, Event, EventRow, Fix,
-    InertialRow, IntegrityRow, InterferenceRow, IonosphereRow, LineRow, NavigationRow, Observation, PassRow, RayRow,
-    SightRow, SkyRow, TrackingRow, TrajectoryRow,
+    AcquisitionRow, ClockRow, Event, EventRow, Fix, InterferenceRow, IonosphereRow, LineRow, NavigationRow,
+    Observation, PassRow, RayRow, SightRow, SkyRow, TrackingRow, TrajectoryRow,
 };
