@@ -79,6 +79,7 @@ const NUMBERS: &[Row] = &[
     ("spoofer", "ramp_s off_s", No, No),
     ("spoofer", "clock_bias_s", Yes, Perhaps),
     ("spoofer", "clock_drift_sps", Yes, No),
+    ("spoofer.transmitter", "latitude_deg longitude_deg height_m", Yes, Yes),
     ("spoofer.drag", "start_s", Yes, No),
     ("spoofer.drag", "azimuth_deg elevation_deg", Yes, Yes),
     ("spoofer.drag", "speed_mps acceleration_mps2", No, No),
@@ -109,6 +110,7 @@ const NUMBERS: &[Row] = &[
     ("detection", "false_alarm interval_s reference_s", No, No),
     ("array", "block_ms", No, No),
     ("array", "loading_db azimuth_deg elevation_deg", Yes, Yes),
+    ("array", "phase_sigma_deg", Yes, No),
     ("array.element", "gain_db phase_deg delay_ns", Yes, Yes),
     ("operation", "search_interval_s reacquisition_interval_s repeated_false_alarm_share frame_limit_s", No, No),
     // A study's own tables; a scene has none of these names.
@@ -131,6 +133,7 @@ const STUDIES: &[Row] = &[
 
 /// Whole numbers: −0.0 is none.
 const WHOLE: &[Row] = &[
+    ("array", "attitude_ms", Yes, No),
     ("", "seed", Yes, No),
     ("", "repetitions", No, No),
     ("axis", "count", No, No),
