@@ -111,6 +111,8 @@ const NUMBERS: &[Row] = &[
     ("array", "block_ms", No, No),
     ("array", "loading_db azimuth_deg elevation_deg", Yes, Yes),
     ("array", "phase_sigma_deg", Yes, No),
+    ("imu", "rate_hz", No, No),
+    ("imu", "accelerometer_bias_instability_mps2", Yes, No),
     ("array.element", "gain_db phase_deg delay_ns", Yes, Yes),
     ("operation", "search_interval_s reacquisition_interval_s repeated_false_alarm_share frame_limit_s", No, No),
     // A study's own tables; a scene has none of these names.
