@@ -10,11 +10,12 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use gnss::earth::{Geodetic, SPEED_OF_LIGHT_MPS};
-use gnss::facts::{InertialFacts, TriadErrors};
+use gnss::facts::{ArrayFacts, InertialFacts, TriadErrors};
 use gnss::gps::l1ca::L1_CA;
 use gnss::record::{
-    AcquisitionRow, BodyRow, DetectionRow, Detector, Event, EventRow, Fix, InertialRow, IntegrityRow, IonosphereModel,
-    IonosphereRow, LineRow, NavigationRow, Observation, SkyRow, TrackingRow, TrajectoryRow,
+    AcquisitionRow, AttitudeRow, BodyRow, DetectionRow, Detector, ElementRow, Event, EventRow, Fix, InertialRow,
+    IntegrityRow, IonosphereModel, IonosphereRow, LineRow, NavigationRow, Observation, SkyRow, TrackingRow,
+    TrajectoryRow,
 };
 use gnss::satellite::Sv;
 use gnss::time::Epoch;
@@ -377,6 +378,49 @@ pub(crate) fn measured_at_rest(run: &Path) {
         qz: 0.0,
     };
     write(&run.join("truth/body.csv"), &[place(0), place(2)]);
+}
+
+/// Adds attitudes of an array of three elements to a run, one a second, each a tenth of a degree off.
+pub(crate) fn oriented(run: &Path) {
+    let path = run.join("truth/scene.json");
+    let mut scene: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    let facts = ArrayFacts {
+        lever_arms_m: vec![[0.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]],
+        axes: [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]],
+        is_still: true,
+        mixing: (0..9).map(|k| [f64::from(u8::from(k % 4 == 0)), 0.0]).collect(),
+        gains: vec![1.0; 3],
+        towards: Vec::new(),
+    };
+    scene["array"] = serde_json::to_value(&facts).unwrap();
+    fs::write(&path, scene.to_string()).unwrap();
+    let path = run.join("rx/receiver.json");
+    let mut receiver: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    let filter = serde_json::json!({"filter": "none", "attitude_ms": 1000, "phase_sigma_deg": 2.0});
+    receiver["settings"]["array"] = filter;
+    fs::write(&path, receiver.to_string()).unwrap();
+    let sample = |second: u64| second * RATE_HZ + RATE_HZ / 2;
+    let attitude = |second: u64| AttitudeRow {
+        sample: sample(second),
+        yaw_deg: if second % 2 == 0 { 0.1 } else { 359.9 },
+        pitch_deg: 0.1,
+        roll_deg: -0.1,
+        sigma_east_deg: 0.1,
+        sigma_north_deg: 0.1,
+        sigma_up_deg: 0.1,
+        signals: PRNS.len(),
+        chi_square: 3.0,
+        freedom: 3,
+    };
+    let element = |second: u64| ElementRow {
+        sample: sample(second),
+        signal: L1_CA.name.to_owned(),
+        element: 2,
+        phase_deg: 1.0,
+        sigma_deg: 1.0,
+    };
+    write(&run.join("rx/attitude.csv"), &(30..60).map(attitude).collect::<Vec<_>>());
+    write(&run.join("rx/elements.csv"), &(30..60).map(element).collect::<Vec<_>>());
 }
 
 /// Adds tests of two detectors to a run, one a second; every tenth of the second one raises an alarm.

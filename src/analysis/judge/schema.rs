@@ -139,7 +139,9 @@ pub fn find<'a>(summary: &'a Value, path: &str) -> Option<&'a Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hand_made::{detected, measured_at_rest, planted, protected, reported, two_bands, verified, write};
+    use crate::hand_made::{
+        detected, measured_at_rest, oriented, planted, protected, reported, two_bands, verified, write,
+    };
     use crate::judge;
     use std::fs;
 
@@ -163,6 +165,7 @@ mod tests {
         protected(run.path());
         detected(run.path());
         measured_at_rest(run.path());
+        oriented(run.path());
         let summary = judge(run.path()).unwrap();
         let mut written = Vec::new();
         paths("", &serde_json::to_value(&summary).unwrap(), &mut written);

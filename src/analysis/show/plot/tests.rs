@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use super::*;
-use crate::hand_made::{Draw, RATE_HZ, detected, planted, protected};
+use crate::hand_made::{Draw, RATE_HZ, detected, oriented, planted, protected};
 use crate::judge;
 use crate::measure::psd::Psd;
 use crate::read::PeakRow;
@@ -33,6 +33,7 @@ fn every_picture_is_a_png_that_is_not_blank_and_its_numbers_are_in_a_table() {
     tables::write_peaks(&run.path().join("peaks.csv"), &peaks).unwrap();
     protected(run.path());
     detected(run.path());
+    oriented(run.path());
     judge(run.path()).unwrap();
     let only_elsewhere = ["multipath", "spoofing", "array"];
     for picture in PICTURES.iter().filter(|picture| !only_elsewhere.contains(&picture.name)) {
