@@ -10,7 +10,9 @@ pub(super) fn with(table: &str, line: &str) -> String {
         "interference" | "spoofer" | "satellite_fault" | "message_fault" => {
             format!("{MINIMAL}{STATIC}[[{table}]]\n{line}\n")
         }
-        "spoofer.drag" => format!("{MINIMAL}{STATIC}[[spoofer]]\npower_db = 6\n[spoofer.drag]\n{line}\n"),
+        "spoofer.drag" | "spoofer.transmitter" => {
+            format!("{MINIMAL}{STATIC}[[spoofer]]\npower_db = 6\n[{table}]\n{line}\n")
+        }
         "motion.point" => format!("{MINIMAL}{WAYPOINTS}{line}\n"),
         "expect.interval" => format!("{MINIMAL}{STATIC}[[expect.interval]]\n{line}\n"),
         "osnma.transition" => format!("{MINIMAL}{STATIC}[[osnma.transition]]\n{line}\n"),
@@ -194,10 +196,20 @@ fn every_value_of_a_wrong_type_names_its_key_and_what_is_expected() {
                 ("station", "name") => cases.push((with("station", "name = 1"), table, key)),
                 ("station", _) => cases.push((with("station", &format!("name = \"a\"\n{key} = 1")), table, key)),
                 ("station.power", _) => cases.push((with("station.power", &format!("{key} = 1")), table, key)),
+                ("spoofer.transmitter", _) => {
+                    let place = "latitude_deg = 48\nlongitude_deg = 11\nheight_m = 500";
+                    cases.push((with("spoofer.transmitter", place), table, key));
+                }
                 ("osnma", "transition") => cases.push((with("osnma", "transition = 1"), table, key)),
                 (
                     "spoofer",
-                    "motion" | "drag" | "time_offset_s" | "navigation" | "navigation_moved_to" | "leap_seconds",
+                    "motion"
+                    | "drag"
+                    | "transmitter"
+                    | "time_offset_s"
+                    | "navigation"
+                    | "navigation_moved_to"
+                    | "leap_seconds",
                 ) => {
                     cases.push((with("spoofer", &format!("power_db = 6\n{key} = 1")), table, key));
                 }
