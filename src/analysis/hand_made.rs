@@ -402,7 +402,7 @@ pub(crate) fn oriented(run: &Path) {
     let sample = |second: u64| second * RATE_HZ + RATE_HZ / 2;
     let attitude = |second: u64| AttitudeRow {
         sample: sample(second),
-        yaw_deg: if second % 2 == 0 { 0.1 } else { 359.9 },
+        yaw_deg: if second.is_multiple_of(2) { 0.1 } else { 359.9 },
         pitch_deg: 0.1,
         roll_deg: -0.1,
         sigma_east_deg: 0.1,
